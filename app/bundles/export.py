@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import IO, Final
 
 from pydantic import ValidationError
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app import __version__
-from app.bundles import repository
 from app.bundles.contents import (
     CONTENTS,
     FORMAT,
@@ -32,10 +32,34 @@ from app.campaigns import service as campaigns
 from app.campaigns.trials.photos import ENDINGS, media_type_of
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import BusyError, ConflictError, StorageError
-from app.db.models import CampaignRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
+from app.db.models import CampaignRow, FlightRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.trajectories import is_intact, refused_for
 from app.db.types import utc_now
 from app.fleet.registration import origin_of
+
+
+def proposals_of(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
+    """Proposals of a campaign, in the order in which they were made."""
+    return session.scalars(
+        select(ProposalRow).where(ProposalRow.campaign_id == campaign_id).order_by(ProposalRow.id)
+    ).all()
+
+
+def photos_of(session: Session, campaign_id: int) -> Sequence[TrialPhotoRow]:
+    """Photos of all its trials, without the picture data, in the order in which they were added."""
+    return session.scalars(
+        select(TrialPhotoRow)
+        .join(TrialPhotoRow.trial)
+        .where(TrialRow.campaign_id == campaign_id)
+        .order_by(TrialPhotoRow.id)
+    ).all()
+
+
+def flight_ids_by_trial(session: Session, campaign_id: int) -> Sequence[tuple[int, int]]:
+    """Trial and flight ids, oldest flight first."""
+    wanted = select(FlightRow.trial_id, FlightRow.id).where(FlightRow.campaign_id == campaign_id)
+    return [(trial_id, flight_id) for trial_id, flight_id in session.execute(wanted.order_by(FlightRow.id))]
+
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """Time stamp of every part, so that the same campaign makes the same parts."""
@@ -88,11 +112,11 @@ class Packer:
         return name
 
     def _campaign(self, row: CampaignRow) -> Campaign:
-        proposals = repository.proposals(self._session, row.id)
+        proposals = proposals_of(self._session, row.id)
         places = {proposal.id: place for place, proposal in enumerate(proposals)}
-        flights = dict(repository.flights(self._session, row.id))
+        flights = dict(flight_ids_by_trial(self._session, row.id))
         photos: dict[int, list[TrialPhotoRow]] = {}
-        for photo in repository.photos(self._session, row.id):
+        for photo in photos_of(self._session, row.id):
             photos.setdefault(photo.trial_id, []).append(photo)
         return Campaign(
             id=row.id,

@@ -2,10 +2,11 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.campaigns import history
@@ -13,7 +14,6 @@ from app.campaigns import service as campaigns_service
 from app.campaigns.definitions import definition_of
 from app.common.errors import InputError, Problem
 from app.common.schemas import OptionValue
-from app.compare import repository
 from app.compare.schemas import FlightDifference, FlightSetting
 from app.core.definition import Option, format_gains
 from app.core.experiments import experiment_of, get_experiment
@@ -21,10 +21,22 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import plus_minus
 from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter
 from app.core.tuning.strategies import STRATEGIES
-from app.db.models import CampaignRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.base import VehicleOption
 from app.vehicles.registry import VEHICLE_KINDS
+
+
+def trials_by_id(session: Session, trial_ids: Collection[int]) -> Mapping[int, TrialRow]:
+    """The existing trials among these ids."""
+    return {row.id: row for row in session.scalars(select(TrialRow).where(TrialRow.id.in_(trial_ids)))}
+
+
+def batteries_of(session: Session, trial_ids: Collection[int]) -> Mapping[int, str]:
+    """Battery label of each trial's last flight, if one was entered."""
+    last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
+    told = select(FlightRow).where(FlightRow.id.in_(last), FlightRow.battery != "")
+    return {row.trial_id: row.battery for row in session.scalars(told)}
 
 
 def measured(value: float, standard_error: float | None, unit: str) -> str:
@@ -104,7 +116,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
 
     Raises InputError naming those (`trial.0`, `trial.1`, …) that cannot be compared.
     """
-    found = repository.trials_by_id(session, trial_ids)
+    found = trials_by_id(session, trial_ids)
     campaigns = {row.campaign_id: campaigns_service.get_row(session, row.campaign_id) for row in found.values()}
     experiments = {key: experiment_of(definition_of(campaign)) for key, campaign in campaigns.items()}
     problems = [

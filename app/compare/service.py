@@ -9,7 +9,7 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from app.campaigns.trials.schemas import GroupBrief
-from app.compare import repository
+from app.compare import compared_flights
 from app.compare.compared_flights import (
     ComparisonFlight,
     file_stem,
@@ -41,7 +41,7 @@ class CurvesExport:
 def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightComparison:
     """Compare the flights. Raises InputError naming those that cannot be compared."""
     sides = sides_of(session, trial_ids)
-    batteries = repository.batteries(session, trial_ids)
+    batteries = compared_flights.batteries_of(session, trial_ids)
     settings = [settings_of(side, batteries.get(side.row.id, "")) for side in sides]
     verdict, sentence = overall_verdict(sides)
     return FlightComparison(

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, Query, status
 
 from app.common.schemas import FigureCard, Page, figure_card
 from app.controller_checks import service
-from app.controller_checks.schemas import ControllerCheck, ControllerCheckSummary
+from app.controller_checks.service import ControllerCheck, ControllerCheckSummary
 from app.web.dependencies import (
     REQUEST_BODY,
     CursorText,

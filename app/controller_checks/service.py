@@ -1,14 +1,16 @@
 """Operations on controller checks: check a recording, read the result, delete it."""
 
+from collections.abc import Sequence
+from datetime import datetime
 from pathlib import PurePath
-from typing import Final
+from typing import Annotated, Final, Literal
 
-from pydantic import TypeAdapter
-from sqlalchemy.orm import Session
+from pydantic import BaseModel, Field, TypeAdapter
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session, undefer
 
 from app.common.errors import NotFoundError, StorageError
-from app.common.schemas import Page, decode_cursor, encode_cursor, without_control_characters
-from app.controller_checks import repository, schemas
+from app.common.schemas import Gains, Page, decode_cursor, encode_cursor, without_control_characters
 from app.controller_checks.check import check_trace, parse_gains
 from app.controller_checks.results import FIGURES, Result, examine_content, result_of
 from app.db.models import ControllerCheckRow
@@ -18,6 +20,69 @@ from app.figures.theme import ThemeName
 from app.logs.loop_trace import read_loop_trace
 from app.processes.sandbox import FILE, run_limited
 from app.reproductions.controller import RECORDED_TAKEOFF
+
+
+def get_one(session: Session, check_id: int) -> ControllerCheckRow:
+    """The check with that id, with its result. Raises NotFoundError."""
+    row = session.get(ControllerCheckRow, check_id, options=[undefer(ControllerCheckRow.result)])
+    if row is None:
+        raise NotFoundError("controller check", check_id)
+    return row
+
+
+def page(session: Session, *, before_id: int | None, limit: int) -> tuple[Sequence[ControllerCheckRow], int]:
+    """The newest `limit` + 1 checks before that id, without their results, and the total count."""
+    wanted = select(ControllerCheckRow)
+    if before_id is not None:
+        wanted = wanted.where(ControllerCheckRow.id < before_id)
+    total = session.scalar(select(func.count()).select_from(ControllerCheckRow)) or 0
+    return session.scalars(wanted.order_by(ControllerCheckRow.id.desc()).limit(limit + 1)).all(), total
+
+
+class ControllerCheckSummary(BaseModel):
+    """A recording that was compared with the replica: `log`, of a flight with Paparazzi, or `trace`, with every
+    step."""
+
+    id: int
+    file_name: str
+    kind: Literal["log", "trace"]
+    passed: bool
+    checked_at: datetime
+
+
+class CheckedSignal(BaseModel):
+    """One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`."""
+
+    name: str
+    title: str
+    largest_difference: float
+    difference_unit: str
+    tolerance: Annotated[float, Field(description="the largest difference allowed, in the same unit")]
+    allowance: Annotated[str, Field(description="what the tolerance means, in words")]
+    verdict: Literal["exact", "agrees", "differs"]
+    different: Annotated[int, Field(description="how many samples differ by more than is allowed")]
+    first_different_s: float | None
+
+
+class CheckFigure(BaseModel):
+    """An available figure of the check."""
+
+    name: Literal["reference", "commands"]
+    title: str
+
+
+class ControllerCheck(ControllerCheckSummary):
+    """The result as a sentence, the gains and notes behind it, and one line for each signal."""
+
+    sentence: str
+    rows: Annotated[int, Field(description="how many samples or steps were compared")]
+    gains: Annotated[Gains | None, Field(description="null where they change within the recording")]
+    gains_from: str
+    better_gains: Annotated[Gains | None, Field(description="other gains that more of the commands follow from")]
+    notes: list[str]
+    signals: list[CheckedSignal]
+    figures: list[CheckFigure]
+
 
 _NAME_LENGTH: Final = 120
 _UNNAMED: Final = "recording"
@@ -38,11 +103,11 @@ def examine_example() -> Result:
     return result_of(check_trace(read_loop_trace(RECORDED_TAKEOFF)))
 
 
-def store_example(session: Session, result: Result) -> schemas.ControllerCheck:
+def store_example(session: Session, result: Result) -> ControllerCheck:
     return store_check(session, RECORDED_TAKEOFF.name, result)
 
 
-def store_check(session: Session, name: str, result: Result) -> schemas.ControllerCheck:
+def store_check(session: Session, name: str, result: Result) -> ControllerCheck:
     """Store the result of a check; the recording itself is not kept."""
     row = ControllerCheckRow(file_name=named(name), kind=result.kind, passed=result.passed, result=result.as_json())
     session.add(row)
@@ -50,24 +115,24 @@ def store_check(session: Session, name: str, result: Result) -> schemas.Controll
     return _view(row, result)
 
 
-def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[schemas.ControllerCheckSummary]:
+def list_checks(session: Session, *, limit: int, cursor: str | None) -> Page[ControllerCheckSummary]:
     """Page of checks, newest first."""
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
-    rows, total = repository.page(session, before_id=before, limit=limit)
+    rows, total = page(session, before_id=before, limit=limit)
     following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    found = [schemas.ControllerCheckSummary.model_validate(row, from_attributes=True) for row in rows[:limit]]
+    found = [ControllerCheckSummary.model_validate(row, from_attributes=True) for row in rows[:limit]]
     return Page(items=found, total=total, next_cursor=following)
 
 
-def get_check(session: Session, check_id: int) -> schemas.ControllerCheck:
+def get_check(session: Session, check_id: int) -> ControllerCheck:
     """The check with that id. Raises NotFoundError."""
-    row = repository.get_one(session, check_id)
+    row = get_one(session, check_id)
     return _view(row, _result(row))
 
 
 def figure(session: Session, check_id: int, name: str, theme: ThemeName) -> Card:
     """Figure of one group of signals, recording and replica overlaid. Raises NotFoundError."""
-    result = _result(repository.get_one(session, check_id))
+    result = _result(get_one(session, check_id))
     if name not in FIGURES:
         raise NotFoundError("figure", name, hint=f"There are: {', '.join(FIGURES)}.")
     title, signals = FIGURES[name]
@@ -82,7 +147,7 @@ def figure(session: Session, check_id: int, name: str, theme: ThemeName) -> Card
 
 def delete_check(session: Session, check_id: int) -> None:
     """Delete a check. Raises NotFoundError."""
-    session.delete(repository.get_one(session, check_id))
+    session.delete(get_one(session, check_id))
 
 
 def named(name: str) -> str:
@@ -99,8 +164,8 @@ def _result(row: ControllerCheckRow) -> Result:
         ) from error
 
 
-def _view(row: ControllerCheckRow, result: Result) -> schemas.ControllerCheck:
-    return schemas.ControllerCheck.model_validate(
+def _view(row: ControllerCheckRow, result: Result) -> ControllerCheck:
+    return ControllerCheck.model_validate(
         {
             "id": row.id,
             "file_name": row.file_name,

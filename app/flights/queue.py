@@ -14,25 +14,44 @@ What is sent to the vehicle is stored in the flight row before it is sent; what 
 known.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Final
 
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.campaigns import proposals
 from app.campaigns import service as campaigns
 from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.trials.records import capture
-from app.common.errors import ConflictError
+from app.common.errors import ConflictError, NotFoundError
 from app.common.states import FlightMode, FlightState, TrialState, VehicleState
 from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.flights import repository
 from app.vehicles.base import FlightRecord, OptionValue
+
+
+def get_flight(session: Session, flight_id: int) -> FlightRow:
+    """Raises NotFoundError."""
+    if (row := session.get(FlightRow, flight_id)) is None:
+        raise NotFoundError("flight", flight_id)
+    return row
+
+
+def first_requested(session: Session) -> FlightRow | None:
+    """The oldest requested flight."""
+    return session.scalar(
+        select(FlightRow).where(FlightRow.state == FlightState.REQUESTED).order_by(FlightRow.id).limit(1)
+    )
+
+
+def running(session: Session) -> Sequence[FlightRow]:
+    return session.scalars(select(FlightRow).where(FlightRow.state == FlightState.RUNNING).order_by(FlightRow.id)).all()
+
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
@@ -67,7 +86,7 @@ def claim_flight(session: Session, worker: str) -> FlightTask | None:
 
     A flight must begin when its operator expects it: a request older than REQUEST_TIMEOUT is withdrawn.
     """
-    while (flight := repository.first_requested(session)) is not None:
+    while (flight := first_requested(session)) is not None:
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
             return _claimed(session, flight, worker)
         _withdraw(flight, f"it could not be begun within {REQUEST_TIMEOUT.total_seconds():g} s")
@@ -78,7 +97,7 @@ def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
     """Withdraw all requested flights at a worker's start, because nothing may take off that was requested while no
     worker ran. Returns their ids."""
     withdrawn: list[int] = []
-    while (flight := repository.first_requested(session)) is not None:
+    while (flight := first_requested(session)) is not None:
         _withdraw(flight, reason)
         withdrawn.append(flight.id)
     return withdrawn
@@ -125,7 +144,7 @@ def take_off_wanted(session: Session, flight_id: int) -> bool:
 
     Nothing takes off later than its operator expects. False also for a flight that is to stand down or is not running.
     """
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     return _may_take_off(flight) and stand_down_wanted(session, flight_id) is None
 
 
@@ -135,7 +154,7 @@ def stand_down_wanted(session: Session, flight_id: int) -> str | None:
     Reasons: it was unstaged, its trial was cancelled, or its take-off was requested and could not begin in time. The
     worker then restores the safe gains and calls `record_withdrawal` with this reason.
     """
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return f"the flight is {flight.state}"
     if flight.stand_down:
@@ -181,7 +200,7 @@ def record_landing(session: Session, flight_id: int, record: FlightRecord) -> No
 
     Idempotent. Raises TrajectoryError when the record cannot be stored.
     """
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
     campaign = campaigns.get_row(session, flight.campaign_id)
@@ -193,7 +212,7 @@ def record_landing(session: Session, flight_id: int, record: FlightRecord) -> No
 
 def record_loss(session: Session, flight_id: int, problem: str) -> None:
     """Record that it is unknown how the flight ended. A real vehicle is quarantined; the operator decides about it."""
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
     set_trial_state(flight.trial, TrialState.LOST, reason=problem)
@@ -218,7 +237,7 @@ def record_withdrawal(session: Session, flight_id: int, reason: str) -> None:
 def quarantine_vehicle(session: Session, flight_id: int, concern: str) -> None:
     """Quarantine the vehicle after a flight whose safe gains could not be verified; it stays grounded until a person
     releases it."""
-    fleet.set_state_after_flight(repository.get_flight(session, flight_id).vehicle, concern=concern)
+    fleet.set_state_after_flight(get_flight(session, flight_id).vehicle, concern=concern)
 
 
 def doubt_vehicle(session: Session, flight_id: int) -> None:
@@ -226,13 +245,13 @@ def doubt_vehicle(session: Session, flight_id: int) -> None:
 
     A simulated vehicle starts afresh with every flight.
     """
-    if repository.get_flight(session, flight_id).vehicle.is_real:
+    if get_flight(session, flight_id).vehicle.is_real:
         quarantine_vehicle(session, flight_id, _NOT_VERIFIED)
 
 
 def record_restored(session: Session, flight_id: int, held: Mapping[str, float]) -> None:
     """Record the safe gains that the vehicle read back after a flight, however the flight ended."""
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     flight.restored, flight.restored_at = dict(held), utc_now()
     fleet.hold_gains(flight.vehicle, held)
 
@@ -242,7 +261,7 @@ def give_up_flight(session: Session, flight_id: int, problem: str) -> bool:
 
     Returns whether it is lost.
     """
-    lifted_off = repository.get_flight(session, flight_id).trial.state == TrialState.FLYING
+    lifted_off = get_flight(session, flight_id).trial.state == TrialState.FLYING
     if lifted_off:
         record_loss(session, flight_id, problem)
     else:
@@ -258,7 +277,7 @@ def lose_running_flights(session: Session) -> list[int]:
     """
     return [
         flight.trial_id
-        for flight in repository.running(session)
+        for flight in running(session)
         if give_up_flight(session, flight.id, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
     ]
 
@@ -268,7 +287,7 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
 
     Raises TrajectoryError when it cannot be stored.
     """
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     if flight.trial.state != TrialState.LOST:
         return
     campaign = campaigns.get_row(session, flight.campaign_id)
@@ -292,14 +311,14 @@ def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record:
 
 
 def _running(session: Session, flight_id: int) -> FlightRow:
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         raise ConflictError(f"Flight {flight_id} is {flight.state}, not running.", hint="It must not go on.")
     return flight
 
 
 def _not_flown(session: Session, flight_id: int, state: FlightState, problem: str) -> None:
-    flight = repository.get_flight(session, flight_id)
+    flight = get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
         return
     was_flying = flight.trial.state == TrialState.FLYING

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Query
 from app.common.schemas import Page
 from app.common.states import JobState
 from app.jobs import service
-from app.jobs.schemas import Job, JobLog
+from app.jobs.service import Job, JobLog
 from app.web.dependencies import CurrentSettings, CursorText, Id, IdempotentPost, Limit, Reader, json_only
 
 router = APIRouter(prefix="/api/jobs", tags=["jobs"], dependencies=[Depends(json_only)])

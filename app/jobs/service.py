@@ -6,10 +6,11 @@ For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it co
 """
 
 from collections.abc import Collection
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
+from pydantic import BaseModel, Field
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
@@ -21,7 +22,43 @@ from app.core.errors import GainlineError
 from app.db.models import JobRow, JsonObject
 from app.db.types import utc_now
 from app.jobs import repository
-from app.jobs.schemas import Job, JobLog
+
+
+class Job(BaseModel):
+    """Numeric work, such as a proposal or a reproduction."""
+
+    id: int
+    kind: str
+    name: Annotated[str, Field(description="what exactly, for the kinds that have a choice; empty otherwise")]
+    state: JobState
+    campaign_id: int | None
+    problem: Trouble | None
+    done_share: Annotated[float | None, Field(description="0 … 1 while it runs, where the kind can tell")]
+    doing: Annotated[str, Field(description="what it is at")]
+    remaining_s: Annotated[float | None, Field(description="seconds that it will still take, at the pace so far")]
+    attempts: int
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    actions: Annotated[list[str], Field(description="what may be done with it now: cancel, retry")]
+
+
+class JobLogLine(BaseModel):
+    """A line of the worker's log about a job. `exception` is a traceback, empty without one."""
+
+    at: datetime
+    level: str
+    message: str
+    details: dict[str, str]
+    exception: str
+
+
+class JobLog(BaseModel):
+    """The last lines about a job, oldest first; `total` counts all that are kept."""
+
+    lines: list[JobLogLine]
+    total: int
+
 
 LEAST_PACE_S: Final = 30.0
 LEAST_PACE_SHARE: Final = 0.1

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Final, Protocol
 
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.campaigns.schemas import Campaign, CampaignStatistics, Start, StopRule
@@ -17,12 +18,25 @@ from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
 from app.core.policy import Gain
 from app.core.tuning.strategies import STRATEGIES
-from app.db.models import TrialPhotoRow
+from app.db.models import TrialPhotoRow, TrialRow
 from app.figures.base import Card
 from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct
-from app.reports import repository
 from app.reports.formatting import count, gain, gains, number, option, percent
 from app.vehicles.registry import VEHICLE_KINDS
+
+
+def photos_of(session: Session, campaign_id: int) -> Sequence[tuple[TrialPhotoRow, int]]:
+    """The photos of all trials of a campaign with their sizes in bytes, in the order they were added.
+
+    The image data is loaded on access.
+    """
+    wanted = (
+        select(TrialPhotoRow, func.length(TrialPhotoRow.data))
+        .join(TrialPhotoRow.trial)
+        .where(TrialRow.campaign_id == campaign_id)
+        .order_by(TrialPhotoRow.id)
+    )
+    return [(row, size) for row, size in session.execute(wanted)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +276,7 @@ MAX_BYTES: Final = 24 * 2**20
 def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
     """Remarks of the trials that have any, in order."""
     photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
-    for row, size in repository.photos(session, campaign_id):
+    for row, size in photos_of(session, campaign_id):
         photos.setdefault(row.trial_id, []).append((row, size))
     kept = _fitting(photos)
     for trial in trials:

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, status
 
 from app.common.schemas import FigureCard, Page, figure_card
-from app.jobs.schemas import Job
+from app.jobs.service import Job
 from app.reproductions import service
 from app.reproductions.schemas import Reproduction, ReproductionSummary, Run
 from app.web.dependencies import IdempotentPost, Reader, Theme, json_only

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from app.common.schemas import Gains, Request
-from app.jobs.schemas import Job
+from app.jobs.service import Job
 
 
 class Run(Request):

@@ -13,7 +13,7 @@ from app.figures.base import Card, card_of
 from app.figures.panels import PanelsFigure
 from app.figures.theme import ThemeName
 from app.jobs import service as jobs
-from app.jobs.schemas import Job
+from app.jobs.service import Job
 from app.reproductions import schemas
 from app.reproductions.registry import REPRODUCTIONS, Reproduction
 from app.reproductions.results import Result, result_from_json

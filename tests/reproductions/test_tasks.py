@@ -15,7 +15,7 @@ from app.common.states import JobState
 from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import ClaimedJob, JobRunner
-from app.jobs.schemas import Job
+from app.jobs.service import Job
 from app.reproductions import service
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
