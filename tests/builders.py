@@ -11,7 +11,7 @@ from app.campaigns import computation, proposals
 from app.core.records.trajectory import Trajectory
 from app.db.session import Database
 from app.flights import queue
-from app.flights.queue import FlightTask
+from app.flights.process_messages import FlightRequest
 from app.jobs import service as jobs
 from app.vehicles.base import Ending, FlightRecord
 
@@ -138,7 +138,7 @@ def run_jobs(database: Database) -> int:
     raise AssertionError("jobs make jobs for ever")
 
 
-def claim(database: Database) -> FlightTask:
+def claim(database: Database) -> FlightRequest:
     """The flight that waits."""
     with database.write() as session:
         task = queue.claim_flight(session, WORKER)
@@ -146,7 +146,7 @@ def claim(database: Database) -> FlightTask:
     return task
 
 
-def stage(database: Database) -> FlightTask:
+def stage(database: Database) -> FlightRequest:
     """Claim the flight that waits and have the vehicle take its gains."""
     task = claim(database)
     with database.write() as session:
@@ -154,7 +154,7 @@ def stage(database: Database) -> FlightTask:
     return task
 
 
-def lift_off(database: Database) -> FlightTask:
+def lift_off(database: Database) -> FlightRequest:
     """Claim, stage and begin the flight that waits."""
     task = stage(database)
     with database.write() as session:
@@ -162,6 +162,6 @@ def lift_off(database: Database) -> FlightTask:
     return task
 
 
-def land(database: Database, task: FlightTask, record: FlightRecord) -> None:
+def land(database: Database, task: FlightRequest, record: FlightRecord) -> None:
     with database.write() as session:
         queue.record_landing(session, task.flight_id, record)

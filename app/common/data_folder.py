@@ -76,3 +76,8 @@ def telemetry_log(data_dir: Path, flight_id: int) -> Path:
 def log_of_trial(data_dir: Path, trial_id: int) -> Path:
     """Path of the .tlog imported with a trial that was flown elsewhere, if there is one."""
     return data_dir / "tlogs" / f"trial-{trial_id}.tlog"
+
+
+def vehicle_lock(data_dir: Path, vehicle: int | str) -> Path:
+    """Held by the process that has the vehicle: by id where it is registered one by one, else by kind."""
+    return data_dir / f"vehicle-{vehicle}.lock"

@@ -15,7 +15,6 @@ from typing import Final, TypeVar
 import structlog
 from sqlalchemy.orm import Session as Transaction
 
-from app.common.data_folder import trial_parameters_folder
 from app.common.errors import ConflictError, StorageError
 from app.common.states import GIVES_GAINS, ActKind
 from app.core.clock import REAL_TIME, Clock
@@ -274,8 +273,7 @@ class VehicleConnectionManager:
             options=vehicle.options,
             safe_gains=vehicle.safe_gains,
             identity=vehicle.identity,
-            lock=self._data_dir / f"vehicle-{vehicle_id}.lock",
-            trial_parameters=trial_parameters_folder(self._data_dir),
+            data_dir=self._data_dir,
             keep_retrying=patient,
             clock=self._clock,
         )

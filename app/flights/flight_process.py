@@ -11,9 +11,13 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Final
 
+from app.common.data_folder import vehicle_lock
+from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
 from app.flights.process_messages import (
@@ -47,21 +51,21 @@ class FlightProcess:
     """The worker's handle of one flight process. `cancel_flight` may be called from any thread and from signal
     handlers."""
 
-    def __init__(self) -> None:
+    def __init__(self, data_dir: Path, clock: Clock = REAL_TIME) -> None:
         context = process_context()
         self._pipe, theirs = context.Pipe()
         self._sending = threading.Lock()
-        self._process = context.Process(target=_work, args=(theirs,), name="flight", daemon=True)
+        self._process = context.Process(target=_work, args=(theirs, data_dir, clock), name="flight", daemon=True)
         self._process.start()
         theirs.close()
 
-    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
+    def fly(self, request: FlightRequest) -> Iterator[FlightMessage]:
         """Send the request and yield the process's messages until it is free again.
 
         The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
         """
         try:
-            self._send(orders)
+            self._send(request)
             while not isinstance(said := self._pipe.recv(), FlightFinished):
                 yield said
         except (EOFError, OSError) as error:
@@ -101,14 +105,15 @@ class FlightProcess:
 class FlightProcessPool:
     """Pool of idle flight processes with everything imported. Thread-safe."""
 
-    def __init__(self, *, spare: int = 1) -> None:
+    def __init__(self, data_dir: Path, clock: Clock = REAL_TIME, *, spare: int = 1) -> None:
+        self._start = partial(FlightProcess, data_dir, clock)
         self._spare = spare
         self._lock = threading.Lock()
-        self._waiting = [FlightProcess() for _ in range(spare)]
+        self._waiting = [self._start() for _ in range(spare)]
 
     def acquire(self) -> FlightProcess:
         with self._lock:
-            return self._waiting.pop() if self._waiting else FlightProcess()
+            return self._waiting.pop() if self._waiting else self._start()
 
     def release(self, process: FlightProcess) -> None:
         """Return a free process to the pool; it is closed when the pool is full."""
@@ -125,7 +130,7 @@ class FlightProcessPool:
             process.close()
 
 
-def _work(pipe: Connection) -> None:
+def _work(pipe: Connection, data_dir: Path, clock: Clock) -> None:
     """Main loop of the process: one flight after another, until the worker closes the pipe or dies.
 
     Imports what the most common vehicle needs while it waits for the first request.
@@ -137,26 +142,26 @@ def _work(pipe: Connection) -> None:
             with suppress(GainlineError, ImportError):  # reported by the flight that needs it
                 prepare()
         while True:
-            if isinstance(orders := pipe.recv(), FlightRequest):
-                _fly(pipe, orders)
+            if isinstance(request := pipe.recv(), FlightRequest):
+                _fly(pipe, request, data_dir, clock)
                 pipe.send(FlightFinished())
     except (EOFError, OSError):
         os._exit(0)
 
 
-def _fly(pipe: Connection, orders: FlightRequest) -> None:
+def _fly(pipe: Connection, request: FlightRequest, data_dir: Path, clock: Clock) -> None:
     try:
         with (
-            hold_vehicle_lock(orders.lock, within_s=LOCK_TIMEOUT_S, clock=orders.flight.clock),
-            open_vehicle(orders.vehicle_kind, orders.vehicle_options, safe_gains=orders.safe_gains) as vehicle,
+            hold_vehicle_lock(vehicle_lock(data_dir, request.vehicle_kind), within_s=LOCK_TIMEOUT_S, clock=clock),
+            open_vehicle(request.vehicle_kind, request.vehicle_options, safe_gains=request.safe_gains) as vehicle,
         ):
-            pipe.send(GainsStaged(vehicle.stage(orders.gains)))
+            pipe.send(GainsStaged(vehicle.stage(request.gains)))
             standing_down: str | None = None
             while not isinstance(answer := pipe.recv(), TakeOffCommand | CancelTakeOff):
-                if isinstance(answer, CancelFlight) and answer.trial_id == orders.trial_id:
+                if isinstance(answer, CancelFlight) and answer.trial_id == request.trial_id:
                     standing_down = answer.reason
             if isinstance(answer, TakeOffCommand):
-                pipe.send(FlightLanded(_take_off(pipe, orders, vehicle, standing_down)))
+                pipe.send(FlightLanded(_take_off(pipe, request, vehicle, standing_down, clock)))
     except GainlineError as error:
         pipe.send(failure_from(error))
     except (EOFError, OSError):
@@ -165,13 +170,15 @@ def _fly(pipe: Connection, orders: FlightRequest) -> None:
         pipe.send(internal_error(error))
 
 
-def _take_off(pipe: Connection, orders: FlightRequest, vehicle: Vehicle, standing_down: str | None) -> FlightRecord:
-    experiment = get_experiment(orders.experiment)
-    monitor = FlightMonitor(orders.campaign_id, orders.trial_id, experiment, pipe.send, orders.flight.clock)
+def _take_off(
+    pipe: Connection, request: FlightRequest, vehicle: Vehicle, standing_down: str | None, clock: Clock
+) -> FlightRecord:
+    experiment = get_experiment(request.experiment)
+    monitor = FlightMonitor(request.campaign_id, request.trial_id, experiment, pipe.send, clock)
     monitor.phase("flying")
     asked: set[str] = set()
-    listener = _listener(pipe, orders.trial_id, standing_down, asked)
-    record = vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=listener)
+    listener = _listener(pipe, request.trial_id, standing_down, asked)
+    record = vehicle.fly(request.options(clock), on_sample=monitor.sample, should_stop=listener)
     monitor.flush()
     monitor.phase("landed")
     return mark_if_requested(record, asked)

@@ -14,7 +14,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from app.common.states import ActKind
+from app.common.states import ActKind, FlightMode
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
 from app.core.experiments.base import Experiment
@@ -35,21 +35,27 @@ from app.vehicles.base import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRequest:
-    """Everything the process needs for one flight.
+    """One flight, from its row to the vehicle: all that a worker and the process that flies it need of the database.
 
-    `lock` is held while the process has the vehicle; `tlog` is where a vehicle that supports it logs its link.
+    `speed`: how many times faster than real time a simulation flies, None for as fast as possible. A flight of mode
+    `stage` waits, once its gains are read back, for its operator's take-off request.
     """
 
-    campaign_id: int
+    flight_id: int
     trial_id: int
+    campaign_id: int
     experiment: str
+    vehicle_id: int
     vehicle_kind: str
     vehicle_options: Mapping[str, OptionValue]
     safe_gains: Mapping[str, float]
     gains: Mapping[str, float]
-    flight: FlightOptions
-    lock: Path
-    tlog: Path | None = None
+    seed: int
+    speed: float | None = None
+    mode: FlightMode = "fly"
+
+    def options(self, clock: Clock) -> FlightOptions:
+        return FlightOptions(seed=self.seed, speed=self.speed, clock=clock)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,9 +206,8 @@ def hold_vehicle_lock(
 class ConnectionRequest:
     """What the process needs to connect to a vehicle.
 
-    `lock` is held as long as the process has the vehicle. `identity` is the pinned one, None before the first
-    connection. `trial_parameters` is the folder for parameters that a trial changes besides the gains. `keep_retrying`:
-    retry until the vehicle answers.
+    `identity` is the pinned one, None before the first connection. `keep_retrying`: retry until the vehicle answers.
+    The vehicle's lock, its telemetry logs and the parameters that a trial changes are in `data_dir`.
     """
 
     vehicle_id: int
@@ -211,8 +216,7 @@ class ConnectionRequest:
     options: Mapping[str, OptionValue]
     safe_gains: Mapping[str, float]
     identity: Identity | None
-    lock: Path
-    trial_parameters: Path
+    data_dir: Path
     keep_retrying: bool = False
     clock: Clock = REAL_TIME
 

@@ -15,7 +15,6 @@ known.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import timedelta
 from typing import Final
 
@@ -27,12 +26,13 @@ from app.campaigns import service as campaigns
 from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
-from app.common.states import FlightMode, FlightState, TrialState, VehicleState
+from app.common.states import FlightState, TrialState, VehicleState
 from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.vehicles.base import FlightRecord, OptionValue
+from app.flights.process_messages import FlightRequest
+from app.vehicles.base import FlightRecord
 
 
 def get_flight(session: Session, flight_id: int) -> FlightRow:
@@ -60,28 +60,7 @@ _WORKER_ENDED: Final = {True: "the worker ended while it flew", False: "the work
 _NOT_VERIFIED: Final = "whoever had it ended before its safe gains were read back, so nobody knows which gains it holds"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FlightTask:
-    """Everything that a worker needs for one flight besides the database.
-
-    A flight of mode `stage` waits, once its gains are read back, for `take_off_wanted` or `stand_down_wanted`.
-    """
-
-    flight_id: int
-    trial_id: int
-    campaign_id: int
-    experiment: str
-    vehicle_id: int
-    vehicle_kind: str
-    vehicle_options: dict[str, OptionValue]
-    safe_gains: dict[str, float]
-    gains: dict[str, float]
-    seed: int
-    speed: float | None
-    mode: FlightMode = "fly"
-
-
-def claim_flight(session: Session, worker: str) -> FlightTask | None:
+def claim_flight(session: Session, worker: str) -> FlightRequest | None:
     """Claim the oldest requested flight for this worker; None when there is none.
 
     A flight must begin when its operator expects it: a request older than REQUEST_TIMEOUT is withdrawn.
@@ -109,12 +88,12 @@ def _withdraw(flight: FlightRow, reason: str) -> None:
     )
 
 
-def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightTask:
+def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightRequest:
     set_flight_state(flight, FlightState.RUNNING)
     flight.worker, flight.claimed_at = worker, utc_now()
     trial, campaign = flight.trial, campaigns.get_row(session, flight.campaign_id)
     flight.safe_gains = dict(flight.vehicle.safe_gains)
-    return FlightTask(
+    return FlightRequest(
         flight_id=flight.id,
         trial_id=trial.id,
         campaign_id=campaign.id,

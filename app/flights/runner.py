@@ -5,7 +5,7 @@ landing; a record goes to the spool first, and from there into the database.
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,10 +30,9 @@ from app.flights.process_messages import (
     Publish,
     SafeGainsRestored,
 )
-from app.flights.queue import FlightTask
 from app.flights.record_spool import Spool
 from app.live.messages import FlightPhase, Phase, Telemetry
-from app.vehicles.base import FlightOptions, FlightRecord, VehicleError
+from app.vehicles.base import FlightRecord, VehicleError
 from app.vehicles.registry import get_kind
 
 RETRY_S: Final = 1.0
@@ -94,7 +93,7 @@ class FlightRunner:
         self._worker = worker
         self._closing = closing
         self._clock = clock
-        self._process_pool = FlightProcessPool()
+        self._process_pool = FlightProcessPool(data_dir, clock)
 
     def close(self) -> None:
         """Close the process pool. Call it only when nothing flies."""
@@ -115,61 +114,63 @@ class FlightRunner:
             self._recover_record(flight_id)
         self._spool.delete_unfinished()
 
-    def claim(self) -> FlightTask | None:
+    def claim(self) -> FlightRequest | None:
         """Claim the oldest requested flight for this worker; None when there is none. Raises StorageError."""
         with ExitStack() as undo:
             with self._database.write() as session:
-                if (task := queue.claim_flight(session, self._worker)) is not None:
-                    self._abort_registry.register(task.trial_id)  # before a client can see that it runs, and abort it
-                    undo.callback(self._abort_registry.unregister, task.trial_id)
+                if (request := queue.claim_flight(session, self._worker)) is not None:
+                    self._abort_registry.register(
+                        request.trial_id
+                    )  # before a client can see that it runs, and abort it
+                    undo.callback(self._abort_registry.unregister, request.trial_id)
             undo.pop_all()
-        return task
+        return request
 
-    def carry_out(self, task: FlightTask) -> None:
+    def carry_out(self, request: FlightRequest) -> None:
         """Carry out the whole flight, from opening the vehicle to the stored outcome. Raises nothing."""
         with structlog.contextvars.bound_contextvars(
-            campaign_id=task.campaign_id, trial_id=task.trial_id, flight_id=task.flight_id
+            campaign_id=request.campaign_id, trial_id=request.trial_id, flight_id=request.flight_id
         ):
             try:
-                self._store_outcome(task, self._fly(task, self._abort_registry.register(task.trial_id)))
+                self._store_outcome(request, self._fly(request, self._abort_registry.register(request.trial_id)))
             except Exception:  # noqa: BLE001 - outermost frame of the thread
                 _log.exception("the end of a flight cannot be stored; the trial is lost at the next start")
             finally:
-                self._abort_registry.unregister(task.trial_id)
+                self._abort_registry.unregister(request.trial_id)
 
-    def _fly(self, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
+    def _fly(self, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
         if flag.reason is not None:
             return FlightOutcome(withdrawn=True, problem=flag.reason)
         try:
-            self._spool.reserve(task.flight_id)
-            telemetry_log(self._data_dir, task.flight_id).parent.mkdir(exist_ok=True)
-            backend = self._acquire_backend(task)
+            self._spool.reserve(request.flight_id)
+            telemetry_log(self._data_dir, request.flight_id).parent.mkdir(exist_ok=True)
+            backend = self._acquire_backend(request)
         except (GainlineError, OSError) as error:
             return FlightOutcome(problem=f"It was not begun: {error}")
         try:
-            return self._fly_on_backend(backend, task, flag)
+            return self._fly_on_backend(backend, request, flag)
         finally:
             flag.add_listener(lambda _reason: None)
 
-    def _acquire_backend(self, task: FlightTask) -> FlightBackend:
+    def _acquire_backend(self, request: FlightRequest) -> FlightBackend:
         """Return the process that flies the vehicle. Raises VehicleError when the vehicle needs a connection and has
         none."""
-        if get_kind(task.vehicle_kind).connect is not None:
-            return self._session(task.vehicle_id)
+        if get_kind(request.vehicle_kind).connect is not None:
+            return self._session(request.vehicle_id)
         return self._process_pool.acquire()
 
-    def _fly_on_backend(self, backend: FlightBackend, task: FlightTask, flag: AbortFlag) -> FlightOutcome:
+    def _fly_on_backend(self, backend: FlightBackend, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
         """Fly the vehicle; whatever happens, release its process and return an outcome."""
         ended = FlightOutcome()
         try:
-            self._phase(task, "staging")
-            flag.add_listener(lambda reason: backend.cancel_flight(task.trial_id, reason))
-            for said in backend.fly(self._request(task)):
+            self._phase(request, "staging")
+            flag.add_listener(lambda reason: backend.cancel_flight(request.trial_id, reason))
+            for said in backend.fly(request):
                 match said:
                     case Telemetry() | FlightPhase():
                         self._publish(said)
                     case GainsStaged(read_back):
-                        ended = self._staged(task, flag, backend, read_back)
+                        ended = self._staged(request, flag, backend, read_back)
                     case FlightLanded(record):
                         ended = FlightOutcome(record=record, lifted_off=True)
                     case SafeGainsRestored(held):
@@ -189,18 +190,18 @@ class FlightRunner:
         return ended
 
     def _staged(
-        self, task: FlightTask, flag: AbortFlag, backend: FlightBackend, read_back: dict[str, float]
+        self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend, read_back: dict[str, float]
     ) -> FlightOutcome:
         """Command the take-off if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
         try:
-            self._store(lambda session: queue.record_staged(session, task.flight_id, read_back))
-            if (problem := describe_mismatch(task.gains, read_back)) is not None:
+            self._store(lambda session: queue.record_staged(session, request.flight_id, read_back))
+            if (problem := describe_mismatch(request.gains, read_back)) is not None:
                 ended = FlightOutcome(problem=problem)
-            elif (withdrawn := self._await_takeoff_clearance(task, flag, backend)) is not None:
+            elif (withdrawn := self._await_takeoff_clearance(request, flag, backend)) is not None:
                 ended = FlightOutcome(withdrawn=True, problem=withdrawn)
             else:
-                self._store(lambda session: queue.record_lift_off(session, task.flight_id))
+                self._store(lambda session: queue.record_lift_off(session, request.flight_id))
         except GainlineError as error:
             ended = FlightOutcome(problem=f"It was not flown, because that could not be recorded: {error}")
         if ended.lifted_off:
@@ -209,12 +210,12 @@ class FlightRunner:
             backend.cancel_take_off()
         return ended
 
-    def _await_takeoff_clearance(self, task: FlightTask, flag: AbortFlag, backend: FlightBackend) -> str | None:
+    def _await_takeoff_clearance(self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend) -> str | None:
         """Wait until the vehicle may take off: at once, or on its operator's request. Returns None, or why it must
         not."""
-        if task.mode == "fly":
+        if request.mode == "fly":
             return flag.reason
-        self._phase(task, "staged")
+        self._phase(request, "staged")
         until_s = self._clock.now_s() + STAGED_FOR_S
         while self._clock.now_s() < until_s:
             if flag.reason is not None:
@@ -223,9 +224,9 @@ class FlightRunner:
                 return "the process that has the vehicle ended"
             try:
                 with self._database.read() as session:
-                    if (reason := queue.stand_down_wanted(session, task.flight_id)) is not None:
+                    if (reason := queue.stand_down_wanted(session, request.flight_id)) is not None:
                         return reason
-                    if queue.take_off_wanted(session, task.flight_id):
+                    if queue.take_off_wanted(session, request.flight_id):
                         return None
             except StorageError as error:
                 _log.error("the operator's word cannot be read", why=str(error))
@@ -233,63 +234,49 @@ class FlightRunner:
             self._clock.wait_s(POLL_INTERVAL_S)
         return f"nobody asked for its take-off within {STAGED_FOR_S / 60:g} minutes"
 
-    def _request(self, task: FlightTask) -> FlightRequest:
-        return FlightRequest(
-            campaign_id=task.campaign_id,
-            trial_id=task.trial_id,
-            experiment=task.experiment,
-            vehicle_kind=task.vehicle_kind,
-            vehicle_options=task.vehicle_options,
-            safe_gains=task.safe_gains,
-            gains=task.gains,
-            flight=FlightOptions(seed=task.seed, speed=task.speed, clock=self._clock),
-            lock=self._data_dir / f"vehicle-{task.vehicle_kind}.lock",
-            tlog=telemetry_log(self._data_dir, task.flight_id),
-        )
+    def _phase(self, request: FlightRequest, phase: Phase, note: str = "") -> None:
+        self._publish(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase=phase, note=note))
 
-    def _phase(self, task: FlightTask, phase: Phase, note: str = "") -> None:
-        self._publish(FlightPhase(campaign_id=task.campaign_id, trial_id=task.trial_id, phase=phase, note=note))
-
-    def _store_outcome(self, task: FlightTask, ended: FlightOutcome) -> None:
+    def _store_outcome(self, request: FlightRequest, ended: FlightOutcome) -> None:
         """Store the outcome; if the database refuses it, set the record aside and give the flight up instead.
 
         Only the end of the worker leaves a flight in state running.
         """
         _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
         if ended.record is not None:
-            self._spool_record(task, ended.record)
+            self._spool_record(request, ended.record)
         try:
-            stored = self._store_with_retry(task, lambda session: _record(session, task, ended))
+            stored = self._store_with_retry(request, lambda session: _record(session, request, ended))
         except Exception as error:  # noqa: BLE001 - whatever is wrong with the outcome, it must not block the vehicle
-            problem = self._refused(task, ended, error)
-            stored = self._store_with_retry(task, lambda session: _give_up(session, task, ended, problem))
+            problem = self._refused(request, ended, error)
+            stored = self._store_with_retry(request, lambda session: _give_up(session, request, ended, problem))
         if stored:
-            self._spool.delete(task.flight_id)
-            self._phase(task, "ended")
+            self._spool.delete(request.flight_id)
+            self._phase(request, "ended")
 
-    def _refused(self, task: FlightTask, ended: FlightOutcome, error: Exception) -> str:
+    def _refused(self, request: FlightRequest, ended: FlightOutcome, error: Exception) -> str:
         why = f"Its outcome cannot be stored: {_describe_error(error)}"
         if ended.record is None:
             return why
-        kept_as = self._spool.set_aside(task.flight_id)
+        kept_as = self._spool.set_aside(request.flight_id)
         return f"{why} The record is kept as {kept_as}." if kept_as else f"{why} The record could not be kept either."
 
-    def _store_with_retry(self, task: FlightTask, work: Callable[[Session], None]) -> bool:
+    def _store_with_retry(self, request: FlightRequest, work: Callable[[Session], None]) -> bool:
         """Retry until the database accepts it; False when the worker closes meanwhile (the spool keeps the record)."""
         while True:
             try:
                 self._store(work)
             except StorageError as error:
                 _log.error("outcome not stored yet", why=str(error))
-                self._phase(task, "landed", f"The outcome is kept, but not stored yet: {error}")
+                self._phase(request, "landed", f"The outcome is kept, but not stored yet: {error}")
                 if self._closing.wait(self._clock.wall_s(RETRY_S)):
                     return False
             else:
                 return True
 
-    def _spool_record(self, task: FlightTask, record: FlightRecord) -> None:
+    def _spool_record(self, request: FlightRequest, record: FlightRecord) -> None:
         try:
-            self._spool.write(task.flight_id, record)
+            self._spool.write(request.flight_id, record)
         except StorageError as error:  # the record is still in memory and is stored from there
             _log.error("record not spooled", why=str(error))
 
@@ -319,7 +306,7 @@ class FlightRunner:
         _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
 
 
-def describe_mismatch(asked: dict[str, float], read_back: dict[str, float]) -> str | None:
+def describe_mismatch(asked: Mapping[str, float], read_back: Mapping[str, float]) -> str | None:
     """Sentence on the gains that were read back with other values than sent, or None."""
     wrong = [
         f"{name} is {read_back.get(name, 'missing')} instead of {value:g}"
@@ -337,27 +324,27 @@ def _describe_error(error: Exception) -> str:
     return f"The program made a mistake ({type(error).__name__}); see the worker's log."
 
 
-def _record(session: Session, task: FlightTask, ended: FlightOutcome) -> None:
+def _record(session: Session, request: FlightRequest, ended: FlightOutcome) -> None:
     if ended.record is not None:
-        queue.record_landing(session, task.flight_id, ended.record)
+        queue.record_landing(session, request.flight_id, ended.record)
     elif ended.lifted_off:
-        queue.record_loss(session, task.flight_id, ended.problem or "its process ended without a record")
+        queue.record_loss(session, request.flight_id, ended.problem or "its process ended without a record")
     elif ended.withdrawn:
-        queue.record_withdrawal(session, task.flight_id, ended.problem)
+        queue.record_withdrawal(session, request.flight_id, ended.problem)
     else:
-        queue.record_failure(session, task.flight_id, ended.problem)
+        queue.record_failure(session, request.flight_id, ended.problem)
     if ended.restored is not None:
-        queue.record_restored(session, task.flight_id, ended.restored)
-    _record_doubts(session, task, ended)
+        queue.record_restored(session, request.flight_id, ended.restored)
+    _record_doubts(session, request, ended)
 
 
-def _give_up(session: Session, task: FlightTask, ended: FlightOutcome, problem: str) -> None:
-    queue.give_up_flight(session, task.flight_id, problem)
-    _record_doubts(session, task, ended)
+def _give_up(session: Session, request: FlightRequest, ended: FlightOutcome, problem: str) -> None:
+    queue.give_up_flight(session, request.flight_id, problem)
+    _record_doubts(session, request, ended)
 
 
-def _record_doubts(session: Session, task: FlightTask, ended: FlightOutcome) -> None:
+def _record_doubts(session: Session, request: FlightRequest, ended: FlightOutcome) -> None:
     if ended.concern:
-        queue.quarantine_vehicle(session, task.flight_id, ended.concern)
+        queue.quarantine_vehicle(session, request.flight_id, ended.concern)
     elif ended.unheard:
-        queue.doubt_vehicle(session, task.flight_id)
+        queue.doubt_vehicle(session, request.flight_id)

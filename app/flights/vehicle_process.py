@@ -13,6 +13,7 @@ from dataclasses import fields
 from multiprocessing.connection import Connection
 from typing import Final
 
+from app.common.data_folder import telemetry_log, trial_parameters_folder, vehicle_lock
 from app.common.states import ActKind
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
@@ -69,7 +70,9 @@ def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
         signal.signal(number, signal.SIG_IGN)
     line = WorkerPipe(pipe)
     try:
-        with hold_vehicle_lock(call.lock, within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock):
+        with hold_vehicle_lock(
+            vehicle_lock(call.data_dir, call.vehicle_id), within_s=LOCK_TIMEOUT_S, wanted=line.is_open, clock=call.clock
+        ):
             process = VehicleProcess(line, call)
             try:
                 process.run()
@@ -117,8 +120,8 @@ class VehicleProcess:
 
     def _carry_out(self, asked: ToVehicleProcess) -> None:
         match asked:
-            case FlightRequest() as orders:
-                self._fly(orders)
+            case FlightRequest() as request:
+                self._fly(request)
             case VehicleRequest():
                 self._line.send(self._act(asked))
             case _:
@@ -155,7 +158,9 @@ class VehicleProcess:
         call = self._call
         connect = get_kind(call.kind).connect
         assert connect is not None, call.kind
-        return connect(call.options, call.safe_gains, call.identity, call.trial_parameters, self._while_waiting)
+        return connect(
+            call.options, call.safe_gains, call.identity, trial_parameters_folder(call.data_dir), self._while_waiting
+        )
 
     def _next(self) -> ToVehicleProcess:
         """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
@@ -276,15 +281,15 @@ class VehicleProcess:
 
     # ---- flights
 
-    def _fly(self, orders: FlightRequest) -> None:
-        self._trial_id, self._stop = orders.trial_id, None
+    def _fly(self, request: FlightRequest) -> None:
+        self._trial_id, self._stop = request.trial_id, None
         try:
-            self._require_safe_gains(orders.safe_gains)
-            with self._logged(orders):
+            self._require_safe_gains(request.safe_gains)
+            with self._logged(request):
                 try:
-                    self._line.send(GainsStaged(self._stage(orders.gains)))
+                    self._line.send(GainsStaged(self._stage(request.gains)))
                     if (cleared := self._await_takeoff_clearance()) is not None:
-                        self._line.send(FlightLanded(self._take_off(orders, cleared)))
+                        self._line.send(FlightLanded(self._take_off(request, cleared)))
                 finally:
                     self._line.send(SafeGainsRestored(restore_safe_gains(self._vehicle)))
         except GainlineError as error:
@@ -298,8 +303,8 @@ class VehicleProcess:
         self._line.send(FlightFinished())
 
     @contextmanager
-    def _logged(self, orders: FlightRequest) -> Iterator[None]:
-        self._vehicle.log_to(orders.tlog)
+    def _logged(self, request: FlightRequest) -> Iterator[None]:
+        self._vehicle.log_to(telemetry_log(self._call.data_dir, request.flight_id))
         try:
             yield
         finally:
@@ -325,9 +330,9 @@ class VehicleProcess:
         if now_s > by_s:
             raise _late_take_off_error()
 
-    def _take_off(self, orders: FlightRequest, cleared: TakeOffCommand) -> FlightRecord:
-        experiment = get_experiment(orders.experiment)
-        monitor = FlightMonitor(orders.campaign_id, orders.trial_id, experiment, self._publish, self._call.clock)
+    def _take_off(self, request: FlightRequest, cleared: TakeOffCommand) -> FlightRecord:
+        experiment = get_experiment(request.experiment)
+        monitor = FlightMonitor(request.campaign_id, request.trial_id, experiment, self._publish, self._call.clock)
         asked: set[str] = set()
 
         def should_stop() -> StopRequest | None:
@@ -342,7 +347,9 @@ class VehicleProcess:
             self._take_off_by_s = cleared.by_s
             self._require_in_time()
             monitor.phase("flying")
-            record = self._vehicle.fly(orders.flight, on_sample=monitor.sample, should_stop=should_stop)
+            record = self._vehicle.fly(
+                request.options(self._call.clock), on_sample=monitor.sample, should_stop=should_stop
+            )
         monitor.flush()
         monitor.phase("landed")
         return mark_if_requested(record, asked)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.common.data_folder import vehicle_lock
 from app.core.experiments import get_experiment
 from app.flights.flight_process import LOCK_TIMEOUT_S, FlightProcess
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
@@ -20,23 +21,25 @@ from app.vehicles.registry import open_vehicle
 GAINS: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 
 
-def orders(folder: Path, *, kind: str = "twin", speed: float | None = None, trial_id: int = 1) -> FlightRequest:
+def flight_of(*, kind: str = "twin", speed: float | None = None, trial_id: int = 1) -> FlightRequest:
     return FlightRequest(
-        campaign_id=1,
+        flight_id=trial_id,
         trial_id=trial_id,
+        campaign_id=1,
         experiment="takeoff",
+        vehicle_id=1,
         vehicle_kind=kind,
         vehicle_options={},
         safe_gains=GAINS,
         gains=GAINS,
-        flight=FlightOptions(seed=3, speed=speed),
-        lock=folder / "vehicle.lock",
+        seed=3,
+        speed=speed,
     )
 
 
 @pytest.fixture(scope="module")
-def flight_process() -> Iterator[FlightProcess]:
-    one = FlightProcess()
+def flight_process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FlightProcess]:
+    one = FlightProcess(tmp_path_factory.mktemp("data"))
     yield one
     one.close()
 
@@ -58,7 +61,7 @@ def only(heard: list[FlightMessage], kind: type[FlightMessage]) -> list[FlightMe
 
 
 def test_a_flight_in_the_process_is_the_flight_in_this_one(flight_process: FlightProcess, tmp_path: Path) -> None:
-    heard = fly(flight_process, orders(tmp_path))
+    heard = fly(flight_process, flight_of())
     with open_vehicle("twin", {}, safe_gains=GAINS) as vehicle:
         vehicle.stage(GAINS)
         here = vehicle.fly(FlightOptions(seed=3), on_sample=lambda _: None, should_stop=lambda: None)
@@ -73,7 +76,7 @@ def test_a_flight_in_the_process_is_the_flight_in_this_one(flight_process: Fligh
 def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(
     flight_process: FlightProcess, tmp_path: Path
 ) -> None:
-    heard = fly(flight_process, orders(tmp_path))
+    heard = fly(flight_process, flight_of())
     rows = [row for said in heard if isinstance(said, Telemetry) for row in said.samples]
     assert [round(row[0] * 50) for row in rows] == list(range(len(rows)))
     assert rows[-1][0] == pytest.approx(33.0, abs=0.03)
@@ -91,11 +94,11 @@ def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
         if isinstance(said, Telemetry):
             flight_process.cancel_flight(1, "too high")
 
-    (landed,) = only(fly(flight_process, orders(tmp_path, speed=1.0), abort), FlightLanded)
+    (landed,) = only(fly(flight_process, flight_of(speed=1.0), abort), FlightLanded)
     assert isinstance(landed, FlightLanded)
     assert (landed.record.ending, landed.record.reason) == ("aborted", "too high")
     assert landed.record.trajectory["altitude_m"][-1] < 0.1
-    (landed,) = only(fly(flight_process, orders(tmp_path, trial_id=2)), FlightLanded)
+    (landed,) = only(fly(flight_process, flight_of(trial_id=2)), FlightLanded)
     assert isinstance(landed, FlightLanded)
     assert landed.record.ending == "completed"
 
@@ -103,15 +106,15 @@ def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
 def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(
     flight_process: FlightProcess, tmp_path: Path
 ) -> None:
-    (trouble,) = fly(flight_process, orders(tmp_path, kind="import"))
+    (trouble,) = fly(flight_process, flight_of(kind="import"))
     assert isinstance(trouble, FlightFailure)
     assert not trouble.unsafe
-    assert len(only(fly(flight_process, orders(tmp_path)), FlightLanded)) == 1
+    assert len(only(fly(flight_process, flight_of()), FlightLanded)) == 1
 
 
 def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess, tmp_path: Path) -> None:
     heard = []
-    for said in flight_process.fly(orders(tmp_path)):
+    for said in flight_process.fly(flight_of()):
         heard.append(said)
         flight_process.cancel_take_off()
     assert heard == [GainsStaged(GAINS)]
@@ -121,7 +124,7 @@ def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(
     flight_process: FlightProcess, tmp_path: Path
 ) -> None:
     heard = []
-    for said in flight_process.fly(orders(tmp_path, speed=1.0)):
+    for said in flight_process.fly(flight_of(speed=1.0)):
         heard.append(said)
         if isinstance(said, GainsStaged):
             flight_process.cancel_flight(1, "not today")
@@ -133,13 +136,15 @@ def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(
 
 
 def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
-    alone, together = FlightProcess(), [FlightProcess(), FlightProcess()]
+    def start(name: str) -> FlightProcess:
+        (tmp_path / name).mkdir()
+        return FlightProcess(tmp_path / name)
+
+    alone, together = start("alone"), [start("one"), start("other")]
     records: dict[int, FlightLanded] = {}
 
     def one(number: int) -> None:
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        (landed,) = only(fly(together[number], orders(folder, kind="jsbsim")), FlightLanded)
+        (landed,) = only(fly(together[number], flight_of(kind="jsbsim")), FlightLanded)
         assert isinstance(landed, FlightLanded)
         records[number] = landed
 
@@ -148,7 +153,7 @@ def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: 
         thread.start()
     for thread in threads:
         thread.join()
-    (expected,) = only(fly(alone, orders(tmp_path, kind="jsbsim")), FlightLanded)
+    (expected,) = only(fly(alone, flight_of(kind="jsbsim")), FlightLanded)
     assert isinstance(expected, FlightLanded)
     for landed in records.values():
         np.testing.assert_array_equal(landed.record.trajectory["altitude_m"], expected.record.trajectory["altitude_m"])
@@ -157,22 +162,22 @@ def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: 
 
 
 def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) -> None:
-    flight_process = FlightProcess()
+    flight_process = FlightProcess(tmp_path)
 
     def kill(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
             os.kill(flight_process._process.pid or 0, signal.SIGKILL)
 
     with pytest.raises(VehicleError, match=r"exit code -9"):
-        fly(flight_process, orders(tmp_path, speed=1.0), kill)
+        fly(flight_process, flight_of(speed=1.0), kill)
     flight_process.close()
 
 
 def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_path: Path) -> None:
-    flight_process = FlightProcess()
+    flight_process = FlightProcess(tmp_path)
     heard: list[FlightMessage] = []
-    with exclusive(tmp_path / "vehicle.lock"):
-        thread = threading.Thread(target=lambda: heard.extend(fly(flight_process, orders(tmp_path))))
+    with exclusive(vehicle_lock(tmp_path, "twin")):
+        thread = threading.Thread(target=lambda: heard.extend(fly(flight_process, flight_of())))
         thread.start()
         thread.join(1.0)
         assert heard == []

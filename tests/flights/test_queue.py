@@ -7,6 +7,7 @@ from app.common.errors import ConflictError
 from app.core.definition import flight_seed
 from app.db.session import Database
 from app.flights import queue
+from app.flights.process_messages import FlightRequest
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
@@ -72,9 +73,9 @@ def test_the_definition_is_frozen_with_its_digest_at_lift_off(client: TestClient
     assert answer.status_code == 409
 
 
-def claim_task(database: Database) -> queue.FlightTask:
-    """The task of the only flight, which runs."""
-    return queue.FlightTask(
+def claim_task(database: Database) -> FlightRequest:
+    """The request of the only flight, which runs."""
+    return FlightRequest(
         flight_id=1,
         trial_id=1,
         campaign_id=1,
@@ -85,7 +86,6 @@ def claim_task(database: Database) -> queue.FlightTask:
         safe_gains={},
         gains={},
         seed=0,
-        speed=None,
     )
 
 

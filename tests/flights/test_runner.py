@@ -268,15 +268,15 @@ class Refusing:
     alive = True
     takes_its_safe_gains = True
 
-    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
-        yield GainsStaged(dict(orders.gains))
+    def fly(self, request: FlightRequest) -> Iterator[FlightMessage]:
+        yield GainsStaged(dict(request.gains))
         if self.takes_its_safe_gains:
-            yield SafeGainsRestored(dict(orders.safe_gains))
+            yield SafeGainsRestored(dict(request.safe_gains))
         yield FlightFailure("The vehicle would not arm.", unsafe=not self.takes_its_safe_gains, not_flown=True)
 
     def take_off(self) -> None: ...
-    def decline(self) -> None: ...
-    def stand_down(self, trial_id: int, reason: str) -> None: ...
+    def cancel_take_off(self) -> None: ...
+    def cancel_flight(self, trial_id: int, reason: str) -> None: ...
     def close(self) -> None: ...
 
 

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from app.common.data_folder import telemetry_log
 from app.common.states import ActKind
 from app.flights import vehicle_process as seat_module
 from app.flights.process_messages import (
@@ -32,7 +33,7 @@ from app.flights.process_messages import (
 )
 from app.flights.vehicle_process import VehicleProcess
 from app.flights.worker_pipe import PipeClosedError, WorkerPipe
-from app.vehicles.base import FlightOptions, Identity
+from app.vehicles.base import Identity
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -115,24 +116,25 @@ def started(
         options=rig.options(),
         safe_gains=safe_gains,
         identity=None,
-        lock=folder / "vehicle.lock",
-        trial_parameters=folder / "parameters.json",
+        data_dir=folder,
         clock=rig,
     )
     return VehicleProcess(line, call)
 
 
-def orders(rig: AnsweringRig, folder: Path) -> FlightRequest:
+def flight_of(rig: AnsweringRig, folder: Path) -> FlightRequest:
+    telemetry_log(folder, 1).parent.mkdir(exist_ok=True)
     return FlightRequest(
-        campaign_id=1,
+        flight_id=1,
         trial_id=1,
+        campaign_id=1,
         experiment="takeoff",
+        vehicle_id=1,
         vehicle_kind="mavlink",
         vehicle_options=rig.options(),
         safe_gains=SAFE,
         gains=TUNED,
-        flight=FlightOptions(seed=1),
-        lock=folder / "vehicle.lock",
+        seed=1,
     )
 
 
@@ -149,7 +151,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
 
     line.on_staged = refuse
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
-    process._fly(orders(rig, tmp_path))
+    process._fly(flight_of(rig, tmp_path))
     [trouble] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert "would not arm" in trouble.what
     assert ("safe gains" in trouble.what) == (not takes_its_safe_gains)
@@ -164,7 +166,7 @@ def test_a_take_off_that_comes_too_late_does_not_take_place(rig: AnsweringRig, t
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
     line.workers_end.send(TakeOffCommand(by_s=time.monotonic() - 0.001))
-    process._fly(orders(rig, tmp_path))
+    process._fly(flight_of(rig, tmp_path))
     staged, restored, failure, _ = (said for said in line.said if not isinstance(said, ConnectionOpened))
     assert (staged, restored) == (GainsStaged(dict(TUNED)), SafeGainsRestored(dict(SAFE)))
     assert isinstance(failure, FlightFailure)
@@ -195,7 +197,7 @@ def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
 
     line.on_staged = watch
     line.workers_end.send(TakeOffCommand(by_s=time.monotonic() + 3600.0))
-    process._fly(orders(rig, tmp_path))
+    process._fly(flight_of(rig, tmp_path))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert (failure.not_flown, failure.unsafe, "too late" in failure.what) == (True, False, True)
     assert SafeGainsRestored(dict(SAFE)) in line.said
@@ -322,7 +324,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
     line.workers_end.send(CancelFlight(9, "of another flight"))
     line.on_staged = lambda: line.workers_end.send(CancelTakeOff())
     order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
-    process._fly(orders(rig, tmp_path))
+    process._fly(flight_of(rig, tmp_path))
     answers = [said for said in line.said if isinstance(said, CommandForwarded)]
     assert [(said.order, said.problem) for said in answers] == [("land", ""), ("motors off", "")]
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
@@ -340,7 +342,7 @@ def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_groun
     process = started(rig, line, tmp_path)
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_REQUEST_READ", LAND)
-    process._fly(orders(rig, tmp_path))
+    process._fly(flight_of(rig, tmp_path))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert ("land was ordered" in failure.what, failure.not_flown, failure.unsafe) == (True, True, False)
     assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
@@ -354,7 +356,7 @@ def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_o
     process = started(rig, line, tmp_path)
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_SET", MOTORS_OFF, nth=2)
-    process._fly(orders(rig, tmp_path))
+    process._fly(flight_of(rig, tmp_path))
     assert CommandForwarded(7, "motors off", "people below") in line.said
     assert not any(isinstance(said, FlightFailure) for said in line.said)
     assert any(isinstance(said, FlightLanded) for said in line.said)

@@ -84,8 +84,7 @@ def session(
         options={},
         safe_gains={},
         identity=None,
-        lock=folder / "vehicle.lock",
-        trial_parameters=folder / "parameters.json",
+        data_dir=folder,
     )
     one = VehicleConnection(call, run, hear=heard.put)
     try:
