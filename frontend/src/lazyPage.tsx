@@ -13,15 +13,15 @@ async function fetchPages(): Promise<Pages> {
   }
 }
 
-/** A page whose code comes after the first page's. */
+/** A page whose code is loaded on demand. */
 export function lazyPage(name: keyof Pages): ComponentType {
   return lazy(async () => ({ default: (await fetchPages())[name] }));
 }
 
 const SOON_MS = 2500;
 
-/** Fetch the code of every page and of the charts, so that none is missing once the server or the Wi-Fi is lost. */
+/** Preload the code of all pages and charts, so that they still open when the server or the Wi-Fi is lost. */
 export function fetchEveryPage(): void {
-  // What cannot be had now is asked for again by the page that needs it, which then says what is wrong.
+  // A page whose preload failed loads its code again when it is opened, and reports the error.
   setTimeout(() => void Promise.allSettled([fetchPages(), loadPlotly(), loadPlotly("contours")]), SOON_MS);
 }

@@ -12,7 +12,7 @@ import { theme } from "./theme/theme";
 const root = document.getElementById("root");
 if (root === null) throw new Error("index.html has no #root");
 
-// The event stream says when an answer has become doubtful, so nothing is asked for twice without need.
+// The event stream invalidates cached responses, so nothing is refetched without a change.
 const queries = new QueryClient({
   defaultOptions: {
     queries: { staleTime: Infinity, retry: retries, networkMode: "always" },

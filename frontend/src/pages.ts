@@ -1,4 +1,4 @@
-/** Every page that is not looked at first, in one piece: it comes while the first page is idle. */
+/** All pages but the first, in one bundle that is loaded while the first page is idle. */
 
 export { FlightPage } from "./features/campaign/FlightPage";
 export { NewCampaignPage } from "./features/campaigns/NewCampaignPage";

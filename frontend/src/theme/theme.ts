@@ -14,7 +14,7 @@ const petrol: MantineColorsTuple = [
   "#034f46",
 ];
 
-/** What ends something. Shade 7 carries white text at 6:1. */
+/** Destructive actions. Shade 7 carries white text at 6:1. */
 const red: MantineColorsTuple = [
   "#fcebea",
   "#f8d3d0",
@@ -28,7 +28,7 @@ const red: MantineColorsTuple = [
   "#7d110c",
 ];
 
-/** Mantine's greys for the dark theme, on the blue side like the page behind them. */
+/** Mantine's greys for the dark theme, with a blue tint like the page background. */
 const dark: MantineColorsTuple = [
   "#eef2f6",
   "#c9d1da",
@@ -63,7 +63,7 @@ export const theme = createTheme({
     InputBase: tall,
     Textarea: { defaultProps: { size: "md" } },
     FileInput: tall,
-    // Words that unfold cannot be read meanwhile; and nothing here gains by it.
+    // Text is unreadable while it unfolds.
     Accordion: { defaultProps: { transitionDuration: 0 } },
   },
 });

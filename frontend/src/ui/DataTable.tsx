@@ -9,7 +9,7 @@ function cell(value: string | number | null, digits: number | null): string {
   return digits === null ? gainText(value) : value.toFixed(digits);
 }
 
-/** A figure's data in numbers. */
+/** The data of a figure as a table. */
 export function DataTable({ table, label, height }: { table: FigureTable; label: string; height: number }) {
   const { more, listed } = useLastRows(table.rows, table.columns.length, "rows", () => false);
   return (

@@ -4,11 +4,11 @@ import classes from "./ErrorNotice.module.css";
 
 interface Props {
   error: unknown;
-  /** Fields whose reasons stand at their inputs already. */
+  /** Fields whose reasons are shown at their inputs. */
   shown?: readonly string[];
 }
 
-/** What went wrong, what it means, what to do. Nothing when nothing did. */
+/** What happened, what it means, what to do. Renders nothing without an error. */
 export function ErrorNotice({ error, shown = [] }: Props) {
   const problem = problemOf(error);
   if (problem === null) return null;

@@ -8,7 +8,7 @@ interface Props {
   experiment: string;
 }
 
-/** Gains in a line: to four digits with what each is; the full number is in its title. */
+/** Gains in a line, to four digits; the title has the name and the full number. */
 export function GainList({ gains, experiment }: Props) {
   const titles = useGainTitles(experiment);
   return (

@@ -5,7 +5,7 @@ import { createPortal } from "react-dom";
 import { EXPLANATIONS, type Topic } from "./explanations";
 import classes from "./HelpTip.module.css";
 
-/** An explanation on demand; a finger's width to hit, a letter's width to look at. */
+/** Help button with an explanation; its touch target is larger than its icon. */
 export function HelpTip({ topic }: { topic: Topic }) {
   const { question, answer } = EXPLANATIONS[topic];
   const id = useId();
@@ -34,7 +34,7 @@ export function HelpTip({ topic }: { topic: Topic }) {
             if (event.newState === "open") event.currentTarget.focus();
           }}
         >
-          {open && answer.map((said) => <p key={said}>{said}</p>)}
+          {open && answer.map((paragraph) => <p key={paragraph}>{paragraph}</p>)}
         </div>,
         document.body,
       )}

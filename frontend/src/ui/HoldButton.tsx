@@ -11,7 +11,7 @@ interface Props {
 
 const AROUND = 2 * Math.PI * 20;
 
-/** Does its act after two seconds under a finger or a pointer; letting go earlier cancels. Keys do nothing here. */
+/** Calls `onHeld` after a press of two seconds; an earlier release cancels. Ignores the keyboard. */
 export function HoldButton({ label, disabled = false, onHeld }: Props) {
   const [share, setShare] = useState<number | null>(null);
   const pointer = useRef<number | null>(null);
@@ -45,7 +45,7 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
 
   function press(event: PointerEvent<HTMLButtonElement>): void {
     if (disabled || event.button !== 0 || pointer.current !== null) return;
-    // A finger that slides off the button has let go, too.
+    // A finger that slides off the button counts as released.
     event.currentTarget.releasePointerCapture(event.pointerId);
     pointer.current = event.pointerId;
     const now = performance.now();
@@ -89,10 +89,10 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
           <circle cx={24} cy={24} r={20} strokeDasharray={AROUND} strokeDashoffset={AROUND * (1 - (share ?? 0))} />
           <IconPlaneDeparture x={13} y={13} size={22} />
         </svg>
-        <span>{share === null ? label : `Hold on: ${(2 * (1 - share)).toFixed(1)} s`}</span>
+        <span>{share === null ? label : `Keep holding: ${(2 * (1 - share)).toFixed(1)} s`}</span>
       </button>
       <p id={note} className={classes["note"]}>
-        Two seconds, by finger or pointer. Letting go earlier cancels; no key does it.
+        Hold for 2 s with a finger or pointer. Release to cancel. The keyboard is ignored.
       </p>
     </div>
   );

@@ -9,7 +9,7 @@ interface Props {
   stale?: boolean;
 }
 
-/** One reading with its name; grey is what is no longer so. */
+/** One reading with its name; stale readings are grey. */
 export function LabelledValue({ title, value, topic, bad = false, stale = false }: Props) {
   return (
     <div data-bad={bad || undefined} data-stale={stale || undefined}>

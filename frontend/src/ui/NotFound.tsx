@@ -2,7 +2,7 @@ import { Anchor } from "@mantine/core";
 import { Link } from "react-router";
 import { ErrorNotice } from "./ErrorNotice";
 
-/** A page whose subject could not be had: why, and the way back. */
+/** Error page of an item that could not be loaded, with a link to all campaigns. */
 export function NotFound({ error }: { error: unknown }) {
   return (
     <>

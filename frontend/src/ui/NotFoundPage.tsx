@@ -6,8 +6,8 @@ export function NotFoundPage() {
   useTitle("Not found");
   return (
     <div style={{ padding: "12vh 0", textAlign: "center" }}>
-      <h1>There is no such page</h1>
-      <p>The address is mistyped, or what it showed has been deleted.</p>
+      <h1>Page not found</h1>
+      <p>The URL is wrong, or the item was deleted.</p>
       <Anchor component={Link} to="/">
         All campaigns
       </Anchor>

@@ -2,18 +2,18 @@ import { TextInput, type TextInputProps } from "@mantine/core";
 import { useState } from "react";
 import { readNumber, typed } from "./numbers";
 
-/** A number, or the text that is not one yet. */
+/** A number, or text that is not a number yet. */
 export type NumberEntry = number | string;
 
 interface Props extends Omit<TextInputProps, "value" | "onChange"> {
   value: NumberEntry;
   onChange: (value: NumberEntry) => void;
   suffix?: string;
-  /** What an empty field stands for; a field without it has to be filled or says so by `required`. */
+  /** Value of an empty field; without it the field must be filled. */
   empty?: number;
 }
 
-/** A number to type. What reads as one is passed on as a number, anything else as the text it is, with the reason. */
+/** Number input. Passes on valid input as a number and anything else as text, with an error message. */
 export function NumberField({ value, onChange, suffix, empty, error, required = false, ...props }: Props) {
   const written = typeof value === "number" ? typed(value) : value;
   const [text, setText] = useState(written);

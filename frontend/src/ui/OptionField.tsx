@@ -21,7 +21,7 @@ function shown(choice: OptionValue): string {
   return String(choice).replace(/^./, (letter) => letter.toUpperCase());
 }
 
-/** A setting as its kind asks for: a switch, a choice, a text, or a number with its range. */
+/** Input for an option, by its type: switch, select, text, or number with its range. */
 export function OptionField({ option, value, error, onChange }: Props) {
   const { title, default: standard, choices = [] } = option;
   const now = value ?? standard;

@@ -13,7 +13,7 @@ interface Props<Value extends string> extends InputBaseProps {
   onChange: (value: Value) => void;
 }
 
-/** One of a few, by the system's own list: big under a finger, and known to every screen reader. */
+/** Native select: large on touch screens, and accessible to screen readers. */
 export function SelectField<Value extends string>({ data, onChange, ...props }: Props<Value>) {
   return (
     <InputBase

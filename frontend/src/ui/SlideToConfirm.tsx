@@ -5,7 +5,7 @@ import classes from "./SlideToConfirm.module.css";
 
 interface Props {
   label: string;
-  /** What happens when it is done; read out with the name. */
+  /** Consequence, read out by screen readers with the label. */
   meaning: string;
   disabled?: boolean;
   onConfirm: () => void;
@@ -17,7 +17,7 @@ interface Drag {
   travelPx: number;
 }
 
-/** Does its act when the knob is drawn along the whole track in one go; a tap or a key does nothing. */
+/** Calls `onConfirm` when the knob is dragged along the whole track. Ignores taps and the keyboard. */
 export function SlideToConfirm({ label, meaning, disabled = false, onConfirm }: Props) {
   const [share, setShare] = useState(0);
   const track = useRef<HTMLDivElement>(null);
@@ -68,7 +68,7 @@ export function SlideToConfirm({ label, meaning, disabled = false, onConfirm }: 
         {label}
       </span>
       <span id={note} className="visually-hidden">
-        {meaning} Slide the knob to the end by finger or pointer; no key does it.
+        {meaning} Slide to the end with a finger or pointer. The keyboard is ignored.
       </span>
     </div>
   );

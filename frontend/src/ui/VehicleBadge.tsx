@@ -6,7 +6,7 @@ interface Props {
   title?: string | undefined;
 }
 
-/** SIM is blue, REAL is hatched orange, everywhere; the word and the icon say it too. */
+/** SIM is blue, REAL is hatched orange; both also differ in text and icon. */
 export function VehicleBadge({ isReal, title }: Props) {
   const Icon = isReal ? IconDrone : IconDeviceDesktop;
   return (

@@ -1,4 +1,4 @@
-/** What a newcomer asks of each number, and a short exact answer: docs/method.md has the long ones. */
+/** Help texts for each number; docs/method.md has the details. */
 
 export interface Explanation {
   question: string;
@@ -13,137 +13,133 @@ export const EXPLANATIONS = explained({
   error: {
     question: "What is the error?",
     answer: [
-      "How far a flight was from its set point on the average: of a takeoff the mean of |3 m − altitude| over the first 32.6 s, of the F-16 the integral of |reference − pitch|.",
-      "Lower is better, and 0 cannot be had: climbing takes time. The reference trajectory by itself scores 0.091 m.",
+      "The distance from the set point. Takeoff: the mean of |3 m − altitude| over the first 32.6 s. F-16: the integral of |reference − pitch|.",
+      "Lower is better. Zero is impossible because climbing takes time: the reference trajectory itself scores 0.091 m.",
     ],
   },
   errorSoFar: {
     question: "What is the error so far?",
     answer: [
-      "The error of the flight's samples up to now. A takeoff begins 3 m below its set point, so it starts high and falls; only after 32.6 s is it the flight's error.",
+      "The error of the samples received so far. A takeoff starts 3 m below its set point, so this value starts high and falls. After 32.6 s it is the error of the flight.",
     ],
   },
   predicted: {
     question: "What is the predicted error?",
     answer: [
-      "What the model scores with these gains, after the flights so far have corrected it. Before the first flight nothing has corrected it yet.",
+      "The error of the model with these gains, corrected by the flights so far. Before the first flight there is no correction.",
     ],
   },
   interval: {
     question: "What is the interval?",
     answer: [
-      "Of ten flights, nine should end inside it. It counts how much flights with the same gains scatter, and how well the model is known.",
-      "A flight outside teaches more than one inside: the model is off, or something happened to the vehicle.",
+      "Nine of ten flights should end inside it. It includes the scatter between flights with the same gains and the uncertainty of the model.",
+      "A flight outside means that the model is off, or that something happened to the vehicle.",
     ],
   },
   bias: {
-    question: "How is the model corrected by the flights?",
+    question: "How do the flights correct the model?",
     answer: [
-      "By a bias: what the best flight did beyond the model's flight with the same gains, sample by sample, is added to what the model says of other gains. So a simple model is right where it was flown, and good enough near by.",
-      "The strategy “calibrated” first fits the vehicle's own parameters to the flights; what is left over is the bias.",
+      "By a bias. The difference between the best flight and the model with the same gains, sample by sample, is added to every prediction. The corrected model is exact at the flown gains and good close to them.",
+      "The strategy “calibrated” first fits the vehicle's parameters to the flights; the remaining difference is the bias.",
     ],
   },
   trustRegion: {
-    question: "What is the trusted region?",
+    question: "What is the trust region?",
     answer: [
-      "How far a step may go from the best gains flown. It grows when predictions hold, and shrinks when a flight disagrees or is aborted.",
+      "The largest step from the best gains flown. It grows when predictions hold, and shrinks when a flight disagrees or is aborted.",
     ],
   },
   fitted: {
-    question: "What was learned of the vehicle?",
+    question: "What are the fitted parameters?",
     answer: [
-      "The model's parameters that fit the flights best, each ± its standard error, beside what was known before any flight. A value that moves over the days tells of wear.",
+      "The model parameters that fit the flights best, each ± its standard error, next to their values before any flight. A value that drifts over days indicates wear.",
     ],
   },
   gradient: {
     question: "What is the gradient?",
     answer: [
-      "By how much the predicted error changes with each gain, from flights of the corrected model with a little more and a little less of it. Steps go against it; the longest that promises most is flown.",
+      "The change of the predicted error with each gain, computed by simulating the corrected model with slightly higher and lower values. Steps go against the gradient; the step with the lowest predicted error is flown.",
     ],
   },
   gate: {
     question: "How are gains checked?",
     answer: [
-      "Exactly, where a product in the autopilot's 32-bit numbers could wrap; and in flights of the model over the spread of what is not known about the vehicle, aborted at any instant too.",
+      "Integer overflow in the autopilot's 32-bit arithmetic is checked exactly. Altitude, divergence, oscillation and aborts are checked in simulated flights over the uncertainty of the vehicle's parameters.",
     ],
   },
   glitch: {
     question: "What is a glitch?",
     answer: [
-      "A stretch that no flight can have had: too fast a change, the same value again and again, nothing at all. It is marked on the curve; the stored record is never altered.",
+      "A part of the record that is physically impossible: a jump, a frozen value or a gap. It is marked on the curve. The stored record is never changed.",
     ],
   },
   curves: {
     question: "What do the lines mean?",
     answer: [
-      "Dotted: the set point. Dash-dotted: the reference trajectory, the climb that the autopilot's own filter asks for on the way there, and that its loop follows.",
-      "Thick: the best flight. Dark: the latest. Dashed in its band: where nine of ten flights with the next gains should run.",
+      "Dotted: the set point. Dash-dotted: the reference trajectory, which the autopilot's filter generates and its control loop follows.",
+      "Thick: the best flight. Dark: the latest flight. Dashed, with its band: the prediction for the next gains. Nine of ten flights should stay inside the band.",
     ],
   },
   threshold: {
-    question: "What has the next flight to beat?",
+    question: "What does the next flight have to beat?",
     answer: [
-      "The threshold of the paper's stop rule: below the best error by the improvement that this campaign asks for (under Settings, Stop). A flight above it counts as no improvement, and two in a row end the campaign.",
-      "The band is where another flight of the best gains would land by chance: what falls in there is no news.",
+      "The threshold of the paper's stop rule: the best error minus the minimum improvement of this campaign (Settings, Stop). A flight above it counts as no improvement; two in a row end the campaign.",
+      "The band shows where another flight with the best gains could end by chance. A result inside it is no resolvable change.",
     ],
   },
   scatter: {
-    question: "Where does the scatter come from?",
+    question: "How is the scatter estimated?",
     answer: [
-      "The standard deviation of the error from flight to flight with the same gains. Before anything is repeated it is what such flights are known for; every repeat counts from then on.",
+      "The standard deviation of the error between flights with the same gains. Without repeats it is a prior estimate; every repeat refines it.",
     ],
   },
   standardError: {
     question: "What is the standard error?",
     answer: [
-      "How far a mean of so many flights is likely to be off: the scatter of one flight divided by the square root of their number. Four flights know it twice as well as one.",
+      "The uncertainty of a mean: the scatter of one flight divided by the square root of the number of flights. Four flights halve it.",
     ],
   },
   difference: {
-    question: "When is a difference real?",
+    question: "When is a difference significant?",
     answer: [
-      "Two flights with the same gains differ too. Better or worse is said only when chance alone would hardly do it; the best of many is judged more strictly, because the luckiest of many looks good.",
+      "Flights with the same gains differ too. The verdict is better or worse only if chance is an unlikely explanation. The best of many flights is tested more strictly, because being the best is partly chance.",
     ],
   },
   record: {
-    question: "What is counted here?",
+    question: "How good are the predictions?",
     answer: [
-      "How many flights ended inside the 90\u00a0% interval that was predicted for them, and how many changed the error in the direction that was predicted.",
+      "The number of flights that ended inside their predicted 90\u00a0% interval, and the number whose error changed in the predicted direction.",
     ],
   },
   drift: {
     question: "What is drift?",
     answer: [
-      "The same gains flying worse or better as the day goes on: battery, wind, wear. The last flight of the first gains is held against their first one, so they have to be flown again to see it.",
+      "A change of the error with the same gains over time, for example from battery, wind or wear. It compares the latest flight of the first gains with their first flight, so these gains must be flown again.",
     ],
   },
   overshoot: {
     question: "What is the overshoot?",
-    answer: ["How far the flight rose above its set point at its highest; 0 if it stayed below."],
+    answer: ["The maximum height above the set point; 0 if the flight stayed below it."],
   },
   warmStart: {
     question: "What is a warm start?",
     answer: [
-      "The first flight uses this campaign's best gains. From how it goes the program sees whether the two vehicles are alike: then it builds on what was learned here, with a shorter first step; else it starts afresh.",
+      "The first flight uses this campaign's best gains. If it shows that the two vehicles are similar, the new campaign builds on what was learned here, with a shorter first step; otherwise it starts from scratch.",
     ],
   },
   safeGains: {
     question: "What are safe gains?",
     answer: [
-      "What the vehicle is given when it is connected, after every flight and with every abort, and then read back. A person answers for those of a real vehicle.",
+      "The gains written to the vehicle when it connects, after every flight and on every abort, and then read back. The operator is responsible for those of a real vehicle.",
     ],
   },
   linkAge: {
     question: "What is the link age?",
-    answer: [
-      "How long ago anything was last heard from the vehicle. Above 2 s what you see is no longer what is so: numbers turn grey.",
-    ],
+    answer: ["Time since the last packet from the vehicle. Above 2 s the values are stale and turn grey."],
   },
   thrust: {
     question: "What does saturated mean?",
-    answer: [
-      "The loop asks for all the thrust there is, or for none. As long as it does, gains cannot change what the vehicle does.",
-    ],
+    answer: ["The control loop demands maximum or zero thrust. While it is saturated, the gains have no effect."],
   },
 });
 

@@ -1,4 +1,4 @@
-/** Numbers and times as a person reads them: no more digits than the measurement can carry, always with the unit. */
+/** Formatting of numbers and times: only significant digits, always with the unit. */
 
 export const NOTHING = "–";
 
@@ -8,18 +8,18 @@ export function withUnit(value: number | null | undefined, unit: string, digits 
   return `${value.toFixed(digits)} ${unit}`;
 }
 
-/** Change of `value` against `base` in percent, with its sign; null where there is nothing to compare. */
+/** Signed change of `value` against `base` in percent; null if one is missing or the base is 0. */
 export function percentChange(value: number | null | undefined, base: number | null | undefined): number | null {
   if (value === null || value === undefined || base === null || base === undefined || base === 0) return null;
   return (100 * (value - base)) / base;
 }
 
-/** `90 %`, held together by a space that does not break. */
+/** `90 %`, with a no-break space. */
 export function percentText(percent: number, digits = 0): string {
   return `${Number(percent.toFixed(digits))}\u00a0%`;
 }
 
-/** A change in percent as people say it: "59 % below the best". */
+/** A change in percent as text: "59 % below the best". */
 export function against(percent: number, base: string): string {
   const size = percentText(Math.abs(percent));
   if (size === percentText(0)) return `the same as ${base}`;
@@ -32,7 +32,7 @@ export function gainText(value: number): string {
   return text.replace(/^-/, "−");
 }
 
-/** Date and time here; the year only when it is not this one. */
+/** Local date and time; with the year if it is not the current one. */
 export function localTime(iso: string | null | undefined, now: Date = new Date()): string {
   if (!iso) return NOTHING;
   const at = new Date(iso);
@@ -48,14 +48,14 @@ export function count(number: number, noun: string): string {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
-/** A large count in groups of three, apart by a thin space: neither point nor comma, which elsewhere mean other things. */
+/** A large count in groups of three digits, separated by thin spaces. */
 export function grouped(number: number): string {
   return String(number).replace(/\B(?=(\d{3})+$)/g, "\u2009");
 }
 
 const SIZES = ["kB", "MB", "GB", "TB"] as const;
 
-/** `1.4 GB`: what a disk or a file holds, in powers of a thousand as disks are sold. */
+/** `1.4 GB`: a size in decimal units. */
 export function bytesText(bytes: number): string {
   const power = Math.min(SIZES.length, Math.max(1, Math.floor(Math.log10(Math.max(bytes, 1)) / 3)));
   const value = bytes / 1000 ** power;

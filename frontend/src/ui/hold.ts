@@ -1,7 +1,7 @@
-/** Acts that a slip of the finger must not do: a button held for two seconds, and a knob slid to its end. */
+/** Protection against accidental touches: a button held for two seconds, and a slider dragged to its end. */
 
 export const HOLD_MS = 2000;
-/** A page that hung for longer cannot know that the finger stayed down. */
+/** A page that hung for longer cannot tell whether the finger stayed down. */
 const BLIND_MS = 1000;
 
 export interface Hold {
@@ -11,7 +11,7 @@ export interface Hold {
 
 export type Held = { kind: "holding"; share: number; hold: Hold } | { kind: "done" } | { kind: "broken" };
 
-/** What a hold has come to when the page looks at it again. */
+/** State of a hold at `nowMs`. */
 export function holdProgress({ sinceMs, seenMs }: Hold, nowMs: number): Held {
   if (nowMs - seenMs > BLIND_MS) return { kind: "broken" };
   if (nowMs - sinceMs >= HOLD_MS) return { kind: "done" };
@@ -20,7 +20,7 @@ export function holdProgress({ sinceMs, seenMs }: Hold, nowMs: number): Held {
 
 const ARRIVED = 0.97;
 
-/** How far along its track a knob is that was taken at `fromPx`, from 0 to 1. */
+/** Position of the knob along its track, 0 to 1, after a drag from `fromPx` to `toPx`. */
 export function slideShare(fromPx: number, toPx: number, travelPx: number): number {
   if (travelPx <= 0) return 0;
   return Math.min(1, Math.max(0, (toPx - fromPx) / travelPx));

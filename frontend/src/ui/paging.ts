@@ -8,8 +8,8 @@ type Pages<Page> = Pick<
 const TRIES = 5;
 
 /**
- * Add the next page to a list. News that arrive meanwhile have the pages that are shown read again, and take the place
- * of a request for the next one: it is made again then, and waits for them where they came first.
+ * Add the next page to a list. An invalidation refetches the shown pages and replaces a pending request for the next
+ * one, so the request is repeated until the page is there.
  */
 export async function addPage<Page>(list: Pages<Page>): Promise<void> {
   const shown = list.data?.pages.length ?? 0;

@@ -2,8 +2,8 @@ import { expect, test } from "vitest";
 import { campaignStateLabel } from "./states";
 
 test("a campaign on a real vehicle is headed by what comes next, not as ready to fly before its rehearsal", () => {
-  expect(campaignStateLabel("ready", null, "missing").word).toBe("To be rehearsed first");
-  expect(campaignStateLabel("deciding", null, "under way").word).toBe("Being rehearsed");
+  expect(campaignStateLabel("ready", null, "missing").word).toBe("Rehearsal required");
+  expect(campaignStateLabel("deciding", null, "under way").word).toBe("Rehearsal in progress");
   expect(campaignStateLabel("ready", null, "failed").word).toBe("Rehearsal failed");
   expect(campaignStateLabel("ready", null, "passed").word).toBe("Ready to fly");
   expect(campaignStateLabel("ready", null).word).toBe("Ready to fly");

@@ -1,4 +1,4 @@
-/** What the states are called on a page, and how much they ask for attention. */
+/** Labels of states, and their tone. */
 
 import type { Campaign, CampaignState, TrialState } from "../api/types";
 
@@ -26,10 +26,10 @@ const OUTCOME: Record<string, StateLabel> = {
 
 type RehearsalState = Campaign["rehearsal"]["state"];
 
-/** What a campaign on a real vehicle waits for, where anything else would say that it may fly. */
+/** Labels of a real vehicle's campaign that waits for its rehearsal. */
 const REHEARSAL: Partial<Record<RehearsalState, StateLabel>> = {
-  missing: { word: "To be rehearsed first", tone: "quiet" },
-  "under way": { word: "Being rehearsed", tone: "busy" },
+  missing: { word: "Rehearsal required", tone: "quiet" },
+  "under way": { word: "Rehearsal in progress", tone: "busy" },
   failed: { word: "Rehearsal failed", tone: "bad" },
 };
 
@@ -47,7 +47,7 @@ const TRIAL: Record<TrialState, StateLabel> = {
   planned: { word: "Planned", tone: "quiet" },
   staged: { word: "Gains set", tone: "busy" },
   flying: { word: "Flying", tone: "busy" },
-  captured: { word: "To be judged", tone: "busy" },
+  captured: { word: "Needs review", tone: "busy" },
   valid: { word: "Valid", tone: "good" },
   aborted: { word: "Aborted", tone: "bad" },
   invalid: { word: "Invalid", tone: "bad" },
@@ -59,7 +59,7 @@ export function trialStateLabel(state: TrialState): StateLabel {
   return TRIAL[state];
 }
 
-/** Trials with a flight behind them; the others are plans. */
+/** States of trials that have flown. */
 const FLOWN: ReadonlySet<TrialState> = new Set<TrialState>(["captured", "valid", "aborted", "invalid", "lost"]);
 
 export function wasFlown(state: TrialState): boolean {

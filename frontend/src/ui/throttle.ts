@@ -1,4 +1,4 @@
-/** Work that may be asked for at any rate and is done no more often than the device can take. */
+/** Throttling of work to a rate that the device can keep up with. */
 
 export interface Throttled {
   ask(): void;
@@ -6,8 +6,8 @@ export interface Throttled {
 }
 
 /**
- * `work` runs at once when it is asked for, then again after a pause if it was asked for meanwhile, so the last asking
- * is always served. The pause is twice the time that the work took, at least `shortestMs`.
+ * Run `work` immediately when requested, and again after a pause if it was requested in between: the last request is
+ * always served. The pause is twice the duration of the work, at least `shortestMs`.
  */
 export function throttled(work: () => Promise<unknown>, shortestMs: number): Throttled {
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -43,8 +43,8 @@ export function throttled(work: () => Promise<unknown>, shortestMs: number): Thr
   };
 }
 
-/** Once what has changed so far is on the screen: heavy work that waits for it does not keep an answer back. */
+/** Resolves after the next paint, so that heavy work does not delay the display of earlier changes. */
 export async function afterPaint(): Promise<void> {
-  if (document.visibilityState === "hidden") return; // where nothing is painted
+  if (document.visibilityState === "hidden") return; // nothing is painted
   await new Promise<void>((done) => requestAnimationFrame(() => setTimeout(done)));
 }

@@ -38,7 +38,7 @@ test("a share is a percentage, and certainty is not claimed", () => {
 });
 
 test("where the scatter is known from, or what to do while it is not", () => {
-  expect(scatterSource(0, 4)).toBe("Nothing repeated yet: what is known of such flights, worth 4 repeats in all.");
-  expect(scatterSource(1, 5)).toBe("From 1 repeat, worth 5 repeats in all.");
-  expect(scatterSource(0, null)).toContain("fly a gain set again");
+  expect(scatterSource(0, 4)).toBe("No repeats yet: prior estimate, 4 degrees of freedom.");
+  expect(scatterSource(1, 5)).toBe("From 1 repeat, 5 degrees of freedom.");
+  expect(scatterSource(0, null)).toContain("Fly a gain set again");
 });

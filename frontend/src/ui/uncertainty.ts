@@ -1,13 +1,13 @@
-/** Numbers with their uncertainty, in as many digits as it allows: 0.105 ± 0.012 m, not 0.10537 ± 0.0123. */
+/** Numbers with their uncertainty, rounded to it: 0.105 ± 0.012 m, not 0.10537 ± 0.0123. */
 
 import type { Interval } from "../api/types";
 import { count, NOTHING, percentText, withUnit } from "./format";
 
 const MOST_DIGITS = 6;
-/** An uncertainty that begins with less than this carries a second digit: rounding 0.012 to 0.01 would cost too much. */
+/** An uncertainty with a smaller leading digit keeps two digits: rounding 0.012 to 0.01 would lose too much. */
 const TWO_DIGITS_BELOW = 3.55;
 
-/** Digits after the point that an uncertainty of this size allows; three where it is not known. */
+/** Decimal places for an uncertainty of this size; three if it is unknown. */
 export function decimalsOf(uncertainty: number | null | undefined): number {
   if (uncertainty === null || uncertainty === undefined || !(uncertainty > 0) || !Number.isFinite(uncertainty))
     return 3;
@@ -20,7 +20,7 @@ function isNumber(value: number | null | undefined): value is number {
   return value !== null && value !== undefined && Number.isFinite(value);
 }
 
-/** `0.105 ± 0.012 m`; the value alone where its uncertainty is not known, a dash where there is none. */
+/** `0.105 ± 0.012 m`; the value alone if its uncertainty is unknown, a dash if there is no value. */
 export function plusMinus(
   value: number | null | undefined,
   uncertainty: number | null | undefined,
@@ -38,7 +38,7 @@ export function rangeText({ lower, upper }: Interval, unit: string): string {
   return `${lower.toFixed(3)} … ${withUnit(upper, unit)}`;
 }
 
-/** `0.093 … 0.118 m (90 %)`: ± is left to standard errors, an interval always shows both ends and its confidence. */
+/** `0.093 … 0.118 m (90 %)`: both ends and the confidence, because ± denotes a standard error. */
 export function intervalText(interval: Interval, unit: string): string {
   return `${rangeText(interval, unit)} (${percent(interval.confidence)})`;
 }
@@ -58,16 +58,15 @@ export function percent(share: number): string {
   return percentText(100 * share, share > 0.99 && share < 1 ? 1 : 0);
 }
 
-/** A confidence as people say it; one that rounds to certainty is not claimed. */
+/** A confidence as text; never 100 %. */
 export function confidenceText(confidence: number): string {
   return confidence > 0.995 ? `more than ${percent(0.99)}` : percent(confidence);
 }
 
-/** Where the scatter of one flight is known from; `freedom`: its degrees of freedom, null while it is not known. */
+/** Source of the estimated scatter of one flight; `freedom`: its degrees of freedom, null if it is unknown. */
 export function scatterSource(repeats: number, freedom: number | null): string {
   if (freedom === null)
-    return "It was not measured under this autopilot, and no gains have been flown twice: fly a gain set again.";
-  const from =
-    repeats === 0 ? "Nothing repeated yet: what is known of such flights" : `From ${count(repeats, "repeat")}`;
-  return `${from}, worth ${Number(freedom.toFixed(1))} repeats in all.`;
+    return "Not measured for this autopilot, and no gain set has been flown twice. Fly a gain set again.";
+  const from = repeats === 0 ? "No repeats yet: prior estimate" : `From ${count(repeats, "repeat")}`;
+  return `${from}, ${Number(freedom.toFixed(1))} degrees of freedom.`;
 }

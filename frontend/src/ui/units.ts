@@ -1,4 +1,4 @@
-/** In which units a campaign's numbers stand and what its gains are called, from its experiment. */
+/** Units and gain names of a campaign, from its experiment. */
 
 import type { Catalogue } from "../api/types";
 
@@ -7,13 +7,13 @@ export interface Units {
   output: string;
   /** Of the gains; empty when they have several. */
   gains: string;
-  /** Where the scored output is to go, in its unit. */
+  /** Set point of the scored output, in its unit. */
   setPoint: number;
 }
 
 const TAKEOFF: Units = { error: "m", output: "m", gains: "counts", setPoint: 3 };
 
-/** Those of the experiment; of the takeoff until the catalogue is there. */
+/** Units of the experiment; those of the takeoff until the catalogue is loaded. */
 export function unitsOf(catalogue: Catalogue | undefined, experiment: string): Units {
   const found = catalogue?.experiments.find(({ name }) => name === experiment);
   if (found === undefined) return TAKEOFF;
@@ -26,7 +26,7 @@ export function unitsOf(catalogue: Catalogue | undefined, experiment: string): U
   };
 }
 
-/** What a gain is, by its name: `theta_1` is "Thrust per speed". Empty until the catalogue is there. */
+/** Titles of gains by name: `theta_1` is "Thrust per speed". Empty until the catalogue is loaded. */
 export function gainTitles(catalogue: Catalogue | undefined, experiment: string): Readonly<Record<string, string>> {
   const found = catalogue?.experiments.find(({ name }) => name === experiment);
   return Object.fromEntries((found?.gains ?? []).map(({ name, title }) => [name, title]));

@@ -1,15 +1,15 @@
-/** What a person has chosen for this browser; it stays here, and no server hears of it. */
+/** Preferences of this browser; stored locally only. */
 
 import { useLocalStorage } from "@mantine/hooks";
 
 const kept = { getInitialValueInEffect: false } as const;
 
-/** The name that one takes control of vehicles with. */
+/** Operator name used to take control of vehicles. */
 export function useOperatorName() {
   return useLocalStorage({ ...kept, key: "gainline-operator", defaultValue: "" });
 }
 
-/** Whether the browser speaks of flights. */
+/** Whether flight events are spoken. */
 export function useSpeechWanted() {
   return useLocalStorage({ ...kept, key: "gainline-speech", defaultValue: false });
 }

@@ -1,6 +1,6 @@
 import { useEffect } from "react";
 
-/** The tab's title: the page first, so that several tabs can be told apart. */
+/** Set the tab's title, with the page's name first. */
 export function useTitle(page: string): void {
   useEffect(() => {
     document.title = `${page} · Gainline`;
