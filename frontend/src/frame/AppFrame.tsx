@@ -22,8 +22,8 @@ import { ThemeSwitch } from "./ThemeSwitch";
 import { VehicleStrip } from "./VehicleStrip";
 
 /**
- * Space ends the flight, whatever has the focus, a text too: losing a blank is cheaper.
- * What flies is known from the stream before it is known from the list, so both count.
+ * Space aborts the flight whatever has the focus, including text fields.
+ * The stream reports a flight before the list does, so both are used.
  */
 function useSpaceAborts(
   listed: readonly Flying[],
@@ -41,7 +41,7 @@ function useSpaceAborts(
       event.stopPropagation();
       if (!event.repeat && event.type === "keydown") press([...new Set(targets.map(({ trialId }) => trialId))]);
     }
-    // A button acts on the release of Space, so that must not get through either.
+    // Buttons act on keyup, so it is suppressed too.
     document.addEventListener("keydown", onKey, { capture: true });
     document.addEventListener("keyup", onKey, { capture: true });
     return () => {
@@ -61,7 +61,7 @@ function useEventStream(flying: boolean): void {
 function CampaignVehicle({ campaignId }: { campaignId: number }) {
   const vehicle = useCampaign(campaignId).data?.vehicle;
   const state = useVehicle(vehicle?.id ?? null)?.state;
-  // A connected one stands in its own line below.
+  // A connected vehicle has its own line below.
   if (vehicle === undefined || (vehicle.registered && state !== "disconnected")) return null;
   return <VehicleBadge isReal={vehicle.is_real} title={vehicle.registered ? vehicle.name : vehicle.title} />;
 }
@@ -81,7 +81,7 @@ export function AppFrame() {
   return (
     <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
       <a href="#main" className={classes["skip"]}>
-        Skip to the content
+        Skip to content
       </a>
       <header className={classes["header"]}>
         <div className={classes["bar"]} data-flying={flying.length > 0 || undefined}>
@@ -105,7 +105,7 @@ export function AppFrame() {
         </div>
         {abort.trouble !== null && (
           <p className={classes["trouble"]} role="alert">
-            <strong>The abort has not reached the worker yet; it is sent again.</strong> {abort.trouble}
+            <strong>The abort has not reached the worker. Retrying.</strong> {abort.trouble}
           </p>
         )}
         <VehicleStrip />

@@ -6,7 +6,7 @@ import { readingOf } from "../live/telemetry";
 import { withUnit } from "../ui/format";
 import classes from "./Frame.module.css";
 
-/** Readings of one flight under way, and the button that ends it: one tap, no question. */
+/** Live readings of one flight and its abort button, which acts without confirmation. */
 export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: ReturnType<typeof useAbort> }) {
   const live = useLiveFlight(flying.trialId);
   const isCurrent = useIsCurrent(live);
@@ -31,7 +31,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
           <>
             <span className={classes["big"]}>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</span>
             <span>{withUnit(time, "s", 1)}</span>
-            {!isCurrent && <span>as last heard</span>}
+            {!isCurrent && <span>last known</span>}
           </>
         )}
       </Link>

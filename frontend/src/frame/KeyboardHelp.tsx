@@ -9,7 +9,7 @@ function isTyping(target: EventTarget | null): boolean {
   return target instanceof HTMLElement && target.matches("input, textarea, select, [contenteditable]");
 }
 
-/** The keys of this page, by a button or by `?`. It covers nothing that ends a flight, and blocks nothing. */
+/** Keyboard shortcuts of this page, opened by a button or `?`. Non-modal, and it does not cover the abort button. */
 export function KeyboardHelp() {
   const { pathname } = useLocation();
   const dialog = useRef<HTMLDialogElement>(null);
@@ -30,8 +30,8 @@ export function KeyboardHelp() {
       <ActionIcon
         color="gray"
         className={classes["ask"] ?? ""}
-        aria-label="Keyboard help"
-        title="Keyboard help (?)"
+        aria-label="Keyboard shortcuts"
+        title="Keyboard shortcuts (?)"
         aria-haspopup="dialog"
         popoverTarget="keys"
       >
@@ -47,7 +47,7 @@ export function KeyboardHelp() {
         onToggle={({ newState, currentTarget }) => newState === "open" && currentTarget.focus()}
       >
         <h2 id="keys-title" className={classes["title"]}>
-          Keys on this page
+          Keyboard shortcuts
         </h2>
         <dl className={classes["keys"]}>
           {keysOf(pathname).map(({ keys, does }) => (
@@ -61,7 +61,9 @@ export function KeyboardHelp() {
             </div>
           ))}
         </dl>
-        <p className={classes["note"]}>No key flies a real vehicle: that takes a finger or a pointer, held for 2 s.</p>
+        <p className={classes["note"]}>
+          There is no shortcut for the take-off of a real vehicle: hold its button for 2 s.
+        </p>
       </dialog>
     </>
   );

@@ -4,7 +4,7 @@ import { useRef } from "react";
 import { NavLink, useLocation } from "react-router";
 import classes from "./MainNav.module.css";
 
-/** In the row where there is room for it; every page is in the menu of a small screen, the others are under "More". */
+/** Pages with `inRow` are in the row on wide screens. The menu has all pages on small screens, else the rest. */
 const PAGES = [
   { to: "/", title: "Campaigns", inRow: true },
   { to: "/vehicles", title: "Vehicles", inRow: true },
@@ -29,7 +29,7 @@ function PageLink({ to, title, onClick }: PageLinkProps) {
   );
 }
 
-/** The pages: what is used most in a row, the rest behind a button; all behind it on a small screen or in flight. */
+/** Main navigation: the main pages in a row, the rest in a menu; all in the menu on small screens and in flight. */
 export function MainNav() {
   const { pathname } = useLocation();
   const menu = useRef<HTMLUListElement>(null);

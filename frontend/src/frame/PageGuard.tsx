@@ -14,7 +14,7 @@ async function reloadWhenAnswered(): Promise<boolean> {
   return answered;
 }
 
-/** A page that cannot be shown: why, and another try; by itself once a lost server is back. */
+/** Error page with a retry button; reloads automatically when a lost server is back. */
 function PageUnavailable({ error }: { error: unknown }) {
   const [away, setAway] = useState(false);
   const { state } = useConnection();
@@ -33,13 +33,13 @@ function PageUnavailable({ error }: { error: unknown }) {
       >
         Try again
       </Button>
-      {away && <p role="status">The server does not answer yet.</p>}
+      {away && <p role="status">The server is still not responding.</p>}
     </>
   );
 }
 
 interface GuardProps {
-  /** Another page is another try. */
+  /** A change of the path clears the error. */
   path: string;
   children: ReactNode;
 }
@@ -48,7 +48,7 @@ interface GuardState {
   error: unknown;
 }
 
-/** Says so when a page's code cannot be had or the page breaks: never an empty screen. */
+/** Error boundary: shows a notice when a page's code cannot be loaded or rendering throws. */
 export class PageGuard extends Component<GuardProps, GuardState> {
   override state: GuardState = { error: null };
 

@@ -19,7 +19,7 @@ interface Line extends Sentence {
   atMs: number;
 }
 
-/** Tells of flights and links as it happens: to screen readers always, aloud if that is wanted. */
+/** Announces flight and link events: to screen readers always, as speech if enabled. */
 export function SpokenAnnouncements() {
   const [wanted] = useSpeechWanted();
   const aloud = useRef(wanted);
@@ -27,15 +27,15 @@ export function SpokenAnnouncements() {
   const queries = useQueryClient();
   const [lines, setLines] = useState<readonly Line[]>([]);
   useEffect(() => {
-    let told: readonly Line[] = [];
-    function tell(sentence: Sentence): void {
+    let announced: readonly Line[] = [];
+    function announce(sentence: Sentence): void {
       const atMs = performance.now();
-      if (told.some(({ text, atMs: earlier }) => text === sentence.text && atMs - earlier < AGAIN_MS)) return;
-      told = [...told.slice(1 - SHOWN), { ...sentence, number: (told.at(-1)?.number ?? 0) + 1, atMs }];
-      setLines(told);
+      if (announced.some(({ text, atMs: earlier }) => text === sentence.text && atMs - earlier < AGAIN_MS)) return;
+      announced = [...announced.slice(1 - SHOWN), { ...sentence, number: (announced.at(-1)?.number ?? 0) + 1, atMs }];
+      setLines(announced);
       if (aloud.current) speak(sentence);
     }
-    return followNews(queries, tell);
+    return followNews(queries, announce);
   }, [queries]);
   return (
     <div className="visually-hidden" aria-live="polite">
@@ -62,7 +62,7 @@ function knownOf(queries: QueryClient, vehicleId: number): Known {
   return { name: vehicle?.name ?? "the vehicle", minBatteryV: typeof limit === "number" ? limit : null };
 }
 
-/** What the record says of the flight, as soon as it says so. A server that is away is told of by itself. */
+/** Announce the result of the flight once it is stored. A lost server is announced separately. */
 async function readOutcome(queries: QueryClient, trialId: number, tell: (sentence: Sentence) => void): Promise<void> {
   for (let look = 0; look < LOOKS; look += 1) {
     try {
@@ -72,7 +72,7 @@ async function readOutcome(queries: QueryClient, trialId: number, tell: (sentenc
       const outcome = outcomeSentence(trial.state, trial.error, units.error);
       if (outcome !== null) return tell(outcome);
     } catch {
-      // The next look may succeed; the connection says by itself that it is gone.
+      // Retried below; a lost connection is announced separately.
     }
     await new Promise((done) => setTimeout(done, LOOK_MS));
   }

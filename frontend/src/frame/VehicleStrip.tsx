@@ -10,7 +10,7 @@ import { gainsInBrackets, inOrder, sameHeld } from "../ui/gains";
 import { VehicleBadge } from "../ui/VehicleBadge";
 import classes from "./VehicleStrip.module.css";
 
-/** On every page: each connected vehicle with its link, battery, gains, and who is in control of it. */
+/** On every page: each connected vehicle with its link, battery, gains and operator. */
 export function VehicleStrip() {
   const connected = (useVehicles().data ?? []).filter(
     ({ registered, state }) => registered && state !== "disconnected",
@@ -38,7 +38,11 @@ function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
           {aged.status.trouble}
         </span>
       )}
-      <span className={classes["fact"]} data-bad={stale || undefined} title="How long ago the vehicle was last heard">
+      <span
+        className={classes["fact"]}
+        data-bad={stale || undefined}
+        title="Time since the last packet from the vehicle"
+      >
         <LinkIcon size={17} aria-hidden />
         <span className="visually-hidden">Link</span>
         {linkText(aged)}
@@ -60,7 +64,7 @@ interface HeldProps {
   stale: boolean;
 }
 
-/** What is on the vehicle beside what is safe: as the link tells, else as it was last read back. */
+/** Current gains next to the safe gains: from the link, otherwise as last read back. */
 function HeldGains({ vehicle, held, stale }: HeldProps) {
   const { safe_gains: safe } = vehicle;
   const known = inOrder(Object.keys(held).length > 0 ? held : (vehicle.held ?? {}), Object.keys(safe));
@@ -74,8 +78,8 @@ function HeldGains({ vehicle, held, stale }: HeldProps) {
   }
   const isSafe = sameHeld(known, safe);
   return (
-    <span className={classes["fact"]} data-stale={stale || undefined} title={`${names}, as read back`}>
-      <span className={classes["word"]}>holds</span>
+    <span className={classes["fact"]} data-stale={stale || undefined} title={`${names}, read back`}>
+      <span className={classes["word"]}>gains</span>
       {gainsInBrackets(known)}
       <span className={isSafe ? classes["safe"] : classes["other"]}>
         {isSafe ? "safe" : `safe ${gainsInBrackets(safe)}`}
@@ -88,9 +92,13 @@ function InControl({ vehicle }: { vehicle: Vehicle }) {
   const own = useOwnLease(vehicle.id);
   const { control } = vehicle;
   const isOwn = own !== null && (control === null || control.operator === own.operator);
-  const who = isOwn ? `${own.operator} (you)` : (control?.operator ?? "nobody in control");
+  const who = isOwn ? `${own.operator} (you)` : (control?.operator ?? "no operator");
   return (
-    <span className={classes["fact"]} data-stale={(control === null && !isOwn) || undefined} title="Who is in control">
+    <span
+      className={classes["fact"]}
+      data-stale={(control === null && !isOwn) || undefined}
+      title="Operator in control"
+    >
       <IconUser size={17} aria-hidden />
       <span className="visually-hidden">In control:</span>
       <span className={classes["who"]}>{who}</span>

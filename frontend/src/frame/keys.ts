@@ -1,4 +1,4 @@
-/** What keys do, as the keyboard help tells it and as the frame obeys. */
+/** Keyboard shortcuts: their help texts, and their commands in the frame. */
 
 export interface Key {
   keys: readonly string[];
@@ -6,25 +6,25 @@ export interface Key {
 }
 
 const EVERYWHERE: readonly Key[] = [
-  { keys: ["Space"], does: "While something flies: abort it, wherever you are, also from within a text." },
-  { keys: ["Tab"], does: "To the next control; with Shift back. The first one of a page skips to its content." },
-  { keys: ["Enter"], does: "Press the marked button, or follow the marked link." },
-  { keys: ["Esc"], does: "Close what has opened." },
-  { keys: ["?"], does: "This help." },
+  { keys: ["Space"], does: "Abort the flight, on every page and even while typing." },
+  { keys: ["Tab"], does: "Next control; with Shift, the previous one. The first control skips to the content." },
+  { keys: ["Enter"], does: "Press the focused button, or follow the focused link." },
+  { keys: ["Esc"], does: "Close the open menu or dialog." },
+  { keys: ["?"], does: "Show these shortcuts." },
 ];
 
 const OF_PAGES: readonly { page: RegExp; keys: readonly Key[] }[] = [
-  { page: /^\/$/, keys: [{ keys: ["/"], does: "To the search." }] },
+  { page: /^\/$/, keys: [{ keys: ["/"], does: "Focus the search field." }] },
   {
     page: /^\/campaigns\/|^\/compare/,
     keys: [
-      { keys: ["←", "→"], does: "In a row of choices, as the speed of a simulation: the one before or after." },
-      { keys: ["Tab", "Enter"], does: "On “Table” at a chart: its numbers as a table instead." },
+      { keys: ["←", "→"], does: "Previous or next option, for example of the simulation speed." },
+      { keys: ["Tab", "Enter"], does: "On a chart's table button: show the numbers as a table." },
     ],
   },
 ];
 
-/** What keys do on the page at `path`: its own first. */
+/** Shortcuts of the page at `path`, its own first. */
 export function keysOf(path: string): Key[] {
   return [...OF_PAGES.filter(({ page }) => page.test(path)).flatMap(({ keys }) => keys), ...EVERYWHERE];
 }
@@ -33,7 +33,7 @@ type Press = Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "altKey">;
 
 const COMMANDS: Readonly<Record<string, "help" | "search">> = { "?": "help", "/": "search" };
 
-/** What a key asks for; nothing while one types. */
+/** Command of a key press; null while the user types. */
 export function commandOf({ key, ctrlKey, metaKey, altKey }: Press, isTyping: boolean): "help" | "search" | null {
   return isTyping || ctrlKey || metaKey || altKey ? null : (COMMANDS[key] ?? null);
 }
