@@ -1,4 +1,4 @@
-/** What this browser may do here. */
+/** Access rights of this browser. */
 
 import { useQuery } from "@tanstack/react-query";
 import { answer } from "./client";
@@ -7,7 +7,7 @@ import { readOnlyReason, type WatchedVehicle } from "./readOnly";
 
 const LOOK_AGAIN_MS = 5000;
 
-/** Read again until it is unlocked: the link that does it is opened in another tab. */
+/** Polled until unlocked, because the unlock link is opened in another tab. */
 function useAccess() {
   return useQuery({
     queryKey: ["access"],
@@ -18,7 +18,7 @@ function useAccess() {
   }).data;
 }
 
-/** Why this browser may only watch the vehicle, or anything at all (null); null where it may act. */
+/** Why this browser has read-only access to the vehicle, or to the server if null; null if it may act. */
 export function useReadOnlyReason(vehicle: WatchedVehicle | null): string | null {
   const access = useAccess();
   return access === undefined ? null : readOnlyReason(access, vehicle);

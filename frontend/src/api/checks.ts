@@ -1,4 +1,4 @@
-/** Recorded controllers held against the replica. */
+/** Comparisons of recorded controllers with the replica. */
 
 import { keepPreviousData, useInfiniteQuery, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
@@ -31,7 +31,7 @@ export function useChecks() {
   });
 }
 
-/** A check stays what it is. */
+/** A check never changes. */
 export function useCheck(checkId: number) {
   return useQuery({
     queryKey: ["check", checkId],
@@ -57,7 +57,7 @@ function useMade(): (check: ControllerCheck) => Promise<unknown> {
 }
 
 export interface Recording extends RecordFiles {
-  /** `KP,KI,KD`, where the log does not say which were flown. */
+  /** `KP,KI,KD`, if the log does not contain them. */
   gains?: string;
 }
 

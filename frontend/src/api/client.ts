@@ -1,4 +1,4 @@
-/** The generated client, set up once: same origin, a key for every POST, problem documents as errors. */
+/** Setup of the generated client: same origin, an idempotency key for every POST, problem documents as errors. */
 
 import { client } from "./generated/client.gen";
 import { randomKey } from "./ids";
@@ -24,7 +24,7 @@ interface Outcome<Data> {
   response?: Response | undefined;
 }
 
-/** The answer of a generated call; throws ApiError for a refusal and for a server that cannot be reached. */
+/** The response of a generated call; throws ApiError if it is refused or the server cannot be reached. */
 export async function answer<Data>(call: Promise<Outcome<Data>>): Promise<Data> {
   let outcome: Outcome<Data>;
   try {

@@ -1,4 +1,4 @@
-/** Flights of any campaigns side by side. Keys stand below `campaigns`: what changes a flight changes both. */
+/** Comparison of flights of any campaigns. Keys are below `campaigns`: a change of a flight invalidates both. */
 
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { answer } from "./client";

@@ -1,4 +1,4 @@
-/** Being in control of a vehicle: taken, renewed while the tab lives, handed over. */
+/** Operator leases of vehicles: taken, renewed while the tab is open, released. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
@@ -17,7 +17,7 @@ async function ask(vehicleId: number, operator: string, takeOver: boolean): Prom
   return { operator: lease.operator, token: lease.token };
 }
 
-/** A refusal ends one's control: somebody else has it. A server that is away may come back within the lease. */
+/** A refusal ends the lease, because another operator has it. An unreachable server may return within the lease. */
 async function renew(vehicleId: number, { operator }: OwnLease): Promise<boolean> {
   try {
     holdLease(vehicleId, await ask(vehicleId, operator, false));
@@ -30,7 +30,7 @@ async function renew(vehicleId: number, { operator }: OwnLease): Promise<boolean
   }
 }
 
-/** Keeps what this tab is in control of, as long as the tab is open. */
+/** Renew the leases of this tab while it is open. */
 export function useRenewedControl(): void {
   const queries = useQueryClient();
   useEffect(() => {

@@ -1,4 +1,4 @@
-/** Files that the server makes or takes: reports, bundles, backups. */
+/** Files that the server creates or imports: reports, bundles, backups. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
@@ -11,15 +11,14 @@ export function pathOf(campaignId: number, file: "report.html" | "report.pdf" | 
   return `/api/campaigns/${campaignId}/${file}`;
 }
 
-/** What the server answers; its refusal, or that it is away, as an error that can be shown. */
+/** Fetch a response; throws ApiError if it is refused or the server cannot be reached. */
 async function asked(path: string, init?: RequestInit): Promise<Response> {
   const response = await fetch(path, init).catch(() => undefined);
   if (response?.ok) return response;
   throw new ApiError(problemFrom(response?.status, await response?.json().catch(() => null)));
 }
 
-/** Save what the server makes, under the name that it gives it, or say why it makes nothing: a link with `download`
- * would hide that. */
+/** Download a file under the server's name for it, and report errors, which a link with `download` would hide. */
 export function useDownload(path: string) {
   return useMutation({
     mutationFn: async () => {
@@ -33,8 +32,8 @@ export function useDownload(path: string) {
   });
 }
 
-/** The page of the campaign opens then. Here and not where it was asked for: an empty list is another page as soon as
- * the campaign is known, and would not hear of it. */
+/** Import a bundle and open its campaign. Navigates here because the calling component may be unmounted by then: the
+ * empty list is replaced as soon as the campaign is known. */
 export function useImportBundle() {
   const queries = useQueryClient();
   const navigate = useNavigate();

@@ -1,4 +1,4 @@
-/** What people do with vehicles, and what vehicles were asked and given. */
+/** Registration, requests and gain history of vehicles. */
 
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
@@ -70,7 +70,7 @@ const ACTS = {
 
 export type VehicleRequest = keyof typeof ACTS;
 
-/** Ask a vehicle for one of its acts; what comes of it is seen in the list of its acts. */
+/** Send a request to a vehicle; its outcome appears in the list of acts. */
 export function useVehicleRequest(vehicleId: number) {
   const changed = useVehicleChanged();
   return useMutation({
@@ -80,7 +80,7 @@ export function useVehicleRequest(vehicleId: number) {
   });
 }
 
-/** A list that is shown a page at a time, the newest first. */
+/** A paged list, newest first. */
 function useNewest<Item>(vehicleId: number, list: string, read: (query: PageQuery) => Promise<PageOf<Item>>) {
   return useInfiniteQuery({
     queryKey: ["vehicle", vehicleId, list],

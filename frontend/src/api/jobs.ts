@@ -1,4 +1,4 @@
-/** Numeric work: the jobs that wait and run, and the reproductions of the paper that are some of them. */
+/** Numeric jobs, among them the reproductions of the paper. */
 
 import { keepPreviousData, useInfiniteQuery, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
@@ -30,7 +30,7 @@ export function useJobs(state: readonly JobState[], limit = JOBS_PAGE) {
   });
 }
 
-/** What the worker wrote down about a job; read again whenever jobs are. */
+/** The worker's log of a job; refetched with the jobs. */
 export function useJobLog(jobId: number, enabled: boolean) {
   return useQuery({
     queryKey: ["jobs", "log", jobId],
@@ -43,7 +43,7 @@ export function useReproductions() {
   return useQuery({ queryKey: ["reproductions"], queryFn: () => answer(listReproductions()) });
 }
 
-/** A result stays what it is: it is read again only when another run, `jobId`, has brought a newer one. */
+/** A result never changes; a newer run has another `jobId`. */
 export function useReproductionResult(name: string, jobId: number | null) {
   return useQuery({
     queryKey: ["reproduction", name, jobId],

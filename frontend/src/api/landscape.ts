@@ -3,7 +3,7 @@ import { answer } from "./client";
 import { getLandscape } from "./generated";
 import type { Theme } from "./queries";
 
-/** Asking for it has the server compute it, so it is asked for once somebody looks. */
+/** The request starts the computation, so it is sent only when the panel is in view. */
 export function useLandscape(campaignId: number, theme: Theme, stacked: boolean, enabled: boolean) {
   return useQuery({
     queryKey: ["campaign", campaignId, "landscape", theme, String(stacked)],

@@ -1,4 +1,4 @@
-/** The vehicles that this tab is in control of, with the tokens that show it. A reload keeps them. */
+/** Leases of this tab with their tokens; they survive a reload. */
 
 import { useSyncExternalStore } from "react";
 import { Store } from "./store";
@@ -47,7 +47,7 @@ export function useOwnLease(vehicleId: number | null): OwnLease | null {
   );
 }
 
-/** The header that shows one's control of a vehicle; empty without it. */
+/** The header that proves control of a vehicle; empty without a lease. */
 export function controlHeader(vehicleId: number): Record<string, string> {
   const lease = leases.get().get(vehicleId);
   return lease === undefined ? {} : { "X-Gainline-Control": lease.token };

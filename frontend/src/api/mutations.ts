@@ -1,4 +1,4 @@
-/** Everything that pages do. The event stream makes the answers doubtful; what comes back is put in at once. */
+/** All mutations. The event stream invalidates queries; responses are stored in the cache immediately. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
@@ -53,9 +53,8 @@ export function useCreateCampaign() {
   });
 }
 
-/** Plan a trial of a proposal or of gains of one's own, and fly it if the body says so; that of a registered vehicle is
- * otherwise staged: its fly screen opens. Here and not where it was asked for: the card that asked is gone as soon as
- * the trial is known, and would not hear of it. */
+/** Plan a trial of a proposal or of manual gains, and fly it if the body requests it; otherwise open the fly screen of
+ * a registered vehicle. Navigates here because the calling card is unmounted as soon as the trial is known. */
 export function useCreateTrial({ id, vehicle }: Campaign) {
   const settled = useSettled();
   const navigate = useNavigate();
@@ -106,7 +105,7 @@ export function useClassify() {
 
 export type AbortJudgementInput = "behaved badly" | "something else";
 
-/** Why the operator broke a flight off. */
+/** Why the operator aborted a flight. */
 export function useJudgeAbort() {
   const settled = useSettled();
   return useMutation({
@@ -120,13 +119,13 @@ export function useJudgeAbort() {
 export interface RecordOrder extends RecordFiles {
   trialId?: number;
   proposalId?: number;
-  /** Which one of a log with several takeoffs. */
+  /** Number of the takeoff in a log with several. */
   takeoff?: number;
-  /** Take the log's gains although they are not the planned ones. */
+  /** Accept the log's gains although they differ from the planned ones. */
   confirm?: boolean;
 }
 
-/** Hand in the record of a flight made elsewhere; the proposal becomes a trial first when none is planned. */
+/** Upload the record of a flight made elsewhere; without a planned trial, the proposal is planned first. */
 export function useUploadRecord(campaignId: number) {
   const settled = useSettled();
   return useMutation({
@@ -166,7 +165,7 @@ export function useFinish(campaignId: number) {
   });
 }
 
-/** The campaign that rehearses this one on a simulation. */
+/** Create the campaign that rehearses this one on a simulation. */
 export function useRehearse(campaignId: number) {
   const settled = useSettled();
   return useMutation({
@@ -176,7 +175,7 @@ export function useRehearse(campaignId: number) {
   });
 }
 
-/** Make the best gains the safe ones of the campaign's registered vehicle. */
+/** Set the best gains as the safe gains of the campaign's registered vehicle. */
 export function usePromote({ id, vehicle }: Campaign) {
   const queries = useQueryClient();
   return useMutation({

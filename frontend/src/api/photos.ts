@@ -1,4 +1,4 @@
-/** What people keep of a flight beside its record: a note, and photos. */
+/** Note and photos of a flight. */
 
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";

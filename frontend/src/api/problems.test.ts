@@ -47,7 +47,7 @@ test("a server that is away is told apart from a refusal", () => {
 });
 
 test("an answer that is no problem document still says something", () => {
-  expect(problemFrom(502, "<html>").title).toBe("The server answered 502.");
+  expect(problemFrom(502, "<html>").title).toBe("The server returned status 502.");
 });
 
 test("a reading is tried again while the server is away, and never after a refusal", () => {

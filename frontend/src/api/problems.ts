@@ -1,9 +1,9 @@
-/** What the server says when it refuses: RFC 9457 problem details, with our hint and the refused fields. */
+/** RFC 9457 problem details of refused requests, with a hint and the refused fields. */
 
 export interface FieldProblem {
   field: string;
   reason: string;
-  /** Values of gains that would pass, where the server knows them. */
+  /** Gain values that would pass, if the server knows them. */
   offer?: Record<string, number>;
 }
 
@@ -28,25 +28,26 @@ export class ApiError extends Error {
 const UNREACHABLE: Problem = {
   status: 0,
   title: "The server cannot be reached.",
-  detail: "It is not known whether what was asked has arrived there.",
-  hint: "Check that Gainline runs and that the Wi-Fi is up. This page catches up by itself: look at it before asking again.",
+  detail: "The request may or may not have been received.",
+  hint: "Check that Gainline is running and that the Wi-Fi is up. The page updates automatically: check it before you try again.",
   problems: [],
 };
 
-/** The program was updated, or the server went away, after this tab was opened. */
+/** Gainline was updated, or the server was lost, after this tab was opened. */
 export const PAGE_MISSING: Problem = {
   status: 0,
-  title: "This page could not be fetched.",
-  detail: "The server is away, or it was updated since this tab was opened. What flies goes on; nothing was changed.",
-  hint: "Try again; once a lost server is back, the page comes by itself.",
+  title: "This page could not be loaded.",
+  detail:
+    "The server is unreachable, or it was updated after this tab was opened. Flights continue; nothing was changed.",
+  hint: "Try again. The page loads automatically when the server is back.",
   problems: [],
 };
 
 export const BROKEN_PAGE: Problem = {
   status: 0,
-  title: "This page broke while it was drawn.",
-  detail: "It is a fault of this program. What flies goes on; nothing was changed.",
-  hint: "Try again; the other pages still work. The browser's console says more.",
+  title: "This page could not be displayed.",
+  detail: "Internal error. Flights continue; nothing was changed.",
+  hint: "Try again. Other pages still work. See the browser console for details.",
   problems: [],
 };
 
@@ -70,32 +71,32 @@ function offeredBy(value: unknown): Record<string, number> {
   return Object.fromEntries(Object.entries(value).filter(([, number]) => typeof number === "number"));
 }
 
-/** Whether it was gains that were refused, and not something else about the request. */
+/** Whether the request was refused because of its gains only. */
 export function isGateRefusal(problem: Problem | null): boolean {
   const fields = (problem?.problems ?? []).map(({ field }) => field.replace(/^body\./, ""));
   return fields.length > 0 && fields.every((field) => field === "gains" || field.startsWith("gains."));
 }
 
-/** Every gain's value that would pass, of all refusals together. */
+/** Gain values that would pass, of all refusals together. */
 export function offersOf(problem: Problem | null): [gain: string, value: number][] {
   const all = Object.assign({}, ...(problem?.problems ?? []).map(({ offer }) => offer ?? {})) as Record<string, number>;
   return Object.entries(all);
 }
 
-/** What the limits say that offer other values; every offer lies within all of them. */
+/** Reasons of the limits that offer other values; every offer is within all of them. */
 export function limitsOf(problem: Problem | null): string[] {
   return [...new Set((problem?.problems ?? []).filter(({ offer }) => offer !== undefined).map(({ reason }) => reason))];
 }
 
-/** Whatever a failed request brought, as a problem that can be shown. */
+/** Convert the response of a failed request to a problem. */
 export function problemFrom(status: number | undefined, body: unknown): Problem {
   if (status === undefined) return UNREACHABLE;
   const found = (typeof body === "object" && body !== null ? body : {}) as Record<string, unknown>;
   return {
     status,
-    title: text(found["title"]) || `The server answered ${status}.`,
+    title: text(found["title"]) || `The server returned status ${status}.`,
     detail: text(found["detail"]),
-    hint: text(found["hint"]) || (status >= 500 ? "Try again; if it happens again, look into the server's log." : ""),
+    hint: text(found["hint"]) || (status >= 500 ? "Try again. If it happens again, check the server log." : ""),
     problems: fieldProblems(found["problems"]),
   };
 }
@@ -106,7 +107,7 @@ export function problemOf(error: unknown): Problem | null {
   return { ...UNREACHABLE, title: error instanceof Error ? error.message : UNREACHABLE.title };
 }
 
-/** Reason per field. A refused field can stand anywhere below `prefix` (`body.definition.bounds.kp`). */
+/** Reason per field. A refused field may have any prefix (`body.definition.bounds.kp`). */
 export function reasonsByField(problem: Problem | null, fields: readonly string[]): Record<string, string> {
   const reasons: Record<string, string> = {};
   for (const { field, reason } of problem?.problems ?? []) {
@@ -118,15 +119,15 @@ export function reasonsByField(problem: Problem | null, fields: readonly string[
   return reasons;
 }
 
-/** Sentences stand side by side; words that are none are kept apart by a semicolon. */
+/** Join sentences by a space, and other texts by a semicolon. */
 function joined(one: string, other: string): string {
   return /[.!?]$/.test(one) ? `${one} ${other}` : `${one}; ${other}`;
 }
 
-/** What decides first: harm in flight, the worst first, before mere limits. */
+/** Most important reasons first: harm in flight before limits. */
 const WEIGHT = [/stuck on the ground/, /wrap/, /ceiling|diverge|rise/];
 
-/** The reason that a person has to read of a refusal of gains, and the other ones. */
+/** Reasons of a gain refusal, most important first. */
 export function reasonsByWeight(problem: Problem | null): string[] {
   const rank = (reason: string): number => {
     const found = WEIGHT.findIndex((words) => words.test(reason));
@@ -136,14 +137,14 @@ export function reasonsByWeight(problem: Problem | null): string[] {
   return [...reasons].sort((one, other) => rank(one) - rank(other));
 }
 
-/** The refused fields that none of `fields` shows. */
+/** Refused fields that are not among `fields`. */
 export function otherProblems(problem: Problem | null, fields: readonly string[]): FieldProblem[] {
   return (problem?.problems ?? []).filter(
     (one) => Object.keys(reasonsByField({ ...UNREACHABLE, problems: [one] }, fields)).length === 0,
   );
 }
 
-/** Whether a failed reading is worth another try: a server that is away may come back, a refusal stays one. */
+/** Whether to retry a failed read: an unreachable server may return, a refusal is final. */
 export function retries(failures: number, error: unknown): boolean {
   const problem = problemOf(error);
   return failures < 3 && (problem === null || problem.status === 0 || problem.status >= 500);

@@ -1,4 +1,4 @@
-/** Everything that pages read. Keys are what `live/staleQueries.ts` makes stale. */
+/** All queries. `live/staleQueries.ts` invalidates them by their keys. */
 
 import { keepPreviousData, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
@@ -23,7 +23,7 @@ import {
 export type Theme = "light" | "dark";
 export type FigureName = "takeoffs" | "errors" | "gains";
 
-/** From and to, in seconds of the flight. */
+/** Start and end, in seconds of the flight. */
 export type TimeRange = readonly [number, number];
 
 export interface CampaignFilter {
@@ -98,7 +98,7 @@ export function useTrial(trialId: number) {
   return useQuery({ queryKey: ["trial", trialId], queryFn: () => answer(getTrial({ path: { trial_id: trialId } })) });
 }
 
-/** What of a figure is looked at: these seconds, in more detail, and that flight's own curve among many. */
+/** Detail of a figure: a time window at full resolution, and one flight drawn individually. */
 export interface FigureView {
   window: TimeRange | null;
   flight: number | null;
@@ -120,7 +120,7 @@ export function useCampaignFigure(campaignId: number, name: FigureName, theme: T
 
 const POINTS = 300;
 
-/** The scored output of a flight in few points; null where it left no record. */
+/** The scored output of a flight, downsampled; null without a record. */
 export function useCurveOf(trials: readonly Trial[], experiment: string) {
   const client = useQueryClient();
   const output = useCatalogue().data?.experiments.find(({ name }) => name === experiment)?.output ?? "";

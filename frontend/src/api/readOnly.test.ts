@@ -13,14 +13,14 @@ const real = { name: "Bee", is_real: true, registered: true };
 const simulated = { ...real, is_real: false };
 const shared = { ...simulated, registered: false };
 
-describe("who may only watch", () => {
+describe("a browser with read-only access", () => {
   it("is nobody in an unlocked browser on this computer", () => {
     for (const vehicle of [null, real, simulated, shared]) expect(readOnlyReason(UNLOCKED, vehicle)).toBeNull();
   });
 
   it("is told for a real vehicle alone, with the way out, before the browser is unlocked", () => {
     expect(readOnlyReason(LOCKED, real)).toBe(
-      `This browser may only watch Bee. ${HINT} Abort and Land work from here all the same.`,
+      `This browser has read-only access to Bee. ${HINT} Abort and Land still work from here.`,
     );
     for (const vehicle of [null, simulated, shared]) expect(readOnlyReason(LOCKED, vehicle)).toBeNull();
   });
@@ -31,11 +31,11 @@ describe("who may only watch", () => {
   });
 
   it("is told on another device where the vehicle is commanded", () => {
-    expect(readOnlyReason(REMOTE, real)).toContain("on the computer that Gainline runs on");
+    expect(readOnlyReason(REMOTE, real)).toContain("on the computer that runs Gainline");
     expect(readOnlyReason(REMOTE, null)).toBeNull();
   });
 
   it("is told of everything on a device that has not opened a link", () => {
-    expect(readOnlyReason(STRANGER, null)).toBe(`This device may only watch. ${HINT}`);
+    expect(readOnlyReason(STRANGER, null)).toBe(`This device has read-only access. ${HINT}`);
   });
 });

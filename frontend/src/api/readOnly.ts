@@ -1,4 +1,4 @@
-/** What is said to who may only watch. */
+/** Messages for browsers with read-only access. */
 
 import type { Access } from "./types";
 
@@ -8,25 +8,25 @@ export interface WatchedVehicle {
   registered: boolean;
 }
 
-const STOPPING = "Abort and Land work from here all the same.";
+const STOPPING = "Abort and Land still work from here.";
 
-/** Why a browser may only watch: this vehicle, or whatever there is (null). Null where it may act. */
+/** Why a browser has read-only access to the vehicle, or to the server if null. Null if it may act. */
 export function readOnlyReason(access: Access, vehicle: WatchedVehicle | null): string | null {
   if (vehicle === null) {
-    return access.may_change ? null : sentences("This device may only watch.", access.hint);
+    return access.may_change ? null : sentences("This device has read-only access.", access.hint);
   }
   if (!vehicle.registered || (vehicle.is_real ? access.may_command : access.may_link)) return null;
-  const watching = `This browser may only watch ${vehicle.name}.`;
-  if (access.elsewhere) return sentences(watching, "It is commanded on the computer that Gainline runs on.");
+  const watching = `This browser has read-only access to ${vehicle.name}.`;
+  if (access.elsewhere) return sentences(watching, "Operate it on the computer that runs Gainline.");
   if (!access.may_link) {
     return sentences(
       watching,
-      "Other devices reach this server, and vehicles with a link fly only from one that is started with --host 127.0.0.1.",
+      "Other devices can reach this server. Vehicles with a link fly only from a server started with --host 127.0.0.1.",
     );
   }
   return sentences(watching, access.hint, STOPPING);
 }
 
-function sentences(...said: string[]): string {
-  return said.filter((one) => one !== "").join(" ");
+function sentences(...parts: string[]): string {
+  return parts.filter((one) => one !== "").join(" ");
 }

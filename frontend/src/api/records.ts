@@ -1,8 +1,8 @@
-/** Records of flights made elsewhere: which files they are, and what the server asks about them. */
+/** Records of flights made elsewhere: their files, and the server's questions about them. */
 
 import type { Problem } from "./problems";
 
-/** For the file chooser. A .log goes with Paparazzi's .data file. */
+/** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
 export const RECORD_FILES = ".csv,.tlog,.bin,.ulg,.data,.log,text/csv";
 
 export interface RecordFiles {
@@ -24,7 +24,7 @@ export function recordOf(files: readonly File[]): RecordFiles | null {
   return { file, ...(companion === undefined ? {} : { companion }) };
 }
 
-/** The takeoffs of a log that the server wants one chosen of. */
+/** The takeoffs of a log from which the server requests a choice. */
 export function takeoffsIn(problem: Problem | null): Takeoff[] {
   return (problem?.problems ?? []).flatMap(({ field, reason }) => {
     const [, number, summary] = /^(\d+): (.*)$/.exec(reason) ?? [];
@@ -34,7 +34,7 @@ export function takeoffsIn(problem: Problem | null): Takeoff[] {
   });
 }
 
-/** Whether the log was flown with other gains than planned, which a person has to take or leave. */
+/** Whether the log has other gains than planned, which needs a confirmation. */
 export function wantsConfirmation(problem: Problem | null): boolean {
   return (problem?.problems ?? []).some(({ field }) => field === "confirm");
 }

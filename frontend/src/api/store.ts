@@ -1,4 +1,4 @@
-/** A value kept outside of React, which components subscribe to. */
+/** A value outside of React that components subscribe to. */
 
 type Listener = () => void;
 

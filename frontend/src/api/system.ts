@@ -1,4 +1,4 @@
-/** The server itself: where it is reached, what it holds. */
+/** The server: addresses, disk usage, version. */
 
 import { useQuery } from "@tanstack/react-query";
 import { answer } from "./client";
@@ -6,7 +6,7 @@ import { getSystem } from "./generated";
 
 export type { System } from "./generated";
 
-/** Disk and addresses change without an event, so they are read whenever they are looked at. */
+/** Disk usage and addresses change without an event, so they are refetched on every visit. */
 export function useSystem() {
   return useQuery({ queryKey: ["system"], queryFn: () => answer(getSystem()), staleTime: 0 });
 }

@@ -1,4 +1,4 @@
-/** The API's types under the names that pages use. */
+/** API types, under the names that pages use. */
 
 export type {
   Access,

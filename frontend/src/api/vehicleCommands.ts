@@ -1,4 +1,4 @@
-/** The acts of the fly screen: stage, take off, unstage; land and motors off, which wait for nothing. */
+/** Actions of the fly screen: stage, take off, unstage; land and motors off, which bypass the queue. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
@@ -43,7 +43,7 @@ export interface CommandAnswer {
 
 const SENDS = { land: landVehicle, "motors off": stopMotors } as const;
 const AGAIN_MS = 400;
-/** An order is not carried out long after it was given: whoever still wants it gives it again. */
+/** A command must not be executed long after it was given. */
 const GIVE_UP_MS = 5000;
 
 async function send(vehicleId: number, order: VehicleCommand): Promise<CommandAnswer> {
@@ -60,7 +60,7 @@ async function send(vehicleId: number, order: VehicleCommand): Promise<CommandAn
   }
 }
 
-/** Tells a vehicle to land or to stop its motors, again and again until the worker has taken it, for five seconds. */
+/** Command a vehicle to land or to stop its motors; retried for five seconds until the worker accepts it. */
 export function useVehicleCommands(vehicleId: number) {
   const [said, setSaid] = useState<CommandAnswer | null>(null);
   const again = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);

@@ -1,11 +1,11 @@
-/** What pages read of vehicles. Keys are what `live/staleQueries.ts` makes stale. */
+/** Queries of vehicles. `live/staleQueries.ts` invalidates them by their keys. */
 
 import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
 import { listVehicles, type PageVehicle, type Vehicle } from "./generated";
 
 const LARGEST_PAGE = 200;
-/** Nobody is told that a lease has run out, so whoever shows one asks again. */
+/** The expiry of a lease causes no event, so a shown lease is polled. */
 const CONTROL_MS = 10_000;
 
 async function allVehicles(): Promise<Vehicle[]> {
@@ -20,7 +20,7 @@ async function allVehicles(): Promise<Vehicle[]> {
   return vehicles;
 }
 
-/** Every vehicle: the registered ones, and the simulations that campaigns share. */
+/** All vehicles: registered ones and shared simulations. */
 export function useVehicles() {
   return useQuery({
     queryKey: ["vehicles"],
@@ -29,12 +29,12 @@ export function useVehicles() {
   });
 }
 
-/** One vehicle out of the list of all, which every page has. */
+/** One vehicle from the list of all, which every page has. */
 export function useVehicle(vehicleId: number | null): Vehicle | null {
   return useVehicles().data?.find(({ id }) => id === vehicleId) ?? null;
 }
 
-/** What an act on a vehicle makes doubtful: to be called once it is over. */
+/** Invalidates the queries of a vehicle after an action. */
 export function useVehicleChanged() {
   const queries = useQueryClient();
   return (vehicleId: number): Promise<unknown> =>

@@ -18,26 +18,26 @@ import { narrowed, type PlotlyFigure, traceWithRole, withLive } from "./traces";
 
 interface Props {
   figure: PlotlyFigure;
-  /** What the chart shows, for those who cannot see it; the data table says the rest. */
+  /** Text alternative for screen readers; the data table has the details. */
   label: string;
-  /** In pixels; null fills what holds it. */
+  /** In pixels; null fills the container. */
   height: number | null;
   liveTrial?: number | null;
   onChoose?: ((trial: number) => void) | undefined;
-  /** The seconds that a zoom leaves in sight, null for all. */
+  /** Called with the zoomed time range; null for the whole range. */
   onWindow?: ((window: TimeRange | null) => void) | undefined;
   curveOf?: CurveOf | undefined;
-  /** Of the chart library; the same for as long as the chart is there. */
+  /** Build of the chart library; constant for the lifetime of the chart. */
   build?: Build | undefined;
 }
 
 const NARROW_PX = 420;
 const coarse = window.matchMedia("(pointer: coarse)");
 
-/** Brushing zooms with a mouse; a finger has to be able to scroll the page. */
+/** Dragging zooms with a mouse; with a finger it scrolls the page. */
 function layoutFor({ data, layout }: PlotlyFigure, width: number): Record<string, unknown> {
   const fitting = width < NARROW_PX ? narrowed(layout, data, width) : layout;
-  // A copy: Plotly writes a zoom into the layout that it is given, and the figure has to stay what it was.
+  // A copy, because Plotly writes the zoom into the layout.
   return { ...structuredClone(fitting), autosize: true, ...(coarse.matches ? { dragmode: false } : {}) };
 }
 
@@ -95,7 +95,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
   useEffect(() => {
     const target = element.current;
     if (target === null || plotly === null) return;
-    // A page that was left resizes its charts to nothing, and by then there may be none to resize.
+    // A page that was left resizes its charts to zero, when they may already be removed.
     const observer = new ResizeObserver(() => void (target.offsetParent !== null && plotly.Plots.resize(target)));
     observer.observe(target);
     return () => {
@@ -113,7 +113,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
       style={{ height: height === null ? "100%" : `min(${height}px, var(--tallest, 96vw))` }}
     >
       {broken !== null && (
-        <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table still works.</p>
+        <p className={classes["broken"]}>The chart could not be drawn ({broken}). Its data table is still available.</p>
       )}
       {plotly === null && broken === null && <div className={classes["waiting"]} aria-hidden />}
       <div ref={element} className={classes["plot"]} data-drawn={plotly !== null || undefined} />

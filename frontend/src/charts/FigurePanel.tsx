@@ -17,10 +17,10 @@ interface Props {
   title: string;
   card: FigureCard | undefined;
   error: unknown;
-  /** Whether it is being asked for already. */
+  /** Whether the figure has been requested. */
   wanted?: boolean;
   height: number;
-  /** What the page adds to the figure as it came. */
+  /** Modifies the received figure. */
   dressed?: (figure: PlotlyFigure) => PlotlyFigure;
   liveTrial?: number | null;
   onChoose?: (trial: number) => void;
@@ -28,14 +28,14 @@ interface Props {
   curveOf?: CurveOf;
   build?: Build;
   tools?: ReactNode;
-  /** What a newcomer asks of it. */
+  /** Help topic. */
   topic?: Topic;
-  /** What there is to say of it in words. */
+  /** Text below the figure. */
   note?: string | undefined;
   className?: string | undefined;
 }
 
-/** One figure with its table one tap away; says so when there is nothing to draw yet or drawing failed. */
+/** A figure that can be switched to its data table; shows the reason if there is nothing to draw or drawing failed. */
 export function FigurePanel({
   title,
   card,

@@ -1,4 +1,4 @@
-/** The chart library, fetched when the first chart is drawn. */
+/** The chart library, loaded when the first chart is drawn. */
 
 import type { Plotly } from "plotly.js-basic-dist-min";
 import type { TimeRange } from "../api/queries";
@@ -9,7 +9,7 @@ import { onPointed, pointAt } from "./pointing";
 import { flightAt, marksOver, roomFor, type Trace, traceWithRole, windowFrom } from "./traces";
 
 const BUILDS = {
-  /** Lines and marks: what nearly every chart is made of, and a fifth less to load than the build with all. */
+  /** Lines and markers, enough for nearly every chart, and a fifth smaller than the full build. */
   lines: () => import("plotly.js-basic-dist-min"),
   contours: () => import("plotly.js-cartesian-dist-min"),
 } as const;
@@ -32,7 +32,7 @@ export function loadPlotly(build: Build = "lines"): Promise<Plotly> {
   return asked;
 }
 
-/** Nothing leaves this machine: Plotly's own upload and edit buttons stay out. */
+/** No data leaves this machine: without Plotly's upload and edit buttons. */
 export const CONFIG = {
   displayModeBar: window.matchMedia("(pointer: coarse)").matches ? false : "hover",
   displaylogo: false,
@@ -58,11 +58,11 @@ export interface PlotlyElement extends HTMLElement {
   removeAllListeners?(event: string): void;
 }
 
-/** Where a flight without a curve of its own finds one. */
+/** Loads the curve of a flight that is not drawn individually. */
 export type CurveOf = (flight: number) => Promise<{ x: number[]; y: number[] } | null>;
 
 export interface Listeners {
-  /** The seconds that a figure shows before anybody zooms. */
+  /** The time range of the figure without a zoom. */
   whole: TimeRange | null;
   onChoose?: ((flight: number) => void) | undefined;
   onWindow?: ((window: TimeRange | null) => void) | undefined;
@@ -70,7 +70,7 @@ export interface Listeners {
 
 const SETTLED_MS = 250;
 
-/** Tell which flight is pointed at and clicked, and, once a zoom has settled, which seconds are looked at. */
+/** Report hovered and clicked flights, and the time range after a zoom has settled. */
 export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, onChoose, onWindow }: Listeners): void {
   for (const event of ["click", "hover", "unhover", "relayout"]) chart.removeAllListeners?.(`plotly_${event}`);
   const flightOf = ([point]: Point[]) => (point ? flightAt(traces, point.curveNumber, point.x) : null);
@@ -92,7 +92,7 @@ export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, 
 
 const DWELL_MS = 150;
 
-/** Let a flight that is pointed at elsewhere stand out: its curve by style alone, its marks by their labels. */
+/** Highlight the flight that is hovered elsewhere: its curve by style, its markers by their labels. */
 export function followPointing(
   plotly: Plotly,
   chart: PlotlyElement,
@@ -145,7 +145,7 @@ export function followPointing(
   };
 }
 
-/** Grow the chart's live trace as telemetry of a trial comes; returns the function that ends it. */
+/** Extend the live trace with the telemetry of a trial; returns the unsubscribe function. */
 export function drawLive(plotly: Plotly, chart: HTMLElement, trace: number, trialId: number): () => void {
   let latest: LiveFlight | null = null;
   const drawing = throttled(async () => {

@@ -1,4 +1,4 @@
-/** The flight that is pointed at: its curve, its marks and its row stand out together, and no component is drawn anew. */
+/** The hovered flight: its curve, markers and row are highlighted together, without rendering components. */
 
 type Listener = (flight: number | null) => void;
 
@@ -11,7 +11,7 @@ export function pointAt(flight: number | null): void {
   for (const listener of listeners) listener(flight);
 }
 
-/** Calls `listener` with each flight that is pointed at, null for none; returns what ends that. */
+/** Call `listener` with each hovered flight, null for none; returns the unsubscribe function. */
 export function onPointed(listener: Listener): () => void {
   listeners.add(listener);
   return () => void listeners.delete(listener);

@@ -12,8 +12,8 @@ export interface Scale {
   y: readonly [number, number];
 }
 
-/** One scale for all curves; a curve that leaves it is cut at the edge. It goes from the ground to above the set point;
- * around one that is zero as far as the first flight strays. */
+/** One scale for all curves, which are clipped to it: from the ground to above the set point; for a set point of zero,
+ * symmetric, as far as the first flight deviates. */
 export function scaleFor(curves: readonly (readonly Point[])[], setPoint: number): Scale {
   const times = curves.flatMap((curve) => curve.map((point) => point[0]));
   const x = [Math.min(0, ...times), Math.max(1, ...times)] as const;

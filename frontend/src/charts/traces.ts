@@ -1,4 +1,4 @@
-/** What a page adds to a figure that the server drew: the live curve, and the emphasis on a chosen flight. */
+/** Changes to the server's figures: the live curve, and the highlight of the selected flight. */
 
 import type { TimeRange } from "../api/queries";
 import type { LiveFlight } from "../live/telemetry";
@@ -28,7 +28,7 @@ export function traceWithRole(traces: readonly Trace[], role: string): number {
   return traces.findIndex((trace) => trace.meta?.role === role);
 }
 
-/** The `live` trace filled with what has been measured so far; as it was when nothing flies. */
+/** The traces with the measured samples in the `live` trace; unchanged without a flight. */
 export function withLive(traces: readonly Trace[], flight: LiveFlight | null): Trace[] {
   if (flight === null || flight.timeS.length === 0) return [...traces];
   return traces.map((trace) =>
@@ -38,7 +38,7 @@ export function withLive(traces: readonly Trace[], flight: LiveFlight | null): T
 
 const FADED = 0.22;
 
-/** A chosen flight stands out and the other flights step back; goal, prediction and live curve stay. */
+/** Highlight the selected flight and fade the others; set point, prediction and live curve are unchanged. */
 export function withChosen(traces: readonly Trace[], trial: number | null): Trace[] {
   if (trial === null || !traces.some((trace) => trace.meta?.role === "flight" && trace.meta.trial === trial)) {
     return [...traces];
@@ -51,11 +51,11 @@ export function withChosen(traces: readonly Trace[], trial: number | null): Trac
   });
 }
 
-/** Roles of marks that stand over the number of their flight. */
+/** Roles of markers whose x value is the flight number. */
 const FLOWN = new Set(["measured", "not counted", "not yet judged", "flown"]);
 const NUMBERED = new Set([...FLOWN, "off scale", "best", "predicted"]);
 
-/** The flight that a point of a chart belongs to, from Plotly's event; the prediction's flight is none yet. */
+/** The flight of a chart point, from Plotly's event; null for others. */
 export function flightAt(traces: readonly Trace[], curveNumber: number, x: unknown): number | null {
   const meta = traces[curveNumber]?.meta;
   if (meta?.role === "flight" || meta?.role === "glitch") return meta.trial ?? null;
@@ -63,7 +63,7 @@ export function flightAt(traces: readonly Trace[], curveNumber: number, x: unkno
   return meta.trial ?? (typeof x === "number" ? x : null);
 }
 
-/** The points that stand over a flight's number: one for each trace of marks that has it. */
+/** The points of a flight: one for each trace of markers that has it. */
 export function marksOver(traces: readonly Trace[], flight: number): { curveNumber: number; pointNumber: number }[] {
   return traces.flatMap((trace, curveNumber) => {
     if (!FLOWN.has(trace.meta?.role ?? "")) return [];
@@ -72,7 +72,7 @@ export function marksOver(traces: readonly Trace[], flight: number): { curveNumb
   });
 }
 
-/** The part of the time axis that is looked at, from Plotly's event: null for all of it, undefined for no change. */
+/** The visible time range, from Plotly's event: null for all of it, undefined if unchanged. */
 export function windowFrom(event: Record<string, unknown>, whole: TimeRange): TimeRange | null | undefined {
   if (event["xaxis.autorange"] === true) return null;
   const range = event["xaxis.range"];
@@ -82,17 +82,17 @@ export function windowFrom(event: Record<string, unknown>, whole: TimeRange): Ti
 }
 
 const LETTER_PX = 5.8;
-/** What Plotly draws before a name, and leaves free after it. */
+/** Width of the legend symbol and its margins. */
 const SYMBOL_PX = 45;
 const WHOLE_PX = 220;
 
-/** The room for names of that length: two to a row, if at most a letter or two is lost, or one that is read whole. */
+/** Legend entry width: two per row if at most a letter or two is cut off, otherwise one. */
 function entryWidth(letters: number, half: number): number {
   const wanted = LETTER_PX * letters;
   return Math.min(wanted, wanted < 1.2 * half ? half : WHOLE_PX);
 }
 
-/** The same layout for a narrow screen: a smaller legend in columns as wide as its longest name. */
+/** The layout for a narrow screen: a smaller legend, with columns as wide as its longest name. */
 export function narrowed(
   layout: Record<string, unknown>,
   traces: readonly Trace[],
@@ -113,14 +113,14 @@ export function narrowed(
   };
 }
 
-/** The top of an axis that a growing curve still fits under: `range` itself, or raised to the curve's peak. */
+/** The axis range, extended if the curve's peak is above it. */
 export function roomFor(range: readonly [number, number], values: readonly number[]): [number, number] {
   const peak = values.reduce((highest, value) => Math.max(highest, value), Number.NEGATIVE_INFINITY);
   const [low, high] = range;
   return peak <= high ? [low, high] : [low, low + 1.1 * (peak - low)];
 }
 
-/** The same layout with its first x axis cut to `range`, or as it was for null. */
+/** The layout with its first x axis limited to `range`; unchanged for null. */
 export function withTimeRange(layout: Record<string, unknown>, range: readonly [number, number] | null) {
   if (range === null) return layout;
   const axis = typeof layout["xaxis"] === "object" && layout["xaxis"] !== null ? layout["xaxis"] : {};

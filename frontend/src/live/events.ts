@@ -1,4 +1,4 @@
-/** The tab's one event stream: changes make cached answers doubtful, telemetry feeds the live curves. */
+/** The event stream of the tab: changes invalidate queries, telemetry feeds the live curves. */
 
 import type { QueryClient } from "@tanstack/react-query";
 import { createInvalidator } from "./invalidation";
@@ -10,23 +10,22 @@ import { secondsBetween, statusFrom } from "./vehicleStatus";
 const GATHER_MS = 40;
 const AGAIN_MS = 1000;
 const HIDDEN_MS = 20_000;
-/** The server says something every three seconds; a line that is silent for longer is dead, though it looks open. */
+/** The server sends an event at least every three seconds; a stream without events for longer is dead. */
 const SILENT_S = 8;
 const WATCH_MS = 1000;
 const MAX_SINCE_S = 60;
 const MARGIN_S = 3;
 
-/** Seconds since the page began to load, and a little more: its first answers may be older than its first stream, which
- * therefore begins with the changes since then. */
+/** Seconds since the page began to load, plus a margin: the first responses may be older than the stream, so the stream
+ * begins with the changes since then. */
 function sinceLoaded(): number {
   return Math.ceil(performance.now() / 1000) + MARGIN_S;
 }
 
 /**
- * Follow the stream until the returned function is called. The browser itself comes back with `Last-Event-ID`; a
- * stream that had to be opened anew has missed changes, so everything is then read again. A hidden tab lets go of its
- * stream after a while, unless something flies. A stream that fell silent, in a sleep or with the Wi-Fi, is given up and
- * opened anew.
+ * Follow the stream until the returned function is called. The browser reconnects with `Last-Event-ID`; a stream that
+ * had to be reopened has missed changes, so everything is refetched. A hidden tab closes its stream after a while,
+ * unless a vehicle flies. A stream without events, after a sleep or a Wi-Fi loss, is closed and reopened.
  */
 export function followEvents(queries: QueryClient, somethingFlies: () => boolean): () => void {
   const invalidator = createInvalidator(queries);
@@ -116,7 +115,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     }
   }
 
-  /** Give up a stream that should have said something by now. */
+  /** Reopen a stream whose next event is overdue. */
   function watch(): void {
     const now = momentNow();
     if (source === null || secondsBetween(heard, now) < SILENT_S) return;

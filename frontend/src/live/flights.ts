@@ -1,4 +1,4 @@
-/** What is in the air, and how to end it. */
+/** Flights in progress, and their abort. */
 
 import { useQuery } from "@tanstack/react-query";
 import { useCallback, useEffect, useRef, useState } from "react";
@@ -39,7 +39,7 @@ export function useFlying(): FlyingCampaign[] {
 
 const AGAIN_MS = 400;
 
-/** Why the worker has not taken the abort, or null when it has. */
+/** Why the worker did not accept the abort; null if it did. */
 async function askToAbort(trialId: number): Promise<string | null> {
   try {
     const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
@@ -51,8 +51,8 @@ async function askToAbort(trialId: number): Promise<string | null> {
 }
 
 /**
- * Abort by trial id. A press counts until the flight is over: while the worker cannot be told, it is told again.
- * `trouble` says that it has not been told yet.
+ * Abort by trial id. The request is repeated until the worker accepts it or the flight is over. `trouble` is the reason
+ * why it has not been accepted yet.
  */
 export function useAbort(flying: readonly FlyingCampaign[]) {
   const [asked, setAsked] = useState<ReadonlySet<number>>(new Set());

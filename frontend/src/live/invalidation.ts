@@ -1,15 +1,14 @@
 import type { InvalidateQueryFilters, QueryClient } from "@tanstack/react-query";
 
 export interface Invalidator {
-  /** Have what matches read again; everything, without filters. */
+  /** Refetch matching queries; all queries without filters. */
   invalidate(filters?: InvalidateQueryFilters): void;
   stop(): void;
 }
 
 /**
- * Reads again what a change has made doubtful. An answer that is just being waited for and is the first of its kind is
- * not asked for anew by the query client, though it may have been read before the change: it is read once more when it
- * is there.
+ * Refetch queries after a change. The query client does not restart a first fetch that is pending, although its response
+ * may be older than the change: such a query is invalidated again when the response is there.
  */
 export function createInvalidator(queries: QueryClient): Invalidator {
   const cache = queries.getQueryCache();

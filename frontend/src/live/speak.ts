@@ -1,8 +1,8 @@
-/** The browser's voice. */
+/** Speech output of the browser. */
 
 import type { Sentence } from "./speech";
 
-/** Says it after what is being said, or at once. Silent in a browser without a voice. */
+/** Speak after the current sentence, or at once if urgent. Does nothing without speech synthesis. */
 export function speak({ text, urgent }: Sentence): void {
   if (!("speechSynthesis" in window)) return;
   if (urgent) window.speechSynthesis.cancel();

@@ -48,14 +48,14 @@ test("what the vehicle does is said once, and what is wrong with it at once", ()
   ]);
   expect(said(of({}), of({ state: "gone" }))).toEqual(["Link to Bee lost."]);
   expect(said(of({ state: "gone" }), of({}))).toEqual(["Link to Bee is back."]);
-  expect(said(of({}), of({ state: "not answering" }))).toEqual(["Orders do not reach Bee. Use the remote control."]);
+  expect(said(of({}), of({ state: "not answering" }))).toEqual(["Commands do not reach Bee. Use the remote control."]);
   expect(said(of({ state: "not answering" }), of({}))).toEqual(["Link to Bee is back."]);
   expect(said(of({ battery_v: 10.6 }), of({ battery_v: 10.4 }))).toEqual(["Battery low, 10.4 volts."]);
   expect(said(of({ battery_v: 10.4 }), of({ battery_v: 10.3 }))).toEqual([]);
 });
 
 test("a server that goes away is told, one that has not been reached yet is not", () => {
-  expect(said(news(), news({ state: "away" }))).toEqual(["The server does not answer."]);
+  expect(said(news(), news({ state: "away" }))).toEqual(["The server is not responding."]);
   expect(said(news({ state: "connecting" }), news({ state: "away" }))).toEqual([]);
 });
 

@@ -1,16 +1,16 @@
-/** What is worth saying aloud: news of the stream in, sentences out. */
+/** Spoken announcements for changes of the event stream. */
 
 import type { LiveFlight } from "./telemetry";
 import type { LastHeard, VehicleStatus } from "./vehicleStatus";
 
-/** What the stream has said so far. */
+/** State of the event stream. */
 export interface News {
   state: "connecting" | "live" | "away";
   flights: ReadonlyMap<number, Pick<LiveFlight, "phase" | "timeS">>;
   vehicles: ReadonlyMap<number, Pick<LastHeard, "status">>;
 }
 
-/** Of a vehicle, what the stream does not say. */
+/** Facts about a vehicle that the stream does not contain. */
 export interface Known {
   name: string;
   minBatteryV: number | null;
@@ -18,7 +18,7 @@ export interface Known {
 
 export interface Sentence {
   text: string;
-  /** Said at once, in place of what is being said. */
+  /** Interrupts the current sentence. */
   urgent: boolean;
 }
 
@@ -36,7 +36,7 @@ const STEPS: Readonly<Record<string, Sentence>> = {
   land: say("Landing."),
   "abort-land": shout("Aborted, landing."),
   "link lost": shout("Link lost."),
-  quarantined: shout("Quarantined. Look at the vehicle."),
+  quarantined: shout("Quarantined. Inspect the vehicle."),
 };
 
 const UNITS: Readonly<Record<string, { word: string; digits: number }>> = {
@@ -50,10 +50,10 @@ function aloud(value: number, unit: string): string {
   return `${value.toFixed(digits)} ${word}`;
 }
 
-/** What has changed and is worth a word. Nothing is said of what was so already when the page was opened. */
+/** Announcements for changes; none for what was so when the page was opened. */
 export function newsSentences(before: News, now: News, known: (vehicleId: number) => Known): Sentence[] {
   const said: Sentence[] = [];
-  if (before.state === "live" && now.state === "away") said.push(shout("The server does not answer."));
+  if (before.state === "live" && now.state === "away") said.push(shout("The server is not responding."));
   for (const [trialId, { phase, timeS }] of now.flights) {
     const earlier = before.flights.get(trialId)?.phase;
     const isNew = phase !== earlier && (earlier !== undefined || timeS.length === 0);
@@ -70,7 +70,7 @@ function statusSentences(before: VehicleStatus, now: VehicleStatus, { name, minB
   const said: Sentence[] = [];
   if (before.state === "connected" && now.state === "gone") said.push(shout(`Link to ${name} lost.`));
   if (before.state !== "not answering" && now.state === "not answering")
-    said.push(shout(`Orders do not reach ${name}. Use the remote control.`));
+    said.push(shout(`Commands do not reach ${name}. Use the remote control.`));
   if (before.state !== "connected" && before.state !== "connecting" && now.state === "connected")
     said.push(say(`Link to ${name} is back.`));
   if (before.armed === false && now.armed === true) said.push(say("Armed."));
@@ -87,7 +87,7 @@ function isLow(batteryV: number | null, minBatteryV: number | null): boolean {
 
 const DOWN: ReadonlySet<string> = new Set(["landed", "ended"]);
 
-/** The trials whose flights have just ended. */
+/** Trials whose flights have just ended. */
 export function justDown(before: News, now: News): number[] {
   return [...now.flights].flatMap(([trialId, { phase }]) =>
     DOWN.has(phase) && before.flights.get(trialId)?.phase === "flying" ? [trialId] : [],
@@ -99,10 +99,10 @@ const OUTCOMES: Readonly<Record<string, Sentence>> = {
   valid: say("Landed, valid"),
   invalid: say("Landed, invalid"),
   aborted: shout("Aborted, landed"),
-  lost: shout("The flight is lost. Look at the vehicle"),
+  lost: shout("Flight lost. Inspect the vehicle"),
 };
 
-/** `Landed, captured, 0.24 metres.`; null while the flight is not in the record yet. */
+/** `Landed, captured, 0.24 metres.`; null until the result is stored. */
 export function outcomeSentence(state: string, error: number | null, unit: string): Sentence | null {
   const outcome = OUTCOMES[state];
   if (outcome === undefined) return null;

@@ -1,4 +1,4 @@
-/** Which cached answers a change on the server makes doubtful. */
+/** Query keys that a change on the server invalidates. */
 
 export interface Change {
   topic: string;
@@ -8,7 +8,7 @@ export interface Change {
 
 export type QueryKey = readonly (string | number)[];
 
-/** What tells of wear. Most of it does not name its vehicle, so that what is known of any vehicle is doubtful. */
+/** Topics that affect calibration history. Most do not name the vehicle, so all vehicles are invalidated. */
 const TELLING = new Set(["campaign", "trial", "flight", "proposal", "vehicle"]);
 
 export function staleQueries(change: Change): QueryKey[] {
@@ -23,7 +23,7 @@ export function staleQueries(change: Change): QueryKey[] {
   return keys;
 }
 
-/** Each key once, however many changes came together. */
+/** The keys of all changes, each once. */
 export function staleQueriesOnce(changes: readonly Change[]): QueryKey[] {
   const keys = new Map(changes.flatMap(staleQueries).map((key) => [JSON.stringify(key), key]));
   return [...keys.values()];

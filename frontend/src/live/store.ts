@@ -1,4 +1,4 @@
-/** What the event stream says, kept outside of React: the connection, the flights under way, and how vehicles are. */
+/** State of the event stream outside of React: connection, flights in progress, vehicle status. */
 
 import { useEffect, useMemo, useState, useSyncExternalStore } from "react";
 import { Store } from "../api/store";
@@ -18,7 +18,7 @@ import {
 export interface Connection {
   state: "connecting" | "live" | "away";
   worker: boolean;
-  /** When the server was last heard, as it stood on this machine's clock; null before the first time. */
+  /** Time of the last event, by this machine's clock; null before the first. */
   heardAt: string | null;
 }
 
@@ -31,7 +31,7 @@ export function setConnection(change: Partial<Connection>): void {
   if (next.state !== connection.get().state || next.worker !== connection.get().worker) connection.set(next);
 }
 
-/** The stream is lost, or let go: nothing on the page may pass for what is so now. */
+/** The stream is lost or closed: all data is stale. */
 export function setNotLive(state: "connecting" | "away", heardAt: string | null): void {
   if (connection.get().state !== state) connection.set({ ...connection.get(), state, heardAt });
 }
@@ -71,7 +71,7 @@ export function liveFlightsNow(): LiveFlight[] {
   return underWay(flights.get());
 }
 
-/** For drawing outside of React: called on every message, returns the function that ends it. */
+/** Subscribe for drawing outside of React: called on every message; returns the unsubscribe function. */
 export function onLive(trialId: number, draw: (flight: LiveFlight) => void): () => void {
   const tell = (): void => {
     const flight = liveNow(trialId);
@@ -83,7 +83,7 @@ export function onLive(trialId: number, draw: (flight: LiveFlight) => void): () 
 
 const TICK_MS = 250;
 
-/** Now, again and again, so that ages count up while nothing comes. */
+/** The current time, updated regularly so that ages increase without messages. */
 function useMoment(): Moment {
   const [now, setNow] = useState(momentNow);
   useEffect(() => {
@@ -93,7 +93,7 @@ function useMoment(): Moment {
   return now;
 }
 
-/** How the vehicle is and how old that is, counting on; null while the stream has said nothing of it. */
+/** Vehicle status with its increasing age; null until the first one is received. */
 export function useVehicleStatus(vehicleId: number | null): Aged | null {
   const heard = useSyncExternalStore(vehicles.subscribe, () =>
     vehicleId === null ? null : (vehicles.get().get(vehicleId) ?? null),
@@ -102,7 +102,7 @@ export function useVehicleStatus(vehicleId: number | null): Aged | null {
   return useMemo(() => (heard === null ? null : aged(heard, now)), [heard, now]);
 }
 
-/** For what speaks of the news: called with everything known, now and whenever any of it changes. Returns the end. */
+/** Subscribe to all state: called now and on every change. Returns the unsubscribe function. */
 export function onNews(tell: (news: News) => void): () => void {
   const tellNow = (): void => tell({ state: connection.get().state, flights: flights.get(), vehicles: vehicles.get() });
   tellNow();
@@ -112,7 +112,7 @@ export function onNews(tell: (news: News) => void): () => void {
   };
 }
 
-/** Whether the readings of a flight under way may be shown as what is so now. */
+/** Whether the readings of a flight in progress are current. */
 export function useIsCurrent(live: LiveFlight | null): boolean {
   const { state, worker } = useConnection();
   const now = useMoment();

@@ -1,4 +1,4 @@
-/** Telemetry of flights under way, as it came over the stream. */
+/** Telemetry of flights in progress, from the event stream. */
 
 import type { Moment } from "./vehicleStatus";
 
@@ -13,7 +13,7 @@ export interface LiveFlight {
   batteryV: number | null;
   errorSoFar: number | null;
   phase: string;
-  /** When the stream last spoke of it; null before. */
+  /** Time of the last message about it; null before the first. */
   heardAt: Moment | null;
 }
 
@@ -21,11 +21,11 @@ export interface Telemetry {
   campaign_id: number;
   trial_id: number;
   time_s: number;
-  /** What each row holds: the seconds first, then the scored channel, then whatever else is worth watching. */
+  /** Columns of each row: time in seconds, the scored channel, then other channels. */
   columns: string[];
   samples: number[][];
   error_so_far: number | null;
-  /** How long ago it was said, in seconds; of what a tab that joins late is told once more. */
+  /** Age of the message in seconds, for messages repeated to tabs that join late. */
   age_s: number;
 }
 
@@ -66,7 +66,7 @@ export function extended(flight: LiveFlight, news: Telemetry): LiveFlight {
   };
 }
 
-/** How a channel is read out: what it is called, its unit, and the digits that matter. */
+/** Display of channels: title, unit and decimal places. */
 const CHANNELS: Record<string, { title: string; unit: string; digits: number }> = {
   altitude_m: { title: "Altitude", unit: "m", digits: 2 },
   pitch_error_rad: { title: "Pitch error", unit: "rad", digits: 3 },
@@ -76,17 +76,17 @@ export function readingOf(channel: string): { title: string; unit: string; digit
   return CHANNELS[channel] ?? { title: channel, unit: "", digits: 3 };
 }
 
-/** On the ground: over, or waiting with the gains set for its operator's word. */
+/** Phases on the ground: finished, or staged and waiting for take-off. */
 const DOWN = new Set(["staged", "landed", "ended"]);
 
-/** The flights that the stream last spoke of as under way, from the moment that their gains are set. */
+/** Flights in progress according to the stream, beginning with the staging of their gains. */
 export function underWay(flights: ReadonlyMap<number, LiveFlight>): LiveFlight[] {
   return [...flights.values()].filter(({ phase }) => !DOWN.has(phase));
 }
 
 const KEPT = 8;
 
-/** The flights with this one put in; of many, only those that were heard of last are kept. */
+/** The flights with this one added; only the most recently updated are kept. */
 export function withFlight(flights: ReadonlyMap<number, LiveFlight>, flight: LiveFlight): Map<number, LiveFlight> {
   const others = [...flights].filter(([trialId]) => trialId !== flight.trialId);
   return new Map([...others.slice(1 - KEPT), [flight.trialId, flight]]);

@@ -41,8 +41,8 @@ test("the age counts on while nothing comes, and after two seconds nothing is cu
   const soon = aged(heard(), after(1));
   expect([soon.linkAgeS, soon.isCurrent, linkText(soon)]).toEqual([1.1, true, "1.1 s"]);
   const late = aged(heard(), after(2));
-  expect([late.isCurrent, linkText(late)]).toEqual([false, "silent for 2.1 s"]);
-  expect(linkText(aged(heard(), after(200)))).toBe("silent for 3 min");
+  expect([late.isCurrent, linkText(late)]).toEqual([false, "no data for 2.1 s"]);
+  expect(linkText(aged(heard(), after(200)))).toBe("no data for 3 min");
 });
 
 test("a status that is told once more is as old as it was said, not as it was told", () => {
@@ -54,17 +54,17 @@ test("a status that is told once more is as old as it was said, not as it was to
 
 test("news that come while the vehicle itself is silent do not make it current", () => {
   const silent = aged(heard({ packet_age_s: 7 }), after(0));
-  expect([silent.isCurrent, linkText(silent)]).toEqual([false, "silent for 7.0 s"]);
+  expect([silent.isCurrent, linkText(silent)]).toEqual([false, "no data for 7.0 s"]);
 });
 
 test("a vehicle that is gone or being sought is not current, however new the news", () => {
   expect(aged(heard({ state: "gone" }), after(0)).isCurrent).toBe(false);
-  expect(linkText(aged(heard({ state: "gone" }), after(0)))).toBe("link gone");
+  expect(linkText(aged(heard({ state: "gone" }), after(0)))).toBe("link lost");
   expect(linkText(aged(heard({ state: "connecting", packet_age_s: null }), after(0)))).toBe("connecting");
   const still = aged(heard({ state: "not answering" }), after(0));
-  expect([still.isCurrent, linkText(still)]).toEqual([false, "its process does not answer"]);
-  expect(linkText(null)).toBe("no news of it");
-  expect(ageText(null)).toBe("never heard");
+  expect([still.isCurrent, linkText(still)]).toEqual([false, "process not responding"]);
+  expect(linkText(null)).toBe("no data");
+  expect(ageText(null)).toBe("no data");
 });
 
 test("a clock that was set back, or that slept, does not make old news new", () => {

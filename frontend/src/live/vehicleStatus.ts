@@ -1,16 +1,16 @@
-/** How a connected vehicle is, as the stream last said, and how old that is by now. */
+/** Last received status of a connected vehicle, and its age. */
 
 export type LinkState = "connecting" | "connected" | "gone" | "not answering";
 
 export interface VehicleStatus {
   vehicleId: number;
   state: LinkState;
-  /** UTC, when it was said. */
+  /** Time of the status, UTC. */
   at: string;
-  /** Seconds since it was said, when the stream told it: of what a tab that joins late is told once more. */
+  /** Age of the status when it was received, in seconds, for statuses repeated to tabs that join late. */
   ageS: number;
   step: string;
-  /** Seconds since the last packet, when it was said. */
+  /** Seconds since the last packet, at the time of the status. */
   packetAgeS: number | null;
   heartbeatAgeS: number | null;
   armed: boolean | null;
@@ -20,15 +20,15 @@ export interface VehicleStatus {
   batteryV: number | null;
   positionHz: number | null;
   lostShare: number | null;
-  /** Gains as last read back; empty when none were. */
+  /** Gains as last read back; empty if none were. */
   held: Readonly<Record<string, number>>;
   said: string;
   trouble: string;
-  /** Why it may only be observed; empty when it may fly. */
+  /** Reason of the quarantine; empty if it may fly. */
   concern: string;
 }
 
-/** Two clocks: one goes on while a tablet sleeps, the other cannot be set back. */
+/** Two clocks: the wall clock runs while a tablet sleeps, the steady clock cannot be set back. */
 export interface Moment {
   wallMs: number;
   steadyMs: number;
@@ -41,27 +41,27 @@ export interface LastHeard {
 
 export interface Aged {
   status: VehicleStatus;
-  /** Seconds since the vehicle was last heard; null when it never was. */
+  /** Seconds since the last packet from the vehicle; null before the first. */
   linkAgeS: number | null;
-  /** Seconds since the status came. */
+  /** Seconds since the status was received. */
   statusAgeS: number;
-  /** Whether the readings may be shown as what is so now. */
+  /** Whether the readings are current. */
   isCurrent: boolean;
 }
 
 export const CURRENT_S = 2;
 
-/** The moment so many seconds before `now`: when that was news which is told only now. */
+/** The moment `ageS` seconds before `now`. */
 export function before(now: Moment, ageS: number): Moment {
   return { wallMs: now.wallMs - 1000 * ageS, steadyMs: now.steadyMs - 1000 * ageS };
 }
 
-/** The larger of what both clocks say: a clock set back or asleep must not make old news look new. */
+/** The larger difference of both clocks: a clock that was set back or slept must not make stale data look current. */
 export function secondsBetween(from: Moment, to: Moment): number {
   return Math.max(0, to.wallMs - from.wallMs, to.steadyMs - from.steadyMs) / 1000;
 }
 
-/** The status with its ages counted on to `now`. */
+/** The status with its ages at `now`. */
 export function aged({ status, heardAt }: LastHeard, now: Moment): Aged {
   const statusAgeS = secondsBetween(heardAt, now);
   const linkAgeS = status.packetAgeS === null ? null : status.packetAgeS + statusAgeS;
@@ -69,26 +69,26 @@ export function aged({ status, heardAt }: LastHeard, now: Moment): Aged {
   return { status, linkAgeS, statusAgeS, isCurrent };
 }
 
-/** `0.1 s` while it is heard; whole seconds and minutes once it is not. */
+/** `0.1 s` up to 10 s; then whole seconds and minutes. */
 export function ageText(ageS: number | null): string {
-  if (ageS === null) return "never heard";
+  if (ageS === null) return "no data";
   if (ageS < 10) return `${ageS.toFixed(1)} s`;
   if (ageS < 120) return `${Math.floor(ageS)} s`;
   return `${Math.floor(ageS / 60)} min`;
 }
 
-/** What the link is like, in few words: its age, or what became of it. */
+/** State of the link as a short text: its age, or why there is no data. */
 export function linkText(one: Aged | null): string {
-  if (one === null) return "no news of it";
+  if (one === null) return "no data";
   switch (one.status.state) {
     case "connecting":
       return "connecting";
     case "gone":
-      return "link gone";
+      return "link lost";
     case "not answering":
-      return "its process does not answer";
+      return "process not responding";
     case "connected":
-      return one.isCurrent || one.linkAgeS === null ? ageText(one.linkAgeS) : `silent for ${ageText(one.linkAgeS)}`;
+      return one.isCurrent || one.linkAgeS === null ? ageText(one.linkAgeS) : `no data for ${ageText(one.linkAgeS)}`;
   }
 }
 
@@ -103,10 +103,10 @@ const STEPS: Readonly<Record<string, string>> = {
   disarm: "Disarming",
   restore: "Restoring safe gains",
   quarantined: "Quarantined",
-  observing: "Only observed",
+  observing: "Monitoring only",
 };
 
-/** The step of a trial as a person says it. */
+/** Label of a trial's step. */
 export function stepWord(step: string): string {
   return STEPS[step] ?? step;
 }
@@ -128,7 +128,7 @@ function gains(value: unknown): Record<string, number> {
 
 const LINKS: readonly LinkState[] = ["connecting", "connected", "gone", "not answering"];
 
-/** The status in one event of the stream; null for anything else. */
+/** Parse a status event of the stream; null if it is not one. */
 export function statusFrom(json: string): VehicleStatus | null {
   const parsed: unknown = JSON.parse(json);
   if (typeof parsed !== "object" || parsed === null) return null;
