@@ -7,18 +7,18 @@ import { abortSentence, abortWords } from "./verdict";
 
 const LABELS = { "behaved badly": "The vehicle behaved badly", "something else": "Something else" } as const;
 
-/** Whether an aborted flight counts against its gains, and one tap with which the operator says so. */
+/** Whether an aborted flight counts against its gains, with buttons for the cause. */
 export function AbortCause({ trial }: { trial: Trial }) {
   const judge = useJudgeAbort();
-  const words = abortWords(trial);
+  const causes = abortWords(trial);
   const sentence = abortSentence(trial);
   if (sentence === "") return null;
   return (
-    <section className={classes["abortCause"]} aria-label="Why it was aborted">
+    <section className={classes["abortCause"]} aria-label="Abort cause">
       <p role="status">{sentence}</p>
-      {words.length > 0 && (
+      {causes.length > 0 && (
         <div className={classes["causes"]}>
-          {words.map((cause) => (
+          {causes.map((cause) => (
             <Button
               key={cause}
               variant="default"

@@ -1,4 +1,4 @@
-/** The charts of a campaign; what one shows is its own business, so that the page need not be drawn anew for it. */
+/** The charts of a campaign. Each keeps its own state, so that the page is not rendered again for it. */
 
 import { SegmentedControl, useComputedColorScheme } from "@mantine/core";
 import { memo, useCallback, useDeferredValue, useState } from "react";
@@ -12,7 +12,7 @@ import { type PlotlyFigure, withChosen, withTimeRange } from "../../charts/trace
 const LOWER_PX = 300;
 const PANEL_PX = 84;
 const FIRST_SECONDS = [-0.3, 8] as const;
-/** Of more flights the server gives an envelope, and a flight's own curve when it is asked for. */
+/** For more flights the server draws an envelope, and one flight's curve on request. */
 const EACH_DRAWN = 30;
 
 function useDressed(chosen: number | null, span: string): (figure: PlotlyFigure) => PlotlyFigure {
@@ -32,7 +32,7 @@ interface CurvesProps {
   onChoose: (trialNumber: number) => void;
 }
 
-/** Every flight over the set point, with the next one's prediction. */
+/** The curves of all flights with the set point and the next prediction. */
 export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen, onChoose }: CurvesProps) {
   const theme = useComputedColorScheme("light");
   const [picked, setPicked] = useState("whole");
@@ -80,7 +80,7 @@ interface ByFlightProps {
   onChoose: (trialNumber: number) => void;
 }
 
-/** What became of the error and of the gains from flight to flight. */
+/** Error and gains per flight. */
 export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, onChoose }: ByFlightProps) {
   const theme = useComputedColorScheme("light");
   const errors = useCampaignFigure(campaignId, "errors", theme);

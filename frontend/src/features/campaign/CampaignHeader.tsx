@@ -27,7 +27,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
       ) : (
         <div className={classes["line"]}>
           <h1 className={classes["name"]}>{campaign.name}</h1>
-          <ActionIcon color="gray" aria-label="Rename the campaign" title="Rename" onClick={() => setRenaming(true)}>
+          <ActionIcon color="gray" aria-label="Rename campaign" title="Rename" onClick={() => setRenaming(true)}>
             <IconPencil size={18} color="var(--dim)" />
           </ActionIcon>
         </div>
@@ -67,7 +67,7 @@ function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void
       }}
     >
       <TextInput
-        aria-label="Name of the campaign"
+        aria-label="Campaign name"
         value={name}
         maxLength={120}
         ref={focused}

@@ -39,7 +39,7 @@ function CampaignById({ campaignId }: { campaignId: number }) {
   return <Coming campaignId={campaignId} />;
 }
 
-/** What the page will want is asked for at once, not only when there is a place for it. */
+/** Loading state. Requests all data of the page in parallel. */
 function Coming({ campaignId }: { campaignId: number }) {
   const theme = useComputedColorScheme("light");
   useCatalogue();
@@ -48,7 +48,7 @@ function Coming({ campaignId }: { campaignId: number }) {
   useCampaignFigure(campaignId, "errors", theme);
   useCampaignFigure(campaignId, "gains", theme);
   useEffect(() => {
-    loadPlotly().catch(() => undefined); // the chart asks again, and says what is wrong
+    loadPlotly().catch(() => undefined); // the chart loads it again and reports the error
   }, []);
   return (
     <div aria-busy="true" className={classes["columns"]}>
@@ -66,7 +66,7 @@ const Landscape = memo(LandscapePanel);
 
 interface View {
   campaign: Campaign;
-  /** Null while they are read: of a thousand flights the charts need not wait for them. */
+  /** Null while loading; the charts do not wait for them. */
   trials: readonly Trial[] | null;
   trouble: unknown;
 }
@@ -88,7 +88,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
   return (
     <>
       <p className="visually-hidden" role="status">
-        {campaign.flying ? `Flight ${campaign.flying.trial_number} is under way.` : (trials.at(-1)?.verdict ?? "")}
+        {campaign.flying ? `Flight ${campaign.flying.trial_number} is in progress.` : (trials.at(-1)?.verdict ?? "")}
       </p>
       <CampaignHeader campaign={campaign} />
       <ReadOnlyNotice why={watching} />

@@ -4,7 +4,7 @@ import type { Campaign } from "../../api/types";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import classes from "./CampaignHeader.module.css";
 
-/** The campaign on paper, and as one file for another installation; what flies is not whole yet. */
+/** Report and bundle of the campaign; no bundle during a flight. */
 export function Exports({ campaign }: { campaign: Campaign }) {
   const pdf = useDownload(pathOf(campaign.id, "report.pdf"));
   const bundle = useDownload(pathOf(campaign.id, "bundle"));
@@ -18,19 +18,14 @@ export function Exports({ campaign }: { campaign: Campaign }) {
           target="_blank"
           rel="noreferrer"
         >
-          Report
+          Open report
         </Button>
         <Button variant="default" loading={pdf.isPending} onClick={() => pdf.mutate()}>
           PDF
         </Button>
         {campaign.flying === null && (
-          <Button
-            variant="default"
-            loading={bundle.isPending}
-            aria-label="Download bundle"
-            onClick={() => bundle.mutate()}
-          >
-            Bundle
+          <Button variant="default" loading={bundle.isPending} onClick={() => bundle.mutate()}>
+            Export bundle
           </Button>
         )}
       </div>

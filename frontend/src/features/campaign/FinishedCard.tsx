@@ -21,7 +21,7 @@ interface Props {
   onChoose: (trialNumber: number) => void;
 }
 
-/** The campaign's result, and what to do with it. */
+/** The campaign's result, and its next actions. */
 export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const archive = useArchive(campaign.id);
   const experiment = campaign.definition.experiment ?? "";
@@ -55,13 +55,13 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
         )}
         {best !== null && (
           <Button variant="default" onClick={() => onChoose(best.number)}>
-            Look at flight {best.number}
+            Show flight {best.number}
           </Button>
         )}
         <PromoteGains campaign={campaign} />
         <p className={classes["quiet"]}>
-          This campaign takes no more flights. To fly on, clone it; with “Start from flight” on, the clone begins at the
-          best gains found here.
+          This campaign has no more flights. To continue, clone it. With “Start from flight” on, the clone starts from
+          the best gains found here.
         </p>
         <CloneForm {...campaign} experiment={experiment} />
         {campaign.actions.includes("archive") && (

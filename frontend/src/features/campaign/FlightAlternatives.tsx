@@ -12,7 +12,7 @@ interface Props {
   onEdit: () => void;
 }
 
-/** What can be flown instead, each with what is to be expected of it. */
+/** Alternatives to the proposal, each with its expected error. */
 export function FlightAlternatives({ campaignId, choices, disabled, onFly, onEdit }: Props) {
   return (
     <div className={classes["row"]}>
@@ -33,6 +33,6 @@ export function FlightAlternatives({ campaignId, choices, disabled, onFly, onEdi
 
 /** One line below the button that flies the variant. */
 export function Expectation({ campaignId, variant }: { campaignId: number; variant: Variant }) {
-  const said = expectationOf(variant, useStatistics(campaignId).data);
-  return said === "" ? null : <p className={`${classes["expectation"]} numbers`}>{said}</p>;
+  const expectation = expectationOf(variant, useStatistics(campaignId).data);
+  return expectation === "" ? null : <p className={`${classes["expectation"]} numbers`}>{expectation}</p>;
 }

@@ -3,7 +3,7 @@ import type { Trial } from "../../api/types";
 import classes from "./FlightMarkers.module.css";
 import { marksOf, predictionResult } from "./verdict";
 
-/** What sets a flight apart: refused gains that were flown all the same, a record with glitches. */
+/** Markers of special flights: refused gains that were flown, glitches in the record. */
 export function FlightMarkers({ trial }: { trial: Trial }) {
   return marksOf(trial).map((mark) => (
     <span key={mark} className={classes["mark"]} title={trial.overrule_reason || undefined}>
@@ -20,7 +20,7 @@ const PREDICTION_LABELS = {
   below: "below the interval",
 } as const;
 
-/** Whether the flight ended where it was predicted to. */
+/** Whether the error is inside its predicted interval. */
 export function PredictionResult({ trial, brief = false }: { trial: Trial; brief?: boolean }) {
   const kept = predictionResult(trial);
   if (kept === null) return null;

@@ -8,7 +8,7 @@ import classes from "./FlightNotes.module.css";
 
 const PICTURES = "image/jpeg,image/png,image/webp";
 
-/** What people keep of a flight beside its record: a note, and photos, straight from the camera on a tablet. */
+/** Note and photos of a flight; a tablet takes photos with its camera. */
 export function FlightNotes({ trial }: { trial: Trial }) {
   const { data: photos = [], error } = usePhotos(trial.id);
   const { add, remove } = usePhotoActions(trial.id);
@@ -18,7 +18,7 @@ export function FlightNotes({ trial }: { trial: Trial }) {
   return (
     <details className={classes["notes"]} open={kept || undefined}>
       <summary>Note and photos</summary>
-      {/* What is being written outlives a verdict, which makes another version of the trial. */}
+      {/* The key keeps unsaved text when a review changes the trial's version. */}
       <Note key={`${trial.id} ${trial.note}`} trial={trial} />
       {photos.length > 0 && (
         <ul className={classes["photos"]}>
@@ -41,9 +41,9 @@ export function FlightNotes({ trial }: { trial: Trial }) {
       )}
       {asked !== null && doomed >= 0 && (
         <div className={classes["asks"]}>
-          <p role="status">Delete photo {doomed + 1} for good? Nothing else keeps it.</p>
+          <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
           <Button variant="default" onClick={() => setAsked(null)}>
-            Keep it
+            Cancel
           </Button>
           <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
             Delete photo {doomed + 1}
@@ -58,7 +58,7 @@ export function FlightNotes({ trial }: { trial: Trial }) {
             loading={add.isPending}
             leftSection={<IconCamera size={20} aria-hidden />}
           >
-            Add a photo
+            Add photo
           </Button>
         )}
       </FileButton>
@@ -89,7 +89,7 @@ function Note({ trial }: { trial: Trial }) {
       />
       {note !== trial.note && (
         <Button type="submit" loading={save.isPending}>
-          Keep the note
+          Save note
         </Button>
       )}
       <ErrorNotice error={save.error} />

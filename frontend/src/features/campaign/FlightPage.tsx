@@ -18,7 +18,7 @@ export function FlightPage() {
   return <FlightById campaignId={campaign} trialId={trial} />;
 }
 
-/** One flight: its own curve and commands first, then what it was worth. */
+/** One flight: its curve and commands, then its verdict. */
 function FlightById({ campaignId, trialId }: { campaignId: number; trialId: number }) {
   const theme = useComputedColorScheme("light");
   const campaign = useCampaign(campaignId).data;

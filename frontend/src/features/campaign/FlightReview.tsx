@@ -8,15 +8,15 @@ import { type Suggestion, suggestedClass } from "./review";
 import classes from "./Verdict.module.css";
 import { consequenceOf, INVALID_REASONS, otherClasses } from "./verdict";
 
-const WORDS = { valid: "Count it as valid", aborted: "Class as aborted", invalid: "Mark invalid" } as const;
+const WORDS = { valid: "Mark valid", aborted: "Mark aborted", invalid: "Mark invalid" } as const;
 
 interface Props {
   trial: Trial;
-  /** All of the campaign, to tell what a class would change. */
+  /** All trials of the campaign, for the consequences of a review. */
   trials: readonly Trial[];
 }
 
-/** Say what a flight is worth: what is suggested first and in one tap, one tap to undo, a reason to throw out. */
+/** Review of a flight: the suggested class first, undo in one tap, and a reason to mark it invalid. */
 export function FlightReview({ trial, trials }: Props) {
   const [asking, setAsking] = useState(false);
   const [reason, setReason] = useState(trial.state === "lost" ? trial.reason : "");
@@ -31,7 +31,7 @@ export function FlightReview({ trial, trials }: Props) {
       setAsking(true);
       return;
     }
-    const word = trial.state === "invalid" ? "counted again by the operator" : "judged by the operator";
+    const word = trial.state === "invalid" ? "restored by the operator" : "reviewed by the operator";
     classify.mutate({ trial, outcome, reason: outcome === "invalid" ? suggested : word });
   }
 
@@ -46,7 +46,7 @@ export function FlightReview({ trial, trials }: Props) {
         }}
       >
         <p>
-          An invalid flight keeps its record, but nothing is computed from it.{" "}
+          The record of an invalid flight is kept, but not used for any computation.{" "}
           <strong>{consequenceOf(trial, trials, "invalid")}</strong> Why is it invalid?
         </p>
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
@@ -70,7 +70,7 @@ export function FlightReview({ trial, trials }: Props) {
             Mark invalid
           </Button>
           <Button variant="default" onClick={() => setAsking(false)}>
-            Keep it
+            Cancel
           </Button>
         </div>
         <ErrorNotice error={classify.error} shown={["reason"]} />

@@ -8,14 +8,14 @@ import { TrialsTable } from "./TrialsTable";
 
 interface Props {
   campaign: Campaign;
-  /** Null while they are read. */
+  /** Null while loading. */
   trials: readonly Trial[] | null;
   shown: number | null;
   unit: string;
   onChoose: (trialNumber: number) => void;
 }
 
-/** The table of all flights, with a way to compare them. */
+/** The table of all flights, with a link to compare them. */
 export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown, unit, onChoose }: Props) {
   const compare = (
     <Anchor component={Link} to={`/compare?campaign=${campaign.id}`} py={12}>
@@ -26,9 +26,7 @@ export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown
     <Panel title="All flights" className={classes["panel"]} tools={trials?.length ? compare : null}>
       {trials === null && <Skeleton height={320} radius="md" />}
       {trials?.length === 0 && (
-        <p className={classes["none"]}>
-          Nothing has flown yet. The first flight will stand here with its gains and error.
-        </p>
+        <p className={classes["none"]}>No flights yet. Flights appear here with their gains and errors.</p>
       )}
       {trials !== null && trials.length > 0 && (
         <TrialsTable campaign={campaign} trials={trials} shown={shown} unit={unit} onChoose={onChoose} />

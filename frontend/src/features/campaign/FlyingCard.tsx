@@ -17,7 +17,7 @@ interface Props {
   step: { trialId: number; trialNumber: number };
 }
 
-const STAGED = "Gains set, waiting for its operator";
+const STAGED = "Gains set, waiting for take-off";
 
 function stageWord(trial: Trial | undefined, live: LiveFlight | null): string {
   const waits = trial?.state === "staged" && trial.flight?.mode === "stage" && trial.flight.take_off_at === null;
@@ -26,7 +26,7 @@ function stageWord(trial: Trial | undefined, live: LiveFlight | null): string {
   return trial?.state === "planned" ? "Waiting for the worker" : "Setting the gains";
 }
 
-/** What the flight under way says about itself. ABORT stands in the bar above, on every page. */
+/** Live values of the flight in progress. The ABORT button is in the header of every page. */
 export function FlyingCard({ campaign, trial, step }: Props) {
   const live = useLiveFlight(step.trialId);
   const unit = useUnits(campaign.definition.experiment ?? "").error;
@@ -76,7 +76,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
         )}
         {stage !== STAGED && (
           <p className={classes["quiet"]}>
-            ABORT above ends the flight at once and restores the safe gains; so does the Space key.
+            ABORT or the Space key ends the flight immediately and restores the safe gains.
           </p>
         )}
       </div>

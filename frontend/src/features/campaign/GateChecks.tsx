@@ -4,23 +4,23 @@ import { count, gainText } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import classes from "./NextFlight.module.css";
 
-/** What was checked before the flight: one line when all is well, each check when opened or when one refused. */
+/** Gate checks of a flight: a summary line, and each check when opened or when one has failed. */
 export function GateChecks({ gate }: { gate: Gate }) {
   const refused = gate.checks.filter((check) => !check.passed).length;
-  const said =
+  const summary =
     refused === 0
       ? `${count(gate.checks.length, "check")} passed`
-      : `${refused} of ${gate.checks.length} checks refused`;
+      : `${refused} of ${gate.checks.length} checks failed`;
   return (
     <details className={classes["more"]} open={refused > 0}>
-      <summary>{said}</summary>
+      <summary>{summary}</summary>
       <div>
         <ul className={classes["gate"]}>
           {gate.checks.map((check) => {
             const Icon = check.passed ? IconCircleCheck : IconCircleX;
             return (
               <li key={`${check.name} ${check.sentence}`} data-failed={!check.passed || undefined}>
-                <Icon size={19} aria-label={check.passed ? "passed" : "refused"} />
+                <Icon size={19} aria-label={check.passed ? "passed" : "failed"} />
                 <span>
                   {check.sentence}
                   <Facts check={check} />
@@ -30,7 +30,7 @@ export function GateChecks({ gate }: { gate: Gate }) {
           })}
         </ul>
         <p className={classes["gateNote"]}>
-          Judged before every flight, whoever chose the gains.
+          Checked before every flight, for proposed and manual gains.
           <HelpTip topic="gate" />
         </p>
       </div>
@@ -38,7 +38,7 @@ export function GateChecks({ gate }: { gate: Gate }) {
   );
 }
 
-/** The case that gave the worst number, and what would pass; the number itself stands in the sentence. */
+/** The worst case of the check, and values that would pass. */
 function Facts({ check }: { check: Check }) {
   const offered = Object.entries(check.offer ?? {}).map(([name, value]) => `${name} ${gainText(value)}`);
   const parts = [check.case ?? "", offered.length > 0 ? `would pass: ${offered.join(", ")}` : ""].filter(

@@ -12,7 +12,7 @@ interface RefusalProps {
   onUse: (offers: readonly Offer[]) => void;
 }
 
-/** What would happen, in a sentence, and what would pass; the other checks folded. */
+/** Main reason of a refusal and values that would pass; other failed checks are collapsed. */
 export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
   const [first, ...reasons] = reasonsByWeight(problem);
   const limits = limitsOf(problem);
@@ -44,7 +44,7 @@ export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
       )}
       {others.length > 0 && (
         <details className={classes["more"]}>
-          <summary>{count(others.length, "more check")} refused</summary>
+          <summary>{count(others.length, "more check")} failed</summary>
           <ul className={classes["gate"]}>
             {others.map((reason) => (
               <li key={reason}>{reason}</li>
@@ -57,14 +57,12 @@ export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
   );
 }
 
-/** Why the offered values can lie below the largest ones that the refusal names: several limits hold at once. */
+/** Explains why the offered values can be below those that the refusal names: several limits apply at once. */
 function OfferNote({ several, above, besides }: { several: boolean; above: boolean; besides: readonly string[] }) {
   const nearest = several
-    ? "These are the nearest values to yours that keep"
-    : "This is the nearest value to yours that keeps";
-  const limits = above
-    ? "all limits at once, the one above and these:"
-    : "these limits; the flights are simulated again:";
+    ? "These are the closest values to yours that satisfy"
+    : "This is the closest value to yours that satisfies";
+  const limits = above ? "the limit above and these limits:" : "these limits. The flights are simulated again:";
   return (
     <>
       <p className={classes["offerNote"]}>

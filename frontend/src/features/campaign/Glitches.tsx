@@ -10,7 +10,7 @@ const KINDS = {
   disagreement: "Sources disagree",
 } as const;
 
-/** Where the record cannot be right, and what the error would be without it. The record itself stays as it came. */
+/** Glitches of the record, and the error without them. The stored record is unchanged. */
 export function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
   const glitches = trial.glitches ?? [];
   if (glitches.length === 0) return null;

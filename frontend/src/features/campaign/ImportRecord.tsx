@@ -12,7 +12,7 @@ interface Props {
   proposalId?: number;
 }
 
-/** Hand in the record of a flight made elsewhere with these gains. */
+/** Upload of the record of a flight made elsewhere with these gains. */
 export function ImportRecord({ upload, trialId, proposalId }: Props) {
   const target = {
     ...(trialId === undefined ? {} : { trialId }),
@@ -24,7 +24,7 @@ export function ImportRecord({ upload, trialId, proposalId }: Props) {
   return (
     <div className={classes["stack"]}>
       <p className={classes["quiet"]}>
-        Set these gains on your vehicle, fly, and hand in the log: MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi
+        Set these gains on your vehicle, fly, and upload the log: MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi
         .data (with its .log), or a CSV file with the columns <code>time_s</code> (seconds since the command) and{" "}
         <code>altitude_m</code>.
       </p>
@@ -58,7 +58,7 @@ export function ImportRecord({ upload, trialId, proposalId }: Props) {
       ))}
       {wantsConfirmation(problem) && (
         <Button variant="default" onClick={() => again({ confirm: true })}>
-          Take it with the gains it was flown with
+          Import with the gains in the log
         </Button>
       )}
     </div>

@@ -18,8 +18,7 @@ function heightOf(card: FigureCard | undefined, stacked: boolean): number {
 }
 
 /**
- * The gains as a path over the model's error. It takes longer to draw than other charts, so it is drawn in the midst of
- * what somebody does elsewhere only when it is in view; else once they pause.
+ * The gains as a path over the model's error. Drawing it is slow, so it is drawn when it is in view or the user is idle.
  */
 export function LandscapePanel({ campaignId }: { campaignId: number }) {
   const place = useRef<HTMLDivElement>(null);

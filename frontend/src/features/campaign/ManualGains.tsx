@@ -19,7 +19,7 @@ interface Props {
   onClose: () => void;
 }
 
-/** The operator's own gains, through the same checks as proposed ones. Only what reads as numbers can be flown. */
+/** Manual gains, with the same checks as proposed ones. Only valid numbers can be flown. */
 export function ManualGains({ campaign, start, speed, onClose }: Props) {
   const names = Object.keys(start);
   const [texts, setTexts] = useState(() =>
@@ -90,7 +90,7 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
       {refused && !campaign.vehicle.is_real && <Overrule pending={create.isPending} onFly={submit} />}
       <p className={`${classes["quiet"]} numbers`} aria-live="polite">
         {unread.length > 0
-          ? `Nothing can be flown before ${unread.join(", ")} ${unread.length === 1 ? "reads as a number" : "read as numbers"}.`
+          ? `Enter a number for ${unread.join(", ")}.`
           : `${act === "Fly" ? "Flies" : "Plans"} ${Object.entries(gains)
               .map(([name, value]) => `${name} ${typed(value).replace("-", "−")}`)
               .join(" · ")}`}
@@ -106,16 +106,15 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
   );
 }
 
-/** Only where nothing can break: fly what the checks refuse, with a reason that stays with the flight. */
+/** Simulations only: fly gains that the gate refuses, with a reason that is stored with the flight. */
 function Overrule({ pending, onFly }: { pending: boolean; onFly: (reason: string) => void }) {
   const [reason, setReason] = useState("");
   return (
     <details className={classes["more"]}>
-      <summary>Overrule with a reason</summary>
+      <summary>Overrule the gate</summary>
       <div className={classes["stack"]}>
         <p className={classes["quiet"]}>
-          This vehicle is simulated, so the refused gains may fly all the same. The reason is kept with the flight and
-          shown wherever it is. On a real vehicle nobody can do this.
+          Refused gains can be flown on a simulated vehicle only. The reason is saved and shown with the flight.
         </p>
         <TextInput
           label="Reason"
@@ -132,7 +131,7 @@ function Overrule({ pending, onFly }: { pending: boolean; onFly: (reason: string
           loading={pending}
           onClick={() => onFly(reason.trim())}
         >
-          Fly in spite of the refusal
+          Fly refused gains
         </Button>
       </div>
     </details>

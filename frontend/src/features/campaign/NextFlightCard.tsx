@@ -16,7 +16,7 @@ interface Props extends CampaignStatus {
   onChoose: (trialNumber: number) => void;
 }
 
-/** Always one recommended thing to do, whatever state the campaign is in. */
+/** The next action of the campaign, in every state. */
 export function NextFlightCard(props: Props) {
   return (
     <>
@@ -28,7 +28,7 @@ export function NextFlightCard(props: Props) {
 
 function Step({ campaign, next, trials, onChoose }: Props) {
   const step = nextStep(campaign, next, trials);
-  // Held here, so that a refused record is still explained when its trial has become a planned one.
+  // Kept here, so that the error of a refused record is still shown when its trial becomes a planned one.
   const upload = useUploadRecord(campaign.id);
   switch (step.kind) {
     case "flying":
@@ -44,14 +44,14 @@ function Step({ campaign, next, trials, onChoose }: Props) {
       return <ProposalCard campaign={campaign} proposal={step.proposal} trials={trials} upload={upload} />;
     case "judge":
       return (
-        <Panel title={`Flight ${step.trial.number} wants your word`}>
+        <Panel title={`Review flight ${step.trial.number}`}>
           <p className={classes["lead"]}>
             {step.trial.state === "lost"
-              ? "Nobody knows how this flight ended. Say what it was before the next one is proposed."
-              : "Say whether this flight counts before the next one is proposed."}
+              ? "The end of this flight is unknown. Classify it; then the next gains are proposed."
+              : "Classify this flight; then the next gains are proposed."}
           </p>
           <Button fullWidth onClick={() => onChoose(step.trial.number)}>
-            Look at flight {step.trial.number}
+            Review flight {step.trial.number}
           </Button>
         </Panel>
       );
@@ -63,7 +63,7 @@ function Step({ campaign, next, trials, onChoose }: Props) {
           <div className={classes["computing"]} role="status">
             <Loader size="md" aria-hidden />
             <p>
-              <strong>Finding the next gains</strong>
+              <strong>Computing the next gains</strong>
               <br />
               from {trials.length === 0 ? "the start settings" : "all flights so far"}. This takes about a second.
             </p>

@@ -20,7 +20,7 @@ interface Props {
   upload: RecordUpload;
 }
 
-/** A trial that is planned and has not flown: fly it, hand in its record, or give it up. */
+/** A planned trial: fly it, upload its record, or cancel it. */
 export function PlannedCard({ campaign, trial, upload }: Props) {
   const [speed, setSpeed] = useSpeed();
   const experiment = campaign.definition.experiment ?? "";
@@ -57,7 +57,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
                 disabled={!trial.actions.includes("fly")}
                 onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
               >
-                Fly it
+                Fly now
               </Button>
             )}
             {registered ? (
@@ -83,7 +83,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           disabled={!trial.actions.includes("cancel")}
           onClick={() => cancel.mutate(trial.id)}
         >
-          Give it up
+          Cancel trial
         </Button>
         <ErrorNotice error={fly.error ?? cancel.error} />
       </div>

@@ -10,12 +10,11 @@ interface Props {
   unit: string;
 }
 
-/** What the flight is expected to score, as exactly as that is known. */
+/** Predicted error with its interval. */
 export function PredictedError({ proposal, best, unit }: Props) {
   const { predicted_error: error, interval } = proposal;
   const change = percentChange(error, best);
-  if (error === null)
-    return <p className={classes["quiet"]}>Nothing is predicted: there is no model of these gains.</p>;
+  if (error === null) return <p className={classes["quiet"]}>No prediction: there is no model of these gains.</p>;
   return (
     <div className={`${classes["predicted"]} numbers`}>
       <span>

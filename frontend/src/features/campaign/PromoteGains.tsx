@@ -10,8 +10,7 @@ import { gainsInBrackets, sameHeld } from "../../ui/gains";
 import classes from "./NextFlight.module.css";
 import { heldGainsNotice, promotable } from "./verdict";
 
-/** Make the best gains those that the vehicle is left with after every flight, once flights have shown that they are
- * better. */
+/** Set the best gains as the vehicle's safe gains, once flights have shown that they are better. */
 export function PromoteGains({ campaign }: { campaign: Campaign }) {
   const [asking, setAsking] = useState(false);
   const [statement, setStatement] = useState("");
@@ -38,7 +37,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
         leftSection={<IconShieldCheck size={20} aria-hidden />}
         onClick={() => setAsking(true)}
       >
-        Make the best gains the safe ones
+        Set best gains as safe gains
       </Button>
     );
   }
@@ -51,21 +50,21 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
       }}
     >
       <p className={classes["quiet"]}>
-        Every flight and every abort of {vehicle.name} then ends with {gainsInBrackets(campaign.best.gains)} instead of{" "}
+        After every flight and abort, {vehicle.name} then gets {gainsInBrackets(campaign.best.gains)} instead of{" "}
         {gainsInBrackets(vehicle.safe_gains)}.
       </p>
       <TextInput
-        label="Who decided that, and why"
+        label="Decided by, and why"
         value={statement}
         maxLength={500}
         error={reasonsByField(problemOf(promote.error), ["statement"])["statement"]}
         onChange={(event) => setStatement(event.currentTarget.value)}
       />
       <Button type="submit" disabled={statement.trim() === ""} loading={promote.isPending}>
-        These are the safe gains
+        Save safe gains
       </Button>
       <Button variant="default" onClick={() => setAsking(false)}>
-        Leave them
+        Cancel
       </Button>
       <ErrorNotice error={promote.error} shown={["statement"]} />
     </form>

@@ -27,7 +27,7 @@ interface Props {
   upload: RecordUpload;
 }
 
-/** The proposed flight: what to do and why, gains now and next, what it should bring, and one button that flies it. */
+/** The proposed flight: recommendation, current and next gains, prediction, and a button that flies it. */
 export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   const [editing, setEditing] = useState(false);
   const [speed, setSpeed] = useSpeed();
@@ -42,7 +42,7 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order });
   if (editing) {
     return (
-      <Panel title={`Flight ${number}, gains of your own`}>
+      <Panel title={`Flight ${number}, manual gains`}>
         <ManualGains
           campaign={campaign}
           start={proposal.gains}

@@ -11,29 +11,29 @@ interface Props {
   gains: Readonly<Record<string, number>>;
 }
 
-/** Why these gains: the sentence, what was learned of the vehicle, what held the step back, and what it will teach. */
+/** Explanation of the proposed gains: summary, expected information, trust region, limits, fitted parameters. */
 export function ProposalExplanation({ explanation, unit, gains }: Props) {
   const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
   return (
     <>
       <details className={classes["more"]}>
-        <summary>Why these gains</summary>
+        <summary>Explanation</summary>
         <div className={classes["stack"]}>
           <span>
             {explanation.summary} <HelpTip topic="bias" />
           </span>
           {lesson && (
             <span>
-              <strong>What it will teach:</strong> {lesson}
+              <strong>Expected to learn:</strong> {lesson}
             </span>
           )}
           {trust !== null && (
             <span className="numbers">
-              Trusted region: {percent(trust)} of each gain's range
+              Trust region: {percent(trust)} of each gain's range
               <HelpTip topic="trustRegion" />
             </span>
           )}
-          {clipped.length > 0 && <span>Stopped by a limit: {clipped.join(", ")}.</span>}
+          {clipped.length > 0 && <span>Limited by: {clipped.join(", ")}.</span>}
           {notes.map((note) => (
             <span key={note}>{note}</span>
           ))}
@@ -49,12 +49,12 @@ function withOwnUnit(text: string, unit: string): string {
   return unit === "" || unit === "1" ? text : `${text} (${unit})`;
 }
 
-/** What the flights say of the vehicle, beside what was known before them. */
+/** Fitted parameters of the vehicle, next to their values before the flights. */
 function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
   return (
     <table className={classes["ladder"]}>
       <caption>
-        The vehicle as the flights have it (± standard error) <HelpTip topic="fitted" />
+        Fitted parameters (± standard error) <HelpTip topic="fitted" />
       </caption>
       {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
         <tbody key={name}>
@@ -75,14 +75,14 @@ function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
   );
 }
 
-/** The gradient and the steps tried along it, for those who want to follow the arithmetic. */
+/** Details: the gradient, and the steps evaluated along it. */
 function Tried({ explanation, unit, gains }: Props) {
   const { gradient = {}, ladder = [], chosen_length: chosen } = explanation;
   const slopes = Object.entries(gradient);
   if (slopes.length === 0 && ladder.length === 0) return null;
   return (
     <details className={classes["more"]}>
-      <summary>Steps tried on the model</summary>
+      <summary>Steps evaluated on the model</summary>
       <div className={classes["stack"]}>
         {slopes.length > 0 && (
           <span className="numbers">
@@ -93,7 +93,7 @@ function Tried({ explanation, unit, gains }: Props) {
         )}
         {ladder.length > 0 && (
           // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-          <section className={`${classes["wide"]} sideways`} aria-label="Steps tried on the model" tabIndex={0}>
+          <section className={`${classes["wide"]} sideways`} aria-label="Steps evaluated on the model" tabIndex={0}>
             <table className={classes["ladder"]}>
               <thead>
                 <tr>

@@ -4,7 +4,7 @@ import { type Advised, RECOMMENDED } from "./proposal";
 
 const ICONS = { step: IconStairsUp, repeat: IconRepeat, baseline: IconHome, stop: IconFlagCheck } as const;
 
-/** The one thing to do next, and why. */
+/** The recommended action, and its reason. */
 export function Recommendation({ advice }: { advice: Advised }) {
   const Icon = ICONS[advice.kind];
   return (

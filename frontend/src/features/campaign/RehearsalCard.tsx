@@ -7,7 +7,7 @@ import { ErrorNotice } from "../../ui/ErrorNotice";
 import { Panel } from "../../ui/Panel";
 import classes from "./NextFlight.module.css";
 
-/** The one thing to do with a campaign on a real vehicle that has not flown on a simulation. */
+/** Next action of a real vehicle's campaign that has not passed its rehearsal. */
 export function RehearsalCard({ campaign }: { campaign: Campaign }) {
   const navigate = useNavigate();
   const rehearse = useRehearse(campaign.id);
@@ -16,16 +16,16 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
     <Panel title="Rehearse first">
       <div className={classes["stack"]}>
         <p className={classes["quiet"]}>
-          {campaign.vehicle.name} is a real vehicle. Before its first flight the whole campaign is flown on a
-          simulation, with the same strategy, bounds, stop rule and gains: three valid flights, or up to its stop, and
-          none aborted or invalid.
+          {campaign.vehicle.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
+          simulation with the same strategy, bounds, stop rule and gains: three valid flights, or fewer if the stop rule
+          ends it, and none aborted or invalid.
         </p>
         <p role="status">
           <strong>{STANDING[state]}</strong> {reason}.
         </p>
         {state === "under way" && campaign_id !== null ? (
           <Button component={Link} to={`/campaigns/${campaign_id}`} fullWidth>
-            Go on with the rehearsal
+            Continue rehearsal
           </Button>
         ) : (
           <Button
@@ -33,12 +33,12 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
             loading={rehearse.isPending}
             onClick={() => rehearse.mutate(undefined, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) })}
           >
-            Rehearse on the simulation
+            Rehearse on a simulation
           </Button>
         )}
         {state === "failed" && campaign_id !== null && (
           <Anchor component={Link} to={`/campaigns/${campaign_id}`} className={classes["link"]}>
-            Look at the rehearsal that failed
+            Open failed rehearsal
           </Anchor>
         )}
         <ErrorNotice error={rehearse.error} />
@@ -49,11 +49,11 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
 
 const STANDING: Partial<Record<Campaign["rehearsal"]["state"], string>> = {
   missing: "Not rehearsed yet:",
-  "under way": "Under way:",
-  failed: "It failed:",
+  "under way": "In progress:",
+  failed: "Failed:",
 };
 
-/** On a rehearsal's own page: what it is for, and the way back. */
+/** Note on a rehearsal's page, with a link to the real campaign. */
 export function RehearsalNote({ campaignId }: { campaignId: number }) {
   const real = useCampaign(campaignId).data;
   if (real === undefined) return null;
@@ -61,9 +61,9 @@ export function RehearsalNote({ campaignId }: { campaignId: number }) {
   return (
     <div className={classes["advice"]}>
       <p>
-        <strong>{passed ? "The rehearsal has passed" : "This is a rehearsal"}</strong>
+        <strong>{passed ? "Rehearsal passed" : "This is a rehearsal"}</strong>
         <span>
-          {passed ? "Now fly it for real: " : "The real campaign waits for it: "}
+          {passed ? "Continue with the real campaign: " : "Required by the real campaign: "}
           <Anchor component={Link} to={`/campaigns/${campaignId}`}>
             {real.name} on {real.vehicle.name}
           </Anchor>

@@ -6,7 +6,7 @@ import { ErrorNotice } from "../../ui/ErrorNotice";
 import { speedOf } from "./nextStep";
 import { useSpeed } from "./SpeedSwitch";
 
-/** The gains of a flight that came to nothing once more: flown at once by a simulation, else to be staged. */
+/** Retry of the gains of an aborted or invalid flight: flown at once on a simulation, otherwise staged. */
 export function RetryGains({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
   const create = useCreateTrial(campaign);
   const [speed] = useSpeed();

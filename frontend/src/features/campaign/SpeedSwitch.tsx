@@ -3,7 +3,7 @@ import { useLocalStorage } from "@mantine/hooks";
 import classes from "./NextFlight.module.css";
 import { SPEEDS } from "./nextStep";
 
-/** The operator's own choice, kept on this device. */
+/** The selected simulation speed, stored on this device. */
 export function useSpeed(): [string, (value: string) => void] {
   const [value, setValue] = useLocalStorage({
     key: "gainline-speed",

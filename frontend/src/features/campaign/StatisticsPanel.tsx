@@ -11,27 +11,27 @@ import { useLastRows } from "../../ui/useLastRows";
 import classes from "./Statistics.module.css";
 import { VERDICTS } from "./verdict";
 
-/** What the flights say about the gains, and how sure that is. */
+/** Statistics of the flights: verdict, scatter, predictions. */
 export function StatisticsPanel({ campaignId }: { campaignId: number }) {
   const statistics = useStatistics(campaignId);
   return (
-    <Panel title="How sure is it?">
+    <Panel title="Statistics">
       <ErrorNotice error={statistics.error} />
       {statistics.isPending && <div className={classes["waiting"]} aria-busy="true" />}
       {statistics.data && statistics.data.groups.length === 0 && (
         <p className={classes["none"]}>
-          After the first valid flight this says how much errors scatter, whether the best gains are really better, and
-          how well the predictions hold.
+          Available after the first valid flight: the scatter of the error, whether the best gains are better, and how
+          good the predictions are.
         </p>
       )}
-      {statistics.data && statistics.data.groups.length > 0 && <Said {...statistics.data} />}
+      {statistics.data && statistics.data.groups.length > 0 && <Results {...statistics.data} />}
     </Panel>
   );
 }
 
-function Said(all: CampaignStatistics) {
+function Results(all: CampaignStatistics) {
   const { comparison, drift, track_record: record, notes, trends } = all;
-  const said = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
+  const shown = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
   return (
     <div className={classes["said"]}>
       <div className={classes["facts"]}>
@@ -50,7 +50,7 @@ function Said(all: CampaignStatistics) {
           <li key={against}>{sentence}</li>
         ))}
         {notes
-          .filter((note) => !said.includes(note))
+          .filter((note) => !shown.includes(note))
           .map((note) => (
             <li key={note}>{note}</li>
           ))}
@@ -63,8 +63,8 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
   if (comparison === null) {
     return (
       <div className={classes["fact"]}>
-        <h3>Best against the first</h3>
-        <p className={classes["big"]}>The same gains</p>
+        <h3>Best against first gains</h3>
+        <p className={classes["big"]}>Same gains</p>
         <p>Nothing to compare: the first flight's gains are the best so far.</p>
       </div>
     );
@@ -74,7 +74,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
   return (
     <div className={classes["fact"]} data-verdict={verdict}>
       <h3>
-        Best against the first
+        Best against first gains
         <HelpTip topic="difference" />
       </h3>
       <p className={classes["big"]}>
@@ -87,8 +87,8 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
         {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>
-            {count(more, "more flight")} would decide: {further?.best ?? 0} of the best, {further?.baseline ?? 0} of the
-            first gains
+            {count(more, "more flight")} needed: {further?.best ?? 0} of the best, {further?.baseline ?? 0} of the first
+            gains
           </strong>
         )}
       </p>
@@ -116,14 +116,14 @@ function Scatter({
       ) : (
         <p className={`${classes["big"]} numbers`}>
           {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
-          <small>± its own standard error</small>
+          <small>± standard error</small>
         </p>
       )}
       <p>{scatterSource(repeats, sigma === null ? null : freedom)}</p>
       {sigma !== null && optimism > 0.1 * sigma && shrunk_error !== null && (
         <p className={`${classes["fine"]} numbers`}>
-          Chosen as the best of {groups.length}, it looks {plusMinus(optimism, null, unit)} better than it is; likely{" "}
-          {plusMinus(shrunk_error, null, unit)}.
+          Selection bias: the best of {groups.length} looks {plusMinus(optimism, null, unit)} better than it is. Likely
+          error: {plusMinus(shrunk_error, null, unit)}.
         </p>
       )}
     </div>
@@ -134,16 +134,16 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
   return (
     <div className={classes["fact"]} data-verdict={record.trustworthy ? undefined : "worse"}>
       <h3>
-        Predictions kept
+        Predictions inside their interval
         <HelpTip topic="record" />
       </h3>
       <p className={`${classes["big"]} numbers`}>
-        {record.of === 0 ? "None tested yet" : `${record.inside} of ${record.of}`}
+        {record.of === 0 ? "None yet" : `${record.inside} of ${record.of}`}
         {record.of > 0 && record.share !== null && <small>{percent(record.share)} inside the 90&nbsp;% interval</small>}
       </p>
       {!record.trustworthy && (
         <p className={classes["warning"]}>
-          <IconAlertTriangle size={18} aria-hidden /> Gradient not trustworthy
+          <IconAlertTriangle size={18} aria-hidden /> Gradient unreliable
         </p>
       )}
       <p className={classes["fine"]}>{record.sentence}</p>
@@ -151,7 +151,7 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
   );
 }
 
-/** Flights of the same gains are one line. */
+/** One row for each gain set. */
 function Groups({ groups, error_unit: unit }: CampaignStatistics) {
   const names = Object.keys(groups[0]?.gains ?? {});
   const { more, listed } = useLastRows(groups, 4, "gain sets", (group) => group.is_best || group.is_baseline);
@@ -166,7 +166,7 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
             <th scope="col">
               Mean error ± standard error <HelpTip topic="standardError" />
             </th>
-            <th scope="col">Standing</th>
+            <th scope="col">Role</th>
           </tr>
         </thead>
         <tbody>

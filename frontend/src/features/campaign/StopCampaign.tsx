@@ -4,7 +4,7 @@ import { useFinish } from "../../api/mutations";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import classes from "./NextFlight.module.css";
 
-/** Ends the campaign between flights; a finished campaign cannot be taken up again, so it asks once. */
+/** Ends the campaign between flights, after a confirmation because it cannot be undone. */
 export function StopCampaign({ campaignId }: { campaignId: number }) {
   const [asking, setAsking] = useState(false);
   const finish = useFinish(campaignId);
@@ -17,13 +17,15 @@ export function StopCampaign({ campaignId }: { campaignId: number }) {
   }
   return (
     <div className={classes["stack"]}>
-      <p className={classes["quiet"]}>No more flights in this campaign? It keeps its flights and can be cloned.</p>
+      <p className={classes["quiet"]}>
+        Stop this campaign? It cannot be resumed. Its flights are kept, and it can be cloned.
+      </p>
       <div className={classes["row"]}>
         <Button variant="default" onClick={() => setAsking(false)}>
-          Keep going
+          Continue
         </Button>
         <Button color="red" loading={finish.isPending} onClick={() => finish.mutate()}>
-          Stop it
+          Stop campaign
         </Button>
       </div>
       <ErrorNotice error={finish.error} />

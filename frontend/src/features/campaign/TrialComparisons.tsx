@@ -11,7 +11,7 @@ const ICONS = {
   "not known yet": IconHelpHexagon,
 } as const;
 
-/** Better, worse or not to be told apart: the flight's gains against the best before it and against the first. */
+/** Verdicts of the flight's gains against the best before it and against the first. */
 export function TrialComparisons({ trial, unit }: { trial: Trial; unit: string }) {
   if (trial.comparisons.length === 0) return null;
   const asked = repeatPurpose(trial) !== "";

@@ -26,7 +26,7 @@ function flightOf(target: EventTarget): number | null {
   return row === null ? null : Number(row.dataset["flight"]);
 }
 
-/** The campaign's flights like the paper's Table 1: gains, error, prediction, and what came of each. */
+/** The campaign's flights as in the paper's Table 1: gains, error, prediction, state and verdict. */
 export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) {
   const names = Object.keys(trials[0]?.gains ?? {});
   const titles = useGainTitles(campaign.definition.experiment ?? "");

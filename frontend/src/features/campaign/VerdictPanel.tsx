@@ -30,11 +30,11 @@ interface Props {
   isBest: boolean;
   unit: string;
   experiment: string;
-  /** On the flight's own page there is no link to that page. */
+  /** Whether this is the flight's own page, which needs no link to itself. */
   own?: boolean;
 }
 
-/** `error` against `other`; two that print alike are the same. */
+/** `error` against `other`; the same if their texts are equal. */
 function Change({ error, other, unit }: { error: number | null; other: number | null | undefined; unit: string }) {
   const percent = percentChange(error, other);
   if (percent === null) return null;
@@ -65,7 +65,7 @@ function Fact({ title, topic, wide = false, children }: FactProps) {
   );
 }
 
-/** What happened in a flight: against the best before it, against its prediction, and what it counts for. */
+/** Result of a flight: compared with the best before it and with its prediction, and its review. */
 export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = false }: Props) {
   const bestBefore = bestBeforeOf(trial, trials);
   const statistics = useStatistics(trial.campaign_id).data;
@@ -94,7 +94,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       <TrialComparisons trial={trial} unit={unit} />
       {trial.overrule_reason && (
         <p className={classes["overruled"]}>
-          <strong>The checks refused these gains, and were overruled:</strong> {trial.overrule_reason}
+          <strong>The gate refused these gains and was overruled:</strong> {trial.overrule_reason}
         </p>
       )}
       <dl className={`${classes["figures"]} numbers`}>
@@ -161,7 +161,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
             to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`}
             className={classes["link"]}
           >
-            Open the flight
+            Open flight
           </Anchor>
         )}
       </div>

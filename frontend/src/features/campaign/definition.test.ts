@@ -39,9 +39,9 @@ test("every setting that a proposal depends on is said in words", () => {
     "Bounds of kp": "0 … 2000 counts",
     "Largest step": "25\u00a0% of each range until a flight is valid, then 100\u00a0%",
     Seed: "3",
-    "Frozen as": "0123456789ab",
+    "Definition digest": "0123456789ab",
   });
-  expect(rows["Stop"]).toBe("Two flights in a row less than 5\u00a0% better than the best, or 7 flights");
+  expect(rows["Stop"]).toBe("Two consecutive flights less than 5\u00a0% better than the best, or 7 flights");
 });
 
 test("a warm start and a stop on noise are said in words", () => {
@@ -56,7 +56,7 @@ test("a warm start and a stop on noise are said in words", () => {
   };
   expect(Object.fromEntries(settingsOf({ ...campaign, definition }, catalogue))).toMatchObject({
     Start: "[900 200 200], flight 2 of campaign 4",
-    Stop: "When nothing is left that flights could tell from noise with 95\u00a0% confidence, or 12 flights",
+    Stop: "No resolvable improvement at 95\u00a0% confidence, or 12 flights",
     Battery: "Stops below 10.8 V after a flight",
   });
 });
@@ -70,5 +70,7 @@ test("until the catalogue is there, options stand under their names", () => {
 });
 
 test("a draft is not frozen yet", () => {
-  expect(Object.fromEntries(settingsOf({ ...campaign, definition_digest: null }))).not.toHaveProperty("Frozen as");
+  expect(Object.fromEntries(settingsOf({ ...campaign, definition_digest: null }))).not.toHaveProperty(
+    "Definition digest",
+  );
 });

@@ -1,4 +1,4 @@
-/** A campaign's settings as title and value, for people. */
+/** A campaign's settings as titles and values. */
 
 import type { Campaign, Catalogue, Definition } from "../../api/types";
 import { percentText } from "../../ui/format";
@@ -8,7 +8,7 @@ const STARTS = {
   default: "The vehicle's default gains",
   simplex: "Simplex on the model",
   given: "Given gains",
-  campaign: "The best of another campaign",
+  campaign: "Best of another campaign",
 } as const;
 
 const CLOSE_UNITS = ["°", "×"];
@@ -25,17 +25,17 @@ function percent(share: number): string {
   return percentText(100 * share, 1);
 }
 
-function said(value: unknown, unit = ""): string {
+function valueText(value: unknown, unit = ""): string {
   if (typeof value === "boolean") return value ? "yes" : "no";
   const gap = unit === "" || CLOSE_UNITS.includes(unit) ? "" : " ";
   return `${value}${gap}${unit}`;
 }
 
-/** Options under the titles and in the units that the catalogue gives them; under their names until it is there. */
+/** Options with the titles and units of the catalogue; with their names until it is loaded. */
 function optionRows(options: Record<string, unknown>, known: readonly Described[] = []): Row[] {
   return Object.entries(options).map(([name, value]) => {
     const found = known.find((one) => one.name === name);
-    return [found?.title ?? name, said(value, found?.unit)];
+    return [found?.title ?? name, valueText(value, found?.unit)];
   });
 }
 
@@ -43,19 +43,19 @@ function named(things: readonly Described[] | undefined, name: string): string {
   return things?.find((thing) => thing.name === name)?.title ?? name;
 }
 
-function stopInWords(stop: Definition["stop"]): string {
+function stopText(stop: Definition["stop"]): string {
   const most = `${stop?.max_flights} flights`;
   switch (stop?.kind) {
     case "budget":
       return `After ${most}`;
     case "noise":
-      return `When nothing is left that flights could tell from noise with ${percent(stop.confidence ?? 0)} confidence, or ${most}`;
+      return `No resolvable improvement at ${percent(stop.confidence ?? 0)} confidence, or ${most}`;
     default:
-      return `Two flights in a row less than ${percent(stop?.improvement ?? 0)} better than the best, or ${most}`;
+      return `Two consecutive flights less than ${percent(stop?.improvement ?? 0)} better than the best, or ${most}`;
   }
 }
 
-function startInWords(start: Definition["start"]): string {
+function startText(start: Definition["start"]): string {
   if (start?.donor && start.gains) {
     return `${gainsInBrackets(start.gains)}, flight ${start.donor.trial_number} of campaign ${start.donor.campaign_id}`;
   }
@@ -75,21 +75,21 @@ export function settingsOf({ definition, vehicle, definition_digest }: Campaign,
     ["Strategy", named(catalogue?.strategies, definition.strategy)],
     ...optionRows(definition.options ?? {}, strategy?.options),
     ...optionRows(definition.experiment_options ?? {}, experiment?.options),
-    ["Start", startInWords(start)],
-    ["Stop", stopInWords(stop)],
+    ["Start", startText(start)],
+    ["Stop", stopText(stop)],
     ...(stop?.min_battery_v ? ([["Battery", `Stops below ${stop.min_battery_v} V after a flight`]] as Row[]) : []),
     ...Object.entries(definition.bounds ?? {}).map(
-      ([name, [low, high]]): Row => [`Bounds of ${name}`, said(`${low} … ${high}`, unitOf(name))],
+      ([name, [low, high]]): Row => [`Bounds of ${name}`, valueText(`${low} … ${high}`, unitOf(name))],
     ),
     [
       "Largest step",
       `${percent(definition.first_step_fraction ?? 0)} of each range until a flight is valid, then ${percent(definition.step_fraction ?? 0)}`,
     ],
     ...(definition.ceiling_m && experiment?.output_unit === "m"
-      ? ([["Ceiling of the checks", `${definition.ceiling_m} m`]] as Row[])
+      ? ([["Gate ceiling", `${definition.ceiling_m} m`]] as Row[])
       : []),
     ["Seed", String(definition.seed)],
   ];
-  if (definition_digest) rows.push(["Frozen as", definition_digest.slice(0, 12)]);
+  if (definition_digest) rows.push(["Definition digest", definition_digest.slice(0, 12)]);
   return rows;
 }

@@ -1,4 +1,4 @@
-/** The one thing to do next in a campaign: what the right-hand card of its page shows. */
+/** The next action in a campaign, which the right-hand card of its page shows. */
 
 import type { Campaign, NextFlight, Proposal, Trial, Trouble } from "../../api/types";
 import { wasFlown } from "../../ui/states";
@@ -14,7 +14,7 @@ export type NextStep =
   | { kind: "failed"; problem: Trouble | null }
   | { kind: "finished" };
 
-/** Whether what the campaign knows as flying is down by its list of flights. */
+/** Whether the flight in progress has landed according to the list of flights. */
 export function hasLanded({ flying }: Campaign, trials: readonly Trial[]): boolean {
   return flying !== null && trials.some(({ id, state }) => id === flying.trial_id && wasFlown(state));
 }
@@ -27,7 +27,7 @@ export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly 
   }
   const unjudged = trials.find((trial) => trial.state === "captured" || trial.state === "lost");
   if (unjudged !== undefined) return { kind: "judge", trial: unjudged };
-  // The list of flights has come before the campaign that it belongs to: neither it nor its proposal is up to date.
+  // The list of flights is newer than the campaign: the campaign and its proposal are stale.
   if (landed) return { kind: "computing" };
   if (campaign.state === "finished" || campaign.state === "archived") return { kind: "finished" };
   if (wantsRehearsal(campaign)) return { kind: "rehearse" };
@@ -38,7 +38,7 @@ export function nextStep(campaign: Campaign, next: NextFlight, trials: readonly 
   return { kind: "computing" };
 }
 
-/** Whether its real vehicle may not fly before the campaign has flown on a simulation. */
+/** Whether the campaign must pass a rehearsal before its real vehicle may fly. */
 export function wantsRehearsal({ rehearsal }: Campaign): boolean {
   return rehearsal.state !== "not needed" && rehearsal.state !== "passed";
 }
@@ -48,7 +48,7 @@ function offered(proposal: Proposal): NextStep {
   return { kind: "propose", proposal };
 }
 
-/** Simulated time over wall time; null is as fast as the machine can. */
+/** Simulated time over wall time; null: as fast as possible. */
 export type Speed = 1 | 10 | null;
 
 export const SPEEDS: readonly { value: string; label: string; speed: Speed }[] = [

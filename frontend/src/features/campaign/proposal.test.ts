@@ -56,10 +56,10 @@ describe("what a choice should score", () => {
 
   test("is what the flights of the same gains scored, with the scatter of one flight", () => {
     expect(expectationOf("repeat", statistics)).toBe(
-      "Expected: 0.128 ± 0.012 m, as flights 2, 3 (± scatter of one flight).",
+      "Expected: 0.128 ± 0.012 m, from flights 2, 3 (± scatter of one flight).",
     );
     expect(expectationOf("baseline", statistics)).toBe(
-      "Expected: 0.528 ± 0.012 m, as flight 1 (± scatter of one flight).",
+      "Expected: 0.528 ± 0.012 m, from flight 1 (± scatter of one flight).",
     );
   });
 

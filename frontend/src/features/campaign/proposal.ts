@@ -1,4 +1,4 @@
-/** What can be flown next instead of, or beside, what is proposed. */
+/** Alternatives to the proposed gains, and the recommended one. */
 
 import type { Campaign, CampaignStatistics, Proposal, Trial } from "../../api/types";
 import { plusMinus } from "../../ui/uncertainty";
@@ -13,15 +13,15 @@ export const KINDS: Record<Proposal["kind"], string> = {
   "shorter step": "Shorter step",
   repeat: "Repeat",
   baseline: "Baseline",
-  manual: "By hand",
-  none: "Nothing better found",
+  manual: "Manual",
+  none: "No better gains found",
 };
 
 export const RECOMMENDED: Record<Recommended, string> = {
   step: "Fly the step",
   repeat: "Repeat the best",
   baseline: "Fly the baseline",
-  stop: "Stop here",
+  stop: "Stop the campaign",
 };
 
 type GainSet = Readonly<Record<string, number>>;
@@ -34,11 +34,11 @@ export function sameGains(one: GainSet, other: GainSet): boolean {
 export interface Advised {
   kind: Recommended;
   why: string;
-  /** The variant that flies what is advised; null when the proposal itself does, or when nothing is to be flown. */
+  /** The recommended variant; null if the proposal itself or no flight is recommended. */
   variant: Variant | null;
 }
 
-/** The one recommended thing: the proposal, one of its variants, or an end. */
+/** The recommendation: the proposal, one of its variants, or the end of the campaign. */
 export function advised(proposal: Proposal): Advised {
   const { advice } = proposal;
   const kind = advice?.kind ?? proposal.recommended;
@@ -54,7 +54,7 @@ export interface Choice {
   hint: string;
 }
 
-/** The variants that would fly something else than the proposal; none is offered that means the same twice. */
+/** The variants that differ from the proposal and from each other. */
 export function choicesFor(campaign: Campaign, proposal: Proposal, trials: readonly Trial[]): Choice[] {
   const best = bestOf(campaign, trials);
   const first = trials.find((trial) => trial.state === "valid") ?? null;
@@ -62,32 +62,32 @@ export function choicesFor(campaign: Campaign, proposal: Proposal, trials: reado
   const choices: Choice[] = [];
   const isNew = !trials.some((trial) => trial.state === "valid" && sameGains(trial.gains, proposal.gains));
   if (isNew) {
-    choices.push({ variant: "smaller step", label: "Smaller step", hint: "Half way from the best gains to these" });
+    choices.push({ variant: "smaller step", label: "Smaller step", hint: "Halfway from the best gains to these" });
   }
   if (!sameGains(best.gains, proposal.gains)) {
     choices.push({
       variant: "repeat",
       label: "Repeat instead",
-      hint: "The best gains once more: was it luck?",
+      hint: "Flies the best gains again to check their result",
     });
   }
   if (!sameGains(first.gains, proposal.gains) && !sameGains(first.gains, best.gains)) {
     choices.push({
       variant: "baseline",
       label: "Baseline",
-      hint: `The gains of flight ${first.number}, the first, once more: has the vehicle changed?`,
+      hint: `Flies the first gains (flight ${first.number}) again to check for drift`,
     });
   }
   return choices;
 }
 
-/** What a variant should score: flights of gains that were flown before say it themselves, half a step nobody does. */
+/** Expected error of a variant: from earlier flights with its gains; none for half a step. */
 export function expectationOf(variant: Variant, statistics: CampaignStatistics | undefined): string {
-  if (variant === "smaller step") return "Half way from the best gains to these. No prediction is made for it.";
+  if (variant === "smaller step") return "Halfway from the best gains to these. No prediction.";
   const group = statistics?.groups.find((one) => (variant === "repeat" ? one.is_best : one.is_baseline));
   if (statistics === undefined || group === undefined) return "";
   const flights = `flight${group.trial_numbers.length === 1 ? "" : "s"} ${group.trial_numbers.join(", ")}`;
   const error = plusMinus(group.mean, statistics.sigma, statistics.error_unit);
-  const meaning = statistics.sigma === null ? "how much flights scatter is not known yet" : "± scatter of one flight";
-  return `Expected: ${error}, as ${flights} (${meaning}).`;
+  const meaning = statistics.sigma === null ? "scatter not known yet" : "± scatter of one flight";
+  return `Expected: ${error}, from ${flights} (${meaning}).`;
 }

@@ -1,19 +1,19 @@
-/** A campaign's parts as its page shows them: read apart, shown together. */
+/** The data of a campaign page: loaded separately, shown consistently. */
 
 import { useState } from "react";
 import { useCampaign, useProposal, useTrials } from "../../api/queries";
 import type { Campaign, NextFlight, Trial } from "../../api/types";
 import { hasLanded } from "./nextStep";
 
-/** A campaign with its flights and its next one, as they belong together. */
+/** A consistent set of a campaign, its trials and its next flight. */
 export interface CampaignStatus {
   campaign: Campaign;
   trials: readonly Trial[];
   next: NextFlight;
 }
 
-/** Null until all of it is known. Each part is read by itself: what a change has made doubtful is not put beside what is
- * new already, so that nobody is asked for what was said a moment ago, or offered gains that are overtaken. */
+/** Null until all parts are loaded. Keeps the last consistent set while a part is stale, so that the page does not ask
+ * for a review that was just given or offer superseded gains. */
 export function useCampaignStatus(campaignId: number): CampaignStatus | null {
   const campaign = useCampaign(campaignId);
   const trials = useTrials(campaignId);
@@ -23,7 +23,7 @@ export function useCampaignStatus(campaignId: number): CampaignStatus | null {
   const areNew = [campaign, trials, next].every(({ isStale, error }) => !isStale || error !== null);
   const areOther = parts.campaign !== held?.campaign || parts.trials !== held?.trials || parts.next !== held?.next;
   if (areNew && areOther && isKnown(parts)) setHeld(parts);
-  // A landing is told at once: nothing is shown in the air that is known to be down.
+  // A landing is shown at once: a landed flight must not be shown as flying.
   if (held !== null && parts.trials !== undefined && hasLanded(held.campaign, parts.trials)) {
     return { ...held, trials: parts.trials };
   }

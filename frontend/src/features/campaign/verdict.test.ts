@@ -76,23 +76,23 @@ test("an overruled flight and one with glitches are marked", () => {
 test("a flight that repeats gains on purpose is held against its own prediction", () => {
   const interval = { lower: 0.3, upper: 0.4, confidence: 0.9 };
   const again = { ...first, kind: "baseline", predicted_interval: interval } as Trial;
-  expect(repeatPurpose(again)).toMatch(/^Asked for: the first flight's gains .* inside its prediction/);
-  expect(repeatPurpose({ ...again, error: 0.5 })).toContain("above its prediction");
+  expect(repeatPurpose(again)).toMatch(/^Baseline flight: repeats the first gains .* inside its predicted interval/);
+  expect(repeatPurpose({ ...again, error: 0.5 })).toContain("above its predicted interval");
   expect(repeatPurpose({ ...again, kind: "step" })).toBe("");
 });
 
 test("what a class would change is said before: which flight is the best then, and that the gains are found anew", () => {
   expect(consequenceOf(third, all, "invalid")).toBe(
-    "Flight 3 is the best; without it flight 1 is, and the next gains are computed anew.",
+    "Flight 3 is the best. Without it, flight 1 is the best, and the next gains are recomputed.",
   );
   expect(consequenceOf(first, all, "invalid")).toBe(
-    "Flight 3 stays the best, and the next gains are computed anew without flight 1.",
+    "Flight 3 stays the best. The next gains are recomputed without flight 1.",
   );
   expect(consequenceOf(first, [first, glitch], "invalid")).toBe(
-    "No other flight counts: without flight 1 the campaign begins again at its start gains.",
+    "No other flight is valid. Without flight 1, the campaign restarts from its start gains.",
   );
   expect(consequenceOf(glitch, all, "valid")).toContain("is scored from its record");
-  expect(standingWithout(glitch, all)).toBe("Flight 3 is the best now; the next gains are computed without flight 2.");
+  expect(standingWithout(glitch, all)).toBe("Flight 3 is the best now. The next gains are computed without flight 2.");
   expect(standingWithout(third, all)).toBe("");
 });
 
@@ -100,19 +100,19 @@ test("the best gains become the safe ones only once flights have shown that they
   const drone = { name: "Number 1", safe_gains: { kp: 283 } };
   const best = { gains: { kp: 400 } } as unknown as NonNullable<Campaign["best"]>;
   expect(promotable({ best, verdict: "better" }, drone)).toEqual({ possible: true, why: "" });
-  expect(promotable({ best, verdict: "unresolved" }, drone).why).toContain("whether they are better is unresolved");
+  expect(promotable({ best, verdict: "unresolved" }, drone).why).toContain("their verdict is “unresolved”");
   expect(promotable({ best, verdict: null }, drone).possible).toBe(false);
   expect(promotable({ best: { ...best, gains: { kp: 283 } }, verdict: "better" }, drone).why).toBe(
-    "The best gains are the safe ones of Number 1.",
+    "The best gains are the safe gains of Number 1.",
   );
 });
 
 test("after a change of the safe gains it is told what the vehicle holds until they are written to it", () => {
   const vehicle = { name: "Bee", state: "ready", held: { kd: 82, kp: 283 }, safe_gains: { kp: 400, kd: 100 } } as const;
   expect(heldGainsNotice(vehicle)).toBe(
-    "Bee itself still holds [283 82]: the safe ones are written to it with its next check, restore or flight.",
+    "Bee still has [283 82]. The safe gains are written at the next check, restore or flight.",
   );
-  expect(heldGainsNotice({ ...vehicle, state: "disconnected" })).toContain("when it is next connected");
+  expect(heldGainsNotice({ ...vehicle, state: "disconnected" })).toContain("at the next connection");
   expect(heldGainsNotice({ ...vehicle, held: vehicle.safe_gains })).toBe("");
   expect(heldGainsNotice({ ...vehicle, held: null })).toBe("");
 });
@@ -121,7 +121,7 @@ test("an operator's abort asks why, and counts against its gains only when they 
   const aborted = (abort_cause: Trial["abort_cause"]) => ({ ...trial(2, "aborted", null), abort_cause });
   expect(abortSentence(aborted("operator"))).toContain("only if the vehicle behaved badly");
   expect(abortSentence(aborted("something else"))).toContain("does not count against its gains");
-  expect(abortSentence(aborted("limit"))).toBe("A limit was met: the flight counts against its gains.");
+  expect(abortSentence(aborted("limit"))).toBe("A limit was exceeded: the flight counts against its gains.");
   expect(abortSentence(first)).toBe("");
 });
 

@@ -1,4 +1,4 @@
-/** What a finished flight is worth, and against what. */
+/** Texts and decisions about the result of a flight. */
 
 import type { Campaign, Trial, Vehicle } from "../../api/types";
 import { gainsInBrackets, inOrder, sameHeld } from "../../ui/gains";
@@ -11,7 +11,7 @@ export const VERDICTS = {
   "not known yet": "Not known yet",
 } as const;
 
-/** Where the error came to lie against what was predicted; null without an interval or an error. */
+/** Position of the error relative to its predicted interval; null if one is missing. */
 export function predictionResult(trial: Trial): "inside" | "above" | "below" | null {
   const { predicted_interval: interval, error } = trial;
   if (!interval || error === null) return null;
@@ -20,17 +20,17 @@ export function predictionResult(trial: Trial): "inside" | "above" | "below" | n
 }
 
 const ASKED: Partial<Record<Trial["kind"], string>> = {
-  baseline: "Asked for: the first flight's gains once more, to see whether the vehicle has changed.",
-  repeat: "Asked for: gains flown before once more, to see how much flights scatter.",
+  baseline: "Baseline flight: repeats the first gains to check whether the vehicle has changed.",
+  repeat: "Repeat flight: flies earlier gains again to measure the scatter.",
 };
 
 const KEPT = {
-  inside: "It ended inside its prediction: nothing has changed.",
-  above: "It ended above its prediction: worth a look.",
-  below: "It ended below its prediction: worth a look.",
+  inside: "The error is inside its predicted interval: no change detected.",
+  above: "The error is above its predicted interval: check the vehicle.",
+  below: "The error is below its predicted interval: check the vehicle.",
 } as const;
 
-/** Of a flight that repeats gains on purpose: why, and how it ended against its own prediction; empty for others. */
+/** Purpose of a flight that repeats gains, and its result against its prediction; empty for other flights. */
 export function repeatPurpose(trial: Trial): string {
   const why = ASKED[trial.kind];
   if (why === undefined || trial.state !== "valid") return "";
@@ -38,7 +38,7 @@ export function repeatPurpose(trial: Trial): string {
   return kept === null ? why : `${why} ${KEPT[kept]}`;
 }
 
-/** What makes a flight special beside its class, in few words. */
+/** Markers of a flight besides its class. */
 export function marksOf(trial: Trial): string[] {
   const glitches = trial.glitches?.length ?? 0;
   return [
@@ -56,7 +56,7 @@ export function bestBeforeOf(trial: Pick<Trial, "number">, trials: readonly Tria
   );
 }
 
-/** The verdict in a sentence, or the reason where there is none; "Aborted" and "Lost" stand beside it already. */
+/** The verdict sentence, otherwise the reason. Without "Aborted" or "Lost", which the state badge shows. */
 export function sentenceOf(trial: Trial): string {
   if (!["aborted", "lost"].includes(trial.state) || trial.reason === "") return trial.verdict || trial.reason;
   return trial.reason.charAt(0).toUpperCase() + trial.reason.slice(1);
@@ -64,24 +64,24 @@ export function sentenceOf(trial: Trial): string {
 
 type AbortWord = "behaved badly" | "something else";
 
-/** What an aborted flight says of its gains; empty for others. */
+/** Whether an aborted flight counts against its gains; empty for other flights. */
 export function abortSentence({ state, abort_cause: cause }: Pick<Trial, "state" | "abort_cause">): string {
   if (state !== "aborted") return "";
   switch (cause) {
     case "limit":
-      return "A limit was met: the flight counts against its gains.";
+      return "A limit was exceeded: the flight counts against its gains.";
     case "operator":
-      return "Why was it aborted? It counts against its gains only if the vehicle behaved badly.";
+      return "Why was the flight aborted? It counts against its gains only if the vehicle behaved badly.";
     case "behaved badly":
       return "The vehicle behaved badly: the flight counts against its gains.";
     case "something else":
-      return "It was something else: the flight does not count against its gains.";
+      return "Something else: the flight does not count against its gains.";
     default:
-      return "Nobody recorded why it was aborted: the flight counts against its gains.";
+      return "Abort cause not recorded: the flight counts against its gains.";
   }
 }
 
-/** What the operator may say of it now: what they have not said already. */
+/** Causes that the operator can select: those other than the current one. */
 export function abortWords({
   actions,
   abort_cause: cause,
@@ -90,62 +90,58 @@ export function abortWords({
   return (["behaved badly", "something else"] as const).filter((word) => word !== cause);
 }
 
-/** The flight that the page shows: the chosen one, else the latest. */
+/** The shown flight: the selected one, otherwise the latest. */
 export function selectedTrial(trials: readonly Trial[], chosen: number | null): Trial | null {
   const flown = trials.filter((trial) => wasFlown(trial.state));
   return flown.find((trial) => trial.number === chosen) ?? flown.at(-1) ?? null;
 }
 
-/** Flights that count; the one with the lowest error, the earliest of equals, is the best. */
+/** The best valid flight: the lowest error, the earliest of equal ones. */
 function bestOfCounted(trials: readonly Trial[]): Trial | null {
   return bestBeforeOf({ number: Infinity }, trials);
 }
 
-/** What classing a flight so would change: which flight is the best, and from what the next gains are computed. */
+/** Consequence of a class: which flight becomes the best, and which flights the next gains use. */
 export function consequenceOf(trial: Trial, trials: readonly Trial[], outcome: Trial["state"]): string {
   const best = bestOfCounted(trials);
   if (outcome === "valid") {
     const until = best === null ? "" : ` Flight ${best.number} is the best of the others.`;
-    return `Flight ${trial.number} is scored from its record, and the next gains are computed with it.${until}`;
+    return `Flight ${trial.number} is scored from its record and used for the next gains.${until}`;
   }
   const other = bestOfCounted(trials.filter(({ id }) => id !== trial.id));
   if (other === null) {
-    return `No other flight counts: without flight ${trial.number} the campaign begins again at its start gains.`;
+    return `No other flight is valid. Without flight ${trial.number}, the campaign restarts from its start gains.`;
   }
-  const anew = "and the next gains are computed anew";
   if (best?.id === trial.id)
-    return `Flight ${trial.number} is the best; without it flight ${other.number} is, ${anew}.`;
-  return `Flight ${other.number} stays the best, ${anew} without flight ${trial.number}.`;
+    return `Flight ${trial.number} is the best. Without it, flight ${other.number} is the best, and the next gains are recomputed.`;
+  return `Flight ${other.number} stays the best. The next gains are recomputed without flight ${trial.number}.`;
 }
 
-/** Of a flight that does not count: what holds instead; empty for others. */
+/** Standing of the campaign without an invalid flight; empty for other flights. */
 export function standingWithout(trial: Trial, trials: readonly Trial[]): string {
   if (trial.state !== "invalid") return "";
   const best = bestOfCounted(trials);
-  if (best === null) return "No flight counts now: the next gains are the start gains.";
-  return `Flight ${best.number} is the best now; the next gains are computed without flight ${trial.number}.`;
+  if (best === null) return "No flight is valid now. The next gains are the start gains.";
+  return `Flight ${best.number} is the best now. The next gains are computed without flight ${trial.number}.`;
 }
 
-/** Whether the best gains may become the vehicle's safe ones; if not, why not, and what to do. */
+/** Whether the best gains may become the vehicle's safe gains; if not, the reason and the action. */
 export function promotable(
   { best, verdict }: Pick<Campaign, "best" | "verdict">,
   { name, safe_gains: safe }: Pick<Vehicle, "name" | "safe_gains">,
 ): { possible: boolean; why: string } {
   if (best !== null && sameHeld(safe, best.gains))
-    return { possible: false, why: `The best gains are the safe ones of ${name}.` };
+    return { possible: false, why: `The best gains are the safe gains of ${name}.` };
   if (verdict === "better") return { possible: true, why: "" };
-  const because =
-    verdict === null
-      ? "no gains are better than the first ones yet"
-      : `whether they are better is ${verdict === "not known yet" ? verdict : `${verdict} as yet`}`;
+  const because = verdict === null ? "no gains are better than the first yet" : `their verdict is “${verdict}”`;
   return {
     possible: false,
-    why: `The best gains cannot become the safe ones of ${name}: ${because}. Fly the best and the first ones again until the statistics say “better”.`,
+    why: `The best gains cannot become the safe gains of ${name}: ${because}. Fly the best and the first gains again until the verdict is “better”.`,
   };
 }
 
-/** After a change of the safe gains: what is on the vehicle until they are written to it; empty when they are, or when
- * nobody has read what it holds. */
+/** After a change of the safe gains: the gains on the vehicle until the new ones are written; empty if they are written
+ * or the vehicle's gains are unknown. */
 export function heldGainsNotice({
   name,
   state,
@@ -155,13 +151,13 @@ export function heldGainsNotice({
   if (held === null || Object.keys(held).length === 0 || sameHeld(held, safe)) return "";
   const gains = gainsInBrackets(inOrder(held, Object.keys(safe)));
   return state === "disconnected"
-    ? `${name} held ${gains} when it was last read, and gets the safe ones when it is next connected.`
-    : `${name} itself still holds ${gains}: the safe ones are written to it with its next check, restore or flight.`;
+    ? `${name} had ${gains} at the last reading. The safe gains are written at the next connection.`
+    : `${name} still has ${gains}. The safe gains are written at the next check, restore or flight.`;
 }
 
-export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong set-up", "Battery low", "Touched something"];
+export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "Low battery", "Collision"];
 
-/** What a flight can be classed as from here, apart from what it is. */
+/** Classes that a flight can be changed to. */
 export function otherClasses(trial: Trial): ("valid" | "aborted" | "invalid")[] {
   if (!trial.actions.includes("classify")) return [];
   switch (trial.state) {

@@ -24,7 +24,7 @@ function Group({ title, children }: { title: string; children: ReactNode }) {
   );
 }
 
-/** Settings that have a good default each. */
+/** Optional settings with defaults. */
 export function AdvancedFields(props: Props) {
   const { form, catalogue, reasons, set } = props;
   const options = optionsOf(form, catalogue);
@@ -58,10 +58,10 @@ export function AdvancedFields(props: Props) {
         prefix="vehicle.options"
         onChange={(vehicleOptions) => set({ vehicleOptions })}
       />
-      <Group title="Chance">
+      <Group title="Random seed">
         <NumberField
           label="Seed"
-          description="The same seed gives the same scatter"
+          description="The same seed reproduces the same scatter"
           value={form.seed}
           error={reasons["seed"]}
           onChange={(seed) => set({ seed })}
@@ -73,14 +73,14 @@ export function AdvancedFields(props: Props) {
 
 const STOPS: Record<StopKind, { label: string; line: string }> = {
   paper: {
-    label: "Not improving",
-    line: "Ends after two flights in a row that are not clearly better than the best, as the paper did.",
+    label: "No improvement",
+    line: "Ends after two consecutive flights that are not clearly better than the best, as in the paper.",
   },
   noise: {
-    label: "Nothing but noise left",
-    line: "Ends when no further step could be told from noise, after the best has been flown again against the first gains.",
+    label: "No resolvable improvement",
+    line: "Ends when no further step would be resolvable, after the best and the first gains have been flown again.",
   },
-  budget: { label: "All flights", line: "Flies until the budget is used." },
+  budget: { label: "Flight budget", line: "Ends after the maximum number of flights." },
 };
 
 function StopFields({ form, reasons, set }: Props) {
@@ -98,14 +98,14 @@ function StopFields({ form, reasons, set }: Props) {
       />
       <p className={classes["note"]}>{STOPS[form.stop].line}</p>
       <NumberField
-        label="Flights at most"
+        label="Maximum flights"
         value={form.maxFlights}
         error={reasons["stop.max_flights"]}
         onChange={(maxFlights) => set({ maxFlights })}
       />
       {form.stop === "paper" && (
         <NumberField
-          label="An improvement is at least"
+          label="Minimum improvement"
           suffix=" %"
           value={form.improvementPercent}
           error={reasons["stop.improvement"]}
@@ -114,7 +114,7 @@ function StopFields({ form, reasons, set }: Props) {
       )}
       {form.stop === "noise" && (
         <NumberField
-          label="Sure enough with a confidence of"
+          label="Confidence"
           suffix=" %"
           value={form.confidencePercent}
           error={reasons["stop.confidence"]}
@@ -122,8 +122,8 @@ function StopFields({ form, reasons, set }: Props) {
         />
       )}
       <NumberField
-        label="Stop when a flight ends below"
-        placeholder="no battery limit"
+        label="Stop below battery voltage"
+        placeholder="No limit"
         suffix=" V"
         value={form.minBatteryV}
         error={reasons["stop.min_battery_v"]}
@@ -168,9 +168,9 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
           set({ bounds: { ...form.bounds, [gain.name]: pair } });
         return (
           <div key={gain.name} className={classes["bounds"]}>
-            <NumberField label={`${gain.name} at least`} value={low} onChange={(value) => change([value, high])} />
+            <NumberField label={`${gain.name} minimum`} value={low} onChange={(value) => change([value, high])} />
             <NumberField
-              label={`${gain.name} at most`}
+              label={`${gain.name} maximum`}
               value={high}
               error={reasons[`bounds.${gain.name}`]}
               onChange={(value) => change([low, value])}
@@ -179,16 +179,16 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
         );
       })}
       <NumberField
-        label="First step at most"
-        description="of each range, until a flight is valid"
+        label="Maximum first step"
+        description="Of each range, until a flight is valid"
         suffix=" %"
         value={form.firstStepPercent}
         error={reasons["first_step_fraction"]}
         onChange={(firstStepPercent) => set({ firstStepPercent })}
       />
       <NumberField
-        label="Later steps at most"
-        description="of each range"
+        label="Maximum later step"
+        description="Of each range"
         suffix=" %"
         value={form.stepPercent}
         error={reasons["step_fraction"]}
@@ -196,8 +196,8 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
       />
       {hasModel(catalogue, form.experiment) && unitsOf(catalogue, form.experiment).output === "m" && (
         <NumberField
-          label="Ceiling of the checks"
-          description="Gains that might rise higher are refused"
+          label="Gate ceiling"
+          description="Gains that could rise above it are refused"
           suffix=" m"
           value={form.ceilingM}
           error={reasons["ceiling_m"]}

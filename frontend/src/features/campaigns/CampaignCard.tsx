@@ -16,7 +16,7 @@ import classes from "./CampaignCard.module.css";
 import { CloneForm } from "./CloneForm";
 import { progress } from "./campaignList";
 
-/** A campaign at a glance: what it reached, how its curves look, what to do next. */
+/** A campaign in the list: result, curves, next action. */
 export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
   const { id, name, state, outcome, vehicle, best, flights, rehearsal, next_action, spark } = campaign;
   const units = useUnits(campaign.experiment);
@@ -49,13 +49,13 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
   );
 }
 
-/** What can be done with a campaign without opening it. */
+/** Actions on a campaign without opening it. */
 function More({ campaign }: { campaign: CampaignSummary }) {
   const [open, setOpen] = useState(false);
   const archive = useArchive(campaign.id);
   return (
     <details className={classes["more"]} onToggle={(event) => setOpen(event.currentTarget.open)}>
-      <summary aria-label={`More to do with ${campaign.name}`}>
+      <summary aria-label={`More actions for ${campaign.name}`}>
         {campaign.state === "finished" ? "Clone or archive" : "Clone"}
       </summary>
       {open && (

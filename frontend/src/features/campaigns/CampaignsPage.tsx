@@ -16,7 +16,7 @@ import { FirstCampaign } from "./FirstCampaign";
 import { ImportBundle } from "./ImportBundle";
 
 const SORTS: { value: Sort; label: string }[] = [
-  { value: "-updated", label: "Lately changed" },
+  { value: "-updated", label: "Last updated" },
   { value: "-created", label: "Newest" },
   { value: "created", label: "Oldest" },
   { value: "name", label: "Name" },
@@ -64,13 +64,13 @@ export function CampaignsPage() {
         <SelectField
           aria-label="Vehicle"
           data={[
-            { value: "", label: "Every vehicle" },
+            { value: "", label: "All vehicles" },
             ...kinds.map(({ name, title }) => ({ value: name, label: title })),
           ]}
           value={vehicle}
           onChange={setVehicle}
         />
-        <SelectField aria-label="Order" data={SORTS} value={sort} onChange={setSort} />
+        <SelectField aria-label="Sort by" data={SORTS} value={sort} onChange={setSort} />
       </search>
       <ErrorNotice error={campaigns.error} />
       {campaigns.isPending && (
@@ -82,7 +82,7 @@ export function CampaignsPage() {
       )}
       {campaigns.data && found.length === 0 && (
         <div className={classes["none"]}>
-          <p>No campaign fits this search.</p>
+          <p>No campaigns match.</p>
           {filtered && (
             <Button
               variant="default"

@@ -16,7 +16,7 @@ interface Props extends Pick<Campaign, "id" | "vehicle" | "best"> {
   experiment: string;
 }
 
-/** The same settings again, on this vehicle or another, from the start or from what this campaign has reached. */
+/** Clone with the same settings, on this vehicle or another, from the start gains or this campaign's best. */
 export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props) {
   const navigate = useNavigate();
   const ownKey = own.registered ? String(own.id) : own.kind;
@@ -31,7 +31,7 @@ export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props)
   return (
     <div className={classes["form"]}>
       <SelectField
-        label="Same settings again, on"
+        label="Clone to vehicle"
         data={[
           ...registered.map(({ id, name }) => ({ value: String(id), label: name })),
           ...kinds.map(({ name, title }) => ({ value: name, label: title })),

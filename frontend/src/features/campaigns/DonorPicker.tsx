@@ -17,7 +17,7 @@ interface Props {
 
 const OFFERED = 6;
 
-/** The campaign whose best gains are flown first; found by its name. */
+/** Search for the campaign whose best gains are flown first. */
 export function DonorPicker({ experiment, donor, error, onChange }: Props) {
   const [search, setSearch] = useState(donor?.name ?? "");
   const [sought] = useDebouncedValue(search.trim(), 200);
@@ -61,7 +61,7 @@ interface OffersProps {
 
 function Offers({ campaigns, onChoose }: OffersProps) {
   if (campaigns.length === 0)
-    return <p role="status">No campaign of this experiment has a valid flight and such a name.</p>;
+    return <p role="status">No campaigns match. Only campaigns of this experiment with a valid flight are listed.</p>;
   return (
     <ul className={classes["offers"]} aria-label="Campaigns to start from">
       {campaigns.slice(0, OFFERED).map((campaign) => (
@@ -71,7 +71,7 @@ function Offers({ campaigns, onChoose }: OffersProps) {
           </UnstyledButton>
         </li>
       ))}
-      {campaigns.length > OFFERED && <li className={classes["rest"]}>More: type more of the name.</li>}
+      {campaigns.length > OFFERED && <li className={classes["rest"]}>Type more of the name to see other campaigns.</li>}
     </ul>
   );
 }
@@ -86,13 +86,13 @@ function Taken({ donor, best, experiment }: TakenProps) {
   const unit = useUnits(experiment).error;
   return (
     <p className={`${classes["taken"]} numbers`}>
-      Its best, flight {best.trial_number} on {donor.vehicle.title}:{" "}
+      Best flight: {best.trial_number} on {donor.vehicle.title}:{" "}
       <strong>
         <GainList gains={best.gains} experiment={experiment} />
       </strong>
       , error {plusMinus(best.mean, best.standard_error, unit)}
-      {best.standard_error === null ? "" : " (± standard error)"}. They are flown first; then it shows whether the
-      vehicles are alike enough to build on what was learned there.
+      {best.standard_error === null ? "" : " (± standard error)"}. The first flight uses these gains and shows whether
+      the vehicles are similar enough to build on what was learned there.
     </p>
   );
 }

@@ -9,12 +9,12 @@ import { ImportBundle } from "./ImportBundle";
 import { firstPreset } from "./newCampaign";
 
 const STEPS = [
-  ["Fly", "The vehicle takes off with its present gains; the mean altitude error over 32.6 s is what counts."],
-  ["Learn", "The flight is compared with a simple model, and the difference is carried over to the next prediction."],
-  ["Step", "The model tries many gain sets in a moment and proposes the best; you see why, and decide."],
+  ["Fly", "The vehicle takes off with its current gains. The score is the mean altitude error over 32.6 s."],
+  ["Learn", "The flight is compared with a simple model, and the difference corrects the next prediction."],
+  ["Step", "The model evaluates many gain sets in about a second and proposes the best. You see why, and decide."],
 ] as const;
 
-/** The empty list teaches what a campaign is and creates the first one with one click. */
+/** Empty list: explains campaigns, and creates the first one with one click. */
 export function FirstCampaign() {
   const navigate = useNavigate();
   const catalogue = useCatalogue();
@@ -23,9 +23,10 @@ export function FirstCampaign() {
   return (
     <section className={classes["first"]}>
       <Drawing />
-      <h1>Tune a takeoff in a handful of flights</h1>
+      <h1>Tune a takeoff in a few flights</h1>
       <p className={classes["lead"]}>
-        A campaign flies one vehicle again and again, each time with better gains, and stops when nothing more is won.
+        A campaign flies one vehicle repeatedly, each time with better gains, and stops when no further improvement is
+        found.
       </p>
       <ol className={classes["steps"]}>
         {STEPS.map(([title, text]) => (

@@ -2,19 +2,19 @@ import { Button, FileButton } from "@mantine/core";
 import { useImportBundle } from "../../api/files";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 
-/** A campaign from another installation, as its bundle. */
+/** Import of a campaign bundle from another installation. */
 export function ImportBundle() {
-  const bringing = useImportBundle();
+  const imported = useImportBundle();
   return (
     <div>
-      <FileButton accept=".zip" onChange={(file) => file && bringing.mutate(file)}>
+      <FileButton accept=".zip" onChange={(file) => file && imported.mutate(file)}>
         {(props) => (
-          <Button {...props} variant="default" loading={bringing.isPending}>
-            Bring in a bundle
+          <Button {...props} variant="default" loading={imported.isPending}>
+            Import bundle
           </Button>
         )}
       </FileButton>
-      <ErrorNotice error={bringing.error} />
+      <ErrorNotice error={imported.error} />
     </div>
   );
 }

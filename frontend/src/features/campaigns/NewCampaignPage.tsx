@@ -33,7 +33,7 @@ import {
 } from "./newCampaign";
 import { VehiclePicker } from "./VehiclePicker";
 
-/** With `?vehicle=ID` that registered vehicle is chosen already. */
+/** `?vehicle=ID` preselects a registered vehicle. */
 export function NewCampaignPage() {
   useTitle("New campaign");
   const catalogue = useCatalogue();
@@ -60,7 +60,7 @@ const STARTS: Record<StartKind, string> = {
   default: "The vehicle's default gains",
   simplex: "Best gains on the model (simplex)",
   campaign: "Best of another campaign",
-  given: "Gains of my own",
+  given: "Custom gains",
 };
 
 interface FormProps {
@@ -116,8 +116,8 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       />
       {isReal && (
         <p className={classes["rehearse"]}>
-          {form.registered?.name} is a real vehicle: before its first flight the campaign is rehearsed on a simulation,
-          in one click from its page.
+          {form.registered?.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
+          simulation, which you start from the campaign page.
         </p>
       )}
       <TextInput
@@ -183,7 +183,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         </Accordion.Item>
       </Accordion>
       <ErrorNotice error={create.error} shown={[...plain, ...advanced]} />
-      {unread.length > 0 && <p role="status">Not a number yet: {unread.join(", ")}.</p>}
+      {unread.length > 0 && <p role="status">Enter a number for {unread.join(", ")}.</p>}
       <div className={classes["create"]}>
         <Button
           type="submit"

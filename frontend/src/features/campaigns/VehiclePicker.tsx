@@ -9,7 +9,7 @@ import classes from "./VehiclePicker.module.css";
 interface Props {
   kinds: readonly VehicleKindInfo[];
   registered: readonly Vehicle[];
-  /** Registered vehicles that fly another experiment: choosing one changes it. */
+  /** Registered vehicles of other experiments; selecting one changes the experiment. */
   others: readonly Vehicle[];
   kind: string;
   vehicleId: number | null;
@@ -20,7 +20,7 @@ interface Props {
 
 const keyOf = (vehicleId: number): string => `vehicle ${vehicleId}`;
 
-/** What flies: a registered vehicle, or a simulation that campaigns share. */
+/** Selection of a registered vehicle or a shared simulation. */
 export function VehiclePicker({ kinds, registered, others, kind, vehicleId, error, onKind, onVehicle }: Props) {
   const choose = (key: string): void => {
     const chosen = registered.find(({ id }) => keyOf(id) === key);
@@ -55,7 +55,7 @@ export function VehiclePicker({ kinds, registered, others, kind, vehicleId, erro
         </div>
       </Radio.Group>
       <div className={classes["more"]}>
-        {others.length > 0 && <span>With another experiment:</span>}
+        {others.length > 0 && <span>For another experiment:</span>}
         {others.map((vehicle) => (
           <Button key={vehicle.id} variant="default" onClick={() => onVehicle(vehicle)}>
             {vehicle.name}

@@ -1,4 +1,4 @@
-/** The list of campaigns: its filters, and what a card says about progress. */
+/** Filters of the campaign list, and the progress text of a card. */
 
 import type { CampaignState, CampaignSummary } from "../../api/types";
 import { against, percentChange } from "../../ui/format";
@@ -7,7 +7,7 @@ export type StateFilter = "all" | "open" | "finished" | "archived";
 
 export const STATE_FILTERS: { value: StateFilter; label: string }[] = [
   { value: "all", label: "All" },
-  { value: "open", label: "Under way" },
+  { value: "open", label: "Active" },
   { value: "finished", label: "Finished" },
   { value: "archived", label: "Archived" },
 ];
@@ -23,12 +23,12 @@ export function statesFor(filter: StateFilter): CampaignState[] {
   return STATES[filter];
 }
 
-/** The best gains against the first flight's, in words; null before there are two flights. */
+/** Comparison of the best gains with the first; null before the second flight. */
 export function progress({ best, first_error, flights, verdict }: CampaignSummary): string | null {
   const change = percentChange(best?.mean, first_error);
   if (best === null || change === null || flights < 2) return null;
-  if (verdict === null) return "none better yet";
-  if (verdict === "unresolved") return "not told apart from the first";
-  if (verdict === "not known yet") return `${against(change, "the first")}, not known yet whether by chance`;
+  if (verdict === null) return "no improvement yet";
+  if (verdict === "unresolved") return "unresolved against the first";
+  if (verdict === "not known yet") return `${against(change, "the first")}, significance not known yet`;
   return against(change, "the first");
 }

@@ -1,4 +1,4 @@
-/** The form of a new campaign: working defaults in, the request out. Number fields hold text while it is not a number. */
+/** Form of a new campaign: its defaults and its request. Number fields contain text until it is a valid number. */
 
 import type {
   CampaignSummary,
@@ -15,7 +15,7 @@ import type { OptionValue } from "../../ui/OptionField";
 export type StartKind = "default" | "simplex" | "given" | "campaign";
 export type StopKind = "paper" | "noise" | "budget";
 
-/** A registered vehicle, as far as the form needs it: its settings stand at the vehicle. */
+/** The fields of a registered vehicle that the form needs. */
 export type Chosen = Pick<Vehicle, "id" | "kind" | "name" | "experiments">;
 
 export interface CampaignForm {
@@ -46,24 +46,24 @@ export function gainsOf(catalogue: Catalogue, experiment: string) {
   return catalogue.experiments.find(({ name }) => name === experiment)?.gains ?? [];
 }
 
-/** Whether flights can be foretold: without a model gains are chosen by hand, and nothing is searched or simulated. */
+/** Whether the experiment has a model; without one, gains are chosen manually and nothing is simulated. */
 export function hasModel(catalogue: Catalogue, experiment: string): boolean {
   return catalogue.experiments.find(({ name }) => name === experiment)?.has_model ?? false;
 }
 
-/** Where the first gains may come from. */
+/** Available sources of the first gains. */
 export function startsFor(catalogue: Catalogue, experiment: string): StartKind[] {
   return hasModel(catalogue, experiment)
     ? ["default", "simplex", "campaign", "given"]
     : ["default", "campaign", "given"];
 }
 
-/** Whether something that works with `experiments` works with this one; an empty list is all of them. */
+/** Whether `experiments` includes this one; an empty list means all. */
 function fits(experiments: readonly string[] | undefined, experiment: string): boolean {
   return experiments === undefined || experiments.length === 0 || experiments.includes(experiment);
 }
 
-/** Shared vehicles that fly this experiment. The simulation comes first, a vehicle that is flown elsewhere last. */
+/** Shared vehicles of this experiment: simulations first, vehicles flown elsewhere last. */
 export function kindsFor(catalogue: Catalogue, experiment: string): VehicleKindInfo[] {
   const rank = (kind: VehicleKindInfo): number => (kind.name === "jsbsim" ? 0 : kind.can_fly ? 1 : 2);
   const kinds: readonly VehicleKindInfo[] = catalogue.vehicle_kinds;
@@ -81,7 +81,7 @@ export function flyingOther<T extends Vehicle>(vehicles: readonly T[], experimen
   return vehicles.filter(({ registered, experiments }) => registered && !fits(experiments, experiment));
 }
 
-/** Strategies that work with this experiment, in the catalogue's order: the first one is recommended. */
+/** Strategies of this experiment in the catalogue's order; the first is recommended. */
 export function strategiesFor(catalogue: Catalogue, experiment: string) {
   return catalogue.strategies.filter((strategy) => fits(strategy.experiments, experiment));
 }
@@ -138,13 +138,13 @@ function isNamedByHand({ name, experiment, vehicle, registered }: CampaignForm, 
   return name !== nameFor(catalogue, experiment, registered?.name ?? vehicle);
 }
 
-/** Another vehicle has other settings; a name that nobody has changed follows it. */
+/** Select a vehicle: resets the vehicle settings and updates an unedited name. */
 export function withVehicle(form: CampaignForm, catalogue: Catalogue, vehicle: string): CampaignForm {
   const name = isNamedByHand(form, catalogue) ? form.name : nameFor(catalogue, form.experiment, vehicle);
   return { ...form, vehicle, registered: null, vehicleOptions: {}, name };
 }
 
-/** A registered vehicle has settings of its own, and brings its experiment where it does not fly the chosen one. */
+/** Select a registered vehicle: changes the experiment if the vehicle does not fly it. */
 export function withRegistered(form: CampaignForm, catalogue: Catalogue, registered: Chosen): CampaignForm {
   const own = registered.experiments[0] ?? form.experiment;
   const suited = fits(registered.experiments, form.experiment) ? form : withExperiment(form, catalogue, own);
@@ -152,7 +152,7 @@ export function withRegistered(form: CampaignForm, catalogue: Catalogue, registe
   return { ...suited, vehicle: registered.kind, registered, vehicleOptions: {}, name };
 }
 
-/** Another experiment has other gains, vehicles and strategies: everything but the stop rule begins anew. */
+/** Select an experiment: resets everything except the stop rule, the seed and an edited name. */
 export function withExperiment(form: CampaignForm, catalogue: Catalogue, experiment: string): CampaignForm {
   const { stop, maxFlights, improvementPercent, confidencePercent, seed } = form;
   const fresh = startingForm(catalogue, experiment);
@@ -168,7 +168,7 @@ function share(entry: NumberEntry, fallback: number): number {
   return typeof entry === "number" ? Number((entry / 100).toPrecision(12)) : fallback;
 }
 
-/** Only what differs from the experiment's own bounds narrows them. */
+/** Bounds that differ from those of the experiment. */
 function narrowed(form: CampaignForm, catalogue: Catalogue): Record<string, [number, number]> {
   const bounds: Record<string, [number, number]> = {};
   for (const gain of gainsOf(catalogue, form.experiment)) {
@@ -230,7 +230,7 @@ export interface OffersOptions {
   vehicle: readonly OptionInfo[];
 }
 
-/** The settings that the chosen experiment, strategy and vehicle have. */
+/** Options of the selected experiment, strategy and vehicle. */
 export function optionsOf(form: CampaignForm, catalogue: Catalogue): OffersOptions {
   return {
     experiment: catalogue.experiments.find(({ name }) => name === form.experiment)?.options ?? [],
@@ -239,7 +239,7 @@ export function optionsOf(form: CampaignForm, catalogue: Catalogue): OffersOptio
   };
 }
 
-/** The names under which the server refuses a field, as far as the form shows it: first the plain ones. */
+/** Server names of the form's fields: always visible ones and advanced ones. */
 export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: string[]; advanced: string[] } {
   const gains = gainsOf(catalogue, form.experiment).map(({ name }) => name);
   const options = optionsOf(form, catalogue);
@@ -271,7 +271,7 @@ export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: str
   };
 }
 
-/** What is typed and does not read as a number, by the words of its field: until then there is nothing to create. */
+/** Labels of fields without a valid number; the campaign cannot be created until they are corrected. */
 export function unreadable(form: CampaignForm, catalogue: Catalogue): string[] {
   const isText = (entry: NumberEntry): boolean => typeof entry === "string" && entry.trim() !== "";
   const gains = gainsOf(catalogue, form.experiment).map(({ name }) => name);
@@ -281,17 +281,17 @@ export function unreadable(form: CampaignForm, catalogue: Catalogue): string[] {
       .filter(({ name, default: standard }) => typeof standard === "number" && typeof chosen[name] === "string")
       .map(({ title }) => title);
   const entries: [string, NumberEntry][] = [
-    ["Flights at most", form.maxFlights],
-    ["An improvement is at least", form.stop === "paper" ? form.improvementPercent : ""],
-    ["Sure enough with a confidence of", form.stop === "noise" ? form.confidencePercent : ""],
-    ["Stop when a flight ends below", form.minBatteryV],
-    ["First step at most", form.firstStepPercent],
-    ["Later steps at most", form.stepPercent],
-    ["Ceiling of the checks", form.ceilingM],
+    ["Maximum flights", form.maxFlights],
+    ["Minimum improvement", form.stop === "paper" ? form.improvementPercent : ""],
+    ["Confidence", form.stop === "noise" ? form.confidencePercent : ""],
+    ["Stop below battery voltage", form.minBatteryV],
+    ["Maximum first step", form.firstStepPercent],
+    ["Maximum later step", form.stepPercent],
+    ["Gate ceiling", form.ceilingM],
     ["Seed", form.seed],
     ...gains.flatMap((name): [string, NumberEntry][] => [
-      [`${name} at least`, form.bounds[name]?.[0] ?? ""],
-      [`${name} at most`, form.bounds[name]?.[1] ?? ""],
+      [`${name} minimum`, form.bounds[name]?.[0] ?? ""],
+      [`${name} maximum`, form.bounds[name]?.[1] ?? ""],
     ]),
   ];
   return [
