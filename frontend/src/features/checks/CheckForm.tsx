@@ -12,38 +12,38 @@ import { RECORDINGS } from "./checks";
 interface Props {
   upload: RecordingCheck;
   onCheck: (files: readonly File[], gains?: string) => void;
-  /** Whether a file is held over the page. */
+  /** Whether a file is dragged over the page. */
   over: boolean;
-  /** Whether what a check is has been seen already. */
+  /** Whether to omit the introduction. */
   brief: boolean;
 }
 
-/** Where a recording is handed in; it says what a check is good for, and shows one. */
+/** Upload form for a recording, with an introduction and an example. */
 export function CheckForm({ upload, onCheck, over, brief }: Props) {
   const example = useCheckExample();
   const navigate = useNavigate();
   return (
     <Panel
-      title={brief ? "Check another recording" : "Is the controller in the model the one in your vehicle?"}
+      title={brief ? "Check another recording" : "Check that the model’s controller matches your vehicle"}
       className={over ? classes["over"] : ""}
     >
       {!brief && (
         <p className={classes["line"]}>
-          The method works only if it is. Hand in a recorded run of the autopilot's vertical loop: it is replayed
-          through the replica that the model flies, and every signal is compared, to the last bit where the recording
-          allows.
+          The method requires an exact replica of the controller. Upload a recorded run of the autopilot's vertical
+          loop. It is replayed through the replica in the model, and every signal is compared, bit by bit where the
+          recording allows it.
         </p>
       )}
       <p className={classes["line"]}>
-        Drop a file here or choose one: Paparazzi's <code>.data</code> file with <code>VERT_LOOP</code> in it (choose
-        its <code>.log</code> too, which says which gains were flown), or a recording of every step as <code>.csv</code>{" "}
-        or <code>.csv.gz</code>. It is not kept.
+        Drop a file here or choose one: Paparazzi's <code>.data</code> file with <code>VERT_LOOP</code> messages (add
+        its <code>.log</code>, which contains the gains), or a recording of every step as <code>.csv</code> or{" "}
+        <code>.csv.gz</code>. The file is not stored.
       </p>
       <div className={classes["actions"]}>
         <FileButton multiple accept={RECORDINGS} onChange={(files) => onCheck(files)}>
           {(props) => (
             <Button {...props} loading={upload.isPending} leftSection={<IconFileUpload size={20} aria-hidden />}>
-              Choose a recording
+              Choose recording
             </Button>
           )}
         </FileButton>
@@ -53,7 +53,7 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
           leftSection={<IconPlayerPlay size={18} aria-hidden />}
           onClick={() => example.mutate(undefined, { onSuccess: ({ id }) => void navigate(`/controller/${id}`) })}
         >
-          Check the example
+          Check example
         </Button>
       </div>
       <ErrorNotice error={upload.error ?? example.error} />
@@ -62,7 +62,7 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
   );
 }
 
-/** A log that does not say which gains were flown is checked with those that a person gives. */
+/** Input for the gains of a log that does not contain them. */
 function GainsAsked({ upload, onCheck }: Pick<Props, "upload" | "onCheck">) {
   const [gains, setGains] = useState("");
   const asked = problemOf(upload.error)?.problems.some(({ field }) => field === "gains") ?? false;
@@ -83,7 +83,7 @@ function GainsAsked({ upload, onCheck }: Pick<Props, "upload" | "onCheck">) {
         onChange={(event) => setGains(event.currentTarget.value)}
       />
       <Button type="submit" disabled={gains === ""}>
-        Check {sent.file.name} with these
+        Check {sent.file.name} with these gains
       </Button>
     </form>
   );

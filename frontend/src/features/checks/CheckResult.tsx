@@ -25,7 +25,7 @@ interface Props {
   onCheck: (files: readonly File[], gains?: string) => void;
 }
 
-/** One check: the result in a sentence, then every signal in numbers, then drawn. */
+/** One check: its result, a table of all signals, and figures. */
 export function CheckResult({ checkId, upload, onCheck }: Props) {
   const { data: check, error } = useCheck(checkId);
   if (check === undefined) {
@@ -64,7 +64,7 @@ export function CheckResult({ checkId, upload, onCheck }: Props) {
   );
 }
 
-/** The same file once more with the gains that its commands follow from, while it is at hand. */
+/** Repeats the check of an uploaded file with the gains that its commands match. */
 function BetterGains({ check, upload, onCheck }: Omit<Props, "checkId"> & { check: ControllerCheck }) {
   const sent = upload.data?.id === check.id ? upload.variables : undefined;
   const better = check.better_gains;

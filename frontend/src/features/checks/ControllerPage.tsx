@@ -15,7 +15,7 @@ import { CheckForm } from "./CheckForm";
 import { CheckResult } from "./CheckResult";
 import { checkStateLabel, KINDS } from "./checks";
 
-/** Is the controller in the model the one in the vehicle? A recorded run of it, held against the replica. */
+/** Comparison of a recorded controller with the replica in the model. */
 export function ControllerPage() {
   useTitle("Controller check");
   const checkId = Number(useParams()["checkId"] ?? 0);
@@ -54,7 +54,7 @@ export function ControllerPage() {
   );
 }
 
-/** What was checked before, the newest first. */
+/** Earlier checks, newest first. */
 function EarlierChecks({ shown }: { shown: number }) {
   const checks = useChecks();
   const remove = useDeleteCheck();
@@ -65,8 +65,8 @@ function EarlierChecks({ shown }: { shown: number }) {
     <section>
       <ErrorNotice error={checks.error ?? remove.error} />
       {checks.isPending && <Skeleton height={90} radius="md" aria-busy="true" />}
-      {found.length > 0 && <h2 className={classes["section"]}>Checked so far</h2>}
-      <ul className={classes["list"]} aria-label="Checked so far">
+      {found.length > 0 && <h2 className={classes["section"]}>Earlier checks</h2>}
+      <ul className={classes["list"]} aria-label="Earlier checks">
         {found.map(({ id, file_name, kind, passed, checked_at }) => (
           <li key={id} className={jobs["job"]}>
             <div className={jobs["what"]}>
@@ -88,8 +88,8 @@ function EarlierChecks({ shown }: { shown: number }) {
             </div>
             <ActionIcon
               color="gray"
-              aria-label={`Remove the check of ${file_name}`}
-              title="Remove"
+              aria-label={`Delete the check of ${file_name}`}
+              title="Delete"
               onClick={() =>
                 remove.mutate(id, { onSuccess: () => id === shown && void navigate("/controller", { replace: true }) })
               }

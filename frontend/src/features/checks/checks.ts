@@ -1,15 +1,15 @@
-/** Controller checks in words. */
+/** Texts and tables of controller checks. */
 
 import type { CheckedSignal, ControllerCheckSummary } from "../../api/checks";
 import type { FigureTable } from "../../api/types";
 import { gainText, NOTHING } from "../../ui/format";
 import type { StateLabel } from "../../ui/states";
 
-/** For the file chooser. A .log goes with Paparazzi's .data file. */
+/** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
 export const RECORDINGS = ".data,.log,.csv,.gz,text/csv";
 
 export const KINDS: Record<ControllerCheckSummary["kind"], string> = {
-  log: "Log of a flight",
+  log: "Flight log",
   trace: "Recording of every step",
 };
 
@@ -23,12 +23,12 @@ export function gainsText(gains: Record<string, number>): string {
     .join(", ");
 }
 
-/** Counts are exact; of what is measured two digits say enough. */
+/** Integers in full, measured values to two digits. */
 function brief(value: number): string {
   return gainText(Number.isInteger(value) ? value : Number(value.toPrecision(2)));
 }
 
-/** One line for each signal. */
+/** Table with one row per signal. */
 export function signalsTable(signals: readonly CheckedSignal[]): FigureTable {
   const column = (name: string, title: string) => ({ name, title, unit: "", digits: null });
   return {
@@ -51,7 +51,7 @@ export function signalsTable(signals: readonly CheckedSignal[]): FigureTable {
   };
 }
 
-/** What is allowed of which signals: "ff_cmd, fb_cmd, thrust: to the last bit". */
+/** Allowed differences of the signals: "ff_cmd, fb_cmd, thrust: to the last bit". */
 export function allowances(signals: readonly CheckedSignal[]): string[] {
   const names = new Map<string, string[]>();
   for (const { name, allowance } of signals) names.set(allowance, [...(names.get(allowance) ?? []), name]);

@@ -7,6 +7,7 @@ import { problemOf } from "../../api/problems";
 import { useTrial } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { ErrorNotice } from "../../ui/ErrorNotice";
+import { count } from "../../ui/format";
 import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { useTitle } from "../../ui/useTitle";
@@ -17,8 +18,7 @@ import { FlightPicker } from "./FlightPicker";
 import { lineStylesOf } from "./LineSample";
 import { SaveComparison } from "./SaveComparison";
 
-/** The flights of the address. `add` takes one in beside those that this tab remembers; a bare address brings them
- * back. */
+/** The flights in the URL. `add` adds one to those stored in this tab; a URL without flights restores them. */
 function useChosen(): [number[], (trials: readonly number[]) => void] {
   const [params, setParams] = useSearchParams();
   const chosen = chosenIn(params);
@@ -38,7 +38,7 @@ function useChosen(): [number[], (trials: readonly number[]) => void] {
   return [chosen, choose];
 }
 
-/** Any flights of any campaigns side by side. */
+/** Comparison of any flights of any campaigns. */
 export function ComparePage() {
   useTitle("Compare");
   const [params] = useSearchParams();
@@ -53,19 +53,19 @@ export function ComparePage() {
         <h1 className={work["title"]}>Compare</h1>
         {chosen.length > 0 && (
           <Button variant="default" onClick={() => choose([])}>
-            Start over
+            Clear selection
           </Button>
         )}
       </div>
       <div className={classes["stack"]}>
-        {chosen.length === 0 && <Teaching />}
+        {chosen.length === 0 && <Introduction />}
         {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
         {problem !== null && chosen.length > 1 && (
           <div>
             <ErrorNotice error={comparison.error} />
             {kept.length < chosen.length && (
               <Button variant="default" mt={10} onClick={() => choose(kept)}>
-                Leave {chosen.length - kept.length === 1 ? "it" : "them"} out
+                Remove {count(chosen.length - kept.length, "flight")}
               </Button>
             )}
           </div>
@@ -84,16 +84,15 @@ export function ComparePage() {
   );
 }
 
-function Teaching() {
+function Introduction() {
   return (
     <section className={work["teach"]}>
       <p>
-        <strong>Lay flights over each other</strong>, of one campaign or of several: which gains are better, how sure
-        that is, and what else was not the same.
+        <strong>Compare flights</strong> of one or more campaigns: which gains are better, with what confidence, and
+        which settings differ.
       </p>
       <p>
-        Tick two or more below. The first one is what the others are held against. The address of this page holds the
-        choice, so that it can be sent to somebody.
+        Select two or more flights below. The first is the reference. Share the selection with the URL of this page.
       </p>
     </section>
   );
@@ -104,10 +103,7 @@ function OnlyOne({ trialId }: { trialId: number }) {
   if (trial.error) return <ErrorNotice error={trial.error} />;
   return (
     <section className={work["teach"]}>
-      <p>
-        {trial.data ? `Flight ${trial.data.number}` : "One flight"} is chosen. Tick at least one more to compare it
-        with.
-      </p>
+      <p>{trial.data ? `Flight ${trial.data.number}` : "One flight"} is selected. Select at least one more.</p>
     </section>
   );
 }
@@ -131,7 +127,9 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
   const { verdict, sentence, notes, flights, pairs } = comparison;
   const Icon = ICONS[verdict ?? "unresolved"];
   const first = flights[0];
-  const said = flights.flatMap(({ trial_id }) => againstFirst(pairs, first?.trial_id ?? 0, trial_id)?.sentence ?? []);
+  const sentences = flights.flatMap(
+    ({ trial_id }) => againstFirst(pairs, first?.trial_id ?? 0, trial_id)?.sentence ?? [],
+  );
   return (
     <>
       <section className={classes["verdict"]} data-verdict={verdict ?? undefined} aria-label="Verdict">
@@ -158,11 +156,11 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
           onRemove={(trial) => choose(trials.filter((one) => one !== trial))}
         />
         <SettingsTable comparison={comparison} />
-        {said.length > 1 && first !== undefined && (
+        {sentences.length > 1 && first !== undefined && (
           <details className={classes["words"]}>
-            <summary>Each against {first.label} in words</summary>
+            <summary>Comparisons with {first.label}</summary>
             <ul>
-              {said.map((one) => (
+              {sentences.map((one) => (
                 <li key={one}>{one}</li>
               ))}
             </ul>

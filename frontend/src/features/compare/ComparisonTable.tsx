@@ -21,7 +21,7 @@ interface Props {
   onRemove: (trial: number) => void;
 }
 
-/** The flights in the order of the address: what each was worth, how it stands against the first, what differs. */
+/** The flights in the order of the URL: error, comparison with the first, differences. */
 export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) {
   const { flights, gains, pairs, error_unit: unit } = comparison;
   const [first] = flights;
@@ -43,7 +43,7 @@ export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) 
               </th>
             ))}
             <th scope="col">
-              <span className="visually-hidden">Choose</span>
+              <span className="visually-hidden">Actions</span>
             </th>
           </tr>
         </thead>
@@ -67,7 +67,7 @@ export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) 
               <td>
                 <span className={classes["acts"]}>
                   {index > 0 && (
-                    <Act title={`Hold the others against ${flight.name}`} onClick={() => onFirst(flight.trial_id)}>
+                    <Act title={`Use ${flight.name} as reference`} onClick={() => onFirst(flight.trial_id)}>
                       <IconArrowBarToUp size={20} color="var(--dim)" />
                     </Act>
                   )}
@@ -131,16 +131,16 @@ function ErrorCell({ flight: { error, group, scatter }, unit }: { flight: Compar
     <>
       <strong>{plusMinus(group.mean, group.standard_error, unit)}</strong>
       <small className={classes["small"]}>
-        mean of {group.n}; this one {error.toFixed(3)} {unit}
+        mean of {group.n}; this flight {error.toFixed(3)} {unit}
       </small>
     </>
   );
 }
 
-const UNJUDGED = { gains: "", repeats: "Same gains", apart: "Not judged", "no error": "No error" } as const;
+const UNJUDGED = { gains: "", repeats: "Same gains", apart: "No verdict", "no error": "No error" } as const;
 
 function Against({ pair, first, unit }: { pair: FlightPair | null; first: string; unit: string }) {
-  if (pair === null) return <small className={classes["small"]}>the first</small>;
+  if (pair === null) return <small className={classes["small"]}>reference</small>;
   const { verdict, basis, difference, standard_error, confidence, further } = pair;
   const same = basis === "repeats" && verdict !== null ? "Same gains, " : "";
   const word = verdict === null ? UNJUDGED[basis] : VERDICTS[verdict];
@@ -159,14 +159,14 @@ function Against({ pair, first, unit }: { pair: FlightPair | null; first: string
       )}
       {further && (
         <small className={classes["small"]}>
-          {further.trial} more of its gains and {further.against} of {first} would decide
+          needs {further.trial} more with its gains and {further.against} with those of {first}
         </small>
       )}
     </>
   );
 }
 
-/** With a sign, and as many digits as a gain has. */
+/** A signed change, with the digits of a gain. */
 function changeText(change: number): string {
   return change > 0 ? `+${gainText(change)}` : gainText(change);
 }
@@ -187,19 +187,19 @@ function Value({ difference: { values, changes }, index }: ValueProps) {
   );
 }
 
-/** What else was not the same: a row for each setting, a column for each flight. */
+/** Settings that differ: a row for each setting, a column for each flight. */
 export function SettingsTable({ comparison: { flights, settings } }: { comparison: FlightComparison }) {
   const everywhere = settings.filter(({ values }) => values.every((value) => value !== null));
   const somewhere = settings.filter((setting) => !everywhere.includes(setting));
   return (
     <>
       {settings.length === 0 && (
-        <p className={classes["quiet"]}>All else was the same: vehicle, experiment, strategy and their settings.</p>
+        <p className={classes["quiet"]}>No other differences: same vehicle, experiment, strategy and settings.</p>
       )}
       {everywhere.length > 0 && <Settings flights={flights} settings={everywhere} title="Settings that differ" />}
       {somewhere.length > 0 && (
         <details className={classes["words"]}>
-          <summary>{count(somewhere.length, "setting")} that only some of the flights have</summary>
+          <summary>{count(somewhere.length, "setting")} of only some flights</summary>
           <Settings flights={flights} settings={somewhere} title="Settings of some flights" />
         </details>
       )}

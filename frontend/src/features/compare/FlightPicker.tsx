@@ -16,11 +16,11 @@ import { MOST_FLIGHTS } from "./chosenFlights";
 interface Props {
   chosen: readonly number[];
   onToggle: (trial: number) => void;
-  /** The campaign that one came from stands first, opened. */
+  /** The originating campaign, shown first and expanded. */
   from: number | null;
 }
 
-/** Campaigns by name, and the flights of each to be ticked. */
+/** Campaigns by name, with checkboxes for their flights. */
 export function FlightPicker({ chosen, onToggle, from }: Props) {
   const [search, setSearch] = useState("");
   const [sought] = useDebouncedValue(search.trim(), 200);
@@ -29,7 +29,7 @@ export function FlightPicker({ chosen, onToggle, from }: Props) {
   const flown = found.filter(({ flights, id }) => flights > 0 && id !== from);
   const full = chosen.length >= MOST_FLIGHTS;
   return (
-    <Panel title="Choose flights">
+    <Panel title="Select flights">
       <TextInput
         aria-label="Search campaigns by name"
         placeholder="Search campaigns"
@@ -45,9 +45,7 @@ export function FlightPicker({ chosen, onToggle, from }: Props) {
       ))}
       {campaigns.data && flown.length === 0 && from === null && (
         <p className={classes["quiet"]}>
-          {sought === ""
-            ? "Nothing has flown yet: fly a campaign first."
-            : "No campaign with a flight fits this search."}
+          {sought === "" ? "No flights yet. Fly a campaign first." : "No campaigns with flights match."}
         </p>
       )}
       {campaigns.hasNextPage && (

@@ -7,7 +7,7 @@ export interface LineStyle {
   dash: string;
 }
 
-/** Plotly's dashes in the units of the little line. */
+/** Plotly's dash patterns for the sample line. */
 const DASHES: Readonly<Record<string, string>> = {
   dash: "7 4",
   dot: "2 3",
@@ -16,7 +16,7 @@ const DASHES: Readonly<Record<string, string>> = {
   longdashdot: "12 3 2 3",
 };
 
-/** How the figure draws each flight. */
+/** Line style of each flight in the figure. */
 export function lineStylesOf(card: FigureCard | undefined): Map<number, LineStyle> {
   const traces = (card?.figure as unknown as PlotlyFigure | null | undefined)?.data ?? [];
   return new Map(
@@ -28,7 +28,7 @@ export function lineStylesOf(card: FigureCard | undefined): Map<number, LineStyl
   );
 }
 
-/** A short piece of a flight's line, as the figure draws it. */
+/** Sample of a flight's line in the figure. */
 export function LineSample({ pen }: { pen: LineStyle }) {
   return (
     <svg width="44" height="12" aria-hidden className={classes["stroke"]}>

@@ -11,7 +11,7 @@ type Format = "png" | "svg";
 const FORMATS: readonly Format[] = ["png", "svg"];
 const SIZE = { width: 1280, height: 800 } as const;
 
-/** The figure as it is drawn for a light page, on white: what goes into a document. */
+/** Save the figure in the light theme on white, for documents. */
 async function save(trials: readonly number[], filename: string, format: Format): Promise<void> {
   const { figure, reason } = await comparisonFigure(trials, "light");
   if (!figure) throw new Error(reason);
@@ -21,7 +21,7 @@ async function save(trials: readonly number[], filename: string, format: Format)
   await plotly.downloadImage({ data, layout: onWhite }, { ...SIZE, format, filename, scale: format === "png" ? 2 : 1 });
 }
 
-/** Curves as numbers, the figure as a picture; the files' names say what is in them. */
+/** Download of the curves as CSV and of the figure as an image. */
 export function SaveComparison({ trials, stem }: { trials: readonly number[]; stem: string }) {
   const saving = useMutation({ mutationFn: (format: Format) => save(trials, stem, format) });
   return (

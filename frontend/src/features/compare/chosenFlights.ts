@@ -1,4 +1,4 @@
-/** Which flights are compared: the address says it, and the tab remembers it while other pages are looked at. */
+/** Selection of compared flights: in the URL, and in the session storage while other pages are open. */
 
 import type { FlightPair } from "../../api/compare";
 import type { Problem } from "../../api/problems";
@@ -10,7 +10,7 @@ function idsIn(texts: readonly string[]): number[] {
   return [...new Set(texts.map(Number).filter((id) => Number.isSafeInteger(id) && id > 0))];
 }
 
-/** The flights of an address, in their order, each once. */
+/** Unique flights of a URL, in order. */
 export function chosenIn(params: URLSearchParams): number[] {
   return idsIn(params.getAll("trial"));
 }
@@ -27,18 +27,18 @@ export function remembered(): number[] {
   return idsIn((sessionStorage.getItem(KEY) ?? "").split(" "));
 }
 
-/** Without a flight that is among them, with it at their end otherwise. */
+/** Remove the flight if it is selected, otherwise append it. */
 export function toggled(trials: readonly number[], trial: number): number[] {
   return trials.includes(trial) ? trials.filter((one) => one !== trial) : [...trials, trial];
 }
 
-/** The flights that a refusal does not name (`trial.2`). */
+/** The flights that are not refused by name (`trial.2`). */
 export function withoutRefused(trials: readonly number[], problem: Problem | null): number[] {
   const refused = new Set(problem?.problems.map(({ field }) => field));
   return trials.filter((_, index) => !refused.has(`trial.${index}`));
 }
 
-/** How a flight stands against the first one; null for the first itself. */
+/** Comparison of a flight with the first; null for the first itself. */
 export function againstFirst(pairs: readonly FlightPair[], first: number, trial: number): FlightPair | null {
   return pairs.find((pair) => pair.against_id === first && pair.trial_id === trial) ?? null;
 }
