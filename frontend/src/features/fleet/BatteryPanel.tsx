@@ -9,7 +9,7 @@ import { LabelledValue } from "../../ui/LabelledValue";
 import { Panel } from "../../ui/Panel";
 import classes from "./Fleet.module.css";
 
-/** Which battery is in, and what it reads. Every flight keeps the label that stood here. */
+/** Label and voltage of the battery. Every flight stores the label. */
 export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
   const status = useVehicleStatus(vehicle.id);
   const edit = useEditVehicle(vehicle.id);
@@ -24,7 +24,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
             value={withUnit(status?.status.batteryV, "V", 1)}
             stale={!status?.isCurrent}
           />
-          <LabelledValue title="Flies from" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
+          <LabelledValue title="Minimum to fly" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
         </dl>
         <form
           className={classes["row"]}
@@ -34,7 +34,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
           }}
         >
           <TextInput
-            label="The battery that is in"
+            label="Battery label"
             placeholder="No. 3"
             value={label}
             maxLength={60}
@@ -42,7 +42,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
             onChange={(event) => setTyped(event.currentTarget.value)}
           />
           <Button type="submit" variant="default" disabled={label === vehicle.battery} loading={edit.isPending}>
-            Keep
+            Save
           </Button>
         </form>
         <ErrorNotice error={edit.error} />

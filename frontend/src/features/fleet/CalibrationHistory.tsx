@@ -9,7 +9,7 @@ import classes from "./Fleet.module.css";
 const EMPTY_PX = 96;
 const heightOf = (card: FigureCard | undefined, ready: number) => (card?.state === "ready" ? ready : EMPTY_PX);
 
-/** What the flights tell of the vehicle itself: its fitted parameters, whether they moved, and its batteries. */
+/** Fitted parameters of the vehicle over its flights, whether they changed, and its batteries. */
 export function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
   const theme = useComputedColorScheme("light");
   const known = useCalibration(vehicleId);
@@ -29,7 +29,7 @@ export function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
           </p>
         )}
         <FigurePanel
-          title="Calibration over the flights"
+          title="Calibration history"
           card={calibration.data}
           error={calibration.error}
           height={heightOf(calibration.data, 460)}

@@ -3,10 +3,10 @@ import type { Vehicle } from "../../api/types";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 
-/** What the last check found, every item of it. */
+/** All items of the last preflight check. */
 export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicle }) {
   if (checks === null) {
-    return <p className={classes["quiet"]}>Not checked yet. All of this is looked at again before every flight.</p>;
+    return <p className={classes["quiet"]}>Not checked yet. All items are checked again before every flight.</p>;
   }
   return (
     <>
@@ -39,7 +39,7 @@ export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicl
                 </td>
                 <td>
                   {found}
-                  <small>needed: {needed}</small>
+                  <small>required: {needed}</small>
                 </td>
               </tr>
             ))}

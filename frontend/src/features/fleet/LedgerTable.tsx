@@ -11,23 +11,23 @@ import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { PURPOSES } from "./fleet";
 
-/** Every gain set that the vehicle was given, and what it said it had then. */
+/** All gain sets written to the vehicle, and the values read back. */
 export function LedgerTable({ vehicleId }: { vehicleId: number }) {
   const ledger = useLedger(vehicleId);
   const lines = ledger.data?.pages.flatMap((page) => page.items) ?? [];
   return (
-    <Panel title="Gains it was given" className={classes["wide"]}>
+    <Panel title="Gain history" className={classes["wide"]}>
       <ErrorNotice error={ledger.error} />
       {ledger.isPending && <Skeleton height={120} aria-busy="true" />}
-      {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>None yet.</p>}
+      {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>No gains written yet.</p>}
       {lines.length > 0 && (
         // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-        <section className={`${classes["scroll"]} sideways`} aria-label="Gains it was given" tabIndex={0}>
+        <section className={`${classes["scroll"]} sideways`} aria-label="Gain history" tabIndex={0}>
           <table className={classes["table"]}>
             <thead>
               <tr>
-                <th scope="col">For</th>
-                <th scope="col">Asked {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
+                <th scope="col">Purpose</th>
+                <th scope="col">Requested {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
                 <th scope="col">Read back</th>
                 <th scope="col">Outcome</th>
               </tr>

@@ -12,27 +12,31 @@ function armedText(armed: boolean | null | undefined): string {
   return armed ? "armed" : "disarmed";
 }
 
-/** How the link is and what the vehicle says through it, as of now. */
+/** Current state of the link and the vehicle's telemetry. */
 export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
-  const status = useVehicleStatus(vehicle.id);
+  const aged = useVehicleStatus(vehicle.id);
   const isLinked = vehicle.state !== "disconnected";
-  const stale = !(status?.isCurrent ?? false);
-  const said = status?.status;
+  const stale = !(aged?.isCurrent ?? false);
+  const status = aged?.status;
   const { identity } = vehicle;
   return (
     <Panel title="Connection">
       <div className={classes["stack"]}>
         {isLinked ? (
           <dl className={`${classes["facts"]} numbers`}>
-            <LabelledValue title="Last heard" topic="linkAge" value={linkText(status)} bad={stale} />
-            <LabelledValue title="Doing" value={said === undefined ? NOTHING : stepWord(said.step)} stale={stale} />
-            <LabelledValue title="Motors" value={armedText(said?.armed)} stale={stale} />
-            <LabelledValue title="Mode" value={said?.mode || NOTHING} stale={stale} />
-            <LabelledValue title="Altitude" value={withUnit(said?.altitudeM, "m", 2)} stale={stale} />
-            <LabelledValue title="Positions" value={withUnit(said?.positionHz, "per s", 0)} stale={stale} />
+            <LabelledValue title="Link age" topic="linkAge" value={linkText(aged)} bad={stale} />
             <LabelledValue
-              title="Packets lost"
-              value={said?.lostShare === null || said === undefined ? NOTHING : percent(said.lostShare)}
+              title="Activity"
+              value={status === undefined ? NOTHING : stepWord(status.step)}
+              stale={stale}
+            />
+            <LabelledValue title="Motors" value={armedText(status?.armed)} stale={stale} />
+            <LabelledValue title="Mode" value={status?.mode || NOTHING} stale={stale} />
+            <LabelledValue title="Altitude" value={withUnit(status?.altitudeM, "m", 2)} stale={stale} />
+            <LabelledValue title="Position rate" value={withUnit(status?.positionHz, "Hz", 0)} stale={stale} />
+            <LabelledValue
+              title="Packet loss"
+              value={status?.lostShare === null || status === undefined ? NOTHING : percent(status.lostShare)}
               stale={stale}
             />
           </dl>
@@ -40,12 +44,12 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
           <p className={classes["quiet"]}>
             Not connected.{" "}
             {identity === null
-              ? "Connecting compares the gains that the vehicle holds with the safe ones, and changes nothing."
-              : "Connecting writes the safe gains and reads them back; nothing moves."}
+              ? "Connecting compares the vehicle's gains with the safe gains and changes nothing."
+              : "Connecting writes the safe gains and reads them back. The vehicle does not move."}
           </p>
         )}
-        {said?.said && <p className={classes["quiet"]}>It says: {said.said}</p>}
-        {said?.trouble && <p className={classes["bad"]}>{said.trouble}</p>}
+        {status?.said && <p className={classes["quiet"]}>Message: {status.said}</p>}
+        {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
         <p className={classes["quiet"]}>
           {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
           {identity !== null && `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}

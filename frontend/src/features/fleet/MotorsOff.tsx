@@ -8,11 +8,11 @@ interface Props {
   vehicle: Vehicle;
   status: Aged | null;
   orders: ReturnType<typeof useVehicleCommands>;
-  /** Whether this browser may only watch the vehicle: then it cannot have it fall. */
+  /** Whether this browser has read-only access, which disables the control. */
   watching?: boolean;
 }
 
-/** The last resort, in a corner of its own. */
+/** Emergency stop of the motors, separate from other controls. */
 export function MotorsOff({ vehicle, status, orders, watching = false }: Props) {
   const asked = vehicle.actions.includes("motors off") || status?.status.armed === true;
   const enabled = asked && !watching;
@@ -20,7 +20,7 @@ export function MotorsOff({ vehicle, status, orders, watching = false }: Props) 
     <div className={classes["motorsOff"]}>
       <SlideToConfirm
         label="Motors off – the drone falls"
-        meaning="Stops the motors at any height."
+        meaning="Stops the motors at any altitude."
         disabled={!enabled}
         onConfirm={() => orders.press("motors off")}
       />
@@ -29,12 +29,12 @@ export function MotorsOff({ vehicle, status, orders, watching = false }: Props) 
   );
 }
 
-/** What became of the last order, loudly where the vehicle was not told. */
+/** Result of the last command, as an alert. */
 export function CommandResult({ orders: { said } }: { orders: ReturnType<typeof useVehicleCommands> }) {
   if (said === null) return null;
   return (
     <p className={classes["said"]} data-bad={!said.accepted || undefined} role="alert">
-      {said.accepted ? said.sentence : `Not told (${said.order}). ${said.sentence}`}
+      {said.accepted ? said.sentence : `Not sent: ${said.order}. ${said.sentence}`}
     </p>
   );
 }

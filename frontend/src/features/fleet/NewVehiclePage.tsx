@@ -75,7 +75,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
     >
       <TextInput
         label="Name"
-        description="As it stands on every page, for instance the number on its hull"
+        description="Shown on every page, for example the number on the hull"
         value={form.name}
         maxLength={120}
         error={reasons["name"]}
@@ -104,19 +104,19 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         <VehicleBadge isReal={!simulated} />
         <p>
           {simulated
-            ? "A simulation on this computer: flights start at one click and are judged by the program."
-            : "A real vehicle: it flies only while somebody in control holds the button, and every flight is judged by a person."}
+            ? "A simulation on this computer: one click starts a flight, and its result is classified automatically."
+            : "A real vehicle: the operator in control holds a button to take off, and reviews every flight."}
         </p>
         <Switch
           size="md"
-          label="It is a simulation on this computer"
+          label="Simulation on this computer"
           checked={simulated}
           error={reasons["options.simulated"]}
           onChange={(event) => setOption("simulated", event.currentTarget.checked)}
         />
       </div>
       <fieldset className={classes["gains"]}>
-        <legend>Safe gains: what every flight ends with</legend>
+        <legend>Safe gains, restored after every flight</legend>
         {gains.map((gain) => (
           <NumberField
             key={gain.name}
@@ -134,13 +134,13 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         <div className={classes["confirm"]}>
           <Checkbox
             size="md"
-            label="These gains fly this vehicle well: somebody has looked."
+            label="These gains have been verified on this vehicle."
             checked={form.confirmed}
             error={reasons["safe_gains_confirmed"]}
             onChange={(event) => set({ confirmed: event.currentTarget.checked })}
           />
           <TextInput
-            label="Who has looked, and at what"
+            label="Verified by, and how"
             placeholder="A. Pilot: flown by hand this morning"
             value={form.statement}
             maxLength={500}
@@ -156,7 +156,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         onChange={setOpened}
       >
         <Accordion.Item value="further">
-          <Accordion.Control mih={56}>Further settings: identity, limits, motion capture, signing</Accordion.Control>
+          <Accordion.Control mih={56}>Advanced: identity, limits, motion capture, signing</Accordion.Control>
           <Accordion.Panel>
             <div className={classes["pair"]}>
               {further.map((option) => (
@@ -173,7 +173,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         </Accordion.Item>
       </Accordion>
       <ErrorNotice error={register.error} shown={fields} />
-      {unread.length > 0 && <p role="status">Not a number yet: {unread.join(", ")}.</p>}
+      {unread.length > 0 && <p role="status">Enter a number for {unread.join(", ")}.</p>}
       <Button
         type="submit"
         size="lg"

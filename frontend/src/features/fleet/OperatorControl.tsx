@@ -7,19 +7,19 @@ import { ErrorNotice } from "../../ui/ErrorNotice";
 import { useOperatorName } from "../../ui/usePreferences";
 import classes from "./OperatorControl.module.css";
 
-/** Whether this tab is in control of the vehicle, as far as it knows. */
+/** Whether this tab has the vehicle's lease. */
 export function useIsInControl(vehicle: Vehicle): boolean {
   const own = useOwnLease(vehicle.id);
   return own !== null && (vehicle.control === null || vehicle.control.operator === own.operator);
 }
 
-/** One operator at a time: take control by name, see who has it, take over where everybody sees it. */
+/** Take control of the vehicle, release it, or take it over from another operator. */
 export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
   const [name, setName] = useOperatorName();
   const isOwn = useIsInControl(vehicle);
   const own = useOwnLease(vehicle.id);
   const take = useTakeControl(vehicle.id);
-  const handOver = useReleaseControl(vehicle.id);
+  const release = useReleaseControl(vehicle.id);
   if (isOwn) {
     return (
       <div className={classes["control"]}>
@@ -34,12 +34,12 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
           color="gray"
           c="var(--dim)"
           px="xs"
-          loading={handOver.isPending}
-          onClick={() => handOver.mutate()}
+          loading={release.isPending}
+          onClick={() => release.mutate()}
         >
-          Hand over
+          Release control
         </Button>
-        <ErrorNotice error={handOver.error} />
+        <ErrorNotice error={release.error} />
       </div>
     );
   }
@@ -54,7 +54,7 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
     >
       {other !== null && (
         <p className={classes["say"]}>
-          <strong>{other} is in control.</strong> Ask for it to be handed over, or take over: everybody sees that.
+          <strong>{other} is in control.</strong> Ask them to release control, or take over. All users see the takeover.
         </p>
       )}
       <div className={classes["take"]}>

@@ -14,7 +14,7 @@ interface Props {
   onRead: () => void;
 }
 
-/** Every parameter of the vehicle, as last read. */
+/** All parameters of the vehicle, as last read. */
 export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
   const [wanted, setWanted] = useState("");
   const acts = useActs(vehicleId).data?.pages.flatMap((page) => page.items) ?? [];
@@ -36,12 +36,12 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
       <div className={classes["stack"]}>
         {parameters.length === 0 ? (
           <p className={classes["quiet"]}>
-            {latest?.state === "failed" ? latest.problem : "Not read yet. Reading all of them takes some seconds."}
+            {latest?.state === "failed" ? latest.problem : "Not read yet. Reading all parameters takes a few seconds."}
           </p>
         ) : (
           <>
             <TextInput
-              label={`Find one of ${parameters.length}`}
+              label={`Search ${parameters.length} parameters`}
               value={wanted}
               onChange={(event) => setWanted(event.currentTarget.value)}
             />

@@ -10,7 +10,7 @@ import { ErrorNotice } from "../../ui/ErrorNotice";
 import classes from "./Fleet.module.css";
 import { MotorsOff } from "./MotorsOff";
 
-/** Something could not be verified: what it is, what can still be done, and who ends it. */
+/** Reason of the quarantine, the remaining commands, and the release. */
 export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
   const [statement, setStatement] = useState("");
   const status = useVehicleStatus(vehicle.id);
@@ -22,13 +22,12 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
       <div role="alert">
         <h2>
           <IconAlertOctagonFilled size={24} aria-hidden />
-          Quarantined: do not fly it
+          Quarantined: do not fly
         </h2>
         <p>{vehicle.concern}</p>
       </div>
       <p>
-        It is only observed now. Land it if it flies, stop its motors if they still turn on the ground, look at it, then
-        release it.
+        Gainline sends it no commands except Land and Motors off. Land it, stop its motors, inspect it, then release it.
       </p>
       <div className={classes["row"]}>
         <Button
@@ -49,7 +48,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         }}
       >
         <TextInput
-          label="Who has looked at it, and what was found"
+          label="Inspected by, and findings"
           value={statement}
           maxLength={500}
           onChange={(event) => setStatement(event.currentTarget.value)}

@@ -7,21 +7,21 @@ import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { ACTS } from "./fleet";
 
-/** What the vehicle was asked beside its flights, by whom, and what came of it. */
+/** Requests to the vehicle besides its flights: who, when, outcome. */
 export function RequestList({ vehicleId }: { vehicleId: number }) {
   const acts = useActs(vehicleId);
   const items = acts.data?.pages.flatMap((page) => page.items) ?? [];
   return (
-    <Panel title="What it was asked" className={classes["wide"]}>
+    <Panel title="Requests" className={classes["wide"]}>
       <ErrorNotice error={acts.error} />
       {acts.isPending && <Skeleton height={120} aria-busy="true" />}
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
-      <section className={`${classes["scroll"]} sideways`} aria-label="What it was asked" tabIndex={0}>
+      <section className={`${classes["scroll"]} sideways`} aria-label="Requests" tabIndex={0}>
         <table className={classes["table"]}>
           <thead>
             <tr>
-              <th scope="col">What</th>
-              <th scope="col">When</th>
+              <th scope="col">Request</th>
+              <th scope="col">Time</th>
               <th scope="col">Outcome</th>
             </tr>
           </thead>

@@ -20,7 +20,7 @@ interface Props {
   onRestore: () => void;
 }
 
-/** What the vehicle holds beside what is safe. */
+/** The vehicle's current gains next to its safe gains. */
 export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   const [entered, setEntered] = useState<Record<string, number>>();
   const status = useVehicleStatus(vehicle.id);
@@ -38,7 +38,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
             <tr>
               <th scope="col">Gain</th>
               <th scope="col" data-number>
-                Holds
+                Current
               </th>
               <th scope="col" data-number>
                 Safe <HelpTip topic="safeGains" />
@@ -58,15 +58,15 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
         {isKnown && sameHeld(held, safe) && (
           <span className={classes["good"]}>
             <IconCircleCheck size={18} aria-hidden />{" "}
-            {isCurrent ? "It holds its safe gains" : "When last read, it held its safe gains"}
+            {isCurrent ? "Current gains are the safe gains" : "At the last reading, it had its safe gains"}
           </span>
         )}
         {isKnown && !sameHeld(held, safe) && (
           <span className={classes["bad"]}>
             <IconAlertTriangle size={18} aria-hidden />{" "}
             {isCurrent
-              ? "It holds other gains than the safe ones"
-              : "When last read, it held other gains than the safe ones"}
+              ? "Current gains differ from the safe gains"
+              : "At the last reading, its gains differed from the safe gains"}
           </span>
         )}
         <p className={classes["quiet"]}>
@@ -75,9 +75,9 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
               Read back <Time at={vehicle.held_at} />.
             </>
           ) : (
-            "Nobody has read its gains yet."
+            "Gains not read yet."
           )}{" "}
-          Every flight ends with the safe gains.
+          The safe gains are restored after every flight.
         </p>
         <div className={classes["buttons"]}>
           <Button
@@ -90,11 +90,11 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           </Button>
           {isKnown && !sameHeld(held, safe) && (
             <Button variant="default" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(held)}>
-              Make what it holds its safe gains
+              Set current gains as safe gains
             </Button>
           )}
           <Button variant="subtle" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(safe)}>
-            Change the safe gains
+            Change safe gains
           </Button>
         </div>
       </div>
@@ -104,7 +104,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
 
 interface FormProps {
   vehicle: Vehicle;
-  /** What the fields hold at first. */
+  /** Initial values of the fields. */
   entered: Record<string, number>;
   onDone: () => void;
 }
@@ -117,7 +117,7 @@ function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
   const reasons = reasonsByField(problemOf(edit.error), fields);
   const read = Object.entries(gains).filter((entry): entry is [string, number] => typeof entry[1] === "number");
   return (
-    <Panel title="Change the safe gains">
+    <Panel title="Change safe gains">
       <form
         className={classes["stack"]}
         onSubmit={(event) => {
@@ -142,7 +142,7 @@ function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
           ))}
         </div>
         <TextInput
-          label="Who decided that, and from which flights"
+          label="Decided by, and based on which flights"
           value={statement}
           maxLength={500}
           error={reasons["statement"]}
@@ -155,10 +155,10 @@ function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
             disabled={read.length < Object.keys(gains).length || statement.trim() === ""}
             loading={edit.isPending}
           >
-            These are the safe gains
+            Save safe gains
           </Button>
           <Button variant="default" onClick={onDone}>
-            Leave them
+            Cancel
           </Button>
         </div>
       </form>

@@ -13,7 +13,7 @@ import { VehicleBadge } from "../../ui/VehicleBadge";
 import { vehicleStateLabel } from "./fleet";
 import classes from "./VehicleCard.module.css";
 
-/** One vehicle in the list: how it is, what it holds, and the next thing to do with it. */
+/** A vehicle in the list: state, gains, next action. */
 export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const status = useVehicleStatus(vehicle.registered ? vehicle.id : null);
   const ask = useVehicleRequest(vehicle.id);
@@ -32,12 +32,12 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
         <dl className={`${classes["facts"]} numbers`}>
           {isLinked && <Fact title="Link" value={linkText(status)} />}
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
-          {held !== "" && <Fact title="Holds" value={held} />}
+          {held !== "" && <Fact title="Current gains" value={held} />}
           <Fact
             title={`Safe ${Object.keys(vehicle.safe_gains).join(", ")}`}
             value={gainsInBrackets(vehicle.safe_gains)}
           />
-          {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "nobody"} />}
+          {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "no operator"} />}
         </dl>
         {vehicle.state === "quarantined" && <p className={classes["concern"]}>{vehicle.concern}</p>}
         <ErrorNotice error={ask.error} />
@@ -54,7 +54,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
       )}
       {vehicle.state === "quarantined" && (
         <Button component={Link} to={`/vehicles/${vehicle.id}`} color="red" variant="outline">
-          Look at it
+          Open vehicle
         </Button>
       )}
     </li>

@@ -36,7 +36,7 @@ export function VehiclePage() {
   return vehicles.isPending ? <Skeleton height={420} radius="md" /> : <NotFoundPage />;
 }
 
-/** A simulation that campaigns share: it has no link of its own, and what its flights tell of it all the same. */
+/** A shared simulation: no link, but a calibration and gain history. */
 function SharedView({ vehicle }: { vehicle: Vehicle }) {
   return (
     <>
@@ -58,7 +58,7 @@ function SharedView({ vehicle }: { vehicle: Vehicle }) {
   );
 }
 
-/** One registered vehicle: its link, what it holds, what it was given and asked, and who is in control. */
+/** A registered vehicle: link, gains, control, battery, history and requests. */
 function VehicleView({ vehicle }: { vehicle: Vehicle }) {
   const ask = useVehicleRequest(vehicle.id);
   const watching = useReadOnlyReason(vehicle);
@@ -99,7 +99,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
               loading={asking === "disconnect"}
               onClick={() => ask.mutate("disconnect")}
             >
-              {vehicle.state === "disconnected" ? "Stop looking for it" : "Disconnect"}
+              {vehicle.state === "disconnected" ? "Stop reconnecting" : "Disconnect"}
             </Button>
           )}
         </div>
@@ -114,7 +114,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           {watching === null ? (
             <OperatorControl vehicle={vehicle} />
           ) : (
-            <p>{vehicle.control?.operator ?? "Nobody"} is in control.</p>
+            <p>{vehicle.control?.operator ?? "No operator"} is in control.</p>
           )}
         </Panel>
         <BatteryPanel vehicle={vehicle} />

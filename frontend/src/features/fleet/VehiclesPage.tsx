@@ -7,7 +7,7 @@ import classes from "../../ui/Page.module.css";
 import { useTitle } from "../../ui/useTitle";
 import { VehicleCard } from "./VehicleCard";
 
-/** Everything that can fly a trial: the registered vehicles first, then the simulations that campaigns share. */
+/** All vehicles: registered ones first, then shared simulations. */
 export function VehiclesPage() {
   useTitle("Vehicles");
   const vehicles = useVehicles();
@@ -27,7 +27,7 @@ export function VehiclesPage() {
       <div className={classes["stack"]}>
         {registered.length > 0 && (
           <section>
-            <h2 className={classes["section"]}>Registered, each with a link of its own</h2>
+            <h2 className={classes["section"]}>Registered vehicles</h2>
             <ul className={classes["list"]} aria-label="Registered vehicles">
               {registered.map((vehicle) => (
                 <VehicleCard key={vehicle.id} vehicle={vehicle} />
@@ -37,7 +37,7 @@ export function VehiclesPage() {
         )}
         {shared.length > 0 && (
           <section>
-            <h2 className={classes["section"]}>Simulations and records, shared by all campaigns</h2>
+            <h2 className={classes["section"]}>Shared simulations and flight records</h2>
             <ul className={classes["list"]} aria-label="Shared simulations">
               {shared.map((vehicle) => (
                 <VehicleCard key={vehicle.id} vehicle={vehicle} />
@@ -50,13 +50,13 @@ export function VehiclesPage() {
   );
 }
 
-/** What to do first, and how to try it without a drone. */
+/** Empty state: explains registration, and how to try it without a drone. */
 function NoVehicles() {
   return (
     <div className={classes["teach"]}>
       <p>
-        <strong>No vehicle is registered yet.</strong> A registered vehicle keeps its link open between flights: its
-        battery, its gains and who is in control stand on every page.
+        <strong>No vehicle is registered yet.</strong> A registered vehicle keeps its link open between flights. Every
+        page shows its battery, gains and operator.
       </p>
       <p>
         To try it without a drone, run <code>gainline sim-drone</code> in a terminal and register it at{" "}

@@ -1,4 +1,4 @@
-/** What is said of vehicles, of what they are asked, and of the gains that they were given. */
+/** Labels of vehicles, requests and gain history, and the form of a new vehicle. */
 
 import type { ActKind, Catalogue, GivenGains, NewVehicle, OptionInfo, Vehicle, VehicleState } from "../../api/types";
 import type { NumberEntry } from "../../ui/NumberField";
@@ -13,7 +13,7 @@ const STATES: Record<VehicleState, StateLabel> = {
   quarantined: { word: "Quarantined", tone: "bad" },
 };
 
-/** A shared simulation is never connected: it is there when a flight begins. */
+/** A shared vehicle has no permanent connection. */
 export function vehicleStateLabel({ state, registered }: Vehicle): StateLabel {
   return !registered && state === "disconnected" ? { word: "Flown elsewhere", tone: "quiet" } : STATES[state];
 }
@@ -33,13 +33,13 @@ export const ACTS: Record<ActKind, string> = {
 
 export const PURPOSES: Record<GivenGains["purpose"], string> = {
   flight: "Flight",
-  "restore after flight": "Safe gains after the flight",
-  connect: "Safe gains at the connection",
+  "restore after flight": "Safe gains after flight",
+  connect: "Safe gains at connection",
   restore: "Safe gains restored",
-  release: "Safe gains at the release",
+  release: "Safe gains at release",
 };
 
-/** What each autopilot is reached at, usually. */
+/** Usual address of each autopilot. */
 export const ADDRESSES: Readonly<Record<string, string>> = {
   paparazzi: "udp:192.168.1.1:4245@4244",
   ardupilot: "udpin:127.0.0.1:14550",
@@ -57,7 +57,7 @@ export function autopilotTitle({ options }: Pick<Vehicle, "options">): string {
 }
 
 const KIND = "mavlink";
-/** Options with a place of their own in the form. */
+/** Options with their own fields in the form. */
 const PLAIN: ReadonlySet<string> = new Set(["autopilot", "address", "simulated"]);
 
 export interface VehicleForm {
@@ -72,7 +72,7 @@ export function autopilotOf(form: VehicleForm): string {
   return String(form.options["autopilot"] ?? "paparazzi");
 }
 
-/** The gains of the takeoff as this autopilot flies it. */
+/** Gains of this autopilot's takeoff. */
 export function gainsFor(catalogue: Catalogue, autopilot: string) {
   const name = autopilot === "paparazzi" ? "takeoff" : `takeoff-${autopilot}`;
   return catalogue.experiments.find((experiment) => experiment.name === name)?.gains ?? [];
@@ -92,7 +92,7 @@ export function startingVehicle(catalogue: Catalogue): VehicleForm {
   };
 }
 
-/** Another autopilot has other gains; an address that nobody has changed follows it. */
+/** Select an autopilot: resets the gains and updates an unedited address. */
 export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot: string): VehicleForm {
   const isUsual = Object.values(ADDRESSES).includes(String(form.options["address"]));
   const address = isUsual ? (ADDRESSES[autopilot] ?? "") : (form.options["address"] ?? "");
@@ -104,7 +104,7 @@ export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot
   };
 }
 
-/** The settings that are folded away. */
+/** Options of the collapsed section. */
 export function furtherOptions(catalogue: Catalogue): OptionInfo[] {
   const options = catalogue.vehicle_kinds.find(({ name }) => name === KIND)?.options ?? [];
   return options.filter(({ name }) => !PLAIN.has(name));
@@ -114,7 +114,7 @@ export function isSimulated(form: VehicleForm): boolean {
   return form.options["simulated"] === true;
 }
 
-/** Safe gains that are not numbers yet, by their names. */
+/** Names of safe gains without a valid number. */
 export function unreadGains({ safeGains }: VehicleForm): string[] {
   return Object.entries(safeGains).flatMap(([name, entry]) => (typeof entry === "number" ? [] : [name]));
 }
@@ -133,7 +133,7 @@ export function vehicleRequest(form: VehicleForm): NewVehicle {
   };
 }
 
-/** The parameters in an act's result, by their names. */
+/** The parameters in an act's result, sorted by name. */
 export function parametersOf(result: Readonly<Record<string, unknown>> | null): [string, number][] {
   const held = result?.["parameters"] ?? result;
   if (typeof held !== "object" || held === null) return [];

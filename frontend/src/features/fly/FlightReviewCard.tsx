@@ -16,7 +16,7 @@ interface Props {
   trial: Trial;
 }
 
-/** What the flight was worth: a suggestion, one tap, and on to the next. */
+/** Result of the flight, its review, and the link to the next flight. */
 export function FlightReviewCard({ campaign, trial }: Props) {
   const trials = useTrials(campaign.id).data ?? [];
   const page = `/campaigns/${campaign.id}`;
@@ -40,7 +40,7 @@ export function FlightReviewCard({ campaign, trial }: Props) {
           </Button>
         )}
         <Anchor component={Link} to={`${page}/flights/${trial.id}`} className={classes["link"]}>
-          Open the flight
+          Open flight
         </Anchor>
       </div>
     </div>

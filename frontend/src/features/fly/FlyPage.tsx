@@ -53,10 +53,10 @@ interface Props {
   vehicle: Vehicle | null;
 }
 
-/** The steps at which a quarantine, or a browser that may only watch, leaves nothing else to do. */
+/** Steps without actions in a quarantine or with read-only access. */
 const BARRED: ReadonlySet<FlyStep> = new Set<FlyStep>(["plan", "staging", "staged", "unstaging"]);
 
-/** Everything that one looks at and touches while a flight is staged, flown and judged. */
+/** All readings and actions to stage, fly and review a flight. */
 function Screen({ campaign, trial, vehicle }: Props) {
   const abort = useOutletContext<AbortControl>();
   const live = useLiveFlight(trial.id);
@@ -112,7 +112,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           )}
         </div>
       </div>
-      <section className={classes["steps"]} aria-label="What to do now">
+      <section className={classes["steps"]} aria-label="Next action">
         <ReadOnlyNotice why={vehicle === null ? null : watching} />
         {quarantined && vehicle !== null && <Quarantine vehicle={vehicle} concern={concern} orders={orders} />}
         {!barred && (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}

@@ -8,15 +8,15 @@ interface Props {
   readBack: Readonly<Record<string, number>> | null;
   held: Readonly<Record<string, number>>;
   titles: Readonly<Record<string, string>>;
-  /** Before they are set there is nothing to tick, whatever the vehicle holds. */
+  /** Whether the gains are staged; before that, none is marked as set. */
   areSet: boolean;
 }
 
-/** Each gain of the flight, ticked once the vehicle has said that it holds it. */
+/** The gains of the flight, each ticked once it is read back. */
 export function HeldGains({ asked, readBack, held, titles, areSet }: Props) {
   return (
     <table className={`${classes["gains"]} numbers`}>
-      <caption className="visually-hidden">Gains of this flight and whether the vehicle holds them</caption>
+      <caption className="visually-hidden">Gains of this flight, and whether they are set</caption>
       <tbody>
         {gainTicks(asked, readBack, held).map((tick) => (
           <tr key={tick.name}>
@@ -40,7 +40,7 @@ function Tick({ tick: { held, confirmed } }: { tick: GainTick }) {
   if (confirmed) return <IconCircleCheckFilled size={22} aria-label="read back" className={classes["confirmed"]} />;
   return (
     <>
-      <small>{held === null ? "not read" : `holds ${gainText(held)}`}</small>
+      <small>{held === null ? "not read" : `now ${gainText(held)}`}</small>
       <IconCircleDashed size={22} aria-hidden />
     </>
   );

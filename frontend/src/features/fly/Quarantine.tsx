@@ -12,14 +12,14 @@ interface Props {
   orders: ReturnType<typeof useVehicleCommands>;
 }
 
-/** Something could not be verified: what it is, what can still be done, and who ends it. */
+/** Reason of the quarantine, the Land command, and a link to the release. */
 export function Quarantine({ vehicle, concern, orders }: Props) {
   return (
     <section className={classes["quarantine"]}>
       <div role="alert">
         <h2>
           <IconAlertOctagonFilled size={24} aria-hidden />
-          Do not fly it
+          Do not fly
         </h2>
         <p>{concern}</p>
       </div>
@@ -33,7 +33,7 @@ export function Quarantine({ vehicle, concern, orders }: Props) {
       </Button>
       {orders.said?.order === "land" && <CommandResult orders={orders} />}
       <Anchor component={Link} to={`/vehicles/${vehicle.id}`} className={classes["link"]}>
-        Look at {vehicle.name} and release it
+        Inspect and release {vehicle.name}
       </Anchor>
     </section>
   );

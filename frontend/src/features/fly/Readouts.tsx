@@ -13,7 +13,7 @@ interface Props {
   trial: Trial;
   unit: string;
   live: LiveFlight | null;
-  /** null for a vehicle that keeps no link. */
+  /** null for a vehicle without a permanent link. */
   status: Aged | null;
   hasLink: boolean;
   isFlying: boolean;
@@ -40,16 +40,16 @@ function Reading({ title, value, topic, size = "usual", stale = false, bad = fal
   );
 }
 
-/** The link in a tile: how old the last word is, or what became of it. */
+/** State of the link: its age, or why there is no data. */
 function LinkReading({ status }: { status: Aged | null }) {
   if (status === null || status.status.state !== "connected") {
     return <Reading title="Link" value={linkText(status)} bad />;
   }
-  const title = status.isCurrent ? "Link age" : "Silent for";
+  const title = status.isCurrent ? "Link age" : "No data for";
   return <Reading title={title} topic="linkAge" value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
 }
 
-/** What can be read from arm's length: altitude and error so far, then the rest. Grey is what is no longer so. */
+/** Large readings: altitude and error, then the rest. Stale readings are grey. */
 export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }: Props) {
   const reading = readingOf(live?.channel ?? "altitude_m");
   const measured = isFlying ? live?.measured.at(-1) : undefined;
@@ -64,7 +64,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
     <div className={`${classes["readouts"]} numbers`}>
       <dl className={classes["row"]}>
         <Reading
-          title={stale ? `${reading.title}, as last heard` : reading.title}
+          title={stale ? `${reading.title}, last known` : reading.title}
           value={withUnit(output, reading.unit, reading.digits)}
           size="huge"
           stale={stale}
@@ -91,7 +91,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
         {isFlying ? (
           <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />
         ) : (
-          <Reading title="Record lasts" value={withUnit(endS, "s", 0)} />
+          <Reading title="Record length" value={withUnit(endS, "s", 0)} />
         )}
       </dl>
     </div>

@@ -23,23 +23,23 @@ interface Props {
   abort: AbortControl;
 }
 
-/** What is to be done now, for a vehicle that keeps a link: control, gains, take-off, a word on the flight. */
+/** Actions of the current step for a vehicle with a link: control, staging, take-off, review. */
 export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & { vehicle: Vehicle }) {
   switch (step) {
     case "plan":
       return <Plan campaign={campaign} trial={trial} vehicle={vehicle} />;
     case "staging":
       return (
-        <Waiting text="The gains are written one by one, and each is read back.">
+        <Waiting text="Writing each gain and reading it back.">
           <Button variant="default" onClick={() => abort.press([trial.id])}>
-            Stop setting them
+            Cancel staging
           </Button>
         </Waiting>
       );
     case "staged":
       return <TakeOff trial={trial} vehicle={vehicle} />;
     case "unstaging":
-      return <Waiting text="The safe gains are written and read back. The flight is planned again then." />;
+      return <Waiting text="Writing the safe gains and reading them back. The flight then returns to planned." />;
     case "flying":
       return <Abort trial={trial} abort={abort} />;
     case "judge":
@@ -48,7 +48,7 @@ export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & {
   }
 }
 
-/** The same for a simulation that is opened for each flight: one click. */
+/** Actions of the current step for a simulation without a link: one click flies. */
 export function PlainSteps({ campaign, trial, step, abort }: Props) {
   const [speed, setSpeed] = useSpeed();
   const fly = useFlyTrial(campaign);
@@ -71,9 +71,9 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
             </>
           ) : (
             <p className={classes["say"]}>
-              This vehicle is flown elsewhere.{" "}
+              This vehicle is not flown by Gainline.{" "}
               <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
-                Hand in the record of the flight
+                Upload the flight record
               </Anchor>
             </p>
           )}
@@ -99,7 +99,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
       <p className={classes["say"]}>
         {vehicle.name} is a real vehicle, and this campaign has not passed its rehearsal: {campaign.rehearsal.reason}.{" "}
         <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
-          Rehearse it first
+          Rehearse first
         </Anchor>
       </p>
     );
@@ -112,7 +112,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
         <p className={classes["say"]}>
           {vehicle.name} is not connected.{" "}
           <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
-            Connect it
+            Connect
           </Anchor>
         </p>
       )}
@@ -130,7 +130,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
       <p className={classes["quiet"]}>
         {wantsControl
           ? "Take control first."
-          : "Sets these gains on the vehicle, landed and disarmed, and reads each one back. Nothing moves."}
+          : "Writes these gains to the landed and disarmed vehicle and reads each one back. The vehicle does not move."}
       </p>
       <ErrorNotice error={stage.error} />
     </div>
@@ -168,14 +168,14 @@ function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
         loading={unstage.isPending}
         onClick={() => unstage.mutate(trial)}
       >
-        Unstage: safe gains back
+        Unstage (restore safe gains)
       </Button>
       <ErrorNotice error={takeOff.error ?? unstage.error} />
     </div>
   );
 }
 
-/** One tap, no question. */
+/** Aborts without confirmation. */
 function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
   const asked = abort.asked.has(trial.id);
   return (
@@ -187,8 +187,8 @@ function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
       </button>
       <p className={classes["quiet"]}>
         {asked
-          ? "Safe gains and Land are sent until the vehicle agrees."
-          : "Ends the flight at once: safe gains back, land, again and again until the vehicle agrees."}
+          ? "Sending safe gains and Land until the vehicle confirms."
+          : "Ends the flight immediately: sends safe gains and Land until the vehicle confirms."}
       </p>
     </div>
   );

@@ -1,12 +1,12 @@
-/** What the fly screen shows and offers: where the flight is, in a word, and what is to be done. */
+/** State of the fly screen: step, label, gains, remaining time. */
 
 import type { Trial, TrialState } from "../../api/types";
 import { type Aged, stepWord } from "../../live/vehicleStatus";
 import { type StateLabel, trialStateLabel } from "../../ui/states";
 
 /**
- * plan: gains to be set. staged: they are on the vehicle, which waits. unstaging: the safe gains go back. judge: it landed
- * and wants a person's word.
+ * plan: before staging. staged: gains are on the vehicle, before take-off. unstaging: safe gains are restored. judge: it
+ * landed and needs a review.
  */
 export type FlyStep = "plan" | "staging" | "staged" | "unstaging" | "flying" | "judge" | "over";
 
@@ -26,7 +26,7 @@ type Standing = Pick<Trial, "state" | "flight">;
 
 const UNDER_WAY: ReadonlySet<string> = new Set(["requested", "running"]);
 
-/** Where the flight is. `phase` is the stream's word, which may run ahead of the record. */
+/** Current step of the flight. `phase` is from the event stream, which may be ahead of the stored state. */
 export function flyStep(trial: Standing, phase: string | null): FlyStep {
   const step = STEPS[trial.state];
   const underWay = trial.flight !== null && UNDER_WAY.has(trial.flight.state);
@@ -43,7 +43,7 @@ const WORDS: Record<FlyStep, StateLabel> = {
   unstaging: { word: "Restoring safe gains", tone: "busy" },
   flying: { word: "Flying", tone: "busy" },
   judge: { word: "Landed", tone: "busy" },
-  over: { word: "Over", tone: "quiet" },
+  over: { word: "Finished", tone: "quiet" },
 };
 
 const IN_FLIGHT: ReadonlySet<string> = new Set([
@@ -57,7 +57,7 @@ const IN_FLIGHT: ReadonlySet<string> = new Set([
   "restore",
 ]);
 
-/** The one big word. Of a vehicle with a link of its own `status` tells the step; a silent one is never "Recording". */
+/** Main label. For a vehicle with a link, `status` has the step; a stale one is never "Recording". */
 export function flyStateLabel(trial: Standing, step: FlyStep, status: Aged | null, quarantined: boolean): StateLabel {
   if (step === "flying" && status !== null) {
     if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
@@ -75,28 +75,28 @@ export function flyStateLabel(trial: Standing, step: FlyStep, status: Aged | nul
 export interface GainTick {
   name: string;
   asked: number;
-  /** What the vehicle says it holds; null while it has not said. */
+  /** Value on the vehicle; null if unknown. */
   held: number | null;
   confirmed: boolean;
 }
 
 type Gains = Readonly<Record<string, number>>;
 
-/** Each gain with what the vehicle says of it: as read back for this trial, else as the link last told. */
+/** Each gain with its value on the vehicle: as read back for this trial, otherwise as last received. */
 export function gainTicks(asked: Gains, readBack: Gains | null, held: Gains): GainTick[] {
   return Object.entries(asked).map(([name, value]) => {
-    const said = readBack?.[name] ?? held[name] ?? null;
-    return { name, asked: value, held: said, confirmed: said === value };
+    const onVehicle = readBack?.[name] ?? held[name] ?? null;
+    return { name, asked: value, held: onVehicle, confirmed: onVehicle === value };
   });
 }
 
-/** Seconds until the record is over; null before it has begun and where its length is not known. */
+/** Seconds until the end of the record; null before its begin or if its length is unknown. */
 export function secondsLeft(lastS: number | undefined, endS: number | null): number | null {
   if (lastS === undefined || endS === null) return null;
   return Math.max(0, endS - lastS);
 }
 
-/** Where the first x axis of a figure ends: the length of the experiment. */
+/** End of a figure's first x axis: the length of the experiment, in seconds. */
 export function endOfTime(layout: Readonly<Record<string, unknown>> | undefined): number | null {
   const axis = layout?.["xaxis"];
   if (typeof axis !== "object" || axis === null || !("range" in axis) || !Array.isArray(axis.range)) return null;
@@ -106,7 +106,7 @@ export function endOfTime(layout: Readonly<Record<string, unknown>> | undefined)
 
 const FULL_THRUST = 0.995;
 
-/** Whether the vehicle gives all the thrust there is. */
+/** Whether the thrust is at its maximum. */
 export function isSaturated(thrust: number): boolean {
   return thrust >= FULL_THRUST;
 }
