@@ -10,7 +10,7 @@ import { JobLog } from "./JobLog";
 import { JobProgress } from "./JobProgress";
 import { between, isUnderWay, jobLink, jobStateLabel, jobTitle } from "./jobs";
 
-/** One job: what it is, how far it is, why it failed, and what may be done about it. */
+/** A job: title, progress, failure and actions. */
 export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string, string> }) {
   const cancel = useCancelJob();
   const retry = useRetryJob();
@@ -32,7 +32,7 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
           <StateBadge words={jobStateLabel(job.state)} />
           <span>Job {job.id}</span>
           <span>
-            asked <Time at={job.created_at} />
+            requested <Time at={job.created_at} />
           </span>
           {job.finished_at !== null && job.started_at !== null && (
             <span>took {between(job.started_at, job.finished_at)}</span>

@@ -4,7 +4,7 @@ import { ErrorNotice } from "../../ui/ErrorNotice";
 import { utcTime } from "../../ui/format";
 import classes from "./JobLog.module.css";
 
-/** What the worker wrote down about a job, read when it is opened. */
+/** The worker's log of a job, loaded when it is opened. */
 export function JobLog({ job }: { job: Job }) {
   const [open, setOpen] = useState(false);
   const { data: log, error } = useJobLog(job.id, open);
@@ -13,9 +13,7 @@ export function JobLog({ job }: { job: Job }) {
       <summary className={classes["summary"]}>Log of job {job.id}</summary>
       <ErrorNotice error={error} />
       {log?.lines.length === 0 && (
-        <p className={classes["none"]}>
-          {job.started_at === null ? "The worker has not begun it yet." : "Its lines are no longer kept."}
-        </p>
+        <p className={classes["none"]}>{job.started_at === null ? "Not started yet." : "The log was deleted."}</p>
       )}
       {log !== undefined && log.total > log.lines.length && (
         <p className={classes["none"]}>

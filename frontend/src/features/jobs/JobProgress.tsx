@@ -2,7 +2,7 @@ import type { Job } from "../../api/jobs";
 import classes from "./JobProgress.module.css";
 import { progressText } from "./jobs";
 
-/** How far a job is that waits or runs. */
+/** Progress of a queued or running job. */
 export function JobProgress({ job, title }: { job: Job; title: string }) {
   return (
     <div className={classes["progress"]}>

@@ -11,15 +11,15 @@ type Group = "failed" | "open" | "over";
 type Filter = "all" | Group;
 
 const GROUPS: Record<Group, { title: string; states: readonly JobState[]; none: string }> = {
-  failed: { title: "Failed jobs", states: ["failed"], none: "Nothing has failed." },
-  open: { title: "Jobs under way", states: ["queued", "running"], none: "Nothing waits and nothing runs." },
-  over: { title: "Jobs that are over", states: ["done", "cancelled"], none: "Nothing is over yet." },
+  failed: { title: "Failed jobs", states: ["failed"], none: "No failed jobs." },
+  open: { title: "Active jobs", states: ["queued", "running"], none: "No active jobs." },
+  over: { title: "Finished jobs", states: ["done", "cancelled"], none: "No finished jobs." },
 };
 const ORDER = ["failed", "open", "over"] as const;
-/** So many failures stand above what is under way; the rest is a tap away. */
+/** Number of failed jobs shown above the active ones. */
 const FAILURES_FIRST = 3;
 
-/** Numeric work: what failed and why, what waits and runs and how far it is, what is over. */
+/** All jobs: failed, active, finished. */
 export function JobsPage() {
   useTitle("Jobs");
   const [filter, setFilter] = useState<Filter>("all");
@@ -40,8 +40,8 @@ export function JobsPage() {
           data={[
             { value: "all", label: "All" },
             { value: "failed", label: "Failed" },
-            { value: "open", label: "Under way" },
-            { value: "over", label: "Over" },
+            { value: "open", label: "Active" },
+            { value: "over", label: "Finished" },
           ]}
         />
       </div>
@@ -50,7 +50,7 @@ export function JobsPage() {
       {isEmpty && (
         <p className={classes["none"]}>
           {filter === "all"
-            ? "Nothing has been computed yet. Proposals, error landscapes and reproductions appear here."
+            ? "No jobs yet. Proposals, error landscapes and reproductions appear here."
             : GROUPS[filter].none}
         </p>
       )}
@@ -96,7 +96,7 @@ function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, o
             loading={query.isFetchingNextPage}
             onClick={() => (isBrief ? onAll() : void addPage(query))}
           >
-            {isBrief ? `Show all ${total} that failed` : `Show more (${items.length} of ${total})`}
+            {isBrief ? `Show all ${total} failed jobs` : `Show more (${items.length} of ${total})`}
           </Button>
         </div>
       )}

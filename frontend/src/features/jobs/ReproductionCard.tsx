@@ -18,7 +18,7 @@ import { ReproductionRows } from "./ReproductionRows";
 
 const FIGURE_HEIGHT_PX = 360;
 
-/** One experiment of the paper: what it shows there, what it comes to here, and its figures. */
+/** One experiment of the paper: published and own results, and figures. */
 export function ReproductionCard({ reproduction }: { reproduction: ReproductionSummary }) {
   const { name, title, line, paper, figures, latest } = reproduction;
   const result = useReproductionResult(name, latest?.job_id ?? null);
@@ -31,7 +31,7 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
         </p>
         <p className={classes["line"]}>
           <strong>Here:</strong> {line}
-          {span !== null && <> Ours come to {span}.</>}
+          {span !== null && <> Our results: {span}.</>}
         </p>
         <Standing reproduction={reproduction} />
         <ErrorNotice error={result.error} />
@@ -79,10 +79,10 @@ function Actions({ reproduction: { name, title, job, latest, long_form } }: { re
         <Button
           variant="default"
           title={long_form}
-          aria-label={`Run in full: ${title}`}
+          aria-label={`Full run: ${title}`}
           onClick={() => run.mutate({ name, full: true })}
         >
-          In full
+          Full run
         </Button>
       )}
       <Button
@@ -98,7 +98,7 @@ function Actions({ reproduction: { name, title, job, latest, long_form } }: { re
   );
 }
 
-/** The run under way, or why the last one came to nothing; and when the result below was made. */
+/** Progress of the current run or the failure of the last one, and the time of the shown result. */
 function Standing({ reproduction: { title, job, latest } }: { reproduction: ReproductionSummary }) {
   return (
     <>
@@ -116,8 +116,8 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
           "Not run yet."
         ) : (
           <>
-            Run <Time at={latest.finished_at} />
-            {latest.full && " in full"}, took {duration(latest.seconds)}.
+            Last run <Time at={latest.finished_at} />
+            {latest.full && " (full)"}, took {duration(latest.seconds)}.
           </>
         )}
       </p>

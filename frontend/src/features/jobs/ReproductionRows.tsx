@@ -4,7 +4,7 @@ import classes from "./ReproductionRows.module.css";
 
 const RATIO_DIGITS = 3;
 
-/** Our numbers beside the published ones, under the headings of their groups. */
+/** Own and published numbers, grouped. */
 export function ReproductionRows({ rows, title }: { rows: readonly ReproductionRow[]; title: string }) {
   const columns = comparedColumns(rows);
   return (

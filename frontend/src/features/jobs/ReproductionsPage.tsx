@@ -9,7 +9,7 @@ import { useTitle } from "../../ui/useTitle";
 import { isUnderWay } from "./jobs";
 import { ReproductionCard } from "./ReproductionCard";
 
-/** Every experiment, table and figure of the paper: run here, beside what was published. */
+/** All experiments, tables and figures of the paper, run here and compared with the published results. */
 export function ReproductionsPage() {
   useTitle("Reproductions");
   const list = useReproductions();
@@ -33,8 +33,8 @@ export function ReproductionsPage() {
         </Button>
       </div>
       <p className={classes["intro"]}>
-        Every experiment, table and figure of the paper, run on this machine: our numbers beside the published ones.
-        Flights and proposals go first; a run can be cancelled and begun again at any time.
+        All experiments, tables and figures of the paper, run on this machine and compared with the published numbers.
+        Flights and proposals have priority. A run can be cancelled and restarted at any time.
       </p>
       <ErrorNotice error={list.error ?? run.error} />
       {list.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
@@ -47,7 +47,7 @@ export function ReproductionsPage() {
   );
 }
 
-/** A link to one of them leads there once they are listed. */
+/** Scroll to the URL's fragment once the list is loaded. */
 function useScrollToHash(ready: boolean): void {
   const { hash } = useLocation();
   useEffect(() => {

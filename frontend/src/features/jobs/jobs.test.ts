@@ -47,7 +47,7 @@ test("durations are as long as a person would say them", () => {
 test("progress says how far, what at, and how long still", () => {
   expect(progressText(JOB)).toBe("38\u00a0% · jsbsim: 285, 44, 82 flown · about 12 s left");
   expect(progressText({ ...JOB, remaining_s: null, doing: "" })).toBe("38\u00a0%");
-  expect(progressText({ ...JOB, state: "queued" })).toBe("Waiting for its turn");
+  expect(progressText({ ...JOB, state: "queued" })).toBe("Queued");
 });
 
 test("a job is named after what it does and leads to where that is seen", () => {
@@ -69,7 +69,7 @@ test("rows stand under their headings, and the nearness to the paper is that of 
     ["jsbsim", 2],
     ["twin", 1],
   ]);
-  expect(ratioSpan(rows)).toBe("0.86 to 1.02 of the published numbers");
+  expect(ratioSpan(rows)).toBe("0.86 to 1.02 times the published values");
   expect(ratioSpan([row("none", null)])).toBeNull();
 });
 

@@ -1,11 +1,11 @@
-/** Numeric work in words: states, how long, how far, and how near the paper. */
+/** Texts of jobs and reproductions: states, durations, progress, comparison with the paper. */
 
 import type { Job, JobState, ReproductionRow } from "../../api/jobs";
 import { NOTHING, percentText } from "../../ui/format";
 import type { StateLabel } from "../../ui/states";
 
 const JOB: Record<JobState, StateLabel> = {
-  queued: { word: "Waiting", tone: "quiet" },
+  queued: { word: "Queued", tone: "quiet" },
   running: { word: "Running", tone: "busy" },
   done: { word: "Done", tone: "good" },
   failed: { word: "Failed", tone: "bad" },
@@ -34,9 +34,9 @@ export function between(from: string | null, to: string | null): string {
   return duration((Date.parse(to) - Date.parse(from)) / 1000);
 }
 
-/** How far a job is: "38 % · jsbsim: 285, 44, 82 flown · about 12 s left". */
+/** Progress of a job: "38 % · jsbsim: 285, 44, 82 flown · about 12 s left". */
 export function progressText({ state, done_share: share, doing, remaining_s: left }: Job): string {
-  if (state === "queued") return "Waiting for its turn";
+  if (state === "queued") return "Queued";
   if (share === null) return "Running";
   const parts = [percentText(Math.floor(100 * share))];
   if (doing !== "") parts.push(doing);
@@ -44,7 +44,7 @@ export function progressText({ state, done_share: share, doing, remaining_s: lef
   return parts.join(" · ");
 }
 
-/** What a job does, for a person. `titles` are those of the reproductions by name. */
+/** Title of a job. `titles` are those of the reproductions by name. */
 export function jobTitle({ kind, name, campaign_id }: Job, titles: ReadonlyMap<string, string>): string {
   if (kind === "proposal") return campaign_id === null ? "Next gains" : `Next gains of campaign ${campaign_id}`;
   if (kind === "landscape" && campaign_id !== null) return `Error landscape of campaign ${campaign_id}`;
@@ -52,7 +52,7 @@ export function jobTitle({ kind, name, campaign_id }: Job, titles: ReadonlyMap<s
   return name === "" ? kind : `${kind} ${name}`;
 }
 
-/** Where a job's outcome is to be seen. */
+/** Link to the result of a job. */
 export function jobLink({ kind, name, campaign_id }: Job): string | null {
   if (campaign_id !== null) return `/campaigns/${campaign_id}`;
   return kind === "reproduction" ? `/reproductions#${name}` : null;
@@ -63,7 +63,7 @@ export interface RowGroup {
   rows: ReproductionRow[];
 }
 
-/** Rows under their headings, both in the order in which they came. */
+/** Rows grouped by heading, in their original order. */
 export function grouped(rows: readonly ReproductionRow[]): RowGroup[] {
   const groups: RowGroup[] = [];
   for (const row of rows) {
@@ -82,18 +82,18 @@ const COMPARED = [
 
 export type ComparedColumn = (typeof COMPARED)[number];
 
-/** What stands beside our numbers; a column without a number in any row is left out. */
+/** Columns next to our numbers, without empty ones. */
 export function comparedColumns(rows: readonly ReproductionRow[]): ComparedColumn[] {
   return COMPARED.filter(([key]) => rows.some((row) => row[key] !== null));
 }
 
-/** The span of measured over published in the first group that has any: "0.86 … 1.02 of the published numbers". */
+/** Range of measured over published in the first group that has any: "0.86 to 1.02 times the published values". */
 export function ratioSpan(rows: readonly ReproductionRow[]): string | null {
   for (const group of grouped(rows)) {
     const ratios = group.rows.flatMap(({ ratio }) => (ratio === null ? [] : [ratio]));
     if (ratios.length === 0) continue;
     const [low, high] = [Math.min(...ratios).toFixed(2), Math.max(...ratios).toFixed(2)];
-    return low === high ? `${low} of the published number` : `${low} to ${high} of the published numbers`;
+    return low === high ? `${low} times the published value` : `${low} to ${high} times the published values`;
   }
   return null;
 }

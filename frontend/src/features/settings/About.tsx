@@ -6,7 +6,7 @@ import fleet from "../fleet/Fleet.module.css";
 
 const SCARCE_BYTES = 1e9;
 
-/** What one is asked for when something is wrong. */
+/** Version and resources of the server, for bug reports. */
 export function About({ system }: { system: System }) {
   const scarce = system.free_bytes < SCARCE_BYTES;
   return (
@@ -17,7 +17,7 @@ export function About({ system }: { system: System }) {
         <LabelledValue title="Database" value={`revision ${system.database_revision}`} />
         <LabelledValue title="Data" value={bytesText(system.data_bytes)} />
         <LabelledValue
-          title={scarce ? "Free disk, scarce" : "Free disk"}
+          title={scarce ? "Free disk space, low" : "Free disk space"}
           value={bytesText(system.free_bytes)}
           bad={scarce}
         />

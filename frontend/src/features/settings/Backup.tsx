@@ -7,16 +7,16 @@ import { bytesText } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 import classes from "./SettingsPage.module.css";
 
-/** A copy of everything, and how it comes back. */
+/** Download of a backup, and how to restore it. */
 export function Backup({ system }: { system: System }) {
   const backup = useDownload(BACKUP);
   return (
     <Panel title="Backup">
       <div className={classes["stack"]}>
         <p className={classes["quiet"]}>
-          One file with every campaign, flight and vehicle as they are at this moment, about{" "}
-          {bytesText(system.database_bytes)}. Flights and computations go on meanwhile. Telemetry logs (folder tlogs)
-          are not in it.
+          One file with the current state of all campaigns, flights and vehicles, about{" "}
+          {bytesText(system.database_bytes)}. Flights and computations continue during the download. Telemetry logs
+          (folder tlogs) are not included.
         </p>
         <div>
           <Button
@@ -24,20 +24,20 @@ export function Backup({ system }: { system: System }) {
             loading={backup.isPending}
             onClick={() => backup.mutate()}
           >
-            Download a backup
+            Download backup
           </Button>
         </div>
         <ErrorNotice error={backup.error} />
         <details className={classes["details"]}>
-          <summary>How to restore it</summary>
+          <summary>How to restore a backup</summary>
           <ol>
             <li>Stop Gainline.</li>
             <li>
               In {system.data_dir}, delete gainline.sqlite3-wal and gainline.sqlite3-shm, and move gainline.sqlite3
               away.
             </li>
-            <li>Put the backup there under the name gainline.sqlite3.</li>
-            <li>Start Gainline. A backup of an earlier version is brought up to date.</li>
+            <li>Copy the backup there as gainline.sqlite3.</li>
+            <li>Start Gainline. A backup of an earlier version is migrated.</li>
           </ol>
         </details>
       </div>

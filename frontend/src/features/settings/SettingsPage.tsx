@@ -14,10 +14,10 @@ import classes from "./SettingsPage.module.css";
 const THEMES = [
   { value: "light", label: "Light" },
   { value: "dark", label: "Dark" },
-  { value: "auto", label: "As the system" },
+  { value: "auto", label: "System" },
 ] as const;
 
-/** This browser's choices, and the server it talks to. */
+/** Preferences of this browser, and information about the server. */
 export function SettingsPage() {
   useTitle("Settings");
   const system = useSystem();
@@ -72,8 +72,8 @@ function ThisBrowser() {
         label="Spoken announcements"
         description={
           canSpeak
-            ? "“Landed, captured, 0.24 metres.” After a reload, tap the page once: browsers speak only then."
-            : "This browser has no voice. What it would say still reaches a screen reader."
+            ? "“Landed, captured, 0.24 metres.” After a reload, tap the page once to enable speech."
+            : "This browser does not support speech. Screen readers still receive the announcements."
         }
         size="md"
         checked={speech}
@@ -85,7 +85,7 @@ function ThisBrowser() {
       />
       <TextInput
         label="Your name"
-        description="With it you take control of a vehicle; everybody sees it there."
+        description="Used when you take control of a vehicle, and visible to all users."
         value={name}
         maxLength={80}
         autoComplete="name"
