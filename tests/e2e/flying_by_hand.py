@@ -67,7 +67,7 @@ def stage(dashboard: Dashboard, gains: int) -> None:
 
 
 def hold_button(page: Page) -> Locator:
-    return page.get_by_role("button", name=re.compile("^(Hold to fly|Hold on)"))
+    return page.get_by_role("button", name=re.compile("^(Hold to fly|Keep holding)"))
 
 
 def hold(page: Page, for_ms: int) -> None:
@@ -90,7 +90,7 @@ def see_it_fly(dashboard: Dashboard, points: int) -> None:
 
 def abort(dashboard: Dashboard) -> None:
     """The big button, beside the vehicle's own in the bar."""
-    dashboard.page.get_by_label("What to do now").get_by_role("button", name=re.compile("^ABORT")).click()
+    dashboard.page.get_by_label("Next action").get_by_role("button", name=re.compile("^ABORT")).click()
 
 
 def middle_of(page: Page, target: Locator) -> tuple[float, float]:

@@ -25,7 +25,7 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/")
-    expect(page.get_by_role("heading", name="Tune a takeoff in a handful of flights")).to_be_visible()
+    expect(page.get_by_role("heading", name="Tune a takeoff in a few flights")).to_be_visible()
     dashboard.button("Create “AR.Drone takeoff to 3 m, simulated”").click()
     expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
     campaign_id = dashboard.when_ready(dashboard.campaign_id)
@@ -121,7 +121,7 @@ def test_a_flight_marked_invalid_is_left_out_and_can_be_taken_back(dashboard: Da
     assert not_counted is not None
     assert not_counted["x"] == [2]
     dashboard.until(lambda: standing(dashboard, trial=2) == "invalid")
-    verdict.get_by_role("button", name="Undo: count it as valid").click()
+    verdict.get_by_role("button", name="Undo: mark valid").click()
     expect(verdict.get_by_text("Valid", exact=True)).to_be_visible()
     dashboard.until(lambda: dashboard.trace("errors", "not counted") is None)
     measured = dashboard.trace("errors", "measured")
@@ -193,7 +193,7 @@ def test_the_list_finds_campaigns_by_name_and_vehicle(
     dashboard.page.get_by_label("Search campaigns by name").fill("jsb")
     expect(cards).to_have_count(1)
     dashboard.page.get_by_label("Search campaigns by name").fill("nothing like it")
-    expect(dashboard.page.get_by_text("No campaign fits this search.")).to_be_visible()
+    expect(dashboard.page.get_by_text("No campaigns match.")).to_be_visible()
 
 
 def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None:
@@ -201,16 +201,16 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     page = dashboard.page
     before = dashboard.get("/campaigns")["total"]
     page.get_by_role("button", name=re.compile("^Advanced")).click()
-    page.get_by_label("Flights at most").fill("-3")
-    page.get_by_label("kp at least").fill("3000")
-    page.get_by_label("kp at most").fill("2000")
+    page.get_by_label("Maximum flights").fill("-3")
+    page.get_by_label("kp minimum").fill("3000")
+    page.get_by_label("kp maximum").fill("2000")
     dashboard.button("Create campaign").click()
-    expect(page.get_by_label("Flights at most")).to_have_attribute("aria-invalid", "true")
-    page.get_by_label("Flights at most").fill("7")
+    expect(page.get_by_label("Maximum flights")).to_have_attribute("aria-invalid", "true")
+    page.get_by_label("Maximum flights").fill("7")
     dashboard.button("Create campaign").click()
-    expect(page.get_by_label("kp at most")).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_label("kp maximum")).to_have_attribute("aria-invalid", "true")
     assert dashboard.get("/campaigns")["total"] == before
-    page.get_by_label("kp at least").fill("0")
+    page.get_by_label("kp minimum").fill("0")
     dashboard.button("Create campaign").click()
     expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
     made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")

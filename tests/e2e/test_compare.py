@@ -77,7 +77,7 @@ def test_flights_are_picked_from_their_campaigns_and_drawn_as_they_are_stored(
     page = dashboard.page
     dashboard.open(f"/campaigns/{flown.morning}")
     page.get_by_role("link", name="Compare flight 3").click()
-    expect(page.get_by_text("Flight 3 is chosen.")).to_be_visible()
+    expect(page.get_by_text("Flight 3 is selected.")).to_be_visible()
     pick(page.get_by_role("checkbox", name=re.compile("^Flight 1 ")))
     page.get_by_text(re.compile("^Compared in the evening")).click()
     pick(page.get_by_role("checkbox", name=re.compile("^Flight 2 .*400 60 100")).last)
@@ -130,7 +130,7 @@ def test_the_verdict_and_what_differs_are_the_apis(dashboard: Dashboard, flown: 
         expect(settings.nth(index)).to_contain_text(str(difference["values"][2]))
     assert [one["title"] for one in found["settings"]] == ["Seed of the campaign"]
     expect(row(page, 2)).to_contain_text("+117")
-    page.get_by_text("Each against A in words").click()
+    page.get_by_text("Comparisons with A").click()
     expect(page.get_by_text(pair["sentence"]).last).to_be_visible()
 
 
@@ -141,18 +141,18 @@ def test_the_address_can_be_sent_and_another_flight_made_the_first(
     page = dashboard.page
     one, other = flown.early[0], flown.late[0]
     compare(dashboard, [one, other])
-    dashboard.button("Hold the others against flight 1 of Compared in the evening").click()
+    dashboard.button("Use flight 1 of Compared in the evening as reference").click()
     dashboard.until(lambda: chosen(page) == [other, one])
     dashboard.until(lambda: dashboard.trace(CURVES, "difference", trial=one) is not None)
-    expect(row(page, 0)).to_contain_text("the first")
+    expect(row(page, 0)).to_contain_text("reference")
     page.get_by_role("link", name="Gainline, all campaigns").click()
     expect(page.get_by_role("heading", name="Campaigns", exact=True)).to_be_visible()
     page.goto("/compare")
     dashboard.until(lambda: chosen(page) == [other, one])
     dashboard.button("Remove flight 1 of Compared in the morning").click()
-    expect(page.get_by_text("Flight 1 is chosen.")).to_be_visible()
-    dashboard.button("Start over").click()
-    expect(page.get_by_text("Lay flights over each other")).to_be_visible()
+    expect(page.get_by_text("Flight 1 is selected.")).to_be_visible()
+    dashboard.button("Clear selection").click()
+    expect(page.get_by_text("Select two or more flights below.")).to_be_visible()
     assert chosen(page) == []
     elsewhere = open_dashboard(shared_server.url, theme="dark", viewport=PHONE)
     compare(elsewhere, [other, one])
@@ -195,7 +195,7 @@ def test_what_cannot_be_compared_is_said_and_can_be_left_out(dashboard: Dashboar
     one, other = flown.early[0], flown.early[2]
     dashboard.open(address([one, flown.pitch, other]))
     expect(page.get_by_role("alert")).to_contain_text("is in rad·s, that of flight 1")
-    dashboard.button("Leave it out").click()
+    dashboard.button("Remove 1 flight").click()
     expect(dashboard.plot(CURVES)).to_be_visible()
     assert chosen(page) == [one, other]
 
@@ -214,7 +214,7 @@ def test_a_flight_whose_campaign_was_deleted_is_said_to_be_gone(
     assert page.request.delete(f"{dashboard.url}/api/campaigns/{doomed}?version={version}").ok
     dashboard.open(address([one, gone, other]))
     expect(page.get_by_role("alert")).to_contain_text(f"there is no trial {gone}")
-    dashboard.button("Leave it out").click()
+    dashboard.button("Remove 1 flight").click()
     expect(dashboard.plot(CURVES)).to_be_visible()
     dashboard.open(address([gone]))
     expect(page.get_by_role("alert")).to_contain_text(f"There is no trial {gone}.")
@@ -225,10 +225,10 @@ def test_an_empty_page_teaches_and_finds_campaigns_by_name(dashboard: Dashboard,
     dashboard.open("/")
     dashboard.button("More pages").click()
     page.get_by_role("link", name="Compare", exact=True).click()
-    expect(page.get_by_text("The first one is what the others are held against.")).to_be_visible()
+    expect(page.get_by_text("The first is the reference.")).to_be_visible()
     page.get_by_role("textbox", name="Search campaigns by name").fill("evening")
     expect(page.get_by_text(re.compile("^Compared in the morning"))).to_have_count(0)
     page.get_by_text(re.compile("^Compared in the evening")).click()
     expect(page.get_by_role("checkbox")).to_have_count(len(flown.late))
     page.get_by_role("textbox", name="Search campaigns by name").fill("no such campaign")
-    expect(page.get_by_text("No campaign with a flight fits this search.")).to_be_visible()
+    expect(page.get_by_text("No campaigns with flights match.")).to_be_visible()

@@ -23,7 +23,7 @@ def page_of_checks(open_dashboard: Opener, empty_server: Server) -> Dashboard:
 
 def choose(dashboard: Dashboard, *files: FilePayload | Path) -> None:
     with dashboard.page.expect_file_chooser() as chooser:
-        dashboard.button("Choose a recording").click()
+        dashboard.button("Choose recording").click()
     chooser.value.set_files(list(files))  # type: ignore[arg-type]
 
 
@@ -49,8 +49,8 @@ def assert_drawn_as_told(dashboard: Dashboard, check: Json) -> None:
 
 def test_one_click_shows_what_a_check_is(page_of_checks: Dashboard) -> None:
     dashboard, page = page_of_checks, page_of_checks.page
-    expect(page.get_by_text("The method works only if it is.")).to_be_visible()
-    dashboard.button("Check the example").click()
+    expect(page.get_by_text("The method requires an exact replica of the controller.")).to_be_visible()
+    dashboard.button("Check example").click()
     expect(page.get_by_text("The replica agrees: all 8\N{NARROW NO-BREAK SPACE}192 steps are exact")).to_be_visible()
     check = newest(dashboard)
     assert page.url.endswith(f"/controller/{check['id']}")
@@ -77,13 +77,13 @@ def test_a_log_that_was_flown_with_other_gains_is_marked_where_it_differs_and_ch
     assert len(marks["x"]) == 200
     dashboard.button("Check again with kp 283, ki 13, kd 82").click()
     expect(page.get_by_text("The replica agrees: 669 of 669 commands follow to the last bit.")).to_be_visible()
-    checked = page.get_by_role("list", name="Checked so far").get_by_role("listitem")
+    checked = page.get_by_role("list", name="Earlier checks").get_by_role("listitem")
     expect(checked).to_have_count(2)
     expect(checked.first).to_contain_text("Agrees")
     expect(checked.last).to_contain_text("Differs")
     checked.last.get_by_role("link", name="flight.data").click()
     expect(page.get_by_text(check["sentence"])).to_be_visible()
-    page.get_by_role("button", name="Remove the check of flight.data").last.click()
+    page.get_by_role("button", name="Delete the check of flight.data").last.click()
     expect(checked).to_have_count(1)
     assert page.url.endswith("/controller")
 
@@ -94,7 +94,7 @@ def test_a_calm_log_asks_for_its_gains(page_of_checks: Dashboard) -> None:
     choose(dashboard, file_of("calm.data", "\n".join(line for line in lines if float(line.split()[0]) > 40.0)))
     expect(page.get_by_role("alert")).to_contain_text("calm.data does not say which gains were flown")
     page.get_by_label("Gains flown: kp, ki, kd").fill("283, 13, 82")
-    dashboard.button("Check calm.data with these").click()
+    dashboard.button("Check calm.data with these gains").click()
     expect(page.get_by_text("The replica agrees: ")).to_be_visible()
     assert newest(dashboard)["gains_from"] == "given"
 
@@ -127,7 +127,7 @@ def test_a_file_may_be_dropped_on_the_page(page_of_checks: Dashboard) -> None:
 def test_on_a_phone_nothing_is_cut_off(open_dashboard: Opener, empty_server: Server) -> None:
     dashboard = open_dashboard(empty_server.url, viewport=PHONE)
     dashboard.open("/controller")
-    dashboard.button("Check the example").click()
+    dashboard.button("Check example").click()
     expect(dashboard.page.get_by_text(re.compile("^The replica agrees"))).to_be_visible()
     expect(dashboard.plot("Commands")).to_be_visible()
     assert dashboard.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

@@ -80,12 +80,12 @@ def create(dashboard: Dashboard, vehicle_id: int) -> int:
     picture(dashboard, "vehicle")
     page.get_by_role("link", name="New campaign").click()
     expect(page.get_by_role("radio", name=re.compile("Number 1"))).to_be_checked()
-    expect(page.get_by_text("before its first flight the campaign is rehearsed on a simulation")).to_be_visible()
+    expect(page.get_by_text("Before its first flight, the campaign must pass a rehearsal on a simulation")).to_be_visible()
     page.get_by_label("Name", exact=True).fill(NAME)
     picture(dashboard, "wizard")
     page.get_by_role("button", name=re.compile("^Advanced")).click()
-    page.get_by_label("Flights at most").fill(str(FLIGHTS_AT_MOST))
-    page.get_by_label("An improvement is at least").fill(str(IMPROVEMENT_PERCENT))
+    page.get_by_label("Maximum flights").fill(str(FLIGHTS_AT_MOST))
+    page.get_by_label("Minimum improvement").fill(str(IMPROVEMENT_PERCENT))
     dashboard.button("Create campaign").click()
     expect(page.get_by_role("heading", level=1)).to_have_text(NAME)
     made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
@@ -103,12 +103,12 @@ def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
     expect(dashboard.panel("Rehearse first")).to_contain_text("Not rehearsed yet")
     expect(dashboard.button("Stage")).to_have_count(0)
     picture(dashboard, "rehearse")
-    dashboard.button("Rehearse on the simulation").click()
+    dashboard.button("Rehearse on a simulation").click()
     expect(page.get_by_text("This is a rehearsal")).to_be_visible()
     assert dashboard.get(f"/campaigns/{dashboard.campaign_id}")["rehearses"] == campaign_id
     dashboard.when_ready(dashboard.campaign_id)
     states.rehearse(campaign_id)
-    expect(page.get_by_text("The rehearsal has passed")).to_be_visible()
+    expect(page.get_by_text("Rehearsal passed")).to_be_visible()
     page.get_by_role("link", name=f"{NAME} on Number 1").click()
     expect(dashboard.button("Stage")).to_be_visible()
 
@@ -148,7 +148,7 @@ def land(dashboard: Dashboard) -> None:
 def count_it(dashboard: Dashboard, trial_id: int) -> Json:
     """Count the flight as valid; its error is what the screen says then, and its verdict the campaign's page."""
     page = dashboard.page
-    dashboard.button("Count it as valid").click()
+    dashboard.button("Mark valid").click()
     expect(page.get_by_role("link", name="Next flight")).to_be_visible()
     trial: Json = dashboard.get(f"/trials/{trial_id}")
     assert trial["state"] == "valid"
@@ -279,18 +279,18 @@ def promote(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> None:
     """The statistics say "better": the best gains become those that the vehicle is left with."""
     campaign = dashboard.get(f"/campaigns/{campaign_id}")
     assert campaign["verdict"] == "better"
-    dashboard.button("Make the best gains the safe ones").click()
-    dashboard.page.get_by_label("Who decided that, and why").fill(DECIDED)
-    dashboard.button("These are the safe gains").click()
-    told = dashboard.page.get_by_text("The best gains are the safe ones of Number 1.")
-    expect(told).to_contain_text("Number 1 itself still holds [283 13 82]")
+    dashboard.button("Set best gains as safe gains").click()
+    dashboard.page.get_by_label("Decided by, and why").fill(DECIDED)
+    dashboard.button("Save safe gains").click()
+    told = dashboard.page.get_by_text("The best gains are the safe gains of Number 1.")
+    expect(told).to_contain_text("Number 1 still has [283 13 82]")
     assert dashboard.get(f"/vehicles/{vehicle_id}")["safe_gains"] == campaign["best"]["gains"]
 
 
 def open_the_report(dashboard: Dashboard, campaign_id: int) -> None:
     """It has the numbers of the API."""
     with dashboard.page.context.expect_page() as coming:
-        dashboard.page.get_by_role("link", name="Report", exact=True).click()
+        dashboard.page.get_by_role("link", name="Open report", exact=True).click()
     report = coming.value
     expect(report.locator("html")).to_have_attribute("data-drawn", CHARTS)
     campaign, statistics = (dashboard.get(f"/campaigns/{campaign_id}{part}") for part in ("", "/statistics"))

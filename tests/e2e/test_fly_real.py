@@ -95,7 +95,7 @@ def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
     dashboard.until(lambda: dashboard.trace("Live curve", "flight", trial=1, standing="unjudged") is not None)
     in_sight_and_large_enough(dashboard)
     with slow_answers(dashboard.page):
-        dashboard.button("Count it as valid").click()
+        dashboard.button("Mark valid").click()
         dashboard.page.get_by_role("link", name="Next flight").click()
         headings = dashboard.page.get_by_role("heading", level=2)
         said: set[str] = set()
@@ -105,7 +105,7 @@ def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
             return "Flight budget used" in said
 
         dashboard.until(is_over)
-    assert "Flight 1 wants your word" not in said
+    assert "Review flight 1" not in said
     expect(dashboard.panel("Flight 1")).to_be_visible()
     assert state_of(dashboard, trial_id) == "valid"
 
@@ -114,12 +114,12 @@ def in_sight_and_large_enough(dashboard: Dashboard) -> None:
     """The reasons for which a flight does not count, and the way back, on the fly screen."""
     page = dashboard.page
     dashboard.button("Mark invalid").click()
-    for label in page.get_by_label("What to do now").locator("form label:visible").filter(has_not_text="Reason").all():
+    for label in page.get_by_label("Next action").locator("form label:visible").filter(has_not_text="Reason").all():
         box = label.bounding_box()
         assert box is not None
         assert box["height"] >= 48, label.inner_text()
-    expect(dashboard.button("Keep it")).to_be_in_viewport(ratio=1)
-    dashboard.button("Keep it").click()
+    expect(dashboard.button("Cancel")).to_be_in_viewport(ratio=1)
+    dashboard.button("Cancel").click()
 
 
 @contextmanager
@@ -147,7 +147,7 @@ def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: 
     asked = dashboard.page.request.post(f"{dashboard.url}/api/trials/{trial_id}/take-off")
     assert asked.status == 403
     assert state_of(dashboard, trial_id) == "staged"
-    dashboard.button("Unstage: safe gains back").click()
+    dashboard.button("Unstage (restore safe gains)").click()
     expect(dashboard.button("Stage")).to_be_enabled()
     assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
 
@@ -166,7 +166,7 @@ def test_one_operator_is_in_control_and_a_take_over_is_seen(
     expect(hold_button(second.page)).to_be_enabled()
     expect(dashboard.page.get_by_text("Ben is in control.")).to_be_visible()
     expect(hold_button(dashboard.page)).to_be_disabled()
-    second.button("Unstage: safe gains back").click()
+    second.button("Unstage (restore safe gains)").click()
     in_state(dashboard, vehicle_id, "ready")
 
 

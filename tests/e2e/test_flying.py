@@ -76,7 +76,7 @@ def test_a_flight_that_is_down_is_not_shown_flying_while_what_comes_next_is_awai
     dashboard.page.get_by_role("button", name=re.compile("^ABORT")).click()
     expect(dashboard.panel("Flight 1").get_by_text("Aborted", exact=True)).to_be_visible()
     expect(dashboard.panel("Flight 1: flying")).to_have_count(0)
-    expect(dashboard.page.get_by_text("Finding the next gains")).to_be_visible()
+    expect(dashboard.page.get_by_text("Computing the next gains")).to_be_visible()
     dashboard.page.unroute(proposal)
     expect(dashboard.fly_button).to_be_visible()
 
@@ -85,18 +85,18 @@ def test_space_aborts_whatever_has_the_focus(dashboard: Dashboard, campaign_id: 
     dashboard.choose_speed("1×")
     dashboard.fly()
     wait_for_live(dashboard, 20)
-    dashboard.button("Rename the campaign").focus()
+    dashboard.button("Rename campaign").focus()
     dashboard.page.keyboard.press("Space")
     dashboard.until(lambda: aborted(dashboard, campaign_id))
-    expect(dashboard.page.get_by_label("Name of the campaign")).to_have_count(0)
+    expect(dashboard.page.get_by_label("Campaign name")).to_have_count(0)
 
 
 def test_space_aborts_from_a_text_too_because_losing_a_blank_is_cheaper(dashboard: Dashboard, campaign_id: int) -> None:
     dashboard.choose_speed("1×")
-    dashboard.button("Rename the campaign").click()
+    dashboard.button("Rename campaign").click()
     dashboard.fly()
     wait_for_live(dashboard, 5)
-    name = dashboard.page.get_by_label("Name of the campaign")
+    name = dashboard.page.get_by_label("Campaign name")
     name.fill("Two")
     name.press("Space")
     expect(name).to_have_value("Two")

@@ -40,7 +40,7 @@ def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_c
     expect(choices).to_have_count(2)
     choices.nth(1).click()
     expect(dashboard.page.get_by_text("The log was flown with kp 1624, ki 1356, kd 195")).to_be_visible()
-    dashboard.button("Take it with the gains it was flown with").click()
+    dashboard.button("Import with the gains in the log").click()
     dashboard.until(lambda: any(trial["state"] == "valid" for trial in dashboard.trials(campaign_id)))
     [trial] = dashboard.trials(campaign_id)
     assert (trial["gains"]["ki"], trial["kind"]) == (1356, "manual")

@@ -75,11 +75,11 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     expect(lines).to_have_count(told["total"])
     assert {line["details"]["exit_code"] for line in told["lines"] if "exit_code" in line["details"]} == {"-9"}
     first.get_by_role("button", name=f"Retry job {job_id}").click()
-    card = page.get_by_role("list", name="Jobs under way").get_by_role("listitem").first
+    card = page.get_by_role("list", name="Active jobs").get_by_role("listitem").first
     expect(card).to_contain_text(f"Job {job_id}")
     expect(card.get_by_role("progressbar")).to_be_visible()
     card.get_by_role("button", name=f"Cancel job {job_id}").click()
-    over = page.get_by_role("list", name="Jobs that are over")
+    over = page.get_by_role("list", name="Finished jobs")
     expect(over.get_by_text("Cancelled", exact=True)).to_be_visible()
 
 
@@ -90,10 +90,10 @@ def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, empty_
     dashboard.until(lambda: bool(dashboard.get("/reproductions/controller")["rows"]))
     dashboard.open("/jobs")
     filters = page.get_by_role("radiogroup", name="Jobs shown")
-    expect(page.get_by_role("list", name="Jobs that are over").get_by_role("listitem").first).to_be_visible()
+    expect(page.get_by_role("list", name="Finished jobs").get_by_role("listitem").first).to_be_visible()
     filters.get_by_text("Failed", exact=True).click()
-    expect(page.get_by_text("Nothing has failed.")).to_be_visible()
-    filters.get_by_text("Over", exact=True).click()
+    expect(page.get_by_text("No failed jobs.")).to_be_visible()
+    filters.get_by_text("Finished", exact=True).click()
     [job] = dashboard.get("/jobs")["items"]
     log = page.get_by_text(f"Log of job {job['id']}")
     log.click()

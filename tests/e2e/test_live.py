@@ -35,8 +35,8 @@ def is_live(dashboard: Dashboard) -> None:
 
 def is_away(dashboard: Dashboard) -> None:
     """Said in words, with the time up to which the page is right, and the page without its colours."""
-    expect(dashboard.page.get_by_text("Server away", exact=True)).to_be_visible(timeout=LOST_MS)
-    notice = dashboard.page.get_by_role("status").filter(has_text="The server does not answer.")
+    expect(dashboard.page.get_by_text("Server unreachable", exact=True)).to_be_visible(timeout=LOST_MS)
+    notice = dashboard.page.get_by_role("status").filter(has_text="The server is not responding.")
     expect(notice.locator("time")).to_be_visible()
     expect(dashboard.page.locator("main[data-stale]")).to_be_visible()
 
@@ -70,8 +70,8 @@ def test_two_tabs_show_the_same_truth_over_one_stream_each(open_dashboard: Opene
     campaign_id = new_campaign(one, "Seen twice")
     one.open(f"/campaigns/{campaign_id}")
     other.open(f"/campaigns/{campaign_id}")
-    one.button("Rename the campaign").click()
-    one.page.get_by_label("Name of the campaign").fill("Seen by both")
+    one.button("Rename campaign").click()
+    one.page.get_by_label("Campaign name").fill("Seen by both")
     one.button("Rename").click()
     expect(heading(other, "Seen by both")).to_be_visible()
     one.page.get_by_role("navigation").get_by_role("link", name="Vehicles").click()
@@ -115,7 +115,7 @@ def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboa
     other.until(lambda: bool(other.page.evaluate(CHARTS_FETCHED)))
     own_server.stop()
     is_away(dashboard)
-    expect(dashboard.page.get_by_role("banner").get_by_text("The server does not answer.")).to_be_visible()
+    expect(dashboard.page.get_by_role("banner").get_by_text("The server is not responding.")).to_be_visible()
     expect(heading(dashboard, "Before")).to_be_visible()
     other.button("More pages").click()
     other.page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
@@ -173,12 +173,12 @@ def test_a_line_that_only_looks_open_is_given_up_and_a_flight_on_it_is_not_shown
     dashboard.fly()
     bar = dashboard.page.get_by_role("region", name=re.compile("^Flying: "))
     expect(bar).to_contain_text(re.compile(r"\d\.\d\d m"))
-    expect(bar).not_to_contain_text("as last heard")
+    expect(bar).not_to_contain_text("last known")
     with stopped(shared_server.pid):
-        expect(bar).to_contain_text("as last heard", timeout=LOST_MS)
+        expect(bar).to_contain_text("last known", timeout=LOST_MS)
         is_away(dashboard)
     is_live(dashboard)
-    expect(bar.get_by_text("as last heard")).to_have_count(0)
+    expect(bar.get_by_text("last known")).to_have_count(0)
     dashboard.post(f"/trials/{dashboard.trials(campaign_id)[0]['id']}/abort")
 
 
@@ -188,7 +188,7 @@ def test_a_page_whose_code_is_gone_says_so_and_comes_on_another_try(
     dashboard = open_dashboard(shared_server.url, alone=True)
     dashboard.page.route("**/assets/pages-*.js", lambda route: route.abort())
     dashboard.open("/vehicles")
-    expect(dashboard.page.get_by_role("alert")).to_contain_text("This page could not be fetched.")
+    expect(dashboard.page.get_by_role("alert")).to_contain_text("This page could not be loaded.")
     expect(dashboard.page.get_by_role("alert")).to_contain_text("Try again")
     dashboard.page.unroute("**/assets/pages-*.js")
     dashboard.button("Try again").click()

@@ -22,7 +22,7 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open(f"/new?vehicle={states.vehicle('Number 1', **REAL)}")
-    expect(page.get_by_text("before its first flight the campaign is rehearsed on a simulation")).to_be_visible()
+    expect(page.get_by_text("Before its first flight, the campaign must pass a rehearsal on a simulation")).to_be_visible()
     dashboard.button("Create campaign").click()
     asks = dashboard.panel("Rehearse first")
     expect(asks).to_contain_text("Not rehearsed yet: it was not flown on a simulation.")
@@ -32,16 +32,16 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     refused = page.request.post(f"{dashboard.url}/api/trials/{trial['id']}/stage")
     assert (refused.status, "has not passed its rehearsal" in refused.json()["detail"]) == (409, True)
 
-    dashboard.button("Rehearse on the simulation").click()
+    dashboard.button("Rehearse on a simulation").click()
     expect(page.get_by_text("This is a rehearsal")).to_be_visible()
     rehearsal = dashboard.campaign_id
     assert rehearsal != real
     page.get_by_role("link", name="Number 1").last.click()
-    expect(asks).to_contain_text("Under way: 0 of 3 valid flights.")
-    page.get_by_role("link", name="Go on with the rehearsal").click()
+    expect(asks).to_contain_text("In progress: 0 of 3 valid flights.")
+    page.get_by_role("link", name="Continue rehearsal").click()
     dashboard.when_ready(rehearsal)
     states.rehearse(real)
-    expect(page.get_by_text("The rehearsal has passed")).to_be_visible()
+    expect(page.get_by_text("Rehearsal passed")).to_be_visible()
     page.get_by_role("link", name="Number 1").last.click()
     expect(page.get_by_role("link", name="Stage")).to_be_visible()
     assert dashboard.get(f"/campaigns/{real}")["rehearsal"]["state"] == "passed"
@@ -51,5 +51,5 @@ def test_what_asks_for_it_fits_on_a_phone(open_dashboard: Opener, empty_server: 
     dashboard = open_dashboard(empty_server.url, theme="dark", viewport=PHONE)
     dashboard.open(f"/new?vehicle={states.vehicle('Number 1', **REAL)}")
     dashboard.button("Create campaign").click()
-    expect(dashboard.button("Rehearse on the simulation")).to_be_visible()
+    expect(dashboard.button("Rehearse on a simulation")).to_be_visible()
     assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")

@@ -120,7 +120,7 @@ def test_served_the_report_runs_under_a_policy_of_its_own(
     dashboard = open_dashboard(shared_server.url)
     dashboard.open_campaign(campaign_id)
     with dashboard.page.context.expect_page() as coming:
-        dashboard.page.get_by_role("link", name="Report", exact=True).click()
+        dashboard.page.get_by_role("link", name="Open report", exact=True).click()
     report = coming.value
     noted: list[str] = []
     report.on("console", lambda message: noted.append(message.text))
@@ -154,12 +154,12 @@ def test_a_campaign_travels_as_a_file(
     dashboard = open_dashboard(shared_server.url)
     dashboard.open_campaign(campaign_id)
     with dashboard.page.expect_download() as coming:
-        dashboard.page.get_by_role("button", name="Download bundle").click()
+        dashboard.page.get_by_role("button", name="Export bundle").click()
     bundle = tmp_path / "campaign.zip"
     coming.value.save_as(bundle)
     there = open_dashboard(server_elsewhere.url)
     there.page.goto("/")
-    expect(there.page.get_by_role("heading", name="Tune a takeoff in a handful of flights")).to_be_visible()
+    expect(there.page.get_by_role("heading", name="Tune a takeoff in a few flights")).to_be_visible()
     there.page.locator("input[type=file]").set_input_files(bundle)
     expect(there.page).to_have_url(re.compile(r"/campaigns/\d+$"))
     expect(there.page.get_by_role("heading", level=1)).to_have_text(NAME)

@@ -44,15 +44,15 @@ def test_a_job_is_watched_cancelled_and_retried(open_dashboard: Opener, empty_se
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/jobs")
-    expect(page.get_by_text("Nothing has been computed yet.")).to_be_visible()
+    expect(page.get_by_text("No jobs yet.")).to_be_visible()
     job_id = dashboard.post("/reproductions/variability/run")["id"]
     card = page.get_by_role("listitem").filter(has_text=f"Job {job_id}")
     expect(card.get_by_role("link", name=FIG12)).to_be_visible()
     expect(card.get_by_text(re.compile(r"^[1-9]\d?\s% · .*battery \d+ of 240 flown"))).to_be_visible(timeout=60_000)
     card.get_by_role("button", name=f"Cancel job {job_id}").click()
     expect(card.get_by_text("Cancelled", exact=True)).to_be_visible()
-    page.get_by_role("radiogroup", name="Jobs shown").get_by_text("Under way").click()
-    expect(page.get_by_text("Nothing waits and nothing runs.")).to_be_visible()
+    page.get_by_role("radiogroup", name="Jobs shown").get_by_text("Active").click()
+    expect(page.get_by_text("No active jobs.")).to_be_visible()
     page.get_by_role("radiogroup", name="Jobs shown").get_by_text("All", exact=True).click()
     card.get_by_role("button", name=f"Retry job {job_id}").click()
     expect(card.get_by_role("progressbar")).to_be_visible()

@@ -38,7 +38,7 @@ def test_theme_and_name_are_kept_by_this_browser(dashboard: Dashboard) -> None:
     dashboard.page.reload()
     expect(dashboard.page.get_by_label("Your name")).to_have_value("Jaime")
     assert theme_of(dashboard) == "dark"
-    dashboard.page.get_by_role("radiogroup", name="Appearance").get_by_text("As the system").click()
+    dashboard.page.get_by_role("radiogroup", name="Appearance").get_by_text("System", exact=True).click()
     dashboard.until(lambda: theme_of(dashboard) == "light")
 
 
@@ -51,7 +51,7 @@ def test_settings_are_reached_from_every_page_by_the_menu(dashboard: Dashboard) 
 
 def test_on_loopback_the_page_says_how_a_tablet_gets_in_and_what_that_opens(dashboard: Dashboard) -> None:
     dashboard.open("/settings")
-    panel = dashboard.panel("Open on the tablet")
+    panel = dashboard.panel("Open on a tablet")
     expect(panel).to_contain_text("gainline serve --host 0.0.0.0")
     expect(panel).to_contain_text("Real vehicles fly only from a server on loopback")
     expect(panel.get_by_role("img")).to_have_count(0)
@@ -65,7 +65,7 @@ def test_a_server_that_others_reach_shows_its_address_to_a_camera(open_dashboard
             pytest.skip("this machine is in no network")
         dashboard = open_dashboard(server.url)
         dashboard.page.goto("/settings")
-        panel = dashboard.panel("Open on the tablet")
+        panel = dashboard.panel("Open on a tablet")
         code = panel.get_by_role("img", name=f"QR code of {addresses[0]}")
         expect(code).to_be_visible()
         dashboard.until(lambda: bool(code.evaluate("image => image.naturalWidth > 0")))
@@ -79,7 +79,7 @@ def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
     campaign_id = states.campaign(name="Worth keeping")
     dashboard.open("/settings")
     with dashboard.page.expect_download() as waiting:
-        dashboard.button("Download a backup").click()
+        dashboard.button("Download backup").click()
     assert waiting.value.suggested_filename.endswith(".sqlite3")
     waiting.value.save_as(tmp_path / "copy.sqlite3")
     with closing(sqlite3.connect(tmp_path / "copy.sqlite3")) as copy:
@@ -92,7 +92,7 @@ def test_a_backup_that_is_refused_says_why_instead_of_failing_as_a_download(dash
     problem = {"title": "Storage trouble", "status": 507, "detail": "There is too little room for a copy.",
                "hint": "Free some disk space."}  # fmt: skip
     dashboard.page.route("**/api/system/backup", lambda route: route.fulfill(status=507, json=problem))
-    dashboard.button("Download a backup").click()
+    dashboard.button("Download backup").click()
     told = dashboard.panel("Backup").get_by_role("alert")
     expect(told).to_contain_text("There is too little room for a copy.")
     expect(told).to_contain_text("Free some disk space.")
@@ -120,14 +120,14 @@ def test_settings_fit_their_screen(open_dashboard: Opener, shared_server: Server
 def test_keys_are_explained_by_a_key_and_those_of_the_page_come_first(dashboard: Dashboard) -> None:
     dashboard.open("/")
     dashboard.page.keyboard.press("?")
-    help_ = dashboard.page.get_by_role("dialog", name="Keys on this page")
+    help_ = dashboard.page.get_by_role("dialog", name="Keyboard shortcuts")
     expect(help_).to_be_visible()
     expect(help_).to_be_focused()
     expect(help_.locator("kbd").first).to_have_text("/")
-    expect(help_).to_contain_text("abort it")
+    expect(help_).to_contain_text("Abort the flight")
     dashboard.page.keyboard.press("Escape")
     expect(help_).to_be_hidden()
-    dashboard.button("Keyboard help").click()
+    dashboard.button("Keyboard shortcuts").click()
     expect(help_).to_be_visible()
 
 
@@ -142,7 +142,7 @@ def test_slash_leads_to_the_search_and_a_question_mark_in_it_is_a_question_mark(
     expect(search).to_be_focused()
     dashboard.page.keyboard.type("what?")
     expect(search).to_have_value("what?")
-    expect(dashboard.page.get_by_role("dialog", name="Keys on this page")).to_be_hidden()
+    expect(dashboard.page.get_by_role("dialog", name="Keyboard shortcuts")).to_be_hidden()
 
 
 def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switched_on(
@@ -169,9 +169,9 @@ def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switch
 
 ASKED = {
     "What is the error?", "What is the predicted error?", "What is the interval?", "What is the overshoot?",
-    "How is the model corrected by the flights?", "How are gains checked?", "Where does the scatter come from?",
-    "What is the standard error?", "When is a difference real?", "What do the lines mean?",
-    "What has the next flight to beat?", "What was learned of the vehicle?",
+    "How do the flights correct the model?", "How are gains checked?", "How is the scatter estimated?",
+    "What is the standard error?", "When is a difference significant?", "What do the lines mean?",
+    "What does the next flight have to beat?", "What are the fitted parameters?",
 }  # fmt: skip
 
 

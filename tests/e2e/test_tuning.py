@@ -40,14 +40,14 @@ def test_a_fitted_vehicle_is_told_with_its_standard_errors(dashboard: Dashboard,
     dashboard.open_campaign(campaign_id)
     why = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["explanation"]
     card = dashboard.panel("Next flight: 2")
-    card.get_by_text("Why these gains").click()
+    card.get_by_text("Explanation").click()
     assert len(why["fitted"]) >= 4
     for one in why["fitted"]:
-        row = card.get_by_role("table", name="The vehicle as").get_by_role("rowgroup").filter(has_text=one["title"])
+        row = card.get_by_role("table", name="Fitted parameters").get_by_role("rowgroup").filter(has_text=one["title"])
         expect(row).to_contain_text(printed(one["value"], one["standard_error"], "").strip())
     expect(card).to_contain_text(why["lesson"])
     card.get_by_role("button", name="What is the interval?").click()
-    expect(dashboard.page.get_by_text("Of ten flights, nine should end inside it")).to_be_visible()
+    expect(dashboard.page.get_by_text("Nine of ten flights should end inside it")).to_be_visible()
 
 
 def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error(
@@ -63,7 +63,7 @@ def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error
     said = dashboard.get(f"/campaigns/{campaign_id}/statistics")
     [group] = [one for one in said["groups"] if len(one["trial_numbers"]) > 1]
     assert group["mean"] == pytest.approx(np.mean([one["error"] for one in flown[1:]]), abs=1e-9)
-    panel = dashboard.panel("How sure is it?")
+    panel = dashboard.panel("Statistics")
     row = panel.get_by_role("row").filter(has_text="2, 3")
     expect(row).to_contain_text(printed(group["mean"], group["standard_error"]))
     dashboard.until(lambda: dashboard.trace("errors", "repeats") is not None)
@@ -107,15 +107,15 @@ def test_a_refusal_is_overruled_on_a_simulation_only_with_a_reason_which_stays_w
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("Max")
     refuse(dashboard.page)
-    dashboard.page.get_by_text("Overrule with a reason", exact=True).click()
-    fly = dashboard.button("Fly in spite of the refusal")
+    dashboard.page.get_by_text("Overrule the gate", exact=True).click()
+    fly = dashboard.button("Fly refused gains")
     expect(fly).to_be_disabled()
     dashboard.page.get_by_label("Reason").fill("the paper flew these gains")
     fly.click()
     dashboard.until(lambda: [one["state"] for one in dashboard.trials(campaign_id)] in (["valid"], ["captured"]))
     [trial] = dashboard.trials(campaign_id)
     assert (trial["gains"]["ki"], trial["overrule_reason"]) == (1356, "the paper flew these gains")
-    expect(dashboard.panel("Flight 1, gains of your own")).to_have_count(0)
+    expect(dashboard.panel("Flight 1, manual gains")).to_have_count(0)
     verdict = dashboard.panel("Flight 1")
     expect(verdict.get_by_text("Overruled", exact=True)).to_be_visible()
     expect(verdict).to_contain_text("the paper flew these gains")

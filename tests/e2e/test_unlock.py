@@ -13,7 +13,7 @@ from tests.e2e.states import States
 from tests.runtime.drones import TRIED
 from tests.unlocking import new_link
 
-WATCHING = "This browser may only watch Bee."
+WATCHING = "This browser has read-only access to Bee."
 
 
 def picture(page: Page, name: str) -> None:
@@ -31,7 +31,7 @@ def bee(empty_server: Server, states: States) -> int:
 def notice(dashboard: Dashboard) -> None:
     expect(dashboard.page.get_by_role("main")).to_contain_text(WATCHING)
     expect(dashboard.page.get_by_role("main")).to_contain_text("gainline unlock")
-    expect(dashboard.page.get_by_role("main")).to_contain_text("Abort and Land work from here all the same.")
+    expect(dashboard.page.get_by_role("main")).to_contain_text("Abort and Land still work from here.")
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -51,7 +51,7 @@ def test_a_browser_that_was_not_unlocked_says_on_every_page_of_a_real_vehicle_th
         expect(dashboard.button(name)).to_have_count(0)
     expect(dashboard.page.get_by_role("button", name="Motors off – the drone falls")).to_be_disabled()
     dashboard.open("/campaigns")
-    expect(dashboard.page.get_by_text("may only watch")).to_have_count(0)
+    expect(dashboard.page.get_by_text("has read-only access")).to_have_count(0)
 
 
 def test_opening_the_link_in_another_tab_unlocks_the_page_that_one_comes_back_to(
@@ -68,7 +68,7 @@ def test_opening_the_link_in_another_tab_unlocks_the_page_that_one_comes_back_to
     tab.close()
     dashboard.page.bring_to_front()
     expect(dashboard.button("Connect")).to_be_visible()
-    expect(dashboard.page.get_by_text("may only watch")).to_have_count(0)
+    expect(dashboard.page.get_by_text("has read-only access")).to_have_count(0)
 
 
 def test_a_spent_link_says_so_and_how_to_get_another(open_dashboard: Opener, shared_server: Server) -> None:

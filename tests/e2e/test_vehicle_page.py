@@ -18,7 +18,7 @@ from tests.e2e.test_pages import THEMES, show, violations
 Json = dict[str, Any]
 WORN: Final = (0.68, *TWIN[1:])
 """Needs more throttle to hover than the twin: heavier, or with worn propellers."""
-CALIBRATION, BATTERIES = "Calibration over the flights", "Batteries"
+CALIBRATION, BATTERIES = "Calibration history", "Batteries"
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -39,7 +39,7 @@ def register_by_hand(dashboard: Dashboard, name: str, drone: Drone) -> int:
     page.get_by_role("link", name="Register a vehicle").click()
     address = page.get_by_role("textbox", name="Address")
     page.get_by_label("Name").fill(name)
-    page.get_by_role("switch", name="It is a simulation on this computer").check()
+    page.get_by_role("switch", name="Simulation on this computer").check()
     address.fill("udp:nowhere")
     dashboard.button("Register").click()
     expect(address).to_have_attribute("aria-invalid", "true")
@@ -59,9 +59,9 @@ def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dash
         dashboard.button("Connect").click()
         expect(state_word(dashboard, "Ready")).to_be_visible()
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
-        expect(fact(dashboard, "Connection", "Last heard")).to_have_text(re.compile(r"^0\.\d s$"))
+        expect(fact(dashboard, "Connection", "Link age")).to_have_text(re.compile(r"^0\.\d s$"))
         expect(fact(dashboard, "Battery", "Voltage now")).to_have_text(re.compile(r"^1\d\.\d V$"))
-        expect(dashboard.panel("Gains").get_by_text("It holds its safe gains")).to_be_visible()
+        expect(dashboard.panel("Gains").get_by_text("Current gains are the safe gains")).to_be_visible()
 
         dashboard.button("Check now").click()
         passed = dashboard.panel("Preflight check").get_by_text("passed", exact=True)
@@ -70,12 +70,12 @@ def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dash
         expect(passed).to_have_count(len(checks))
         assert all(check["passed"] for check in checks)
 
-        page.get_by_label("The battery that is in").fill("No. 3")
-        dashboard.button("Keep").click()
+        page.get_by_label("Battery label").fill("No. 3")
+        dashboard.button("Save").click()
         dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["battery"] == "No. 3")
 
-        given = dashboard.panel("Gains it was given").get_by_role("row").nth(1)
-        expect(given).to_contain_text("Safe gains at the connection")
+        given = dashboard.panel("Gain history").get_by_role("row").nth(1)
+        expect(given).to_contain_text("Safe gains at connection")
         expect(given.get_by_role("cell", name=SAFE_IN_BRACKETS, exact=True)).to_have_count(2)
 
         dashboard.button("Disconnect").click()
@@ -140,17 +140,17 @@ def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
     page = dashboard.page
     with Drone(speed=DRONE_SPEED) as drone:
         vehicle_id = left_in_the_air(dashboard, shared_server, states, drone, "Wasp")
-        expect(page.get_by_role("heading", name="Quarantined: do not fly it")).to_be_visible()
+        expect(page.get_by_role("heading", name="Quarantined: do not fly")).to_be_visible()
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("armed")
         dashboard.button("Land now").click()
         expect(page.get_by_text(re.compile("told to land"))).to_be_visible()
         expect(fact(dashboard, "Connection", "Altitude")).to_have_text(re.compile(r"^-?0\.[01]\d m$"), timeout=60_000)
         slide_to_its_end(dashboard, page.get_by_role("button", name="Motors off – the drone falls"))
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
-        page.get_by_label("Who has looked at it, and what was found").fill("Ada: it stands, nothing is broken")
+        page.get_by_label("Inspected by, and findings").fill("Ada: it stands, nothing is broken")
         dashboard.button("Release").click()
         expect(state_word(dashboard, "Ready")).to_be_visible()
         assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
-        expect(dashboard.panel("Gains it was given")).to_contain_text("Safe gains at the release")
+        expect(dashboard.panel("Gain history")).to_contain_text("Safe gains at release")
         dashboard.post(f"/vehicles/{vehicle_id}/disconnect")
         until_in_state(dashboard, vehicle_id, "disconnected")

@@ -38,20 +38,20 @@ def test_marking_the_best_invalid_says_what_it_changes_before_and_after_and_is_u
     verdict = open_flight(dashboard, best)
     verdict.get_by_role("button", name="Mark invalid").click()
     expect(verdict).to_contain_text(
-        f"Flight {best['number']} is the best; without it flight {second['number']} is, "
-        "and the next gains are computed anew."
+        f"Flight {best['number']} is the best. Without it, flight {second['number']} is the best, "
+        "and the next gains are recomputed."
     )
     verdict.get_by_text("Wind gust").click()
     verdict.get_by_role("button", name="Mark invalid").click()
     expect(verdict).to_contain_text(
-        f"Flight {second['number']} is the best now; the next gains are computed without flight {best['number']}."
+        f"Flight {second['number']} is the best now. The next gains are computed without flight {best['number']}."
     )
     expect(verdict).to_contain_text("Wind gust")
     assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_number"] == second["number"]
     dashboard.when_ready(campaign_id)
     assert dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["history_digest"] != before
 
-    verdict.get_by_role("button", name="Undo: count it as valid").click()
+    verdict.get_by_role("button", name="Undo: mark valid").click()
     expect(verdict.get_by_text("best so far")).to_be_visible()
     assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_number"] == best["number"]
 
@@ -87,7 +87,7 @@ def test_one_tap_after_an_abort_says_whether_it_counts_against_the_gains(
     expect(badly).to_be_visible()
 
     dashboard.open(f"/fly/{aborted['id']}")
-    why = dashboard.page.get_by_role("region", name="Why it was aborted")
+    why = dashboard.page.get_by_role("region", name="Abort cause")
     why.get_by_role("button", name="The vehicle behaved badly").click()
     expect(why).to_contain_text("the flight counts against its gains.")
 
@@ -97,14 +97,14 @@ def test_a_note_and_a_photo_stay_with_the_flight(dashboard: Dashboard, campaign_
     page, verdict = dashboard.page, open_flight(dashboard, trial)
     verdict.get_by_text("Note and photos").click()
     verdict.get_by_label("Note on flight 1").fill("Gust from the north at 4 s")
-    verdict.get_by_role("button", name="Keep the note").click()
-    expect(verdict.get_by_role("button", name="Keep the note")).to_have_count(0)
+    verdict.get_by_role("button", name="Save note").click()
+    expect(verdict.get_by_role("button", name="Save note")).to_have_count(0)
     assert dashboard.get(f"/trials/{trial['id']}")["note"] == "Gust from the north at 4 s"
     assert verdict.locator("input[type=file]").get_attribute("capture") == "environment"
 
     def choose(name: str, content: bytes) -> None:
         with page.expect_file_chooser() as chooser:
-            verdict.get_by_role("button", name="Add a photo").click()
+            verdict.get_by_role("button", name="Add photo").click()
         chooser.value.set_files({"name": name, "mimeType": "image/png", "buffer": content})
 
     choose("page.png", b"<script>alert(1)</script>")
@@ -117,8 +117,8 @@ def test_a_note_and_a_photo_stay_with_the_flight(dashboard: Dashboard, campaign_
     expect(verdict.get_by_label("Note on flight 1")).to_have_value("Gust from the north at 4 s")
     expect(photo).to_be_visible()
     verdict.get_by_role("button", name="Delete photo 1 of flight 1").click()
-    verdict.get_by_role("button", name="Keep it").click()
-    expect(verdict.get_by_text("for good?")).to_have_count(0)
+    verdict.get_by_role("button", name="Cancel").click()
+    expect(verdict.get_by_text("cannot be undone")).to_have_count(0)
     assert len(dashboard.get(f"/trials/{trial['id']}/photos")) == 1
     verdict.get_by_role("button", name="Delete photo 1 of flight 1").click()
     verdict.get_by_role("button", name="Delete photo 1", exact=True).click()
@@ -134,10 +134,10 @@ def test_a_note_that_is_being_written_outlives_a_verdict(dashboard: Dashboard, c
     verdict.get_by_role("button", name="Mark invalid").click()
     verdict.get_by_text("Wind gust").click()
     verdict.get_by_role("button", name="Mark invalid").click()
-    expect(verdict.get_by_role("button", name="Undo: count it as valid")).to_be_visible()
+    expect(verdict.get_by_role("button", name="Undo: mark valid")).to_be_visible()
     expect(verdict.get_by_label("Note on flight 1")).to_have_value("Gust from the north")
-    verdict.get_by_role("button", name="Keep the note").click()
-    expect(verdict.get_by_role("button", name="Keep the note")).to_have_count(0)
+    verdict.get_by_role("button", name="Save note").click()
+    expect(verdict.get_by_role("button", name="Save note")).to_have_count(0)
     assert dashboard.get(f"/trials/{trial['id']}")["note"] == "Gust from the north"
 
 
@@ -160,7 +160,7 @@ def test_a_card_clones_a_campaign_onto_another_vehicle_and_archives_a_finished_o
     dashboard.open("/")
     card = page.get_by_role("listitem").filter(has=page.get_by_role("heading", name="On the twin", exact=True))
     card.get_by_text("Clone or archive").click()
-    card.get_by_label("Same settings again, on").select_option("jsbsim")
+    card.get_by_label("Clone to vehicle").select_option("jsbsim")
     card.get_by_role("button", name="Clone").click()
     expect(page.get_by_role("heading", name="On the twin (again)")).to_be_visible()
     assert dashboard.get(f"/campaigns/{dashboard.campaign_id}")["vehicle"]["kind"] == "jsbsim"
