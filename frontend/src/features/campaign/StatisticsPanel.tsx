@@ -6,6 +6,7 @@ import { count } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Panel } from "../../ui/Panel";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { confidenceText, percent, plusMinus, scatterSource } from "../../ui/uncertainty";
 import { useLastRows } from "../../ui/useLastRows";
 import classes from "./Statistics.module.css";
@@ -156,31 +157,28 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
   const names = Object.keys(groups[0]?.gains ?? {});
   const { more, listed } = useLastRows(groups, 4, "gain sets", (group) => group.is_best || group.is_baseline);
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={`${classes["scroll"]} sideways`} aria-label="Gain sets flown" tabIndex={0}>
-      <table className={classes["groups"]}>
-        <thead>
-          <tr>
-            <th scope="col">[{names.join(" ")}]</th>
-            <th scope="col">Flights</th>
-            <th scope="col">
-              Mean error ± standard error <HelpTip topic="standardError" />
-            </th>
-            <th scope="col">Role</th>
+    <ScrollTable label="Gain sets flown" className={classes["groups"]}>
+      <thead>
+        <tr>
+          <th scope="col">[{names.join(" ")}]</th>
+          <th scope="col">Flights</th>
+          <th scope="col">
+            Mean error ± standard error <HelpTip topic="standardError" />
+          </th>
+          <th scope="col">Role</th>
+        </tr>
+      </thead>
+      <tbody>
+        {more}
+        {listed.map((group) => (
+          <tr key={group.trial_numbers[0]} data-best={group.is_best || undefined}>
+            <th scope="row">{gainsInBrackets(group.gains)}</th>
+            <td>{group.trial_numbers.join(", ")}</td>
+            <td>{plusMinus(group.mean, group.standard_error, unit)}</td>
+            <td>{[group.is_best ? "best" : "", group.is_baseline ? "first" : ""].filter(Boolean).join(", ")}</td>
           </tr>
-        </thead>
-        <tbody>
-          {more}
-          {listed.map((group) => (
-            <tr key={group.trial_numbers[0]} data-best={group.is_best || undefined}>
-              <th scope="row">{gainsInBrackets(group.gains)}</th>
-              <td>{group.trial_numbers.join(", ")}</td>
-              <td>{plusMinus(group.mean, group.standard_error, unit)}</td>
-              <td>{[group.is_best ? "best" : "", group.is_baseline ? "first" : ""].filter(Boolean).join(", ")}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
-    </section>
+        ))}
+      </tbody>
+    </ScrollTable>
   );
 }

@@ -4,6 +4,7 @@ import type { Campaign, Trial } from "../../api/types";
 import { onPointed, pointAt } from "../../charts/pointing";
 import { gainText, NOTHING, withUnit } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { StateBadge } from "../../ui/StateBadge";
 import { trialStateLabel, wasFlown } from "../../ui/states";
 import { rangeText } from "../../ui/uncertainty";
@@ -43,90 +44,87 @@ export function TrialsTable({ campaign, trials, shown, unit, onChoose }: Props) 
     [],
   );
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={`${classes["scroll"]} sideways`} aria-label="All flights" tabIndex={0}>
-      <table className={classes["table"]}>
-        <thead>
-          <tr>
-            <th scope="col">Flight</th>
-            {names.map((name) => (
-              <th key={name} scope="col">
-                {name} {titles[name] && <small>{titles[name]}</small>}
+    <ScrollTable label="All flights" className={classes["table"]}>
+      <thead>
+        <tr>
+          <th scope="col">Flight</th>
+          {names.map((name) => (
+            <th key={name} scope="col">
+              {name} {titles[name] && <small>{titles[name]}</small>}
+            </th>
+          ))}
+          <th scope="col">
+            Error <HelpTip topic="error" />
+          </th>
+          <th scope="col">
+            Predicted <HelpTip topic="interval" />
+          </th>
+          <th scope="col" className={classes["text"]}>
+            State
+          </th>
+          <th scope="col" className={classes["text"]}>
+            Verdict
+          </th>
+        </tr>
+      </thead>
+      <tbody
+        ref={body}
+        onPointerOver={({ target }) => pointAt(flightOf(target))}
+        onPointerLeave={() => pointAt(null)}
+        onFocus={({ target }) => pointAt(flightOf(target))}
+        onBlur={() => pointAt(null)}
+      >
+        {more}
+        {listed.map((trial) => {
+          const isBest = trial.id === best;
+          return (
+            <tr
+              key={trial.id}
+              data-flight={trial.number}
+              data-best={isBest || undefined}
+              data-shown={trial.number === shown || undefined}
+            >
+              <th scope="row">
+                {wasFlown(trial.state) ? (
+                  <button
+                    type="button"
+                    aria-pressed={trial.number === shown}
+                    aria-label={`Flight ${trial.number}${isBest ? ", best" : ""}`}
+                    onClick={() => onChoose(trial.number)}
+                  >
+                    {trial.number}
+                    {isBest && <IconStarFilled size={15} aria-hidden />}
+                  </button>
+                ) : (
+                  <span>{trial.number}</span>
+                )}
               </th>
-            ))}
-            <th scope="col">
-              Error <HelpTip topic="error" />
-            </th>
-            <th scope="col">
-              Predicted <HelpTip topic="interval" />
-            </th>
-            <th scope="col" className={classes["text"]}>
-              State
-            </th>
-            <th scope="col" className={classes["text"]}>
-              Verdict
-            </th>
-          </tr>
-        </thead>
-        <tbody
-          ref={body}
-          onPointerOver={({ target }) => pointAt(flightOf(target))}
-          onPointerLeave={() => pointAt(null)}
-          onFocus={({ target }) => pointAt(flightOf(target))}
-          onBlur={() => pointAt(null)}
-        >
-          {more}
-          {listed.map((trial) => {
-            const isBest = trial.id === best;
-            return (
-              <tr
-                key={trial.id}
-                data-flight={trial.number}
-                data-best={isBest || undefined}
-                data-shown={trial.number === shown || undefined}
-              >
-                <th scope="row">
-                  {wasFlown(trial.state) ? (
-                    <button
-                      type="button"
-                      aria-pressed={trial.number === shown}
-                      aria-label={`Flight ${trial.number}${isBest ? ", best" : ""}`}
-                      onClick={() => onChoose(trial.number)}
-                    >
-                      {trial.number}
-                      {isBest && <IconStarFilled size={15} aria-hidden />}
-                    </button>
-                  ) : (
-                    <span>{trial.number}</span>
-                  )}
-                </th>
-                {names.map((name) => (
-                  <td key={name} title={String(trial.gains[name] ?? "")}>
-                    {gainText(trial.gains[name] ?? Number.NaN)}
-                  </td>
-                ))}
-                <td className={classes["error"]}>{withUnit(trial.error, unit)}</td>
-                <td>
-                  <span className={classes["predicted"]}>
-                    {withUnit(trial.predicted_error, unit)}
-                    <PredictionResult trial={trial} brief />
-                  </span>
-                  {trial.predicted_interval && (
-                    <small className={classes["range"]}>{rangeText(trial.predicted_interval, unit)}</small>
-                  )}
+              {names.map((name) => (
+                <td key={name} title={String(trial.gains[name] ?? "")}>
+                  {gainText(trial.gains[name] ?? Number.NaN)}
                 </td>
-                <td className={classes["text"]}>
-                  <span className={classes["state"]}>
-                    <StateBadge words={trialStateLabel(trial.state)} />
-                    <FlightMarkers trial={trial} />
-                  </span>
-                </td>
-                <td className={`${classes["text"]} ${classes["verdict"]}`}>{sentenceOf(trial) || NOTHING}</td>
-              </tr>
-            );
-          })}
-        </tbody>
-      </table>
-    </section>
+              ))}
+              <td className={classes["error"]}>{withUnit(trial.error, unit)}</td>
+              <td>
+                <span className={classes["predicted"]}>
+                  {withUnit(trial.predicted_error, unit)}
+                  <PredictionResult trial={trial} brief />
+                </span>
+                {trial.predicted_interval && (
+                  <small className={classes["range"]}>{rangeText(trial.predicted_interval, unit)}</small>
+                )}
+              </td>
+              <td className={classes["text"]}>
+                <span className={classes["state"]}>
+                  <StateBadge words={trialStateLabel(trial.state)} />
+                  <FlightMarkers trial={trial} />
+                </span>
+              </td>
+              <td className={`${classes["text"]} ${classes["verdict"]}`}>{sentenceOf(trial) || NOTHING}</td>
+            </tr>
+          );
+        })}
+      </tbody>
+    </ScrollTable>
   );
 }

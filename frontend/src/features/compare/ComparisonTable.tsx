@@ -4,6 +4,7 @@ import type { ReactNode } from "react";
 import { Link } from "react-router";
 import type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } from "../../api/compare";
 import { count, gainText, NOTHING } from "../../ui/format";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { StateBadge } from "../../ui/StateBadge";
 import { trialStateLabel } from "../../ui/states";
 import { Time } from "../../ui/Time";
@@ -28,59 +29,56 @@ export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) 
   if (first === undefined) return null;
   const several = flights.some(({ campaign_id }) => campaign_id !== first.campaign_id);
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={`${classes["scroll"]} sideways`} aria-label="Flights compared" tabIndex={0}>
-      <table className={classes["table"]}>
-        <thead>
-          <tr>
-            <th scope="col">Flight</th>
-            <th scope="col">Error</th>
-            <th scope="col">Against {first.label}</th>
-            {gains.map(({ title, unit: of }) => (
-              <th key={`${title} ${of}`} scope="col">
-                {title}
-                {of && ` (${of})`}
-              </th>
-            ))}
-            <th scope="col">
-              <span className="visually-hidden">Actions</span>
+    <ScrollTable label="Flights compared" className={classes["table"]}>
+      <thead>
+        <tr>
+          <th scope="col">Flight</th>
+          <th scope="col">Error</th>
+          <th scope="col">Against {first.label}</th>
+          {gains.map(({ title, unit: of }) => (
+            <th key={`${title} ${of}`} scope="col">
+              {title}
+              {of && ` (${of})`}
             </th>
-          </tr>
-        </thead>
-        <tbody>
-          {flights.map((flight, index) => (
-            <tr key={flight.trial_id}>
-              <th scope="row">
-                <Name flight={flight} several={several} pen={pens.get(flight.trial_id)} />
-              </th>
-              <td>
-                <ErrorCell flight={flight} unit={unit} />
-              </td>
-              <td>
-                <Against pair={againstFirst(pairs, first.trial_id, flight.trial_id)} first={first.label} unit={unit} />
-              </td>
-              {gains.map((difference) => (
-                <td key={`${difference.title} ${difference.unit}`}>
-                  <Value difference={difference} index={index} />
-                </td>
-              ))}
-              <td>
-                <span className={classes["acts"]}>
-                  {index > 0 && (
-                    <Act title={`Use ${flight.name} as reference`} onClick={() => onFirst(flight.trial_id)}>
-                      <IconArrowBarToUp size={20} color="var(--dim)" />
-                    </Act>
-                  )}
-                  <Act title={`Remove ${flight.name}`} onClick={() => onRemove(flight.trial_id)}>
-                    <IconX size={20} color="var(--dim)" />
-                  </Act>
-                </span>
-              </td>
-            </tr>
           ))}
-        </tbody>
-      </table>
-    </section>
+          <th scope="col">
+            <span className="visually-hidden">Actions</span>
+          </th>
+        </tr>
+      </thead>
+      <tbody>
+        {flights.map((flight, index) => (
+          <tr key={flight.trial_id}>
+            <th scope="row">
+              <Name flight={flight} several={several} pen={pens.get(flight.trial_id)} />
+            </th>
+            <td>
+              <ErrorCell flight={flight} unit={unit} />
+            </td>
+            <td>
+              <Against pair={againstFirst(pairs, first.trial_id, flight.trial_id)} first={first.label} unit={unit} />
+            </td>
+            {gains.map((difference) => (
+              <td key={`${difference.title} ${difference.unit}`}>
+                <Value difference={difference} index={index} />
+              </td>
+            ))}
+            <td>
+              <span className={classes["acts"]}>
+                {index > 0 && (
+                  <Act title={`Use ${flight.name} as reference`} onClick={() => onFirst(flight.trial_id)}>
+                    <IconArrowBarToUp size={20} color="var(--dim)" />
+                  </Act>
+                )}
+                <Act title={`Remove ${flight.name}`} onClick={() => onRemove(flight.trial_id)}>
+                  <IconX size={20} color="var(--dim)" />
+                </Act>
+              </span>
+            </td>
+          </tr>
+        ))}
+      </tbody>
+    </ScrollTable>
   );
 }
 
@@ -215,35 +213,32 @@ interface SettingsProps {
 
 function Settings({ flights, settings, title }: SettingsProps) {
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={`${classes["scroll"]} sideways`} aria-label={title} tabIndex={0}>
-      <table className={`${classes["table"]} ${classes["settings"]}`}>
-        <thead>
-          <tr>
-            <th scope="col">{title}</th>
-            {flights.map(({ trial_id, label }) => (
-              <th key={trial_id} scope="col">
-                {label}
-              </th>
+    <ScrollTable label={title} className={`${classes["table"]} ${classes["settings"]}`}>
+      <thead>
+        <tr>
+          <th scope="col">{title}</th>
+          {flights.map(({ trial_id, label }) => (
+            <th key={trial_id} scope="col">
+              {label}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody>
+        {settings.map(({ title: name, unit, values, changes }) => (
+          <tr key={`${name} ${unit}`}>
+            <th scope="row">
+              {name}
+              {unit && ` (${unit})`}
+            </th>
+            {flights.map(({ trial_id }, index) => (
+              <td key={trial_id}>
+                <Value difference={{ values, changes }} index={index} />
+              </td>
             ))}
           </tr>
-        </thead>
-        <tbody>
-          {settings.map(({ title: name, unit, values, changes }) => (
-            <tr key={`${name} ${unit}`}>
-              <th scope="row">
-                {name}
-                {unit && ` (${unit})`}
-              </th>
-              {flights.map(({ trial_id }, index) => (
-                <td key={trial_id}>
-                  <Value difference={{ values, changes }} index={index} />
-                </td>
-              ))}
-            </tr>
-          ))}
-        </tbody>
-      </table>
-    </section>
+        ))}
+      </tbody>
+    </ScrollTable>
   );
 }

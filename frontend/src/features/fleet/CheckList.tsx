@@ -1,5 +1,6 @@
 import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
 import type { Vehicle } from "../../api/types";
+import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 
@@ -10,8 +11,8 @@ export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicl
   }
   return (
     <>
-      <div className={classes["scroll"]}>
-        <table className={classes["table"]}>
+      <div className={table["scroll"]}>
+        <table className={`${table["table"]} ${classes["table"]}`}>
           <thead>
             <tr>
               <th scope="col">Item</th>

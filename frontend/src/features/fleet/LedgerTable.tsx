@@ -7,6 +7,7 @@ import { NOTHING } from "../../ui/format";
 import { gainsInBrackets, sameHeld } from "../../ui/gains";
 import { Panel } from "../../ui/Panel";
 import { addPage } from "../../ui/paging";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { PURPOSES } from "./fleet";
@@ -21,24 +22,21 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
       {ledger.isPending && <Skeleton height={120} aria-busy="true" />}
       {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>No gains written yet.</p>}
       {lines.length > 0 && (
-        // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-        <section className={`${classes["scroll"]} sideways`} aria-label="Gain history" tabIndex={0}>
-          <table className={classes["table"]}>
-            <thead>
-              <tr>
-                <th scope="col">Purpose</th>
-                <th scope="col">Requested {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
-                <th scope="col">Read back</th>
-                <th scope="col">Outcome</th>
-              </tr>
-            </thead>
-            <tbody>
-              {lines.map((line) => (
-                <Line key={`${line.purpose} ${line.flight_id ?? line.act_id}`} line={line} />
-              ))}
-            </tbody>
-          </table>
-        </section>
+        <ScrollTable label="Gain history" className={classes["table"]}>
+          <thead>
+            <tr>
+              <th scope="col">Purpose</th>
+              <th scope="col">Requested {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
+              <th scope="col">Read back</th>
+              <th scope="col">Outcome</th>
+            </tr>
+          </thead>
+          <tbody>
+            {lines.map((line) => (
+              <Line key={`${line.purpose} ${line.flight_id ?? line.act_id}`} line={line} />
+            ))}
+          </tbody>
+        </ScrollTable>
       )}
       {ledger.hasNextPage && (
         <Button

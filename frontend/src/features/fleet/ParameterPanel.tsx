@@ -3,6 +3,7 @@ import { useState } from "react";
 import { useActs } from "../../api/fleet";
 import { gainText } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
+import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { parametersOf } from "./fleet";
@@ -47,7 +48,7 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
             />
             {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
             <section className={classes["parameters"]} aria-label="Parameters" tabIndex={0}>
-              <table className={classes["table"]}>
+              <table className={`${table["table"]} ${classes["table"]}`}>
                 <tbody>
                   {found.map(([name, value]) => (
                     <tr key={name}>

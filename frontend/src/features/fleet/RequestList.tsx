@@ -3,6 +3,7 @@ import { useActs } from "../../api/fleet";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { Panel } from "../../ui/Panel";
 import { addPage } from "../../ui/paging";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { ACTS } from "./fleet";
@@ -15,36 +16,33 @@ export function RequestList({ vehicleId }: { vehicleId: number }) {
     <Panel title="Requests" className={classes["wide"]}>
       <ErrorNotice error={acts.error} />
       {acts.isPending && <Skeleton height={120} aria-busy="true" />}
-      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
-      <section className={`${classes["scroll"]} sideways`} aria-label="Requests" tabIndex={0}>
-        <table className={classes["table"]}>
-          <thead>
-            <tr>
-              <th scope="col">Request</th>
-              <th scope="col">Time</th>
-              <th scope="col">Outcome</th>
+      <ScrollTable label="Requests" className={classes["table"]}>
+        <thead>
+          <tr>
+            <th scope="col">Request</th>
+            <th scope="col">Time</th>
+            <th scope="col">Outcome</th>
+          </tr>
+        </thead>
+        <tbody>
+          {items.map((act) => (
+            <tr key={act.id}>
+              <td>
+                {ACTS[act.kind]}
+                {act.reason && <small>{act.reason}</small>}
+              </td>
+              <td>
+                <Time at={act.requested_at} />
+                {act.by && <small>by {act.by}</small>}
+              </td>
+              <td>
+                {act.state}
+                {act.problem && <small>{act.problem}</small>}
+              </td>
             </tr>
-          </thead>
-          <tbody>
-            {items.map((act) => (
-              <tr key={act.id}>
-                <td>
-                  {ACTS[act.kind]}
-                  {act.reason && <small>{act.reason}</small>}
-                </td>
-                <td>
-                  <Time at={act.requested_at} />
-                  {act.by && <small>by {act.by}</small>}
-                </td>
-                <td>
-                  {act.state}
-                  {act.problem && <small>{act.problem}</small>}
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      </section>
+          ))}
+        </tbody>
+      </ScrollTable>
       {acts.hasNextPage && (
         <Button
           variant="default"

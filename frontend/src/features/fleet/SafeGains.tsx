@@ -11,6 +11,7 @@ import { inOrder, sameHeld } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { type NumberEntry, NumberField } from "../../ui/NumberField";
 import { Panel } from "../../ui/Panel";
+import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 
@@ -33,7 +34,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   return (
     <Panel title="Gains">
       <div className={classes["stack"]}>
-        <table className={classes["table"]}>
+        <table className={`${table["table"]} ${classes["table"]}`}>
           <thead>
             <tr>
               <th scope="col">Gain</th>

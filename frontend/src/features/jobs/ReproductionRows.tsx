@@ -1,4 +1,5 @@
 import type { ReproductionRow } from "../../api/jobs";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { type ComparedColumn, comparedColumns, grouped, measure } from "./jobs";
 import classes from "./ReproductionRows.module.css";
 
@@ -8,34 +9,31 @@ const RATIO_DIGITS = 3;
 export function ReproductionRows({ rows, title }: { rows: readonly ReproductionRow[]; title: string }) {
   const columns = comparedColumns(rows);
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
-    <section className={`${classes["scroll"]} sideways`} aria-label={`${title}: numbers`} tabIndex={0}>
-      <table className={classes["table"]}>
-        <thead>
-          <tr>
-            <td />
-            <th scope="col">Ours</th>
-            {columns.map(([key, heading]) => (
-              <th key={key} scope="col">
-                {heading}
-              </th>
-            ))}
+    <ScrollTable label={`${title}: numbers`} className={classes["table"]}>
+      <thead>
+        <tr>
+          <td />
+          <th scope="col">Ours</th>
+          {columns.map(([key, heading]) => (
+            <th key={key} scope="col">
+              {heading}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      {grouped(rows).map((group) => (
+        <tbody key={group.title}>
+          <tr className={classes["group"]}>
+            <th scope="rowgroup" colSpan={2 + columns.length}>
+              {group.title}
+            </th>
           </tr>
-        </thead>
-        {grouped(rows).map((group) => (
-          <tbody key={group.title}>
-            <tr className={classes["group"]}>
-              <th scope="rowgroup" colSpan={2 + columns.length}>
-                {group.title}
-              </th>
-            </tr>
-            {group.rows.map((row) => (
-              <Row key={row.label} row={row} columns={columns} />
-            ))}
-          </tbody>
-        ))}
-      </table>
-    </section>
+          {group.rows.map((row) => (
+            <Row key={row.label} row={row} columns={columns} />
+          ))}
+        </tbody>
+      ))}
+    </ScrollTable>
   );
 }
 
