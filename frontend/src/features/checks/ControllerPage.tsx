@@ -7,6 +7,7 @@ import { recordOf } from "../../api/records";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import classes from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
+import row from "../../ui/RowCard.module.css";
 import { StateBadge } from "../../ui/StateBadge";
 import { Time } from "../../ui/Time";
 import { useTitle } from "../../ui/useTitle";
@@ -68,8 +69,8 @@ function EarlierChecks({ shown }: { shown: number }) {
       {found.length > 0 && <h2 className={classes["section"]}>Earlier checks</h2>}
       <ul className={classes["list"]} aria-label="Earlier checks">
         {found.map(({ id, file_name, kind, passed, checked_at }) => (
-          <li key={id} className={jobs["job"]}>
-            <div className={jobs["what"]}>
+          <li key={id} className={`${row["card"]} ${jobs["job"]}`}>
+            <div className={`${row["what"]} ${jobs["what"]}`}>
               <h3 className={jobs["title"]}>
                 <Anchor
                   component={Link}

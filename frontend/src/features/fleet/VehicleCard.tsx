@@ -8,6 +8,7 @@ import { linkText } from "../../live/vehicleStatus";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
+import row from "../../ui/RowCard.module.css";
 import { StateBadge } from "../../ui/StateBadge";
 import { VehicleBadge } from "../../ui/VehicleBadge";
 import { vehicleStateLabel } from "./fleet";
@@ -20,8 +21,8 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const held = Object.keys(vehicle.held ?? {}).length > 0 ? gainsInBrackets(vehicle.held ?? {}) : "";
   const isLinked = vehicle.registered && vehicle.state !== "disconnected";
   return (
-    <li className={classes["card"]} data-state={vehicle.state}>
-      <div className={classes["what"]}>
+    <li className={`${row["card"]} ${classes["card"]}`} data-state={vehicle.state}>
+      <div className={`${row["what"]} ${classes["what"]}`}>
         <h3 className={classes["name"]}>
           <VehicleBadge isReal={vehicle.is_real} />
           <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>

@@ -3,6 +3,7 @@ import { Link } from "react-router";
 import { type Job, useCancelJob, useRetryJob } from "../../api/jobs";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { count } from "../../ui/format";
+import row from "../../ui/RowCard.module.css";
 import { StateBadge } from "../../ui/StateBadge";
 import { Time } from "../../ui/Time";
 import classes from "./JobCard.module.css";
@@ -17,8 +18,8 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
   const title = jobTitle(job, titles);
   const link = jobLink(job);
   return (
-    <li className={classes["job"]} data-state={job.state}>
-      <div className={classes["what"]}>
+    <li className={`${row["card"]} ${classes["job"]}`} data-state={job.state}>
+      <div className={`${row["what"]} ${classes["what"]}`}>
         <h3 className={classes["title"]}>
           {link === null ? (
             title
