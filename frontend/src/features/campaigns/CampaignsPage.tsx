@@ -6,6 +6,7 @@ import { Link } from "react-router";
 import { useCampaigns, useCatalogue } from "../../api/queries";
 import type { Sort } from "../../api/types";
 import { ErrorNotice } from "../../ui/ErrorNotice";
+import work from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
 import { SelectField } from "../../ui/SelectField";
 import { useTitle } from "../../ui/useTitle";
@@ -38,8 +39,8 @@ export function CampaignsPage() {
   if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
   return (
     <>
-      <div className={classes["head"]}>
-        <h1 className={classes["title"]}>Campaigns</h1>
+      <div className={`${work["head"]} ${classes["head"]}`}>
+        <h1 className={`${work["title"]} ${classes["title"]}`}>Campaigns</h1>
         <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
           New campaign
         </Button>
@@ -81,7 +82,7 @@ export function CampaignsPage() {
         </div>
       )}
       {campaigns.data && found.length === 0 && (
-        <div className={classes["none"]}>
+        <div className={work["none"]}>
           <p>No campaigns match.</p>
           {filtered && (
             <Button
@@ -103,7 +104,7 @@ export function CampaignsPage() {
         ))}
       </ul>
       {campaigns.hasNextPage && (
-        <div className={classes["more"]}>
+        <div className={work["more"]}>
           <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
             Show more ({found.length} of {total})
           </Button>
