@@ -1,4 +1,4 @@
-import { Accordion, Button, Skeleton, TextInput } from "@mantine/core";
+import { Button, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate, useSearchParams } from "react-router";
@@ -8,8 +8,11 @@ import { useCatalogue } from "../../api/queries";
 import type { Catalogue, Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
 import { ErrorNotice } from "../../ui/ErrorNotice";
+import { FoldedSection } from "../../ui/FoldedSection";
 import classes from "../../ui/Form.module.css";
-import { NumberField } from "../../ui/NumberField";
+import { FormPage } from "../../ui/FormPage";
+import { GainFields } from "../../ui/GainFields";
+import { MissingNumbers } from "../../ui/MissingNumbers";
 import { SelectField } from "../../ui/SelectField";
 import { useTitle } from "../../ui/useTitle";
 import { AdvancedFields } from "./AdvancedFields";
@@ -39,10 +42,13 @@ export function NewCampaignPage() {
   const catalogue = useCatalogue();
   const vehicles = useVehicles();
   const wanted = Number(useSearchParams()[0].get("vehicle"));
-  const error = catalogue.error ?? vehicles.error;
+
   return (
-    <div className={classes["page"]}>
-      <h1 className={classes["title"]}>New campaign</h1>
+    <FormPage
+      title="New campaign"
+      error={catalogue.error ?? vehicles.error}
+      isPending={catalogue.isPending || vehicles.isPending}
+    >
       {catalogue.data && vehicles.data && (
         <NewCampaignForm
           catalogue={catalogue.data}
@@ -50,9 +56,7 @@ export function NewCampaignPage() {
           wanted={vehicles.data.find(({ id, registered }) => registered && id === wanted)}
         />
       )}
-      {error && <ErrorNotice error={error} />}
-      {(catalogue.isPending || vehicles.isPending) && <Skeleton height={420} radius="md" aria-busy="true" />}
-    </div>
+    </FormPage>
   );
 }
 
@@ -78,7 +82,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   const create = useCreateCampaign();
   const { plain, advanced } = fieldsOf(form, catalogue);
   const reasons = reasonsByField(problemOf(create.error), [...plain, ...advanced]);
-  const [opened, setOpened] = useState<string | null>(null);
+
   const refusedBelow = advanced.some((field) => reasons[field] !== undefined);
   const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
   const strategies = strategiesFor(catalogue, form.experiment);
@@ -153,37 +157,20 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         />
       )}
       {form.start === "given" && (
-        <fieldset className={classes["gains"]}>
-          <legend>Start gains</legend>
-          {gainsOf(catalogue, form.experiment).map((gain) => (
-            <NumberField
-              key={gain.name}
-              required
-              withAsterisk={false}
-              label={gain.name}
-              description={`${gain.lower} … ${gain.upper} ${gain.unit}`}
-              value={form.startGains[gain.name] ?? ""}
-              error={reasons[`start.gains.${gain.name}`]}
-              onChange={(value) => set({ startGains: { ...form.startGains, [gain.name]: value } })}
-            />
-          ))}
-        </fieldset>
+        <GainFields
+          legend="Start gains"
+          gains={gainsOf(catalogue, form.experiment)}
+          values={form.startGains}
+          reasons={reasons}
+          prefix="start.gains"
+          onChange={(startGains) => set({ startGains })}
+        />
       )}
-      <Accordion
-        variant="contained"
-        chevronPosition="left"
-        value={refusedBelow ? "advanced" : opened}
-        onChange={setOpened}
-      >
-        <Accordion.Item value="advanced">
-          <Accordion.Control mih={56}>Advanced: stop rule, bounds, vehicle settings, seed</Accordion.Control>
-          <Accordion.Panel>
-            <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
-          </Accordion.Panel>
-        </Accordion.Item>
-      </Accordion>
+      <FoldedSection title="Advanced: stop rule, bounds, vehicle settings, seed" forcedOpen={refusedBelow}>
+        <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
+      </FoldedSection>
       <ErrorNotice error={create.error} shown={[...plain, ...advanced]} />
-      {unread.length > 0 && <p role="status">Enter a number for {unread.join(", ")}.</p>}
+      <MissingNumbers fields={unread} />
       <div className={classes["create"]}>
         <Button
           type="submit"

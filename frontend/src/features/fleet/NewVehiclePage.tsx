@@ -1,4 +1,4 @@
-import { Accordion, Button, Checkbox, Skeleton, Switch, TextInput } from "@mantine/core";
+import { Button, Checkbox, Switch, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
@@ -7,8 +7,11 @@ import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue } from "../../api/types";
 import { ErrorNotice } from "../../ui/ErrorNotice";
+import { FoldedSection } from "../../ui/FoldedSection";
 import classes from "../../ui/Form.module.css";
-import { NumberField } from "../../ui/NumberField";
+import { FormPage } from "../../ui/FormPage";
+import { GainFields } from "../../ui/GainFields";
+import { MissingNumbers } from "../../ui/MissingNumbers";
 import { OptionField } from "../../ui/OptionField";
 import { SelectField } from "../../ui/SelectField";
 import { useTitle } from "../../ui/useTitle";
@@ -30,12 +33,9 @@ export function NewVehiclePage() {
   useTitle("Register a vehicle");
   const catalogue = useCatalogue();
   return (
-    <div className={classes["page"]}>
-      <h1 className={classes["title"]}>Register a vehicle</h1>
+    <FormPage title="Register a vehicle" error={catalogue.error} isPending={catalogue.isPending}>
       {catalogue.data && <NewVehicleForm catalogue={catalogue.data} />}
-      {catalogue.error && <ErrorNotice error={catalogue.error} />}
-      {catalogue.isPending && <Skeleton height={420} radius="md" />}
-    </div>
+    </FormPage>
   );
 }
 
@@ -61,7 +61,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
   ];
   const reasons = reasonsByField(problemOf(register.error), fields);
   const refusedBelow = folded.some((field) => reasons[field] !== undefined);
-  const [opened, setOpened] = useState<string | null>(null);
+
   const unread = unreadGains(form);
   const simulated = isSimulated(form);
   return (
@@ -115,21 +115,14 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           onChange={(event) => setOption("simulated", event.currentTarget.checked)}
         />
       </div>
-      <fieldset className={classes["gains"]}>
-        <legend>Safe gains, restored after every flight</legend>
-        {gains.map((gain) => (
-          <NumberField
-            key={gain.name}
-            required
-            withAsterisk={false}
-            label={gain.name}
-            description={`${gain.lower} … ${gain.upper} ${gain.unit}`}
-            value={form.safeGains[gain.name] ?? ""}
-            error={reasons[`safe_gains.${gain.name}`]}
-            onChange={(value) => set({ safeGains: { ...form.safeGains, [gain.name]: value }, confirmed: false })}
-          />
-        ))}
-      </fieldset>
+      <GainFields
+        legend="Safe gains, restored after every flight"
+        gains={gains}
+        values={form.safeGains}
+        reasons={reasons}
+        prefix="safe_gains"
+        onChange={(safeGains) => set({ safeGains, confirmed: false })}
+      />
       {!simulated && (
         <div className={classes["confirm"]}>
           <Checkbox
@@ -149,31 +142,21 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           />
         </div>
       )}
-      <Accordion
-        variant="contained"
-        chevronPosition="left"
-        value={refusedBelow ? "further" : opened}
-        onChange={setOpened}
-      >
-        <Accordion.Item value="further">
-          <Accordion.Control mih={56}>Advanced: identity, limits, motion capture, signing</Accordion.Control>
-          <Accordion.Panel>
-            <div className={classes["pair"]}>
-              {further.map((option) => (
-                <OptionField
-                  key={option.name}
-                  option={option}
-                  value={form.options[option.name]}
-                  error={reasons[`options.${option.name}`]}
-                  onChange={(value) => setOption(option.name, value)}
-                />
-              ))}
-            </div>
-          </Accordion.Panel>
-        </Accordion.Item>
-      </Accordion>
+      <FoldedSection title="Advanced: identity, limits, motion capture, signing" forcedOpen={refusedBelow}>
+        <div className={classes["pair"]}>
+          {further.map((option) => (
+            <OptionField
+              key={option.name}
+              option={option}
+              value={form.options[option.name]}
+              error={reasons[`options.${option.name}`]}
+              onChange={(value) => setOption(option.name, value)}
+            />
+          ))}
+        </div>
+      </FoldedSection>
       <ErrorNotice error={register.error} shown={fields} />
-      {unread.length > 0 && <p role="status">Enter a number for {unread.join(", ")}.</p>}
+      <MissingNumbers fields={unread} />
       <Button
         type="submit"
         size="lg"
