@@ -80,7 +80,7 @@ def create(dashboard: Dashboard, vehicle_id: int) -> int:
     picture(dashboard, "vehicle")
     page.get_by_role("link", name="New campaign").click()
     expect(page.get_by_role("radio", name=re.compile("Number 1"))).to_be_checked()
-    expect(page.get_by_text("Before its first flight, the campaign must pass a rehearsal on a simulation")).to_be_visible()
+    expect(page.get_by_text("the campaign must pass a rehearsal on a simulation")).to_be_visible()
     page.get_by_label("Name", exact=True).fill(NAME)
     picture(dashboard, "wizard")
     page.get_by_role("button", name=re.compile("^Advanced")).click()

@@ -22,7 +22,7 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open(f"/new?vehicle={states.vehicle('Number 1', **REAL)}")
-    expect(page.get_by_text("Before its first flight, the campaign must pass a rehearsal on a simulation")).to_be_visible()
+    expect(page.get_by_text("the campaign must pass a rehearsal on a simulation")).to_be_visible()
     dashboard.button("Create campaign").click()
     asks = dashboard.panel("Rehearse first")
     expect(asks).to_contain_text("Not rehearsed yet: it was not flown on a simulation.")
