@@ -48,3 +48,9 @@ def test_every_test_that_shows_a_promise_is_there() -> None:
 def test_decision_records_are_numbered_without_gaps() -> None:
     numbers = sorted(int(path.name[:4]) for path in (ROOT / "docs/decisions").glob("[0-9]*.md"))
     assert numbers == list(range(1, len(numbers) + 1))
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_file_that_a_document_names_is_there(document: Path) -> None:
+    named = re.findall(r"`((?:app|bench|frontend/src|migrations|tests)/[\w./-]+)`", document.read_text())
+    assert [name for name in named if "NAME" not in name and not (ROOT / name).exists()] == []
