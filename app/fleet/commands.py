@@ -2,7 +2,7 @@
 
     request_act → claim_act → finish_act
                      └ with the outcome, in the same transaction: record_connected, record_disconnected,
-                       quarantine_vehicle, record_released, record_held, record_checks
+                       quarantine_vehicle, record_released, record_checks
 
 Land and motors off bypass the database; `record_command` records them afterwards. At a worker's start: `withdraw_acts`,
 then `forget_connections`, then `request_reconnections`. Later, `list_vehicles_to_reconnect` lists those that are not
@@ -275,11 +275,6 @@ def record_released(session: Session, vehicle_id: int, *, identity: Identity | N
     _move_to(row, VehicleState.READY)
 
 
-def record_held(session: Session, vehicle_id: int, held: Gains) -> None:
-    """Record the gains that the vehicle reported."""
-    hold_gains(repository.get_one(session, vehicle_id), held)
-
-
 def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]) -> None:
     """Record the results of the preflight check."""
     row = repository.get_one(session, vehicle_id)
@@ -292,11 +287,6 @@ def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str
     act = record_act(session, row, kind, by="", reason=reason)
     if problem:
         act.state, act.problem = ActState.FAILED, problem
-
-
-def linked_vehicle(session: Session, vehicle_id: int) -> LinkedVehicle:
-    """The registered vehicle with that id. Raises NotFoundError."""
-    return _linked(repository.get_one(session, vehicle_id))
 
 
 def _linked(row: VehicleRow) -> LinkedVehicle:

@@ -125,12 +125,6 @@ class JsbsimFlight:
         self._done += steps
         return rows
 
-    @property
-    def horizontal_offset_m(self) -> tuple[float, float]:
-        """How far north and east of its place of takeoff the vehicle is."""
-        north_ft, east_ft = (self._fdm[f"position/from-start-neu-{axis}-ft"] for axis in "ne")
-        return north_ft * _FOOT_M, east_ft * _FOOT_M
-
     def _property(self, path: str) -> "jsbsim.FGPropertyNode":
         """A handle that skips the search for the name at every access."""
         node = self._fdm.get_property_manager().get_node(path)

@@ -122,13 +122,9 @@ class Overlay:
     differs: Mapping[str, NDArray[np.bool_]]
 
 
-def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
-    """Compare ff_cmd, fb_cmd and thrust of every active sample with the values computed from the sample itself."""
-    return compare_commands(log, gains)[0]
-
-
 def compare_commands(log: LoopLog, gains: Gains) -> tuple[CommandCheck, Overlay]:
-    """As `check_commands`, and return both sides of `COMMANDS` for every active sample."""
+    """Compare ff_cmd, fb_cmd and thrust of every active sample with the values computed from the sample itself. With
+    both sides of `COMMANDS` for every active sample."""
     active = ~log.idle
     sample = LoopLog(log.time_s[active], log.values[active])
     tilt = _tilts_deg(sample)
@@ -156,19 +152,11 @@ def compare_commands(log: LoopLog, gains: Gains) -> tuple[CommandCheck, Overlay]
     return check, Overlay(sample.time_s, recorded, replica, differs)
 
 
-def check_simulation(log: LoopLog) -> SimulationCheck | None:
+def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
     """Simulate the reference and the integrator from the first command that lasts two seconds.
 
-    None if there is none: the loop is active from the first sample on, never, or only briefly.
-    """
-    found = compare_simulation(log)
-    return None if found is None else found[0]
-
-
-def compare_simulation(log: LoopLog) -> tuple[SimulationCheck, Overlay] | None:
-    """As `check_simulation`, and return both sides of `SIMULATED` for every sample after the command.
-
-    NaN where the integrator is not active.
+    None if there is none: the loop is active from the first sample on, never, or only briefly. With both sides of
+    `SIMULATED` for every sample after the command, NaN where the integrator is not active.
     """
     found = _first_command(log)
     if found is None:

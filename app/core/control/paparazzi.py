@@ -250,11 +250,6 @@ class VerticalLoop:
         """Feedback part of the thrust command."""
         return int(self._state[FB_CMD])
 
-    @property
-    def largest_product(self) -> int:
-        """Largest |gain · error| since the start, before wrapping; above 2³¹ − 1 a product has wrapped."""
-        return int(self._state[LARGEST_PRODUCT])
-
 
 INPUTS: Final = ("mode", "target", "kp", "ki", "kd", "z", "zd", "r33", "in_flight")
 OUTPUTS: Final = ("z_ref", "zd_ref", "zdd_ref", "z_sum_err", "ff_cmd", "fb_cmd", "thrust")
@@ -298,11 +293,6 @@ def replayed(trace: LoopTrace) -> NDArray[np.int64]:
         thrust = loop.step(mode, target, kp, ki, kd, z, zd, r33, bool(in_flight))
         computed[row] = (loop.z_ref, loop.zd_ref, loop.zdd_ref, loop.z_sum_err, loop.ff_cmd, loop.fb_cmd, thrust)
     return computed
-
-
-def replay_trace(trace: LoopTrace) -> Replay:
-    """Compare every output of every row with the replica's."""
-    return compared(trace, replayed(trace))
 
 
 def compared(trace: LoopTrace, computed: NDArray[np.int64]) -> Replay:

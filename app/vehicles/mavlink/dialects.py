@@ -193,10 +193,6 @@ COMMON: Final = Dialect(
     uncounted=_MOCAP_MESSAGES,
 )
 
-DIALECTS: Final[Mapping[str, Dialect]] = MappingProxyType(
-    {dialect.name: dialect for dialect in (PAPARAZZI, ARDUPILOTMEGA, COMMON)}
-)
-
 
 _EVENT: Final = 410
 _EVENT_FIELDS: Final[Mapping[str, str]] = MappingProxyType(

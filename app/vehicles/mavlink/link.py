@@ -169,11 +169,6 @@ class Link:
         self.close()
 
     @property
-    def vehicle_system(self) -> int | None:
-        """The vehicle's system id, None until it is known."""
-        return self._vehicle_system
-
-    @property
     def doubled(self) -> str:
         """Why it is believed that two vehicles speak under the one system id; empty while one does."""
         now_s = self._clock.now_s()

@@ -5,12 +5,30 @@ import io
 import numpy as np
 import pytest
 
-from app.core.control.loop_log import FIELDS, LoopLog, check_commands, check_simulation, infer_gains
+from app.core.control.loop_log import (
+    FIELDS,
+    CommandCheck,
+    LoopLog,
+    SimulationCheck,
+    compare_commands,
+    compare_simulation,
+    infer_gains,
+)
+from app.core.policy import Gains
 from app.logs.paparazzi import read_loop_log
 from tests.logs.paparazzi_flights import Flight, data_of
 
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
 TUNED = {"kp": 1624, "ki": 1356, "kd": 195}
+
+
+def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
+    return compare_commands(log, gains)[0]
+
+
+def check_simulation(log: LoopLog) -> SimulationCheck | None:
+    found = compare_simulation(log)
+    return None if found is None else found[0]
 
 
 def log_of(flight: Flight) -> LoopLog:

@@ -5,7 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.core.control.paparazzi import FULL_THRUST, INPUTS, INT32_MAX, OUTPUTS, LoopTrace, VerticalLoop, replay_trace
+from app.core.control.paparazzi import (
+    FULL_THRUST,
+    INPUTS,
+    INT32_MAX,
+    LARGEST_PRODUCT,
+    OUTPUTS,
+    LoopTrace,
+    VerticalLoop,
+    compared,
+    replayed,
+)
 from app.logs.loop_trace import read_loop_trace
 
 TRACES = sorted((Path(__file__).parents[2] / "data" / "vertical_loop").glob("*.csv.gz"))
@@ -23,7 +33,7 @@ def test_all_seven_recorded_traces_are_here() -> None:
 @pytest.mark.parametrize("path", TRACES, ids=lambda path: path.name)
 def test_the_replica_reproduces_every_column_of_every_row(path: Path) -> None:
     trace = read_loop_trace(path)
-    replay = replay_trace(trace)
+    replay = compared(trace, replayed(trace))
     assert replay.rows == len(trace) >= 6144
     assert replay.largest_difference == dict.fromkeys(OUTPUTS, 0)
     assert replay.exact
@@ -34,7 +44,7 @@ def test_one_wrong_number_is_found_with_its_row_and_size() -> None:
     wrong = trace.outputs.copy()
     wrong[3000, OUTPUTS.index("fb_cmd")] += 7
     wrong[4000, OUTPUTS.index("fb_cmd")] -= 9
-    replay = replay_trace(LoopTrace(trace.inputs, wrong))
+    replay = compared(LoopTrace(trace.inputs, wrong), replayed(trace))
     assert not replay.exact
     assert replay.first_different_row == 3000
     assert replay.largest_difference == dict.fromkeys(OUTPUTS, 0) | {"fb_cmd": 9}
@@ -64,7 +74,7 @@ def test_gains_that_wrap_the_integrator_turn_full_up_into_full_down_and_are_repo
         loop = VerticalLoop()
         loop.start(0, 0)
         thrusts.append([loop.step(1, 3 << 8, 0, ki, 0, 0, 0, 16384, True) for _ in range(4000)][-1])
-        products.append(loop.largest_product)
+        products.append(int(loop._state[LARGEST_PRODUCT]))
     assert thrusts == [FULL_THRUST, 0]
     assert products == [1073 * 2_000_000, 1074 * 2_000_000]
     assert products[0] <= INT32_MAX < products[1]

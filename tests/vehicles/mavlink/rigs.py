@@ -112,7 +112,7 @@ class LockstepRig(Lockstep, _Heard):
     def switch_on_failsafes(self) -> None:
         """As a person does with another ground station before the first flight."""
         with self.link() as link:
-            while link.vehicle_system is None:
+            while link._vehicle_system is None:
                 link.receive(0.1)
             for name, kind, value in _FAILSAFES[self.autopilot]:
                 whole = struct.unpack("<f", struct.pack("<i", value))[0] if kind == _BYTEWISE else float(value)

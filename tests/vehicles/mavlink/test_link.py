@@ -20,7 +20,6 @@ from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress
 from app.vehicles.mavlink.dialects import (
     ARDUPILOTMEGA,
     COMMON,
-    DIALECTS,
     PAPARAZZI,
     Dialect,
     FieldValue,
@@ -199,7 +198,7 @@ def test_without_a_system_id_the_first_autopilot_is_taken_not_a_ground_station(p
         paparazzi.say("LOCAL_POSITION_NED", **position(40))
         beat, sample = collect(link, 2)
         assert (beat.message.get_type(), sample.message.get_type()) == ("HEARTBEAT", "LOCAL_POSITION_NED")
-        assert link.vehicle_system == 31
+        assert link._vehicle_system == 31
         assert link.health.foreign == 2
         assert link.health.last_heartbeat_s == beat.received_s
         assert link.health.last_packet_s == sample.received_s
@@ -581,11 +580,3 @@ def test_a_clock_that_cannot_run_is_refused(speed: float) -> None:
     with pytest.raises(InputError) as refusal:
         ScaledClock(speed)
     assert refusal.value.problems[0].field == "clock_speed"
-
-
-def test_the_dialects_are_found_by_name() -> None:
-    assert {name: dialect.mavlink for name, dialect in DIALECTS.items()} == {
-        "paparazzi": 1,
-        "ardupilotmega": 2,
-        "common": 2,
-    }
