@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+import hypothesis
 import pytest
 import structlog
 from fastapi import FastAPI
@@ -16,6 +17,10 @@ from app.db.migrate import migrate
 from app.db.session import Database
 from app.main import create_app
 from tests.unlocking import client_here
+
+# No test measures how long something takes: the first example of one may load and compile the numerics.
+hypothesis.settings.register_profile("untimed", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
+hypothesis.settings.load_profile("untimed")
 
 # Errors that a test provokes are logged with their places, not with every value there, which takes seconds to print.
 structlog.configure(
