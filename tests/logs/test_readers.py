@@ -60,7 +60,7 @@ def read_or_refuse(content: bytes | Path, companion: bytes | None = None) -> Non
 
 
 @given(head=st.sampled_from(HEADS), rest=st.binary(max_size=600))
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 def test_any_bytes_are_read_or_refused_in_words(head: bytes, rest: bytes) -> None:
     read_or_refuse(head + rest)
 
@@ -71,7 +71,7 @@ def test_any_bytes_are_read_or_refused_in_words(head: bytes, rest: bytes) -> Non
     changes=st.integers(1, 60),
     cut=st.floats(0.0, 1.0),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_a_log_damaged_anywhere_is_read_or_refused_in_words(kind: str, seed: int, changes: int, cut: float) -> None:
     chance = random.Random(seed)
     content = bytearray(ORIGINALS[kind])
@@ -92,7 +92,7 @@ def test_a_log_damaged_anywhere_is_read_or_refused_in_words(kind: str, seed: int
         st.binary(max_size=300), st.text(max_size=200).map(lambda text: COMPANION[:400].encode() + text.encode())
     )
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_any_companion_is_read_or_refused_in_words(companion: bytes) -> None:
     read_or_refuse(ORIGINALS[".data"], companion=companion)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.definition import Definition, Flight, Start, StopRule
@@ -74,7 +74,7 @@ def test_on_the_twin_the_models_optimum_is_a_good_start() -> None:
 
 
 @pytest.mark.timeout(600)
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6)
 @given(DEFINITIONS)
 def test_every_proposal_is_recomputed_bit_for_bit_and_passes_the_gate(definition: Definition) -> None:
     if problems_of(definition):

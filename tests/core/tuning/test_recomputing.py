@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
@@ -58,14 +58,14 @@ def landed(number: int, proposal: Proposal, flown: tuple[tuple[float, ...], floa
 Flying = list[tuple[tuple[float, ...], float, int]]
 
 
-@settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=4)
 @given(DEFINITIONS, FLYING)
 def test_every_proposal_and_every_advice_is_recomputed_bit_for_bit(definition: Definition, flying: Flying) -> None:
     recompute(definition, flying)
 
 
 @pytest.mark.complete
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=8)
 @given(DEFINITIONS, FLYING)
 def test_so_are_those_of_many_more_campaigns(definition: Definition, flying: Flying) -> None:
     recompute(definition, flying)

@@ -231,57 +231,6 @@ export const editTrial = <ThrowOnError extends boolean = false>(options: Options
 });
 
 /**
- * Fly Trial
- *
- * Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
- * for a real vehicle, which has to be staged.
- */
-export const flyTrial = <ThrowOnError extends boolean = false>(options: Options<FlyTrialData, ThrowOnError>): RequestResult<FlyTrialResponses, FlyTrialErrors, ThrowOnError> => (options.client ?? client).post<FlyTrialResponses, FlyTrialErrors, ThrowOnError>({
-    url: '/api/trials/{trial_id}/fly',
-    ...options,
-    headers: {
-        'Content-Type': 'application/json',
-        ...options.headers
-    }
-});
-
-/**
- * Stage Trial
- *
- * Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator.
- */
-export const stageTrial = <ThrowOnError extends boolean = false>(options: Options<StageTrialData, ThrowOnError>): RequestResult<StageTrialResponses, StageTrialErrors, ThrowOnError> => (options.client ?? client).post<StageTrialResponses, StageTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/stage', ...options });
-
-/**
- * Unstage Trial
- *
- * Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again.
- */
-export const unstageTrial = <ThrowOnError extends boolean = false>(options: Options<UnstageTrialData, ThrowOnError>): RequestResult<UnstageTrialResponses, UnstageTrialErrors, ThrowOnError> => (options.client ?? client).post<UnstageTrialResponses, UnstageTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/unstage', ...options });
-
-/**
- * Take Off Trial
- *
- * Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
- * own page on this computer, with the token of the operator in control.
- */
-export const takeOffTrial = <ThrowOnError extends boolean = false>(options: Options<TakeOffTrialData, ThrowOnError>): RequestResult<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError> => (options.client ?? client).post<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/take-off', ...options });
-
-/**
- * Abort Trial
- *
- * End a flight now. Goes straight to the worker without waiting for storage; may be repeated.
- */
-export const abortTrial = <ThrowOnError extends boolean = false>(options: Options<AbortTrialData, ThrowOnError>): RequestResult<AbortTrialResponses, AbortTrialErrors, ThrowOnError> => (options.client ?? client).post<AbortTrialResponses, AbortTrialErrors, ThrowOnError>({
-    url: '/api/trials/{trial_id}/abort',
-    ...options,
-    headers: {
-        'Content-Type': 'application/json',
-        ...options.headers
-    }
-});
-
-/**
  * Cancel Trial
  *
  * Cancel a trial that has not flown.
@@ -392,6 +341,57 @@ export const deletePhoto = <ThrowOnError extends boolean = false>(options: Optio
  * A picture as uploaded. Its headers keep it from running or loading anything when it is opened by itself.
  */
 export const getPhoto = <ThrowOnError extends boolean = false>(options: Options<GetPhotoData, ThrowOnError>): RequestResult<GetPhotoResponses, GetPhotoErrors, ThrowOnError> => (options.client ?? client).get<GetPhotoResponses, GetPhotoErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/photos/{photo_id}', ...options });
+
+/**
+ * Fly Trial
+ *
+ * Request the flight of a planned trial without staging. Refused when the vehicle has a flight already, and always
+ * for a real vehicle, which has to be staged.
+ */
+export const flyTrial = <ThrowOnError extends boolean = false>(options: Options<FlyTrialData, ThrowOnError>): RequestResult<FlyTrialResponses, FlyTrialErrors, ThrowOnError> => (options.client ?? client).post<FlyTrialResponses, FlyTrialErrors, ThrowOnError>({
+    url: '/api/trials/{trial_id}/fly',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
+ * Stage Trial
+ *
+ * Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator.
+ */
+export const stageTrial = <ThrowOnError extends boolean = false>(options: Options<StageTrialData, ThrowOnError>): RequestResult<StageTrialResponses, StageTrialErrors, ThrowOnError> => (options.client ?? client).post<StageTrialResponses, StageTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/stage', ...options });
+
+/**
+ * Unstage Trial
+ *
+ * Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again.
+ */
+export const unstageTrial = <ThrowOnError extends boolean = false>(options: Options<UnstageTrialData, ThrowOnError>): RequestResult<UnstageTrialResponses, UnstageTrialErrors, ThrowOnError> => (options.client ?? client).post<UnstageTrialResponses, UnstageTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/unstage', ...options });
+
+/**
+ * Take Off Trial
+ *
+ * Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
+ * own page on this computer, with the token of the operator in control.
+ */
+export const takeOffTrial = <ThrowOnError extends boolean = false>(options: Options<TakeOffTrialData, ThrowOnError>): RequestResult<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError> => (options.client ?? client).post<TakeOffTrialResponses, TakeOffTrialErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/take-off', ...options });
+
+/**
+ * Abort Trial
+ *
+ * End a flight now. Goes straight to the worker without waiting for storage; may be repeated.
+ */
+export const abortTrial = <ThrowOnError extends boolean = false>(options: Options<AbortTrialData, ThrowOnError>): RequestResult<AbortTrialResponses, AbortTrialErrors, ThrowOnError> => (options.client ?? client).post<AbortTrialResponses, AbortTrialErrors, ThrowOnError>({
+    url: '/api/trials/{trial_id}/abort',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
 
 /**
  * List Vehicles

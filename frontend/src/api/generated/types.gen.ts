@@ -4632,212 +4632,6 @@ export type EditTrialResponses = {
 
 export type EditTrialResponse = EditTrialResponses[keyof EditTrialResponses];
 
-export type FlyTrialData = {
-    /**
-     * Body
-     */
-    body?: FlightOrder | null;
-    headers?: {
-        /**
-         * Idempotency-Key
-         *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
-         */
-        'Idempotency-Key'?: string | null;
-        /**
-         * X-Gainline-Control
-         *
-         * token of the lease by which one is in control of the vehicle
-         */
-        'X-Gainline-Control'?: string | null;
-    };
-    path: {
-        /**
-         * Trial Id
-         */
-        trial_id: number;
-    };
-    query?: never;
-    url: '/api/trials/{trial_id}/fly';
-};
-
-export type FlyTrialErrors = {
-    /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
-     */
-    default: Problem;
-};
-
-export type FlyTrialError = FlyTrialErrors[keyof FlyTrialErrors];
-
-export type FlyTrialResponses = {
-    /**
-     * Successful Response
-     */
-    202: Trial;
-};
-
-export type FlyTrialResponse = FlyTrialResponses[keyof FlyTrialResponses];
-
-export type StageTrialData = {
-    body?: never;
-    headers?: {
-        /**
-         * Idempotency-Key
-         *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
-         */
-        'Idempotency-Key'?: string | null;
-        /**
-         * X-Gainline-Control
-         *
-         * token of the lease by which one is in control of the vehicle
-         */
-        'X-Gainline-Control'?: string | null;
-    };
-    path: {
-        /**
-         * Trial Id
-         */
-        trial_id: number;
-    };
-    query?: never;
-    url: '/api/trials/{trial_id}/stage';
-};
-
-export type StageTrialErrors = {
-    /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
-     */
-    default: Problem;
-};
-
-export type StageTrialError = StageTrialErrors[keyof StageTrialErrors];
-
-export type StageTrialResponses = {
-    /**
-     * Successful Response
-     */
-    202: Trial;
-};
-
-export type StageTrialResponse = StageTrialResponses[keyof StageTrialResponses];
-
-export type UnstageTrialData = {
-    body?: never;
-    headers?: {
-        /**
-         * Idempotency-Key
-         *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
-         */
-        'Idempotency-Key'?: string | null;
-    };
-    path: {
-        /**
-         * Trial Id
-         */
-        trial_id: number;
-    };
-    query?: never;
-    url: '/api/trials/{trial_id}/unstage';
-};
-
-export type UnstageTrialErrors = {
-    /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
-     */
-    default: Problem;
-};
-
-export type UnstageTrialError = UnstageTrialErrors[keyof UnstageTrialErrors];
-
-export type UnstageTrialResponses = {
-    /**
-     * Successful Response
-     */
-    202: Trial;
-};
-
-export type UnstageTrialResponse = UnstageTrialResponses[keyof UnstageTrialResponses];
-
-export type TakeOffTrialData = {
-    body?: never;
-    headers?: {
-        /**
-         * Idempotency-Key
-         *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
-         */
-        'Idempotency-Key'?: string | null;
-        /**
-         * X-Gainline-Control
-         *
-         * token of the lease by which one is in control of the vehicle
-         */
-        'X-Gainline-Control'?: string | null;
-    };
-    path: {
-        /**
-         * Trial Id
-         */
-        trial_id: number;
-    };
-    query?: never;
-    url: '/api/trials/{trial_id}/take-off';
-};
-
-export type TakeOffTrialErrors = {
-    /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
-     */
-    default: Problem;
-};
-
-export type TakeOffTrialError = TakeOffTrialErrors[keyof TakeOffTrialErrors];
-
-export type TakeOffTrialResponses = {
-    /**
-     * Successful Response
-     */
-    202: Trial;
-};
-
-export type TakeOffTrialResponse = TakeOffTrialResponses[keyof TakeOffTrialResponses];
-
-export type AbortTrialData = {
-    /**
-     * Body
-     */
-    body?: Abort | null;
-    path: {
-        /**
-         * Trial Id
-         */
-        trial_id: number;
-    };
-    query?: never;
-    url: '/api/trials/{trial_id}/abort';
-};
-
-export type AbortTrialErrors = {
-    /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
-     */
-    default: Problem;
-};
-
-export type AbortTrialError = AbortTrialErrors[keyof AbortTrialErrors];
-
-export type AbortTrialResponses = {
-    /**
-     * Successful Response
-     */
-    202: AbortAnswer;
-};
-
-export type AbortTrialResponse = AbortTrialResponses[keyof AbortTrialResponses];
-
 export type CancelTrialData = {
     body?: never;
     headers?: {
@@ -5261,6 +5055,212 @@ export type GetPhotoResponses = {
 };
 
 export type GetPhotoResponse = GetPhotoResponses[keyof GetPhotoResponses];
+
+export type FlyTrialData = {
+    /**
+     * Body
+     */
+    body?: FlightOrder | null;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/fly';
+};
+
+export type FlyTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type FlyTrialError = FlyTrialErrors[keyof FlyTrialErrors];
+
+export type FlyTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: Trial;
+};
+
+export type FlyTrialResponse = FlyTrialResponses[keyof FlyTrialResponses];
+
+export type StageTrialData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/stage';
+};
+
+export type StageTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type StageTrialError = StageTrialErrors[keyof StageTrialErrors];
+
+export type StageTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: Trial;
+};
+
+export type StageTrialResponse = StageTrialResponses[keyof StageTrialResponses];
+
+export type UnstageTrialData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/unstage';
+};
+
+export type UnstageTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type UnstageTrialError = UnstageTrialErrors[keyof UnstageTrialErrors];
+
+export type UnstageTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: Trial;
+};
+
+export type UnstageTrialResponse = UnstageTrialResponses[keyof UnstageTrialResponses];
+
+export type TakeOffTrialData = {
+    body?: never;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease by which one is in control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/take-off';
+};
+
+export type TakeOffTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type TakeOffTrialError = TakeOffTrialErrors[keyof TakeOffTrialErrors];
+
+export type TakeOffTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: Trial;
+};
+
+export type TakeOffTrialResponse = TakeOffTrialResponses[keyof TakeOffTrialResponses];
+
+export type AbortTrialData = {
+    /**
+     * Body
+     */
+    body?: Abort | null;
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/abort';
+};
+
+export type AbortTrialErrors = {
+    /**
+     * An error: what happened, what to do about it, and the fields that are to blame.
+     */
+    default: Problem;
+};
+
+export type AbortTrialError = AbortTrialErrors[keyof AbortTrialErrors];
+
+export type AbortTrialResponses = {
+    /**
+     * Successful Response
+     */
+    202: AbortAnswer;
+};
+
+export type AbortTrialResponse = AbortTrialResponses[keyof AbortTrialResponses];
 
 export type ListVehiclesData = {
     body?: never;

@@ -180,7 +180,7 @@ def test_pinned_gains_and_narrow_bounds_are_kept() -> None:
 
 
 @compiled_only
-@settings(max_examples=5, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=5, suppress_health_check=list(HealthCheck))
 @given(
     hover=st.floats(0.45, 0.75),
     latency=st.floats(0.0, 0.4),
