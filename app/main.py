@@ -33,7 +33,8 @@ from app.reproductions.router import router as reproductions
 from app.web import errors, events, system
 from app.web.errors import describe
 from app.web.headers import Assets, BodyLimitMiddleware, HeadersMiddleware
-from app.web.origin import AccessMiddleware, unlock_router
+from app.web.origin import AccessMiddleware
+from app.web.unlock import unlock_router
 
 # Modules loaded by now stay for good: the garbage collector skips them, also as the process ends.
 gc.freeze()

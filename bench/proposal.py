@@ -24,7 +24,8 @@ from app.campaigns.trials.schemas import FlightOrder, NewTrial
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
-from app.flights import queue, requests
+from app.flights import queue
+from app.flights import service as flights
 from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
 from app.vehicles.base import FlightOptions as Order
@@ -58,7 +59,7 @@ def fly(database: Database, campaign_id: int) -> bool:
         following = campaigns.next_flight(session, campaign_id).proposal
         if following is None or "plan" not in campaigns.get_campaign(session, campaign_id).actions:
             return False
-        requests.plan_trial(session, campaign_id, NewTrial(proposal_id=following.id, fly=FlightOrder(speed=None)))
+        flights.plan_trial(session, campaign_id, NewTrial(proposal_id=following.id, fly=FlightOrder(speed=None)))
         task = queue.claim_flight(session, WORKER)
     assert task is not None
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:

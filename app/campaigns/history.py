@@ -12,7 +12,6 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.common.errors import NotFoundError, StorageError
-from app.common.state_machine import check_transition
 from app.common.states import (
     ACTIVE_FLIGHT_STATES,
     CAMPAIGN_TRANSITIONS,
@@ -25,6 +24,7 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
+from app.common.transition_checks import check_transition
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory

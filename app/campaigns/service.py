@@ -32,8 +32,8 @@ from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
-from app.common.state_machine import check_action, check_version
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
+from app.common.transition_checks import check_action, check_version
 from app.core.definition import Definition as CoreDefinition
 from app.core.definition import format_gains
 from app.core.experiments import get_experiment

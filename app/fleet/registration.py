@@ -11,8 +11,8 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import Permission, RequestContext, require
 from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue
-from app.common.state_machine import check_action, check_version
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
+from app.common.transition_checks import check_action, check_version
 from app.core.experiments import get_experiment
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow

@@ -3,9 +3,9 @@
 from fastapi import APIRouter, Depends, status
 from starlette.concurrency import run_in_threadpool
 
-from app.campaigns.trials import service
+from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
-from app.flights import requests
+from app.flights import service
 from app.web.dependencies import CurrentDatabase, Id, IdempotentPost, Live, RequestContextDep, json_only
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
@@ -16,8 +16,8 @@ def create_trial(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id
     """Plan a trial of the proposal or of your own gains and, with `fly`, request its flight at once."""
     return act(
         Trial,
-        lambda session: requests.plan_trial(session, campaign_id, body, asking),
-        ahead=lambda session: service.warm_gate_cache_for_new(session, campaign_id, body),
+        lambda session: service.plan_trial(session, campaign_id, body, asking),
+        ahead=lambda session: trials.warm_gate_cache_for_new(session, campaign_id, body),
     )
 
 
@@ -27,8 +27,8 @@ def fly_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id, body
     for a real vehicle, which has to be staged."""
     return act(
         Trial,
-        lambda session: requests.fly_trial(session, trial_id, body or FlightOrder(), asking),
-        ahead=lambda session: requests.warm_gate_cache(session, trial_id),
+        lambda session: service.fly_trial(session, trial_id, body or FlightOrder(), asking),
+        ahead=lambda session: service.warm_gate_cache(session, trial_id),
     )
 
 
@@ -37,22 +37,22 @@ def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) ->
     """Write the gains of a planned trial to a registered vehicle, read them back, and wait for its operator."""
     return act(
         Trial,
-        lambda session: requests.stage_trial(session, trial_id, asking),
-        ahead=lambda session: requests.warm_gate_cache(session, trial_id),
+        lambda session: service.stage_trial(session, trial_id, asking),
+        ahead=lambda session: service.warm_gate_cache(session, trial_id),
     )
 
 
 @router.post("/trials/{trial_id}/unstage", status_code=status.HTTP_202_ACCEPTED)
 def unstage_trial(act: IdempotentPost, trial_id: Id) -> Trial:
     """Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again."""
-    return act(Trial, lambda session: requests.unstage_trial(session, trial_id))
+    return act(Trial, lambda session: service.unstage_trial(session, trial_id))
 
 
 @router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
 def take_off_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
     """Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
     own page on this computer, with the token of the operator in control."""
-    return act(Trial, lambda session: requests.take_off_trial(session, trial_id, asking))
+    return act(Trial, lambda session: service.take_off_trial(session, trial_id, asking))
 
 
 @router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)
@@ -68,4 +68,4 @@ async def abort_trial(live: Live, database: CurrentDatabase, trial_id: Id, body:
 
 def _withdraw(database: CurrentDatabase, trial_id: int, reason: str) -> AbortAnswer:
     with database.write() as session:
-        return requests.withdraw_flight(session, trial_id, reason)
+        return service.withdraw_flight(session, trial_id, reason)

@@ -16,7 +16,7 @@ from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI
-from app.campaigns import landscapes, proposals, service
+from app.campaigns import landscapes, proposals
 from app.campaigns import service as campaigns
 from app.campaigns.computation import compute
 from app.campaigns.schemas import NewCampaign
@@ -31,7 +31,8 @@ from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
 from app.fleet import registration
 from app.fleet.schemas import NewVehicle
-from app.flights import queue, requests
+from app.flights import queue
+from app.flights import service as flights
 from app.flights.process_messages import mark_if_requested
 from app.jobs import service as jobs
 from app.reproductions import service as reproductions
@@ -215,7 +216,7 @@ class States:
         def fly(session: Session) -> int:
             what = {"proposal_id": _proposed(session, campaign_id).id} if chosen is None else chosen
             new = NewTrial.model_validate({**what, "fly": {"speed": None}})
-            trial = requests.plan_trial(session, campaign_id, new)
+            trial = flights.plan_trial(session, campaign_id, new)
             _carry_out(session, trial.id, stop)
             _propose(session, campaign_id)
             return trial.id
@@ -228,7 +229,7 @@ class States:
 
 
 def _rehearsal(session: Session, campaign_id: int) -> int:
-    made = service.rehearse(session, campaign_id).id
+    made = campaigns.rehearse(session, campaign_id).id
     _propose(session, made)
     return made
 

@@ -26,7 +26,7 @@ VIOLATIONS = {
     "the simulated drone reads the database": ("simdrone/drone.py", "import app.db.models", "The simulated drone"),
     "states know a service": ("common/states.py", "import app.campaigns.service", "States import nothing"),
     "a service uses another slice's repository": (
-        "flights/requests.py",
+        "flights/service.py",
         "import app.campaigns.repository",
         "A slice calls another",
     ),

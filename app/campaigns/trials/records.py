@@ -23,13 +23,14 @@ from app.campaigns.trials.service import check_flown_gains, create_trial, requir
 from app.campaigns.trials.views import trajectory_view, trial_view
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
-from app.common.state_machine import check_action
 from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, Ending, TrialState
+from app.common.transition_checks import check_action
 from app.core.errors import TrajectoryError
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.core.policy import Gains
 from app.core.records.glitches import find_glitches, repaired
+from app.core.records.metrics import overshoot
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.stop_rules import landing_battery_v
 from app.db import trajectories
@@ -112,23 +113,13 @@ def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool =
         error = experiment.error(trajectory, accept_gaps=accept_gaps)
     except TrajectoryError as found:
         refusal = "; ".join(f"{problem.field} {problem.reason}" for problem in found.problems) or found.message
+    flown = trajectory.channels.get(experiment.output)
     return Score(
-        error=error, refusal=refusal, overshoot=_overshoot(experiment, trajectory), curve=_curve(experiment, trajectory)
+        error=error,
+        refusal=refusal,
+        overshoot=None if flown is None else overshoot(trajectory.time_s, flown, experiment.set_point),
+        curve=_curve(experiment, trajectory),
     )
-
-
-def _overshoot(experiment: Experiment, trajectory: Trajectory) -> float | None:
-    """Overshoot of the output over its last set point; zero when it stayed below.
-
-    None without samples, and where the set point is zero, because there is no rise.
-    """
-    if experiment.output not in trajectory.channels:
-        return None
-    flown = trajectory[experiment.output][trajectory.time_s >= 0.0]
-    if not flown.size:
-        return None
-    target = float(experiment.set_point(trajectory.time_s[-1:])[0])
-    return max(float(flown.max()) - target, 0.0) if target > 0.0 else None
 
 
 def _curve(experiment: Experiment, trajectory: Trajectory) -> list[list[float]]:

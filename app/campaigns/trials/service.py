@@ -21,8 +21,8 @@ from app.campaigns.trials.schemas import NewTrial, Trial, TrialEdit, Variant
 from app.campaigns.trials.views import trial_view, trial_views
 from app.common.errors import ConflictError, GainlineError, InputError, Problem
 from app.common.schemas import Page, decode_cursor, encode_cursor
-from app.common.state_machine import check_action, check_version
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
+from app.common.transition_checks import check_action, check_version
 from app.core.definition import flight_seed
 from app.core.experiments import experiment_of
 from app.core.policy import Gains

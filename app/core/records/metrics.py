@@ -27,6 +27,18 @@ def mean_absolute_error(time_s: Samples, values: Samples, set_point: SetPoint, s
     return float(np.trapezoid(deviations, instants)) / (stop_s - start_s)
 
 
+def overshoot(time_s: Samples, values: Samples, set_point: SetPoint) -> float | None:
+    """Largest excess of the output over its last set point from the command on, shape (n,); zero when it stayed below.
+
+    None without samples after the command, and where the set point is zero, because there is no rise.
+    """
+    flown = values[time_s >= 0.0]
+    if not flown.size:
+        return None
+    target = float(set_point(time_s[-1:])[0])
+    return max(float(flown.max()) - target, 0.0) if target > 0.0 else None
+
+
 def require_scorable(
     trajectory: Trajectory, channel: str, start_s: float, stop_s: float, *, accept_gaps: bool = False
 ) -> None:

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.errors import TrajectoryError
-from app.core.records.metrics import mean_absolute_error, require_scorable
+from app.core.records.metrics import mean_absolute_error, overshoot, require_scorable
 from app.core.records.trajectory import Samples, Trajectory
 
 
@@ -32,6 +32,23 @@ def test_uneven_samples_are_weighted_by_the_time_they_stand_for() -> None:
 
 def test_outside_the_samples_the_nearest_holds() -> None:
     assert mean_absolute_error(np.array([0.2, 9.8]), np.array([2.0, 2.0]), three, 0.0, 10.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("altitudes_m", "expected_m"),
+    [((9.0, 0.0, 2.0, 3.4, 3.0), 0.4), ((9.0, 0.0, 1.0, 2.0, 2.9), 0.0), ((9.0, -0.1, 3.0, 3.0, 2.0), 0.0)],
+)
+def test_the_overshoot_is_the_largest_excess_after_the_command(
+    altitudes_m: tuple[float, ...], expected_m: float
+) -> None:
+    time_s = np.array([-0.5, 0.0, 1.0, 2.0, 3.0])
+    assert overshoot(time_s, np.array(altitudes_m), three) == pytest.approx(expected_m, abs=1e-12)
+
+
+def test_without_a_command_or_a_rise_there_is_no_overshoot() -> None:
+    before = np.array([-2.0, -1.0])
+    assert overshoot(before, np.ones(2), three) is None
+    assert overshoot(np.array([0.0, 1.0]), np.ones(2), np.zeros_like) is None
 
 
 def good() -> tuple[Samples, Samples]:

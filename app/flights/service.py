@@ -13,8 +13,8 @@ from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, NewTrial, Tri
 from app.campaigns.trials.service import check_own_gains
 from app.campaigns.trials.views import trial_view
 from app.common.errors import ConflictError, NotAllowedError
-from app.common.state_machine import check_action
 from app.common.states import HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
+from app.common.transition_checks import check_action
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
