@@ -301,4 +301,5 @@ def test_nothing_can_be_uploaded_to_the_makers_of_the_charts(dashboard: Dashboar
 @pytest.mark.parametrize("path", ["/campaigns/999999", "/campaigns/abc", "/campaigns/1/flights/999999"])
 def test_an_address_that_leads_nowhere_says_so(dashboard: Dashboard, path: str) -> None:
     dashboard.open(path)
-    expect(dashboard.page.get_by_text(re.compile("^(There is no|Page not found)")).first).to_be_visible()
+    main = dashboard.page.get_by_role("main")
+    expect(main.get_by_text(re.compile("^(There is no|Page not found)")).first).to_be_visible()
