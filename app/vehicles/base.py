@@ -1,9 +1,9 @@
-"""The interface between the program and anything that flies, and the errors of vehicles.
+"""Interface of all vehicles, simulated and real, and their errors.
 
 GainlineError
-└── VehicleError                  a vehicle could not do what was asked
-    ├── InterruptedByOrderError   a person ordered something else meanwhile
-    └── SafeGainsError            it may still hold experimental gains: to be quarantined
+└── VehicleError                  a vehicle could not carry out a request
+    ├── InterruptedByOrderError   an operator's command interrupted it
+    └── SafeGainsError            the vehicle may still hold experimental gains: quarantine it
 """
 
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ from app.core.records.trajectory import Trajectory
 
 OptionValue = bool | int | float | str
 Ending = Literal["completed", "aborted", "invalid"]
-"""aborted: cut short, a safety limit or a person; invalid: the measurement is no good, whatever the gains."""
+"""aborted: ended early by a safety limit or a person; invalid: the measurement is unusable for any gains."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,8 +35,8 @@ class VehicleOption:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Telemetry of one instant: seconds since the command, and the channels of a record that are worth watching, the
-    scored one among them."""
+    """Telemetry at one instant: seconds since the takeoff command, and the record's channels for live display,
+    including the scored one."""
 
     time_s: float
     channels: Mapping[str, float]
@@ -47,11 +47,10 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOptions:
-    """What one flight is to do.
+    """Options of one flight.
 
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
-    over that of the `clock` (10.0: ten times as fast as life); None runs as fast as possible. Vehicles that own no
-    time ignore both.
+    over the time of the `clock` (10.0: ten times real time); None runs as fast as possible. Real vehicles ignore both.
     """
 
     seed: int
@@ -61,7 +60,8 @@ class FlightOptions:
 
 @dataclass(frozen=True, slots=True)
 class StopRequest:
-    """What ends a flight early. `motors_off` stops the motors at once, at any height; without it the vehicle lands."""
+    """Request to end a flight early. `motors_off` stops the motors at once, at any height; otherwise the vehicle
+    lands."""
 
     reason: str
     motors_off: bool = False
@@ -73,10 +73,10 @@ MOTORS_OFF_ASKED: Final = "Motors off was asked for: "
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecord:
-    """What a flight left: its full-rate trajectory, how it ended, and why when it was cut short.
+    """Result of a flight: its trajectory at full rate, how it ended, and the reason if it ended early.
 
-    A flight that `should_stop` ended, and no limit before it, has a `reason` that begins with the stop's, or with
-    `MOTORS_OFF_ASKED` and the stop's. `on_request` says so of an aborted one, once whoever asked has looked.
+    If `should_stop` ended the flight before any limit did, `reason` begins with the reason of the stop request, or with
+    `MOTORS_OFF_ASKED` followed by it. The caller that requested the stop then sets `on_request` of the aborted flight.
     """
 
     trajectory: Trajectory
@@ -89,7 +89,7 @@ class FlightRecord:
 class Vehicle(Protocol):
     """One vehicle under this program's control, between `open_vehicle` and its exit.
 
-    Nothing flies on gains that were not read back: `stage` writes and returns what the vehicle now holds.
+    `stage` writes gains and returns the values read back; the vehicle never flies on gains that were not read back.
     """
 
     @property
@@ -100,11 +100,11 @@ class Vehicle(Protocol):
     def safe_gains(self) -> Gains: ...
 
     def stage(self, gains: Gains) -> dict[str, float]:
-        """Write every gain and return what was read back."""
+        """Write every gain and return the values read back."""
         ...
 
     def read_gains(self) -> dict[str, float]:
-        """What the vehicle holds now."""
+        """Return the gains that the vehicle holds now."""
         ...
 
     def fly(
@@ -112,9 +112,9 @@ class Vehicle(Protocol):
     ) -> FlightRecord:
         """Take off with the staged gains and record until the manoeuvre is over.
 
-        `on_sample` gets telemetry at 50 Hz of vehicle time while it happens; `should_stop` is asked at least as often
-        and says so once the flight is to end early. Raises VehicleError when the flight could not be carried out;
-        it is `not_flown` when the vehicle was never told to take off.
+        `on_sample` receives live telemetry at 50 Hz of vehicle time; `should_stop` is called at least as often and
+        returns a request once the flight must end early. Raises VehicleError if the flight could not be carried out,
+        with `not_flown` set if the vehicle was never commanded to take off.
         """
         ...
 
@@ -123,8 +123,8 @@ class Vehicle(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """Who a vehicle is: its MAVLink system id, the make of its autopilot, what that tells of its version, and `uid`,
-    its hardware's own id in hexadecimal digits. Both are empty where it does not tell them."""
+    """Identity of a vehicle: its MAVLink system id, its autopilot, the autopilot's version, and `uid`, the hardware id
+    in hexadecimal digits. Version and `uid` are empty if the autopilot does not report them."""
 
     system_id: int
     autopilot: str
@@ -132,7 +132,7 @@ class Identity:
     uid: str = ""
 
     def completed_by(self, other: "Identity | None") -> "Identity":
-        """With the other's version and hardware id where this one has none."""
+        """Return this identity, with the other's version and hardware id where this one has none."""
         if other is None:
             return self
         return replace(self, version=self.version or other.version, uid=self.uid or other.uid)
@@ -140,12 +140,12 @@ class Identity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """How a connected vehicle is now; None and empty where it is not known.
+    """Current state of a connected vehicle; None or empty where unknown.
 
-    `step` is where it is in a trial ("idle", "arm", "take-off", "record", "land", "abort-land", "link lost", "disarm",
-    "restore", "quarantined"), or "observing" for one that is only watched. Ages are seconds since the last packet and
-    heartbeat; `held` are the gains as last read back, `said` is its last line of text, `trouble` what does not
-    work on our side.
+    `step` is the step of the trial ("idle", "arm", "take-off", "record", "land", "abort-land", "link lost", "disarm",
+    "restore", "quarantined"), or "observing" for a vehicle that is only observed. Ages are seconds since the last
+    packet and heartbeat; `held` are the gains last read back, `said` is the last status text, `trouble` a fault of the
+    ground station.
     """
 
     step: str
@@ -165,7 +165,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckItem:
-    """One thing that has to be so before a flight: what was found, what is needed, and what to do where they differ."""
+    """Result of one preflight check: what was found, what is required, and what to do if they differ."""
 
     name: str
     title: str
@@ -176,82 +176,82 @@ class CheckItem:
 
 
 class ConnectedVehicle(Vehicle, Protocol):
-    """A vehicle whose link stays open between flights. For one thread.
+    """A vehicle whose link stays open between flights. To be used by one thread only.
 
-    Met armed, or in doubt, it is only observed: `concern` says why, and `stage`, `fly` and `parameters` raise
-    SafeGainsError until `release`. `check` only reads; `land` and `motors_off` are possible always; `restore` once it
-    is disarmed.
+    A vehicle that is armed on connection, or whose state could not be verified, is only observed: `concern` gives the
+    reason, and `stage`, `fly` and `parameters` raise SafeGainsError until `release`. `check` only reads; `land` and
+    `motors_off` are always possible; `restore` once the vehicle is disarmed.
     """
 
     @property
     def identity(self) -> Identity: ...
     @property
     def concern(self) -> str:
-        """Why it may only be observed; empty when it may fly."""
+        """Reason why the vehicle may only be observed; empty if it may fly."""
         ...
 
     @property
     def has_standing_order(self) -> bool:
-        """Whether it has not obeyed yet what `land` or `motors_off` asked for, which is repeated."""
+        """Whether a command of `land` or `motors_off` is still being repeated because telemetry does not confirm it."""
         ...
 
     def condition(self) -> Condition:
-        """How it is, as last heard: nothing is waited for."""
+        """Return the state last received, without waiting."""
         ...
 
     def attend(self, timeout_s: float) -> None:
-        """Listen for so long, and tell the vehicle that its ground station is there. What `land` or `motors_off` asked
-        for is repeated every second until telemetry agrees. Raises VehicleError when the link is closed."""
+        """Receive for `timeout_s` while sending the ground station's heartbeats. A command of `land` or `motors_off` is
+        repeated every second until telemetry confirms it. Raises VehicleError if the link is closed."""
         ...
 
     def check(self) -> tuple[CheckItem, ...]:
-        """Look at everything that has to be so before a flight; what is not so is an item, not an error."""
+        """Run all preflight checks; a failed check is an item of the result, not an error."""
         ...
 
     def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
-        """Every parameter of the vehicle; `on_progress` is told how many came, of how many. Raises VehicleError when
-        they do not come."""
+        """Read every parameter of the vehicle; `on_progress` receives how many have arrived, and the total. Raises
+        VehicleError if they do not arrive."""
         ...
 
     def restore(self) -> dict[str, float]:
-        """Write the safe gains and return what was read back, which is them. One that is only observed stays so. Raises
-        SafeGainsError when it is armed or does not take them."""
+        """Write the safe gains and return the values read back, which are equal. A vehicle that is only observed stays
+        so. Raises SafeGainsError if the vehicle is armed or does not accept them."""
         ...
 
     def change_safe_gains(self, safe_gains: Gains) -> None:
-        """Take other safe gains, and write them as connecting does. What goes wrong becomes a concern. Raises
-        GainsError for gains that it cannot hold."""
+        """Replace the safe gains and write them, as on connection. A failure becomes the `concern`. Raises GainsError
+        for gains that the vehicle cannot hold."""
         ...
 
     def land(self, reason: str) -> None:
-        """Tell it to land, at once, whatever state it is in."""
+        """Command the vehicle to land at once, in any state."""
         ...
 
     def motors_off(self, reason: str) -> None:
-        """Stop its motors, at once and at any height."""
+        """Stop the motors at once, at any height."""
         ...
 
     def log_to(self, path: Path | None) -> None:
-        """Write what passes from now on, in both directions, to this telemetry log; None ends the log. Raises
-        VehicleError when the file cannot be opened: the log before goes on then."""
+        """Record all packets from now on, in both directions, in this telemetry log; None ends the log. Raises
+        VehicleError if the file cannot be opened; the previous log then continues."""
         ...
 
     def release(self) -> None:
-        """A person has looked at it: out of observation, once it is disarmed and holds its safe gains, read back.
-        Raises VehicleError when it is not or does not; it stays as it was then."""
+        """End the observation after a person has inspected the vehicle. It must be disarmed and hold its safe gains,
+        read back. Otherwise raises VehicleError and changes nothing."""
         ...
 
 
 class VehicleError(GainlineError):
-    """A vehicle could not do what was asked of it. `not_flown`: that was to fly, and it was never told to take off."""
+    """A vehicle could not carry out a request. `not_flown`: the request was a flight, and the vehicle was never
+    commanded to take off."""
 
     not_flown = False
 
 
 class InterruptedByOrderError(VehicleError):
-    """What was under way with the vehicle was ended by a person's order to land or to stop its motors, which has gone
-    out."""
+    """An operator's command to land or stop the motors, which has been sent, ended what was in progress."""
 
 
 class SafeGainsError(VehicleError):
-    """The safe gains could not be verified on the vehicle; it must not fly until a person has looked at it."""
+    """The safe gains could not be verified on the vehicle; it must not fly until a person has inspected it."""

@@ -51,7 +51,7 @@ _LARGEST_GAIN: Final = float(np.finfo(np.float32).max)
 
 
 class LinearAircraft:
-    """An aircraft that is a program: it holds the controller's six gains, and each flight starts from trim."""
+    """Simulated aircraft that holds the controller's six gains and starts every flight from trim."""
 
     kind: Final = "lti"
     is_real: Final = False
@@ -64,24 +64,24 @@ class LinearAircraft:
         self._staged = False
 
     def stage(self, gains: Gains) -> dict[str, float]:
-        """Write every gain and return what the aircraft now holds. Raises GainsError for what is no number of single
-        precision's size; nothing is changed then."""
+        """Write every gain and return the gains now held. Raises GainsError, and changes nothing, for a value that is
+        not finite or exceeds the range of single precision."""
         self._held = _numbers(gains)
         self._staged = True
         return self.read_gains()
 
     def read_gains(self) -> dict[str, float]:
-        """What the aircraft holds now."""
+        """Return the gains that the aircraft holds now."""
         return dict(self._held)
 
     def fly(
         self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
     ) -> FlightRecord:
-        """Track the reference for a minute with the staged gains, holding simulated time back to the order's speed.
+        """Track the reference for a minute with the staged gains, with simulated time limited to the order's speed.
 
-        `should_stop` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. A stop sets the
-        safe gains and lets the pitch return to trim for ten seconds, which the record keeps. Once the pitch error has
-        reached 10 rad the state stands still. Raises VehicleError when nothing was staged.
+        `should_stop` is called every 20 ms, of vehicle time or of wall time, whichever comes first. A stop sets the
+        safe gains and lets the pitch return to trim for ten seconds, which are part of the record. Once the pitch error
+        has reached 10 rad the state is frozen. Raises VehicleError if no gains were staged.
         """
         if not self._staged:
             raise VehicleError(
@@ -91,12 +91,12 @@ class LinearAircraft:
         tracking, noise = _TrackingRun(self._held, AMPLITUDE_RAD, _STEPS), _noise(self._log_noise, order.seed)
         try:
             detail = _flown(noise, tracking)
-            told, stop = _tell(detail, Pacer(order.speed, order.clock), on_sample, should_stop)
+            flown_steps, stop = _send_samples(detail, Pacer(order.speed, order.clock), on_sample, should_stop)
         finally:
             self._restore()
         if stop is not None:
-            returning = _TrackingRun(self.safe_gains, 0.0, _RECOVERY_STEPS if told else 1)
-            detail = _flown(noise, replace(tracking, steps=told), returning)
+            returning = _TrackingRun(self.safe_gains, 0.0, _RECOVERY_STEPS if flown_steps else 1)
+            detail = _flown(noise, replace(tracking, steps=flown_steps), returning)
         return FlightRecord(
             trajectory=_trajectory(detail),
             ending="completed" if stop is None else "aborted",
@@ -105,7 +105,7 @@ class LinearAircraft:
         )
 
     def close(self) -> None:
-        """Nothing is held open between flights."""
+        """Do nothing: no resource is open between flights."""
 
     def _restore(self) -> None:
         self._held = dict(self.safe_gains)
@@ -113,13 +113,13 @@ class LinearAircraft:
 
 
 def whole_flight(gains: Gains, *, log_noise: float, seed: int) -> Trajectory:
-    """The record of one whole flight, the same as through the vehicle seam, in one call: 1 ms instead of 40."""
+    """Return the record of one whole flight, the same as from `LinearAircraft.fly`, in 1 ms instead of 40 ms."""
     return _trajectory(_flown(_noise(log_noise, seed), _TrackingRun(_numbers(gains), AMPLITUDE_RAD, _STEPS)))
 
 
 @dataclass(frozen=True, slots=True)
 class _TrackingRun:
-    """So many steps on a reference of `amplitude_rad`."""
+    """Flight of `steps` steps along a reference of `amplitude_rad`."""
 
     gains: Gains
     amplitude_rad: float
@@ -127,12 +127,12 @@ class _TrackingRun:
 
 
 def _noise(log_noise: float, seed: int) -> Samples:
-    """What the longest record's states are off by, shape (n, 5), in the source's units."""
+    """Return the noise on the states of the longest record, shape (n, 5), in the source's units."""
     return log_noise * LOG_NOISE * np.random.default_rng(seed).standard_normal((_STEPS + _RECOVERY_STEPS, STATES))
 
 
 def _flown(noise: Samples, *legs: _TrackingRun) -> Samples:
-    """The legs flown one after the other from trim, as they are recorded: shape (n, 8)."""
+    """Fly the legs one after the other from trim; return the record's rows, shape (n, 8)."""
     memory, motion = np.zeros(MEMORY_SIZE), transitions(SYSTEM)
     detail, first = np.empty((sum(leg.steps for leg in legs), DETAIL)), 0
     for leg in legs:
@@ -143,10 +143,10 @@ def _flown(noise: Samples, *legs: _TrackingRun) -> Samples:
     return detail
 
 
-def _tell(
+def _send_samples(
     detail: Samples, pacer: Pacer, on_sample: Callable[[Sample], None], should_stop: ShouldStop
 ) -> tuple[int, StopRequest | None]:
-    """Tell a flight step by step as its time comes; how many steps were told, and what ended it early or None."""
+    """Send the samples of a flight at their time; return how many were sent, and the stop request if one came."""
     for i, row in enumerate(detail):
         if (stop := pacer.wait_until(i * STEP_S, should_stop)) is not None:
             return i, stop

@@ -1,7 +1,7 @@
 """The simulated AR.Drone 2 of the paper's Table 1: JSBSim, closed at 512 Hz around the autopilot's vertical loop.
 
-The aircraft file holds attitude, heading and horizontal position by itself, so that each step crosses into JSBSim for
-three numbers out (altitude, sink rate, tilt) and one in (thrust).
+The aircraft file controls attitude, heading and horizontal position itself, so that each step exchanges only three
+outputs (altitude, sink rate, tilt) and one input (thrust) with JSBSim.
 """
 
 import math
@@ -37,7 +37,7 @@ _CENTRE_ABOVE_GROUND_M: Final = 0.1 - 0.00196
 
 _GROUND_STEPS: Final = 4
 """Steps of JSBSim for one of the loop near the ground: the contacts settle in 1 ms, less than one step of the loop, and
-JSBSim's integration would let the vehicle dance on them."""
+at the loop's step JSBSim's integration of them oscillates."""
 _CLEAR_OF_GROUND_M: Final = 0.02
 _SETTLING_STEPS: Final = 200
 _GUST_CORRELATION_S: Final = 1.0
@@ -47,8 +47,8 @@ _FULL_BATTERY_V: Final = 11.1
 def new_aircraft() -> "jsbsim.FGFDMExec":
     """The AR.Drone 2 of the aircraft file, standing on its springs at 52° north, sea level, at 512 Hz; no wind.
 
-    Raises VehicleError when JSBSim cannot load it. JSBSim is silenced by its own switch, not by a logger of ours: it
-    keeps a logger for each thread and lets go of it after Python has left the thread, which ends the process.
+    Raises VehicleError if JSBSim cannot load it. JSBSim is silenced by its own switch and not by a logger of ours: it
+    keeps one logger per thread and releases it after Python has left the thread, which crashes the process.
     """
     import jsbsim
 
@@ -66,10 +66,10 @@ def new_aircraft() -> "jsbsim.FGFDMExec":
 
 
 class JsbsimFlight:
-    """A simulation by the protocol of `app.vehicles.simulated`.
+    """One flight in JSBSim, a `Simulation` of `app.vehicles.simulated`.
 
-    `options` are those of the kind, complete. Gusts and sensor noise depend on `seed` alone; after `MAX_STEPS` they
-    come again. `autopilot` is the loop's memory, the state of app.core.control.paparazzi first.
+    `options` are the complete options of the kind. Gusts and sensor noise depend on `seed` alone and repeat after
+    `MAX_STEPS`. `autopilot` is the loop's memory, which begins with the state of app.core.control.paparazzi.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:
@@ -94,7 +94,7 @@ class JsbsimFlight:
         self._ground_m = self._settle()
 
     def advance(self, steps: int, command: Integers) -> Rows:
-        """As the protocol says. The altitude recorded is the one sensed, noise included."""
+        """Implement `Simulation.advance`. The recorded altitude is the measured one, noise included."""
         rows = np.zeros((steps, len(CHANNELS)))
         rows[:, BATTERY] = _FULL_BATTERY_V
         altitude_ft = self._property("position/h-agl-ft").get_double_value
@@ -126,7 +126,7 @@ class JsbsimFlight:
         return rows
 
     def _property(self, path: str) -> "jsbsim.FGPropertyNode":
-        """A handle that skips the search for the name at every access."""
+        """Return a handle, which avoids the search for the name at every access."""
         node = self._fdm.get_property_manager().get_node(path)
         if node is None:
             raise VehicleError(f"The simulated vehicle has no property {path}.", hint="Install the program again.")
@@ -143,7 +143,7 @@ class JsbsimFlight:
         fdm["atmosphere/wind-east-fps"] = options["wind_m_s"] / _FOOT_M * math.sin(blows_to)
 
     def _settle(self) -> float:
-        """Stand until nothing moves; the height of the centre then, m."""
+        """Let the vehicle settle on its springs; return the height of its centre then, m."""
         for _ in range(_SETTLING_STEPS):
             self._run_near_ground()
         return self._fdm["position/h-agl-ft"] * _FOOT_M
@@ -155,7 +155,7 @@ class JsbsimFlight:
         self._fdm.set_dt(STEP_S)
 
     def _exchange(self, step: int, row: Rows) -> None:
-        """What only some flights have: gusts in, battery voltage out."""
+        """Set the gusts and read the battery voltage, which only some flights have."""
         if self._gusts_ft_s:
             for axis, series in zip(("north", "east", "down"), self._gusts_ft_s, strict=True):
                 self._fdm[f"atmosphere/gust-{axis}-fps"] = series[step % MAX_STEPS]
@@ -171,13 +171,16 @@ def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -
 
 
 def prepare() -> None:
-    """Load JSBSim, its aircraft and the compiled autopilot, which the first flight would otherwise wait for."""
+    """Load JSBSim, its aircraft and the compiled autopilot, so that the first flight need not wait for them."""
     options = {option.name: float(option.default) for option in JSBSIM.options}
     JsbsimFlight(options, seed=0).advance(1, np.zeros(COMMAND_SIZE, dtype=np.int64))
 
 
 def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
-    """A sagging battery at hover throttle h leaves (1 − sag·h)² of the thrust; at full command (1 − sag)²."""
+    """Report a mass that needs more than `_HIGHEST_HOVER` of full thrust to hover.
+
+    A sagging battery at hover throttle h leaves (1 − sag·h)² of the thrust; at full command (1 − sag)².
+    """
     strength = float(options["thrust_scale"]) * (1.0 - float(options["battery_sag"])) ** 2
     share = float(options["mass_kg"]) * GRAVITY_M_S2 / (FULL_THRUST_N * strength)
     if share <= _HIGHEST_HOVER:
@@ -185,8 +188,8 @@ def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, .
     return (
         Problem(
             "mass_kg",
-            f"is too much for these motors and this battery: it takes {percent(share)} of full thrust, "
-            f"at most {percent(_HIGHEST_HOVER)} leaves room to control",
+            f"is too much for these motors and this battery: hovering needs {percent(share)} of full thrust, and "
+            f"control is possible up to {percent(_HIGHEST_HOVER)}",
         ),
     )
 

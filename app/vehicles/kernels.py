@@ -1,4 +1,4 @@
-"""Compiled inner loops of the simulated vehicles. All in one file: the kept machine code is judged by it."""
+"""Compiled inner loops of the simulated vehicles, all in one file because the cache of compiled code is keyed by it."""
 
 from typing import Final
 
@@ -50,7 +50,8 @@ CHANNELS: Final = (
 ENTERED: Final = STATE_SIZE
 LAST_THRUST: Final = STATE_SIZE + 1
 AUTOPILOT_SIZE: Final = STATE_SIZE + 2
-"""The autopilot's memory: the loop's state, whether the loop was entered, and the command of the step before."""
+"""The autopilot's memory: the loop's state, whether the loop was entered, and the thrust command of the previous
+step."""
 
 MODE: Final = 0
 TARGET: Final = 1
@@ -70,10 +71,10 @@ def control(
     may_enter: bool,
     row: Rows,
 ) -> float:
-    """One step of the autopilot on what it senses, rounded to its integers; returns the thrust, a share of full.
+    """Run one step of the autopilot on its measurements, rounded to its integers; return thrust as a share of full.
 
-    Until `may_enter` the motors rest and the loop is not entered. Writes the row's reference, thrust and its parts, and
-    altitude and climb rate as sensed.
+    Until `may_enter` the motors are off and the loop is not entered. Writes the row's reference, thrust, feed-forward
+    and feedback, and the altitude and climb rate as measured.
     """
     z, zd = measured(-altitude_m, POSITION_BITS), measured(-climb_m_s, SPEED_BITS)
     row[ALTITUDE], row[CLIMB_RATE] = altitude_m, climb_m_s
@@ -113,10 +114,10 @@ GROUND_EFFECT_HEIGHT_M: Final = 5
 MEASUREMENT_DELAY_S: Final = 6
 SAG_1_S: Final = 7
 MODEL_SIZE: Final = 8
-"""Places in the simple model's parameters."""
+"""Indices into the simple model's parameters."""
 
 PAST: Final = 64
-"""Steps of altitude and climb rate that are remembered, a power of two: 0.1 s of delay are 51.2."""
+"""Steps of altitude and climb rate that are kept, a power of two; a delay of 0.1 s needs 51.2."""
 
 
 @kernel
@@ -132,14 +133,14 @@ def fly_simple_model(
     first: int,
     rows: Rows,
 ) -> None:
-    """Advance the simple vertical model by as many steps as `rows` is long, writing a row before each.
+    """Advance the simple vertical model by one step per row of `rows`, writing each row before its step.
 
     `plant` is altitude (m), climb rate (m/s) and thrust command after the lag (share of full); `past`, shape (2, 64),
-    the last altitudes and climb rates, for a delayed sense of them. A command u lifts by
+    are the last altitudes and climb rates, for delayed measurement. A command u gives a lift of
     ((1 − q)·u + q·u²) / `HOVER_SHARE` of the weight, q the quadratic share, times 1 + e·exp(−altitude / height) near
     the ground, less `SAG_1_S` of it per second since the command. Explicit Euler at 512 Hz, the ground at 0.
-    `gusts_m_s2` has the shape of the steps, `first` is the number of the first one; the loop may be entered from step
-    `resting_steps` on; altitude is sensed `datum_m` too high.
+    `gusts_m_s2` has shape (n,) as `rows`, and `first` is the number of the first step. The loop may be entered from
+    step `resting_steps` on. The measured altitude is `datum_m` too high.
     """
     lag, drag, quadratic, ground_effect = (
         model[MOTOR_LAG_S],

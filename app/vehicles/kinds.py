@@ -1,4 +1,4 @@
-"""What a kind of vehicle is: its description, its settings, and how one is opened."""
+"""Kinds of vehicle: description, options, and how a vehicle is opened."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from app.vehicles.base import ConnectedVehicle, Identity, OptionValue, Vehicle, 
 
 Options = Mapping[str, OptionValue]
 Hosts = frozenset[str]
-"""Beyond this computer, hosts on which the administrator says that simulations run."""
+"""Hosts besides this computer on which simulations run, as configured by the administrator."""
 
 HERE: Final[Hosts] = frozenset()
 
@@ -25,24 +25,28 @@ def _never(_options: Options, _simulation_hosts: Hosts) -> bool:
 
 
 def _accept_any_gains(_options: Options, _gains: Gains) -> None:
-    """A simulation flies whatever its controller can hold."""
+    """Accept all gains: a simulation flies whatever its controller can hold."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleKind:
     """A registered kind of vehicle.
 
-    `experiments` names those that it can fly; where that depends on its settings, `suits(options)` those that it can
-    fly with these. `open(options, safe_gains, trial_parameters)` gets complete, checked options and returns a vehicle
-    that holds its safe gains. `connect(options, safe_gains, identity, trial_parameters, on_wait)` opens a link that
-    stays open between flights; None: the kind has none, and is opened for each flight. `on_wait` is called twice a
-    second at least while the vehicle is waited for on the ground; what it raises ends what is under way. `connect`
-    raises VehicleError when nobody answers, or another than `identity` (None: whoever answers); an armed vehicle is
-    returned, with nothing written to it and its `concern` set. In the folder `trial_parameters` either keeps what a
-    trial changes beside the gains, which is put back even if this process dies.
-    `conflicts(options, hosts)` names options that are possible one by one but not together; `simulates(options, hosts)`
-    says whether a vehicle of a real kind is a simulation all the same. `check_gains(options, gains)` raises GainsError
-    for gains that such a vehicle is never given, whatever anybody overrules.
+    `experiments` are the experiments that it can fly; `experiments_for(options)` those with these options, if that
+    depends on them.
+    `open(options, safe_gains, trial_parameters)` receives complete, checked options and returns a vehicle that holds
+    its safe gains.
+    `connect(options, safe_gains, identity, trial_parameters, on_wait)` opens a link that stays open between flights;
+    None: vehicles of this kind are opened for each flight. `on_wait` is called at least twice a second while waiting
+    for the vehicle on the ground; an exception from it ends the operation. `connect` raises VehicleError if no vehicle
+    answers, or one other than `identity` (None: any vehicle). An armed vehicle is returned with its `concern` set, and
+    nothing is written to it.
+    In the folder `trial_parameters` both keep the parameters that a trial changes in addition to the gains, so that
+    they are restored even if this process dies.
+    `find_conflicts(options, hosts)` names options that are valid one by one but not together;
+    `is_simulation(options, hosts)` returns whether a vehicle of a real kind is a simulation.
+    `check_gains(options, gains)` raises GainsError for gains that are never written to such a vehicle, even if a person
+    overrules the gate.
     """
 
     name: str
@@ -60,21 +64,21 @@ class VehicleKind:
     check_gains: Callable[[Options, Gains], None] = _accept_any_gains
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
-        """Those that a vehicle with these options, complete and checked, can fly; the first is its usual one."""
+        """Experiments that a vehicle with these complete, checked options can fly; the first is the default."""
         return self.experiments if self.experiments_for is None else self.experiments_for(options)
 
     def is_real_with(self, options: Options, simulation_hosts: Hosts = HERE) -> bool:
-        """Whether a vehicle with these options, complete and checked, is REAL."""
+        """Whether a vehicle with these complete, checked options is REAL."""
         return self.is_real and not self.is_simulation(options, simulation_hosts)
 
     def completed(self, options: Options) -> dict[str, OptionValue]:
-        """Options as any version of the program stored them: later ones at their defaults, none that are gone."""
+        """Complete options stored by another version: add new ones at their defaults, drop unknown ones."""
         return {option.name: options.get(option.name, option.default) for option in self.options}
 
     def check(
         self, options: Mapping[str, object], *, field: str, simulation_hosts: Hosts = HERE
     ) -> dict[str, OptionValue]:
-        """The options completed with the defaults. Raises InputError naming every unknown or impossible one."""
+        """Return the options completed with the defaults. Raises InputError naming every unknown or invalid one."""
         known = {option.name: option for option in self.options}
         names = ", ".join(known) or "none"
         problems = [
@@ -102,7 +106,7 @@ class VehicleKind:
 
 
 def _accept(option: VehicleOption, value: object) -> tuple[OptionValue, str | None]:
-    """`value` in the type of the option's default, and why it cannot be used, if so."""
+    """Return `value` in the type of the option's default, and the reason if it is invalid."""
     default = option.default
     if isinstance(default, bool | str):
         fits = isinstance(value, type(default))

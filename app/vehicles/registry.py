@@ -1,4 +1,4 @@
-"""The kinds of vehicle, and the one way to take control of one. Of the kind `import`, flights come in as files."""
+"""Registry of the kinds of vehicle, and opening of a vehicle. Flights of the kind `import` are uploaded as files."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -18,7 +18,7 @@ from app.vehicles.twin import TWIN
 
 def _open(_options: Options, _safe_gains: Gains, _trial_parameters: Path | None) -> NoReturn:
     raise VehicleError(
-        "This vehicle flies elsewhere, so this program cannot fly it.",
+        "This vehicle is flown outside Gainline, which cannot command it.",
         hint="Fly the proposed gains yourself, then upload the flight's log, or a CSV with the columns time_s and "
         "altitude_m.",
     )
@@ -42,7 +42,7 @@ VEHICLE_KINDS: Final[Mapping[str, VehicleKind]] = MappingProxyType(
 
 
 def get_kind(kind: str, *, field: str = "vehicle.kind") -> VehicleKind:
-    """Raises InputError when there is no vehicle of that kind."""
+    """Return the kind of this name. Raises InputError if it is unknown."""
     if kind not in VEHICLE_KINDS:
         raise InputError(
             "There is no such vehicle.",
@@ -53,7 +53,7 @@ def get_kind(kind: str, *, field: str = "vehicle.kind") -> VehicleKind:
 
 
 def check_options(kind: str, options: Mapping[str, object], *, field: str = "vehicle") -> dict[str, OptionValue]:
-    """The options of a vehicle completed with their defaults.
+    """Return the options of a vehicle completed with their defaults.
 
     Raises InputError naming every field that is unknown or out of range as `<field>.options.<name>`.
     """
@@ -64,11 +64,11 @@ def check_options(kind: str, options: Mapping[str, object], *, field: str = "veh
 def open_vehicle(
     kind: str, options: Mapping[str, object], *, safe_gains: Gains, trial_parameters: Path | None = None
 ) -> Iterator[Vehicle]:
-    """Control of one vehicle; on any exit, an exception included, it is left holding `safe_gains`, read back. What a
-    trial changes on it beside the gains is kept in the folder `trial_parameters` until it is put back.
+    """Open a vehicle; on any exit, exceptions included, write `safe_gains` and read them back.
 
-    Raises InputError for options it cannot have, VehicleError when it cannot be opened, and SafeGainsError when the
-    safe gains could not be verified at the end.
+    Parameters that a trial changes in addition to the gains are kept in the folder `trial_parameters` until they are
+    restored. Raises InputError for invalid options, VehicleError if the vehicle cannot be opened, and SafeGainsError if
+    the safe gains could not be verified at the end.
     """
     vehicle = get_kind(kind).open(check_options(kind, options), safe_gains, trial_parameters)
     try:
@@ -77,14 +77,14 @@ def open_vehicle(
         try:
             restore_safe_gains(vehicle)
         except SafeGainsError:
-            with suppress(Exception):  # what must be heard is that its gains are in doubt
+            with suppress(Exception):  # the SafeGainsError must reach the caller
                 vehicle.close()
             raise
         vehicle.close()
 
 
 def restore_safe_gains(vehicle: Vehicle) -> dict[str, float]:
-    """Write the safe gains and give what was read back, which is them. Raises SafeGainsError when it is not."""
+    """Write the safe gains and return the values read back. Raises SafeGainsError if they differ."""
     wanted = dict(vehicle.safe_gains)
     hint = "Do not fly it. Set its gains by hand, read them back, then release it."
     try:

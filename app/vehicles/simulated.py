@@ -1,5 +1,5 @@
-"""What all simulated vehicles share: the gains that they can hold, the course of a flight, its record, simulated time
-held back to the requested speed, seeded disturbances, aborts.
+"""Common parts of the simulated vehicles: gain limits, flight sequence and record, pacing of simulated time, seeded
+disturbances, aborts.
 """
 
 import math
@@ -44,8 +44,8 @@ from app.vehicles.kernels import (
 def accept_gains(
     gains: Gains, names: Sequence[str], refusal: Callable[[float], str | None], *, kind: type[float], numbers: str
 ) -> dict[str, float]:
-    """The gains, complete and in order, each as `kind`. Raises GainsError naming every unknown or missing gain and each
-    that `refusal` gives a reason against; `numbers` says which could be held."""
+    """Return the gains, complete and in order, each as `kind`. Raises GainsError naming every unknown or missing gain
+    and each for which `refusal` returns a reason; `numbers` describes the accepted values."""
     problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in names]
     for name in names:
         reason = refusal(gains[name]) if name in gains else "is missing"
@@ -61,13 +61,13 @@ def accept_gains(
 
 
 LISTEN_EVERY_S: Final = 0.02
-"""The longest that a flight held back is deaf to an abort."""
+"""Longest interval between two calls of `should_stop` in a paced flight."""
 
 
 class Pacer:
-    """Lets vehicle time pass `speed` times as fast as the clock's, never faster; None does not hold it back at all.
+    """Limit vehicle time to `speed` times the clock's time; None does not limit it.
 
-    Time is counted from the start: a computation that fell behind catches up.
+    Time is counted from the start, so that a computation that fell behind catches up.
     """
 
     def __init__(self, speed: float | None, clock: Clock = REAL_TIME) -> None:
@@ -76,16 +76,16 @@ class Pacer:
             raise InputError(
                 "This flight cannot be paced.",
                 problems=(Problem("speed", f"must be above 0 and finite, got {speed:g}"),),
-                hint="Give simulated time over wall time, such as 10; nothing means as fast as possible.",
+                hint="Give the ratio of simulated to wall time, such as 10, or nothing for as fast as possible.",
             )
         self._speed = speed
         self._clock = clock
         self._start_s = clock.now_s()
 
     def wait_until(self, vehicle_time_s: float, should_stop: ShouldStop) -> StopRequest | None:
-        """Return None once `vehicle_time_s` seconds of the flight may have passed, or at once what ends it early.
+        """Wait until `vehicle_time_s` seconds of the flight may have passed; return a stop request as soon as it comes.
 
-        `should_stop` is asked at least once, every 20 ms of the clock, and last when the time has come.
+        `should_stop` is called at least once, every 20 ms of the clock, and a last time at the end of the wait.
         """
         while True:
             early_s = self._early_s(vehicle_time_s)
@@ -105,7 +105,7 @@ class Pacer:
 GAIN_NAMES: Final = ("kp", "ki", "kd")
 TAKEOFF_ALTITUDE_M: Final = 3.0
 FLIGHT_S: Final = 33.0
-"""Recorded after the command: a little more than the 32.6 s that are scored."""
+"""Time recorded after the command, a little more than the 32.6 s that are scored."""
 TELEMETRY_HZ: Final = 50
 _WATCHED: Final = ("altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "battery_v")
 
@@ -123,15 +123,15 @@ class Simulation(Protocol):
     """One flight of a simulated vehicle, resting on the ground and commanded to take off at step 0."""
 
     def advance(self, steps: int, command: Integers) -> Rows:
-        """Fly so many steps of 1/512 s under the autopilot's `command`; one row of `CHANNELS` for each, shape
-        (steps, 8), holding what the autopilot sensed at the beginning of the step and the thrust it then chose."""
+        """Fly `steps` steps of 1/512 s under the autopilot's `command`; return one row of `CHANNELS` for each, shape
+        (steps, 8), with the measurements at the beginning of the step and the resulting thrust."""
         ...
 
 
 class SimulatedVehicle:
-    """A vehicle that is a program: it holds the loop's three integers, and each flight starts it afresh on the ground.
+    """Simulated vehicle that holds the loop's three integer gains and starts every flight from rest on the ground.
 
-    `launch(order)` gives the simulation of one flight; `settings` describe the vehicle in its records.
+    `launch(order)` returns the simulation of one flight; `settings` describe the vehicle in its records.
     """
 
     is_real: Final = False
@@ -151,25 +151,25 @@ class SimulatedVehicle:
         self._staged = False
 
     def stage(self, gains: Gains) -> dict[str, float]:
-        """Write every gain and return what the vehicle now holds. Raises GainsError for what its 32-bit integers cannot
-        hold; nothing is changed then."""
+        """Write every gain and return the gains now held. Raises GainsError, and changes nothing, for a value that is
+        not a 32-bit integer."""
         self._held = _counts(gains)
         self._staged = True
         return self.read_gains()
 
     def read_gains(self) -> dict[str, float]:
-        """What the vehicle holds now."""
+        """Return the gains that the vehicle holds now."""
         return dict(self._held)
 
     def fly(
         self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
     ) -> FlightRecord:
-        """Take off to 3 m with the staged gains, holding simulated time back to the order's speed.
+        """Take off to 3 m with the staged gains, with simulated time limited to the order's speed.
 
-        `should_stop` is asked every 20 ms, of vehicle time or of wall time, whichever comes first. A stop ends the
-        flight there: the safe gains are set and the vehicle descends at 0.5 m/s; the record keeps both, the set point
-        of the descent being the ground. Afterwards the vehicle holds its safe gains. Raises VehicleError when nothing
-        was staged or the simulation broke down.
+        `should_stop` is called every 20 ms, of vehicle time or of wall time, whichever comes first. A stop ends the
+        flight there: the safe gains are set and the vehicle descends at 0.5 m/s. The record includes the descent, whose
+        set point is the ground. Afterwards the vehicle holds its safe gains. Raises VehicleError if no gains were
+        staged or the simulation diverged.
         """
         if not self._staged:
             raise VehicleError(
@@ -193,7 +193,7 @@ class SimulatedVehicle:
         )
 
     def close(self) -> None:
-        """Nothing is held open between flights."""
+        """Do nothing: no resource is open between flights."""
 
     def _restore(self) -> None:
         self._held = dict(self.safe_gains)
@@ -207,7 +207,7 @@ class SimulatedVehicle:
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
     ) -> StopRequest | None:
-        """Fill `rows` until the manoeuvre is over; what ended it early, or None."""
+        """Fill `rows` until the manoeuvre is over; return the stop request that ended it early, if any."""
         command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
         for first, last in _slices():
             if (stop := pacer.wait_until(first * STEP_S, should_stop)) is not None:
@@ -217,11 +217,11 @@ class SimulatedVehicle:
         return None
 
     def _stay(self, simulation: Simulation) -> Rows:
-        """Aborted before anything moved: the one instant on the ground."""
+        """Record a single instant on the ground, for an abort before the first step."""
         return _flown(simulation, 1, self._command(THROTTLE, 0), 0.0)
 
     def _land(self, simulation: Simulation, last: Rows) -> Iterator[Rows]:
-        """Descend until the vehicle stands on the ground, half a minute at most, as fast as it can be computed."""
+        """Descend until the vehicle stands on the ground, for at most 30 s, without pacing."""
         command = self._command(CLIMB, fix(-_LANDING_RATE_M_S, SPEED_BITS))
         for _ in range(round(_LANDING_S * RATE_HZ) // _LANDING_SLICE):
             if last[-1, ALTITUDE] <= _LANDED_M:
@@ -268,8 +268,8 @@ def _flown(simulation: Simulation, steps: int, command: Integers, set_point_m: f
     rows[:, SET_POINT] = set_point_m
     if not np.isfinite(rows).all():
         raise VehicleError(
-            "The simulation broke down: the vehicle's state is no longer a number.",
-            hint="These gains or options throw the vehicle about; choose milder ones.",
+            "The simulation diverged: the vehicle's state is no longer finite.",
+            hint="The vehicle is unstable with these gains or options. Choose milder ones.",
         )
     return rows
 
@@ -285,17 +285,17 @@ def _counts(gains: Gains) -> dict[str, float]:
 
 def _refusal(value: float) -> str | None:
     if not INT32_MIN <= value <= INT32_MAX:
-        return f"must be a number that 32 bits hold, got {shortened(value)}"
+        return f"must fit into 32 bits, got {shortened(value)}"
     return None if value == int(value) else f"must be a whole number of counts, got {value:g}"
 
 
 def streams(seed: int, count: int) -> list[np.random.Generator]:
-    """Independent generators of one flight: what one of them is asked for leaves the others alone."""
+    """Return `count` independent random generators for one flight."""
     return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(count)]
 
 
 def gusts(generator: np.random.Generator, steps: int, *, sd: float, correlation_s: float) -> Rows:
-    """Gauss-Markov gusts at 512 Hz, shape (steps,), with the standard deviation's unit."""
+    """Return Gauss-Markov gusts at 512 Hz, shape (steps,), in the unit of the standard deviation."""
     if sd == 0.0:
         return np.zeros(steps)
     series = generator.standard_normal(steps)

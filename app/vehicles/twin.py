@@ -1,8 +1,9 @@
-"""The twin of the paper's real flights: a simple vertical model with what the nominal one leaves out, and scatter.
+"""Twin of the paper's real flights: a simple vertical model with effects that the nominal model omits, and scatter.
 
-Hover throttle 0.61, a motor lag of 50 ms and a loop entered 0.3 s after the command score every row of the paper's
-Table 2 within 8 %; with the scatter below, repeated takeoffs differ as in its Fig. 12. Physics beyond that (thrust that
-grows with the square of the command, ground effect, delayed measurement, a battery that sags) is off by default.
+With a hover throttle of 0.61, a motor lag of 50 ms and a loop entered 0.3 s after the command, the scores of all rows
+of the paper's Table 2 are reproduced within 8 %; with the scatter below, repeated takeoffs differ as in its Fig. 12.
+Further physics (thrust that grows with the square of the command, ground effect, delayed measurement, a sagging
+battery) is off by default.
 """
 
 from pathlib import Path
@@ -55,10 +56,11 @@ _PLACES: Final = {
 
 
 class TwinFlight:
-    """A simulation by the protocol of `app.vehicles.simulated`.
+    """One flight of the twin, a `Simulation` of `app.vehicles.simulated`.
 
-    `options` are those of the kind, complete. What differs between flights depends on `seed` alone; after `MAX_STEPS`
-    its gusts come again. `autopilot` is the loop's memory, the state of app.core.control.paparazzi first.
+    `options` are the complete options of the kind. The scatter between flights depends on `seed` alone; the gusts
+    repeat after `MAX_STEPS`. `autopilot` is the loop's memory, which begins with the state of
+    app.core.control.paparazzi.
     """
 
     def __init__(self, options: dict[str, float], seed: int) -> None:
@@ -79,7 +81,7 @@ class TwinFlight:
         self._done = 0
 
     def advance(self, steps: int, command: Integers) -> Rows:
-        """As the protocol says. The battery's voltage is the one that explains the thrust, which goes with its
+        """Implement `Simulation.advance`. The battery voltage is derived from the thrust, which is proportional to its
         square."""
         rows = np.zeros((steps, len(CHANNELS)))
         time_s = (self._done + np.arange(steps)) * STEP_S
@@ -101,7 +103,7 @@ class TwinFlight:
 
 
 def _hover_share(options: Options) -> float:
-    """What lifts at hover throttle, as a share of what lifts at full command: (1 − q)·h + q·h²."""
+    """Return the lift at hover throttle h as a share of that at full command: (1 − q)·h + q·h²."""
     hover, quadratic = float(options["hover_throttle"]), float(options["quadratic_share"])
     return (1.0 - quadratic) * hover + quadratic * hover * hover
 
@@ -118,8 +120,8 @@ def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, .
     return (
         Problem(
             "battery_sag",
-            f"leaves too little thrust: at the end of a flight it takes {percent(share)} of it to hover, "
-            f"at most {percent(_HIGHEST_HOVER)} leaves room to control",
+            f"leaves too little thrust: at the end of a flight, hovering needs {percent(share)} of it, and control is "
+            f"possible up to {percent(_HIGHEST_HOVER)}",
         ),
     )
 
