@@ -21,7 +21,7 @@ from app.core.experiments.base import Experiment
 from app.live.messages import FlightPhase, Phase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
 from app.processes.locks import LockedError, exclusive
 from app.vehicles.base import (
-    MOTORS_OFF_ASKED,
+    MOTORS_OFF_REQUESTED,
     CheckItem,
     FlightOptions,
     FlightRecord,
@@ -148,7 +148,7 @@ class FlightBackend(Protocol):
 def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
     """Return the record with `on_request` set: whether the flight was aborted for one of these reasons, which were sent
     by the worker, and not for a limit."""
-    said = record.reason.removeprefix(MOTORS_OFF_ASKED)
+    said = record.reason.removeprefix(MOTORS_OFF_REQUESTED)
     asked = record.ending == "aborted" and any(said.startswith(reason) for reason in reasons)
     return replace(record, on_request=asked)
 

@@ -68,7 +68,7 @@ class StopRequest:
 
 
 ShouldStop = Callable[[], StopRequest | None]
-MOTORS_OFF_ASKED: Final = "Motors off was asked for: "
+MOTORS_OFF_REQUESTED: Final = "Motors off was requested: "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +76,8 @@ class FlightRecord:
     """Result of a flight: its trajectory at full rate, how it ended, and the reason if it ended early.
 
     If `should_stop` ended the flight before any limit did, `reason` begins with the reason of the stop request, or with
-    `MOTORS_OFF_ASKED` followed by it. The caller that requested the stop then sets `on_request` of the aborted flight.
+    `MOTORS_OFF_REQUESTED` followed by it. The caller that requested the stop then sets `on_request` of the aborted
+    flight.
     """
 
     trajectory: Trajectory

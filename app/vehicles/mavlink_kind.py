@@ -1,4 +1,4 @@
-"""The kind `mavlink`: vehicles under Paparazzi, ArduCopter or PX4 at the other end of a link."""
+"""The kind `mavlink`: vehicles with Paparazzi, ArduCopter or PX4, controlled over a MAVLink link."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +21,7 @@ SCORED: Final = ("vehicle", "mocap")
 
 
 def is_simulated(options: Options, simulation_hosts: Hosts = HERE) -> bool:
-    """Said to be simulated, and its address reaches nothing beyond this computer and the `simulation_hosts`."""
+    """Whether the vehicle is declared as simulated and its address is on this computer or one of `simulation_hosts`."""
     return bool(options["simulated"]) and _may_simulate(addresses.parse(str(options["address"])), simulation_hosts)
 
 
@@ -63,9 +63,9 @@ def _vehicle(
     trial_parameters: Path | None = None,
     on_wait: Callable[[], None] = lambda: None,
 ) -> "MavlinkVehicle":
-    """It counts as REAL but on this computer; which other hosts simulate, only whoever registered it knows.
+    """Open the vehicle. It counts as REAL unless it is on this computer: other simulation hosts are not known here.
 
-    What speaks to a vehicle is imported here, by the process that opens one: those that only know its settings do not.
+    The modules that talk to a vehicle are imported here, so that only the process that opens one loads them.
     """
     from app.vehicles.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415
     from app.vehicles.mocap.opening import open_source  # noqa: PLC0415
@@ -101,20 +101,20 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
     except InputError as error:
         return (*problems, *error.problems)
     if options["simulated"] and not _may_simulate(address, simulation_hosts):
-        believed = ", ".join(("a loopback address", *sorted(simulation_hosts)))
-        problems.append(Problem("simulated", f"is not believed of {address}: only {believed} can be simulated"))
+        possible = ", ".join(("a loopback address", *sorted(simulation_hosts)))
+        problems.append(Problem("simulated", f"is not possible at {address}: only {possible} can be simulated"))
     problems += _second_source_problems(str(options["second_source"]), str(options["scored_source"]))
     if options["signing_key_file"] and options["autopilot"] == "paparazzi":
         problems.append(
-            Problem("signing_key_file", "cannot be had: Paparazzi speaks MAVLink 1, which has no signatures")
+            Problem("signing_key_file", "is not supported: Paparazzi uses MAVLink 1, which has no signatures")
         )
     if options["clock_speed"] != 1.0 and not options["simulated"]:
-        problems.append(Problem("clock_speed", "must be 1: a real vehicle's time is that of life"))
+        problems.append(Problem("clock_speed", "must be 1: a real vehicle flies in real time"))
     return tuple(problems)
 
 
 def _experiments(options: Options) -> tuple[str, ...]:
-    """The one whose gains the autopilot has."""
+    """Return the experiment whose gains the autopilot has."""
     return (PROFILES[str(options["autopilot"])].experiment,)
 
 
@@ -141,7 +141,7 @@ def _number(name: str, title: str, unit: str, default: float, lower: float, uppe
 MAVLINK: Final = VehicleKind(
     name="mavlink",
     title="Vehicle over MAVLink",
-    line="A real vehicle under Paparazzi, ArduCopter or PX4, or a simulated one that speaks like it.",
+    line="A real vehicle with Paparazzi, ArduCopter or PX4, or a simulated one with the same protocol.",
     is_real=True,
     can_fly=True,
     experiments=tuple(profile.experiment for profile in PROFILES.values()),
@@ -149,27 +149,27 @@ MAVLINK: Final = VehicleKind(
         VehicleOption(name="autopilot", title="Autopilot: paparazzi, ardupilot or px4", unit="", default="paparazzi"),
         VehicleOption(
             name="address",
-            title="Where the vehicle is reached: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
+            title="Address of the vehicle: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
             unit="",
             default="udp:127.0.0.1:4245@4244",
         ),
-        VehicleOption(name="simulated", title="It is a simulated vehicle on this computer", unit="", default=False),
-        _number("system_id", "Its MAVLink system id; 0: the first autopilot heard", "", 0.0, 0.0, 255.0),
+        VehicleOption(name="simulated", title="Simulated vehicle on this computer", unit="", default=False),
+        _number("system_id", "MAVLink system id; 0: the first autopilot received", "", 0.0, 0.0, 255.0),
         _number("aircraft_id", "Paparazzi's aircraft id (AC_ID); 0: the same as the system id", "", 0.0, 0.0, 255.0),
-        _number("telemetry_hz", "Positions a second that are asked for", "Hz", 50.0, 40.0, 200.0),
-        _number("climb_waypoint", "Paparazzi: number of the waypoint that its take-off climbs to", "", 2.0, 1.0, 254.0),
+        _number("telemetry_hz", "Requested rate of positions", "Hz", 50.0, 40.0, 200.0),
+        _number("climb_waypoint", "Paparazzi: number of the waypoint that the take-off climbs to", "", 2.0, 1.0, 254.0),
         _number("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
-        _number("radius_m", "How far from its start it may drift", "m", 5.0, 0.5, 100.0),
-        _number("plan_radius_m", "Paparazzi: how far from HOME its flight plan lets it fly", "m", 8.0, 0.5, 1000.0),
-        _number("clock_speed", "Speed of its time: 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
+        _number("radius_m", "Maximum distance from the start", "m", 5.0, 0.5, 100.0),
+        _number("plan_radius_m", "Paparazzi: maximum distance from HOME in the flight plan", "m", 8.0, 0.5, 1000.0),
+        _number("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
             name="second_source",
-            title="A second source of altitude: natnet:HOST?body=ID, odometry or mavlink:ADDRESS; empty: none",
+            title="Second source of altitude: natnet:HOST?body=ID, odometry or mavlink:ADDRESS; empty: none",
             unit="",
             default="",
         ),
         VehicleOption(
-            name="scored_source", title="Whose altitude is scored: vehicle or mocap", unit="", default="vehicle"
+            name="scored_source", title="Scored source of altitude: vehicle or mocap", unit="", default="vehicle"
         ),
         VehicleOption(
             name="signing_key_file",
@@ -178,7 +178,7 @@ MAVLINK: Final = VehicleKind(
             default="",
         ),
         VehicleOption(
-            name="log_folder", title="Folder for telemetry logs of every flight; empty: none", unit="", default=""
+            name="log_folder", title="Folder for the telemetry logs of all flights; empty: none", unit="", default=""
         ),
     ),
     open=_open,

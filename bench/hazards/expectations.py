@@ -27,15 +27,15 @@ LEADS: Final[Mapping[str, str]] = {ABORT: "the operator's abort", "link-lost": "
 """What leads a trial into a state that it does not reach by itself, and how it is told then."""
 
 _NOT_LANDED: Final = "It has not landed within 40 s"
-_NO_POSITION: Final = ("stood still", "position was lost", "Position: ", "Its clock: ")
-_DOUBLED: Final = ("Two vehicles speak", "Its system id: ")
+_NO_POSITION: Final = ("froze", "stood still", "position was lost", "Position: ", "Vehicle clock: ")
+_DOUBLED: Final = ("Two vehicles use", "System id: ")
 _MOVED: Final = "Standing still: "
 _NO_GAINS: Final = ("did not confirm", "could not be verified", "it holds", "failsafe", "Motors off: ", "Gains: ")
 _BY_HAND: Final = (
-    "took the vehicle over by hand",
+    "took over manual control",
     "may have flown",
-    "went into mode",
-    "would not arm",
+    "entered mode",
+    "did not arm",
     "did not lift off",
 )
 
@@ -43,7 +43,7 @@ _BLIND: Final = Expected(told=(*_NO_POSITION, _NOT_LANDED), ends=AIR, quarantine
 _UNVERIFIED: Final = Expected(told=_NO_GAINS, quarantines=True)
 _TWINS: Final = Expected(told=(*_DOUBLED, *_NO_POSITION, _MOVED), ends=AIR, quarantines=True)
 _UNSEEN: Final = Expected(told=("second source of altitude", "Second source of altitude: "), ends=AIR)
-_ONCE: Final = Expected(told=(_MOVED, "Its clock: "))
+_ONCE: Final = Expected(told=(_MOVED, "Vehicle clock: "))
 _SHIFTED: Final = Expected(told=(_MOVED, _NOT_LANDED), quarantines=True)
 _PILOT: Final = Expected(told=_BY_HAND, ends=AIR, aborts=True, quarantines=True)
 
@@ -60,13 +60,13 @@ EXPECTED: Final[Mapping[str, Expected]] = {
     "ground every second": Expected(told=("samples had to be dropped", _MOVED), ends=AIR),
     **dict.fromkeys(("disarmed once", "disarmed every second", "by hand once"), HARMLESS),
     "no HEARTBEAT": Expected(
-        told=("link was lost", "Heartbeat: ", "No heartbeat", "would not arm", "not said within"),
+        told=("link was lost", "Heartbeat: ", "No heartbeat", "did not arm", "not confirmed within"),
         ends=AIR,
         quarantines=True,
     ),
     "no LOCAL_POSITION_NED": _BLIND,
-    "no SYS_STATUS": Expected(told=("No battery voltage", "no voltage told"), ends=AIR),
-    "no COMMAND_ACK": Expected(told=("could not be set up", "would not arm", "did not lift off", "Motors off: ")),
+    "no SYS_STATUS": Expected(told=("No battery voltage", "no voltage reported"), ends=AIR),
+    "no COMMAND_ACK": Expected(told=("could not be set up", "did not arm", "did not lift off", "Motors off: ")),
     "no EXTENDED_SYS_STATE": HARMLESS,
     **{f"altitude {by_m:+g} m": _SHIFTED for by_m in SHIFTS_M},
     **dict.fromkeys(("mocap nan", "mocap frozen", "mocap silent"), _UNSEEN),
@@ -75,7 +75,7 @@ EXPECTED: Final[Mapping[str, Expected]] = {
     "pilot for 1 s": replace(_PILOT, ends=()),
     "pilot for 3 s": _PILOT,
     "deaf": Expected(
-        told=("not said within", "began to land by itself", "did not lift off", "would not arm", *_NO_GAINS),
+        told=("not confirmed within", "began to land by itself", "did not lift off", "did not arm", *_NO_GAINS),
         aborts=True,
         quarantines=True,
     ),

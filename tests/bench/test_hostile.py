@@ -32,24 +32,24 @@ def case(autopilot: str, what: str, stage: Stage, delay_s: float = 5.0, duration
 
 
 SEEN = [
-    ("paparazzi", "z nan", Stage.RECORD, "invalid", "stood still while it went on talking"),
+    ("paparazzi", "z nan", Stage.RECORD, "invalid", "froze while packets still arrived"),
     ("paparazzi", "companion as autopilot", Stage.RECORD, "completed", ""),
     ("paparazzi", "disarmed once", Stage.RECORD, "completed", ""),
     ("ardupilot", "reboot once", Stage.RECORD, "completed", ""),
-    ("paparazzi", "twin 0.4 s older", Stage.LAND, "invalid", "Two vehicles speak under one system id"),
-    ("paparazzi", "pilot", Stage.RECORD, "invalid", "Somebody took the vehicle over by hand"),
+    ("paparazzi", "twin 0.4 s older", Stage.LAND, "invalid", "Two vehicles use the same system id"),
+    ("paparazzi", "pilot", Stage.RECORD, "invalid", "A pilot took over manual control"),
     ("paparazzi", "carried away", Stage.RECORD, "aborted", "away from its start"),
 ]
 SEEN_ALIKE = [
-    ("paparazzi", "vz nan", Stage.RECORD, "invalid", "stood still while it went on talking"),
-    ("paparazzi", "x nan", Stage.RECORD, "invalid", "stood still while it went on talking"),
+    ("paparazzi", "vz nan", Stage.RECORD, "invalid", "froze while packets still arrived"),
+    ("paparazzi", "x nan", Stage.RECORD, "invalid", "froze while packets still arrived"),
     ("ardupilot", "companion as autopilot", Stage.RECORD, "completed", ""),
     ("px4", "companion as autopilot", Stage.RECORD, "completed", ""),
     ("px4", "an hour ahead", Stage.RECORD, "completed", ""),
     ("ardupilot", "deaf", Stage.RECORD, "invalid", "The vehicle began to land by itself"),
-    ("px4", "mocap nan", Stage.RECORD, "invalid", "The second source of altitude did not see it"),
-    ("px4", "pilot for 1 s", Stage.RECORD, "invalid", "A person may have flown the vehicle"),
-    ("ardupilot", "twin 3600 s older", Stage.RECORD, "invalid", "Two vehicles speak under one system id"),
+    ("px4", "mocap nan", Stage.RECORD, "invalid", "The second source of altitude did not track it"),
+    ("px4", "pilot for 1 s", Stage.RECORD, "invalid", "A pilot may have flown the vehicle"),
+    ("ardupilot", "twin 3600 s older", Stage.RECORD, "invalid", "Two vehicles use the same system id"),
 ]
 """Further ones, for the complete ring."""
 
@@ -86,7 +86,7 @@ UP = tuple(replace(each, height_m=3.0, armed=True) if each.time_s >= 10.0 else e
 DOWN = tuple(replace(each, height_m=0.0, armed=False) if each.time_s > 48.0 else each for each in UP)
 WHOLE = Trajectory(np.arange(0.0, 33.5, 0.5), {"altitude_m": np.full(67, 3.0)}, "mavlink", "vehicle")
 SAFE_AND_SOUND = Said("completed", "safe", "", record=WHOLE)
-QUARANTINED = Said("invalid", "quarantined", "Somebody took the vehicle over by hand.", "It flies.", "It flies.")
+QUARANTINED = Said("invalid", "quarantined", "A pilot took over manual control.", "It flies.", "It flies.")
 LANDED_ON = tuple((at_s, Order.LAND) for at_s in np.arange(45.0, 70.0, 6.0))
 
 

@@ -272,7 +272,7 @@ class Refusing:
         yield GainsStaged(dict(request.gains))
         if self.takes_its_safe_gains:
             yield SafeGainsRestored(dict(request.safe_gains))
-        yield FlightFailure("The vehicle would not arm.", unsafe=not self.takes_its_safe_gains, not_flown=True)
+        yield FlightFailure("The vehicle did not arm.", unsafe=not self.takes_its_safe_gains, not_flown=True)
 
     def take_off(self) -> None: ...
     def cancel_take_off(self) -> None: ...
@@ -288,7 +288,7 @@ def test_a_flight_that_never_left_the_ground_is_refused_and_can_be_flown_again(
         field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"], after["flown_at"]) == ("planned", "failed", None)
-    assert after["reason"] == "The vehicle would not arm."
+    assert after["reason"] == "The vehicle did not arm."
     assert get(client, f"/api/campaigns/{after['campaign_id']}")["state"] == "deciding"
     assert vehicle_state(client) == "ready"
     assert client.post(f"/api/trials/{trial_id}/fly", json={}).is_success

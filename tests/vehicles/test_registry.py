@@ -60,7 +60,7 @@ def test_a_vehicle_that_keeps_experimental_gains_is_reported_loudly(monkeypatch:
 def test_a_flight_made_elsewhere_cannot_be_flown_here() -> None:
     with pytest.raises(VehicleError) as refusal, open_vehicle("import", {}, safe_gains=SAFE):
         pass
-    assert "flies elsewhere" in refusal.value.message
+    assert "is flown outside Gainline" in refusal.value.message
     assert "time_s and altitude_m" in refusal.value.hint
     assert not VEHICLE_KINDS["import"].can_fly
 

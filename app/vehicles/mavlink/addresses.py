@@ -1,7 +1,7 @@
-"""Where a vehicle is reached, written as one text.
+"""Addresses of vehicles, written as one text.
 
 udp:HOST:PORT[@LOCALPORT]  send to the vehicle there, from LOCALPORT (Paparazzi sends to a port fixed in its firmware)
-udpin:HOST:PORT            wait at our own address until a vehicle speaks
+udpin:HOST:PORT            wait at our own address until a vehicle sends
 tcp:HOST:PORT              connect to the vehicle
 serial:DEVICE:BAUD         a telemetry radio or cable
 """
@@ -20,7 +20,7 @@ FORMS: Final = "udp:HOST:PORT[@LOCALPORT], udpin:HOST:PORT, tcp:HOST:PORT or ser
 
 @dataclass(frozen=True, slots=True)
 class UdpAddress:
-    """A vehicle that listens at `host`:`port`; `local_port` is ours, None any free one."""
+    """A vehicle that receives at `host`:`port`; `local_port` is ours, None for any free one."""
 
     host: str
     port: int
@@ -32,7 +32,7 @@ class UdpAddress:
 
 @dataclass(frozen=True, slots=True)
 class UdpInAddress:
-    """Our own address, at which a vehicle will speak first; 0.0.0.0 means every interface."""
+    """Our own address, to which the vehicle sends first; 0.0.0.0 means every interface."""
 
     host: str
     port: int
@@ -43,7 +43,7 @@ class UdpInAddress:
 
 @dataclass(frozen=True, slots=True)
 class TcpAddress:
-    """A vehicle, or a bridge to it, that takes connections at `host`:`port`."""
+    """A vehicle, or a bridge to it, that accepts connections at `host`:`port`."""
 
     host: str
     port: int
@@ -67,7 +67,7 @@ Address = UdpAddress | UdpInAddress | TcpAddress | SerialAddress
 
 
 def parse(text: str) -> Address:
-    """The address that `text` writes; str() of it gives the text back. Raises InputError saying what is wrong."""
+    """Parse an address; str() of the result is the text again. Raises InputError with the reason if it is invalid."""
     kind, _, rest = text.strip().partition(":")
     place, colon, number = rest.rpartition(":")
     if kind not in _PARSERS or not colon or not place:
@@ -76,14 +76,14 @@ def parse(text: str) -> Address:
 
 
 def is_loopback(address: Address) -> bool:
-    """Whether nothing beyond this computer can be reached by it: a simulation, not a vehicle."""
+    """Whether the address is on this computer, and so of a simulation, not a vehicle."""
     if isinstance(address, SerialAddress):
         return False
     return is_loopback_host(address.host)
 
 
 def is_loopback_host(host: str) -> bool:
-    """Whether `host` is this computer, judged by its text alone: no name is looked up."""
+    """Whether `host` is this computer, by its text alone, without name resolution."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

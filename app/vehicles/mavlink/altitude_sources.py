@@ -1,6 +1,6 @@
-"""A second source of altitude beside the vehicle's own, such as motion capture.
+"""Second source of altitude in addition to the vehicle's own, such as motion capture.
 
-A record has both: `altitude_m` is the scored one, `altitude_2_m` the other.
+A record contains both: `altitude_m` is the scored one, `altitude_2_m` the other.
 """
 
 import statistics
@@ -14,12 +14,12 @@ from app.vehicles.mavlink.link import Received
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceSample:
-    """What a source saw once.
+    """One sample of a source.
 
-    `received_s`: by the clock that the source was given, as the vehicle's messages are stamped; `seen_s`: when it saw
-    that, on the same clock but for a constant latency, whatever held the message up; `altitude_m`: positive up, on the
-    source's own zero, which is compared from the ground on; `tracking_valid`: false where the source says that it does
-    not see the vehicle; `advances`: false where it repeats an old frame.
+    `received_s`: time of receipt by the clock passed to the source, which also stamps the vehicle's messages; `seen_s`:
+    time of the measurement on the same clock, up to a constant latency, without variable delays; `altitude_m`: positive
+    up from the source's own zero; `tracking_valid`: false if the source reports that it does not track the vehicle;
+    `advances`: false if it repeats an old frame.
     """
 
     received_s: float
@@ -30,33 +30,33 @@ class SourceSample:
 
 
 class AltitudeSource(Protocol):
-    """Hears in a thread of its own, or what it is given; nothing of it ever waits."""
+    """Second source of altitude, which receives in its own thread or through `on_message`; no method waits."""
 
     @property
     def name(self) -> str:
-        """For a person: what it is and where it is heard."""
+        """Description for the operator: what it is and where it is received."""
         ...
 
     @property
     def trouble(self) -> str:
-        """Why nothing comes, where the source knows; empty otherwise."""
+        """Reason why no samples arrive, if known; otherwise empty."""
         ...
 
     def on_message(self, received: Received) -> None:
-        """Take in a message of the vehicle's own link; a source with a link of its own passes it over."""
+        """Process a message of the vehicle's own link; a source with its own link ignores it."""
         ...
 
     def take(self) -> Sequence[SourceSample]:
-        """What came since the last call, oldest first."""
+        """Return the samples since the last call, oldest first."""
         ...
 
     def close(self) -> None: ...
 
 
 class AlignedAltitudeSource:
-    """A source whose altitudes are put on the vehicle's datum: both stood on the ground at the same time.
+    """Source whose altitudes are converted to the vehicle's datum by their values on the ground.
 
-    `seen` are the sightings of the flight so far, as `SourceSample.seen_s` and altitude (m).
+    `seen` are the samples of the flight so far, as `SourceSample.seen_s` and altitude (m) on the vehicle's datum.
     """
 
     def __init__(self, source: AltitudeSource) -> None:
@@ -65,21 +65,22 @@ class AlignedAltitudeSource:
         self._rise_m = 0.0
 
     def discard_pending(self) -> None:
-        """Pass over what came while nobody needed it."""
+        """Discard the samples since the last call."""
         self.source.take()
 
     def ground_altitudes(self) -> tuple[float, ...]:
-        """The altitudes at which it saw the vehicle since the last call."""
+        """Return the valid altitudes since the last call, on the source's datum."""
         return tuple(sample.altitude_m for sample in self.source.take() if sample.tracking_valid and sample.advances)
 
     def align(self, stood_m: Sequence[float], ground_m: float) -> None:
-        """A flight begins: `stood_m` is where it saw the vehicle stand, which is at `ground_m` on its own datum."""
+        """Begin a flight: `stood_m` are the source's altitudes of the vehicle on the ground, which is at `ground_m` on
+        the vehicle's datum."""
         self._rise_m = ground_m - statistics.median(stood_m)
         self.seen.clear()
         self.discard_pending()
 
     def take_samples(self) -> list[SecondaryAltitudeReceived]:
-        """What it saw since the last call."""
+        """Return the samples since the last call as events."""
         samples = [(sample, sample.tracking_valid and sample.advances) for sample in self.source.take()]
         self.seen += [(sample.seen_s, sample.altitude_m + self._rise_m) for sample, is_new in samples if is_new]
         return [

@@ -1,10 +1,11 @@
-"""What keeps a PX4 from arming, by its events.
+"""PX4's arming checks, from its events.
 
-Since release 1.14 it tells the results of its own checks as events (https://mavlink.io/en/services/events.html): a
-summary of what fails and of the modes in which it may arm, one event for each check, a summary of its health, in this
-order and by consecutive sequence numbers (https://github.com/mavlink/libevents, README). The words of a check are in
-its component metadata, which is not asked for; the summary names the parts that fail. Numbers and names below are those
-of the metadata that a PX4 of March 2026 wrote into its log (tests/data/logs/px4_takeoff.ulg.gz).
+Since release 1.14 PX4 sends the results of its arming checks as events
+(https://mavlink.io/en/services/events.html): a summary of the failing components and of the modes in which it may arm,
+one event for each check, and a summary of its health, in this order and with consecutive sequence numbers
+(https://github.com/mavlink/libevents, README). The text of a check is in PX4's component metadata, which is not
+requested; the summary names the failing components. Numbers and names below are from the metadata that a PX4 of March
+2026 wrote into its log (tests/data/logs/px4_takeoff.ulg.gz).
 """
 
 import struct
@@ -27,27 +28,27 @@ COMPONENTS: Final = (
     "Global position estimate", "Storage", "Parachute", "Magnetometer", "Accelerometer", "Gyroscope",
     "Open Drone ID system", "Traffic Avoidance (ADSB/FLARM)",
 )  # fmt: skip
-"""By the bits of health_component_t. The first stands for no component."""
+"""Components by the bits of health_component_t. The first stands for no component."""
 MODE_GROUPS: Final[Mapping[str, int]] = MappingProxyType(
     {
         "1.0": 0, "2.0": 1, "3.0": 2, "4.4": 3, "4.3": 4, "4.5": 5, "5.0": 10, "6.0": 14, "7.0": 15, "4.2": 17,
         "4.6": 18,
     }
 )  # fmt: skip
-"""The bits of navigation_mode_group_t by the modes as the profile names them."""
+"""Bits of navigation_mode_group_t by the profile's names of the modes."""
 
 _SUMMARY: Final = struct.Struct("<BIIII")
-"""Chunk, components with errors and with warnings, modes in which it may arm and which may run."""
+"""Chunk, components with errors and with warnings, modes in which it may arm, modes that may run."""
 _CHECK: Final = struct.Struct("<IB")
-"""Modes that the check is about, and the component."""
+"""Modes that the check concerns, and the component."""
 _SEQUENCE_NUMBERS: Final = 1 << 16
 _MOST_CHECKS: Final = 256
-"""Of one chunk: what goes on beyond them has lost its end."""
+"""Maximum number of checks of one chunk; beyond it the end of the chunk was lost."""
 
 
 @dataclass(slots=True)
 class _Report:
-    """One chunk of the results. `is_whole` once every check of it was heard."""
+    """One chunk of the results. `is_whole` once all its checks have been received."""
 
     chunk: int
     errors: int
@@ -56,7 +57,7 @@ class _Report:
     is_whole: bool = False
 
     def failing(self, group: int | None) -> int:
-        """The components that fail; where it is whole, only those that a check for this group of modes names."""
+        """Return the failing components; if the chunk is whole, only those with a check for this group of modes."""
         if not self.is_whole or group is None:
             return self.errors
         about = 0
@@ -66,7 +67,7 @@ class _Report:
 
 
 class ArmingChecks:
-    """The latest results, put together from events as they come; what is lost is not waited for."""
+    """Latest results, assembled from events as they arrive; lost events are not waited for."""
 
     def __init__(self) -> None:
         self._reports: dict[int, _Report] = {}
@@ -78,7 +79,7 @@ class ArmingChecks:
         if event.number == ARMING_CHECK_SUMMARY:
             chunk, errors, _, may_arm, _ = _SUMMARY.unpack_from(event.arguments)
             self._open = self._reports[chunk] = _Report(chunk, errors, may_arm)
-        elif ahead >= _SEQUENCE_NUMBERS // 2:  # it comes again, as somebody asked
+        elif ahead >= _SEQUENCE_NUMBERS // 2:  # repeated on request
             return
         elif self._open is not None:
             self._proceed(self._open, event, is_next=ahead == 0)
@@ -93,7 +94,7 @@ class ArmingChecks:
         self._open = None
 
     def failing(self, mode: str) -> tuple[str, ...]:
-        """The parts that keep the vehicle from arming in this mode; of every mode where that cannot be told apart."""
+        """Return the components that prevent arming in this mode, or in any mode if modes cannot be distinguished."""
         failing = 0
         for report in self._reports.values():
             failing |= report.failing(MODE_GROUPS.get(mode))
@@ -101,7 +102,7 @@ class ArmingChecks:
 
     @property
     def arming_modes(self) -> frozenset[str]:
-        """The modes in which it may arm; none where it has told nothing."""
+        """Modes in which it may arm; none without results."""
         reports = self._reports.values()
         return frozenset(
             mode

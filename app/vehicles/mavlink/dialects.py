@@ -1,4 +1,4 @@
-"""The MAVLink dialects spoken here, and the one place that touches the untyped MAVLink library.
+"""The supported MAVLink dialects, and the only module that uses the untyped MAVLink library.
 
 The library's connection layer (mavutil) is not used: it changes the protocol version of the whole process when one
 frame of MAVLink 2 arrives.
@@ -40,40 +40,40 @@ class _Packable(Message, Protocol):
 
 
 def number(message: Message, field: str) -> float:
-    """The value of a numeric field. Raises AttributeError when the message has no such field."""
+    """Return the value of a numeric field. Raises AttributeError if the message has no such field."""
     return float(getattr(message, field))
 
 
 def text(message: Message, field: str) -> str:
-    """The value of a text field, without the zeros that fill it. Raises AttributeError as `number` does."""
+    """Return the value of a text field, without its padding of zeros. Raises AttributeError as `number` does."""
     value = getattr(message, field)
     return value.decode("ascii", errors="replace").rstrip("\0") if isinstance(value, bytes) else str(value)
 
 
 def is_known(message: Message) -> bool:
-    """Whether the dialect knows the message: it is neither noise nor a newer id, whose checksum cannot be judged."""
+    """Whether the dialect knows the message: it is neither noise nor a newer id, whose checksum cannot be verified."""
     return message.get_type() != BAD_DATA and not message.get_type().startswith(UNKNOWN)
 
 
 def is_autopilots_heartbeat(message: Message) -> bool:
-    """Not that of a gimbal, a companion computer or another ground station."""
+    """Whether this is a heartbeat of an autopilot, not of a gimbal, a companion computer or another ground station."""
     return message.get_type() == "HEARTBEAT" and number(message, "autopilot") != NO_AUTOPILOT
 
 
 def source_system(message: Message) -> int:
-    """The sender's system id, read from the frame: the library does not tell it for unknown ids."""
+    """Return the sender's system id from the frame, because the library does not provide it for unknown messages."""
     frame = message.get_msgbuf()
     return frame[3] if frame[0] == _MAVLINK_1 else frame[5]
 
 
 def source_component(message: Message) -> int:
-    """The sender's component id, read from the frame for the same reason."""
+    """Return the sender's component id from the frame, for the same reason."""
     frame = message.get_msgbuf()
     return frame[4] if frame[0] == _MAVLINK_1 else frame[6]
 
 
 def sequence(message: Message) -> int:
-    """The sender's sequence number (0 to 255), read from the frame for the same reason."""
+    """Return the sender's sequence number (0 to 255) from the frame, for the same reason."""
     frame = message.get_msgbuf()
     return frame[2] if frame[0] == _MAVLINK_1 else frame[4]
 
@@ -85,20 +85,20 @@ class Dialect:
     name: str
     module: str
     mavlink: int
-    """1 or 2: the version sent. Both are understood."""
+    """Version sent, 1 or 2. Both are received."""
     uses_gcs_heartbeats: bool = True
-    """Whether this autopilot wants to hear a ground station's heartbeat."""
+    """Whether this autopilot needs heartbeats of a ground station."""
     uncounted: tuple[str, ...] = ()
-    """Beginnings of the names of messages whose sequence numbers are another counter's."""
+    """Prefixes of the names of messages that have a separate sequence counter."""
 
     @property
     def can_sign(self) -> bool:
         return self.mavlink >= 2
 
     def message(self, kind: str, fields: Mapping[str, FieldValue]) -> Message:
-        """A message ready to be packed, `kind` its name ("PARAM_SET"), text fields as str or bytes.
+        """Return a message ready to be packed; `kind` is its name ("PARAM_SET"), text fields are str or bytes.
 
-        Raises ValueError when the dialect has no such message, or it cannot carry these fields.
+        Raises ValueError if the dialect has no such message, or the message cannot contain these fields.
         """
         known = _classes(self.module).get(kind)
         if known is None:
@@ -111,14 +111,14 @@ class Dialect:
         return message
 
     def codec(self, *, system: int, component: int, signing_key: bytes | None = None) -> "Codec":
-        """One end of a conversation in this dialect. Raises InputError when signing was asked of MAVLink 1."""
+        """Return a codec of this dialect. Raises InputError for a signing key with MAVLink 1."""
         return Codec(self, system=system, component=component, signing_key=signing_key)
 
 
 class Codec:
-    """One end of one conversation: packs with its own identity and sequence numbers, and parses a stream of bytes.
+    """Codec of one link: packs with its own identity and sequence numbers, and parses a stream of bytes.
 
-    One thread may pack while another parses, for the library's state of the two is kept apart.
+    One thread may pack while another parses, because they use separate states of the library.
     """
 
     def __init__(self, dialect: Dialect, *, system: int, component: int, signing_key: bytes | None) -> None:
@@ -126,7 +126,7 @@ class Codec:
             raise InputError(
                 f"The dialect {dialect.name} cannot be signed.",
                 problems=(Problem("signing_key", "needs MAVLink 2"),),
-                hint="Leave the signing key away, and keep strangers off the vehicle's network.",
+                hint="Remove the signing key, and protect the vehicle's network instead.",
             )
         library = _load(dialect.module)
         self._out = library.MAVLink(None, srcSystem=system, srcComponent=component)
@@ -138,30 +138,31 @@ class Codec:
             signing.enable(self._in.signing, signing_key)
 
     def pack(self, message: Message) -> bytes:
-        """The frame of `message` (of `Dialect.message`), with the next sequence number, signed when that was set up."""
+        """Return the frame of `message` (of `Dialect.message`), with the next sequence number, signed if there is a
+        key."""
         if self._signs:
             signing.refresh(self._out.signing, seen=self._in.signing.timestamp)
-        packable: _Packable = message  # type: ignore[assignment]  # every message of the library can
+        packable: _Packable = message  # type: ignore[assignment]  # every message of the library has `pack`
         frame = packable.pack(self._out)
         self._out.seq = (self._out.seq + 1) % 256
         return frame
 
     def parse(self, data: bytes) -> list[Message]:
-        """Every message that `data` completes, noise among them as BAD_DATA; never raises for what comes in."""
+        """Return every message that `data` completes, including noise as BAD_DATA; never raises for received data."""
         found: list[Message] = []
         while (message := self._next(data)) is not None:
             found.append(message)
             data = b""
-        if self._in.buf_index > _SPENT_BYTES:  # the library frees its buffer only when that happens to run empty
+        if self._in.buf_index > _SPENT_BYTES:  # the library frees its buffer only when it is empty
             del self._in.buf[: self._in.buf_index]
             self._in.buf_index = 0
         return found
 
     def _next(self, data: bytes) -> Message | None:
-        """The next message that `data` completes.
+        """Return the next message that `data` completes, or None.
 
-        The library believes the time stamp of a frame before it has checked the signature: one flipped bit, or one
-        forged frame, and everything after it would be refused as old. So what a bad frame said of time is forgotten.
+        The library stores the time stamp of a frame before it has checked the signature. After one corrupt or forged
+        frame, all later frames could be refused as old. So the time stamps are reset after a bad frame.
         """
         times = dict(self._in.signing.stream_timestamps)
         message: Message | None = self._in.parse_char(data)
@@ -171,7 +172,7 @@ class Codec:
 
 
 _MOCAP_MESSAGES: Final = ("ODOMETRY", "VISION_", "ATT_POS_MOCAP")
-"""What a bridge may say in the vehicle's name, by numbers of its own."""
+"""Messages that a bridge may send under the vehicle's system id, with its own sequence numbers."""
 
 PAPARAZZI: Final = Dialect(
     name="paparazzi",
@@ -206,7 +207,7 @@ _EVENT_FIELDS: Final[Mapping[str, str]] = MappingProxyType(
         "arguments": "uint8_t",
     }
 )
-"""In the order of the wire. CRC_EXTRA, 160, follows from these names and types."""
+"""Fields in wire order. CRC_EXTRA, 160, follows from these names and types."""
 _EVENT_ARGUMENTS: Final = 40
 
 
@@ -219,10 +220,10 @@ def _load(module: str) -> ModuleType:
 
 
 def _event_of(library: ModuleType) -> type:
-    """EVENT (https://mavlink.io/en/messages/common.html#EVENT), which the library leaves out."""
+    """Return the class of EVENT (https://mavlink.io/en/messages/common.html#EVENT), which the library lacks."""
     names = list(_EVENT_FIELDS)
 
-    def __init__(self: Any, *values: object, **named: object) -> None:  # noqa: N807 - of the class that is made here
+    def __init__(self: Any, *values: object, **named: object) -> None:  # noqa: N807 - method of the class created below
         library.MAVLink_message.__init__(self, _EVENT, "EVENT")
         self._fieldnames = names
         for name, value in {**dict(zip(names, values, strict=False)), **named}.items():
@@ -259,14 +260,14 @@ def _classes(module: str) -> Mapping[str, type]:
 
 @cache
 def _capacities(known: type) -> Mapping[str, int]:
-    """How many characters each text field holds."""
+    """Return the capacity of each text field, in characters."""
     kinds = dict(zip(known.fieldnames, known.fieldtypes, strict=True))  # type: ignore[attr-defined]
     lengths = zip(known.ordered_fieldnames, known.array_lengths, strict=True)  # type: ignore[attr-defined]
     return {name: length for name, length in lengths if kinds[name] == "char"}
 
 
 def _wire(known: type, name: str, value: FieldValue) -> FieldValue:
-    """As the library wants it: text as bytes, and none that it would cut without a word."""
+    """Convert a field for the library: text to bytes. Raises ValueError for text that it would silently truncate."""
     encoded = value.encode("ascii") if isinstance(value, str) else value
     capacity = _capacities(known).get(name)
     if capacity is not None and isinstance(encoded, bytes) and len(encoded) > capacity:

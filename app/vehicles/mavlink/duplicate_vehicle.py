@@ -1,7 +1,7 @@
-"""Whether one vehicle speaks under one system id, or two by turns.
+"""Detection of two vehicles that use the same system id.
 
-Two that speak at once use every sequence number twice, with other contents, and tell two times. A packet that comes
-twice, late or in another order does neither.
+Two vehicles that send at the same time use every sequence number twice, with different contents, and report two times.
+Packets that are repeated, late or out of order do neither.
 """
 
 from collections import deque
@@ -11,21 +11,21 @@ from typing import Final
 NUMBERS: Final = 256
 WITHIN_S: Final = 2.0
 PIECES: Final = 6
-"""So many pieces of evidence within that time, and it is certain."""
+"""Pieces of evidence within `WITHIN_S` that make a duplicate certain."""
 LASTS_S: Final = 0.12
-"""Evidence that comes within less than this is one stream's that began fast: its rate is not known yet."""
+"""Shorter evidence is of one stream that began fast, because its rate is not known yet."""
 REMEMBERED_S: Final = 5.0
-"""How long it stays certain once the evidence is gone."""
+"""Time for which a duplicate stays certain after the evidence ends."""
 
 _SAME_CLOCK_S: Final = 0.6
-"""Two time stamps that differ by less from what has passed are of one clock: packets may be held up."""
+"""Two time stamps are of one clock if they differ from the elapsed time by less than this, the delay of packets."""
 _RATE_OVER_S: Final = 1.0
 _PEAK_OVER_S: Final = 10.0
 _AT_ONCE: Final = 16
 _LATE: Final = 100
-"""A number that lies so little behind the latest, and was not used yet, is of a packet that was held up."""
+"""An unused number less than this behind the latest is of a delayed packet."""
 _OF_A_ROUND: Final = 0.9
-"""The share of a round of sequence numbers after which one may come again."""
+"""Share of a cycle of sequence numbers after which one may be used again."""
 
 
 @dataclass(slots=True)
@@ -36,7 +36,7 @@ class _Used:
 
 
 class DuplicateDetector:
-    """The messages of one component, in the order in which they came."""
+    """Detector for the messages of one component, in the order of receipt."""
 
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
@@ -51,16 +51,16 @@ class DuplicateDetector:
         self._why = ""
 
     def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None) -> None:
-        """A message by its whole frame and sequence number; `boot_s`: the time that it tells, where it tells one."""
+        """Add a message by its whole frame and sequence number; `boot_s` is its time stamp, if it has one."""
         if self._hear_number(frame, number, now_s) and boot_s is not None:
             self._hear_clock(boot_s - now_s, now_s)
 
     def reason(self, now_s: float) -> str:
-        """Why two are believed to speak; empty while one does."""
+        """Return the evidence for two vehicles; empty without evidence."""
         if self._is_certain(self._doubled_numbers, now_s):
-            self._certain_s, self._why = now_s, "Its sequence numbers come twice, with other contents."
+            self._certain_s, self._why = now_s, "Its sequence numbers are repeated with different contents."
         elif self._is_certain(self._doubled_clocks, now_s):
-            self._certain_s, self._why = now_s, "Its messages tell two times by turns."
+            self._certain_s, self._why = now_s, "Its messages alternate between two clocks."
         is_recent = self._certain_s is not None and now_s - self._certain_s < REMEMBERED_S
         return self._why if is_recent else ""
 
@@ -70,7 +70,7 @@ class DuplicateDetector:
         return len(evidence) >= PIECES and evidence[-1] - evidence[0] >= LASTS_S
 
     def _hear_number(self, frame: bytes, number: int, now_s: float) -> bool:
-        """Whether the packet came in its turn: not once more, nor later than others that were sent after it."""
+        """Process a sequence number; return whether the packet is in order, neither repeated nor late."""
         self._count += 1
         used = self._used.get(number)
         is_taken = used is not None and self._is_of_this_round(used, now_s)
@@ -89,12 +89,12 @@ class DuplicateDetector:
         return not is_late
 
     def _is_of_this_round(self, used: _Used, now_s: float) -> bool:
-        """Whether the numbers cannot have come round since it was used."""
+        """Whether the sequence numbers cannot have completed a cycle since this one was used."""
         round_s = _OF_A_ROUND * NUMBERS / self._rate.number_hz
         return self._count - used.count < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
 
     def _hear_clock(self, offset_s: float, now_s: float) -> None:
-        """Evidence is a return: from another clock to one that was heard a moment ago."""
+        """Process a clock offset; evidence is a return from another clock to a recent one."""
         for clock, (known_s, at_s) in self._clocks.items():
             if abs(offset_s - known_s) < _SAME_CLOCK_S and now_s - at_s < WITHIN_S:
                 if clock != self._clock:
@@ -108,7 +108,7 @@ class DuplicateDetector:
 
 
 class _Rate:
-    """How many sequence numbers are used up within a second, lost ones among them: the most of the last while."""
+    """Greatest recent rate at which sequence numbers are used, including those of lost packets."""
 
     def __init__(self) -> None:
         self._passed: deque[tuple[float, int]] = deque()
@@ -121,7 +121,7 @@ class _Rate:
         return max(self._peak, self._former_peak) / _RATE_OVER_S
 
     def pass_on(self, numbers: int, now_s: float) -> None:
-        """What comes at one instant was held up: most of it was not sent within the last second."""
+        """Count numbers; of packets that arrive at one instant only some, because they were delayed and sent before."""
         at_once = self._passed[-1][1] if self._passed and self._passed[-1][0] == now_s else 0
         counted = min(numbers, _AT_ONCE - at_once)
         if at_once:

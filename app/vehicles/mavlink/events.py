@@ -1,5 +1,5 @@
-"""Events and commands of a trial: what a vehicle's messages mean, whichever autopilot sent them, what else goes into
-the trial machine, and what comes out of it. SI, altitude and climb positive up; events carry their time.
+"""Events and commands of a trial: autopilot-independent measurements from a vehicle's messages, other inputs of the
+trial machine, and its outputs. SI units, altitude and climb rate positive up; events carry their time.
 """
 
 import math
@@ -9,12 +9,12 @@ from enum import StrEnum
 from typing import Final
 
 DISARMING: Final = "command 400"
-"""What an answer to arming and disarming refers to (`Reply.to`)."""
+"""`CommandReply.to` of a reply to arming and disarming."""
 
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """By the vehicle's own clock and origin; `climb_rate_m_s` is the vehicle's own estimate."""
+    """Position by the vehicle's own clock and origin; `climb_rate_m_s` is the vehicle's own estimate."""
 
     time_boot_s: float
     altitude_m: float
@@ -23,14 +23,14 @@ class Position:
     east_m: float = 0.0
 
     def away_m(self, start: "Position") -> float:
-        """How far it is from there, horizontally."""
+        """Return the horizontal distance from `start`."""
         return math.hypot(self.north_m - start.north_m, self.east_m - start.east_m)
 
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """Of an autopilot, by its MAVLink `system` and `component`. `mode` in its own numbers, as text; `autopilot` is
-    MAVLink's number of its make."""
+    """Heartbeat of an autopilot with its MAVLink `system` and `component`. `mode` is the autopilot's mode number as
+    text, `autopilot` a MAV_AUTOPILOT."""
 
     autopilot: int
     armed: bool
@@ -41,7 +41,7 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """None where the vehicle does not know. `may_arm`: whether its own checks would let it be armed, told beside."""
+    """Battery voltage, and from the same message whether the vehicle's own checks allow arming; None if unknown."""
 
     voltage_v: float | None
     may_arm: bool | None = None
@@ -49,7 +49,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class StatusText:
-    """A line of text from the vehicle; of a longer one (with a `number`) the piece that has this `place`."""
+    """A status text, or of a longer one (with a `number`) the chunk at this `place`."""
 
     text: str
     number: int = 0
@@ -59,7 +59,7 @@ class StatusText:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """`place` of `count` in the vehicle's own list, where it is told; the same parameter with or without."""
+    """A parameter's value, with its `place` among the `count` in the vehicle's list if reported; not compared."""
 
     name: str
     value: float
@@ -69,7 +69,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class CommandReply:
-    """The vehicle's answer to what was asked: `to` is "command 400" or "waypoint"."""
+    """The vehicle's reply to a request: `to` is "command 400" or "waypoint"."""
 
     to: str
     accepted: bool
@@ -78,21 +78,21 @@ class CommandReply:
 
 @dataclass(frozen=True, slots=True)
 class FenceBreach:
-    """The vehicle's own fence was crossed; which limit of it, where it is told."""
+    """The vehicle has crossed its own fence; `limit` names which limit, if reported."""
 
     limit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class LandedState:
-    """Whether the vehicle itself believes to be on the ground."""
+    """Whether the vehicle reports that it is on the ground."""
 
     on_ground: bool
 
 
 @dataclass(frozen=True, slots=True)
 class BlockCount:
-    """How many blocks Paparazzi's flight plan has."""
+    """Number of blocks in Paparazzi's flight plan."""
 
     count: int
 
@@ -107,14 +107,14 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class BlockEntered:
-    """Paparazzi's flight plan has come to another block."""
+    """Paparazzi's flight plan has entered another block."""
 
     number: int
 
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """What the autopilot's firmware calls itself, and its hardware's own id; either empty where it is not told."""
+    """Version of the autopilot's firmware, and its hardware id; either is empty if not reported."""
 
     version: str
     uid: str = ""
@@ -122,7 +122,7 @@ class Version:
 
 @dataclass(frozen=True, slots=True)
 class VehicleEvent:
-    """One event of MAVLink's events interface; what its `arguments` mean depends on its `number`."""
+    """One event of MAVLink's events interface; the meaning of its `arguments` depends on its `number`."""
 
     number: int
     sequence: int
@@ -147,7 +147,7 @@ Measurement = (
 
 
 def confirms_motors_off(measurement: Measurement | None, stop_settings: Collection[str]) -> bool:
-    """Whether it answers the order to stop the motors: the command accepted, or a setting that stops them read back."""
+    """Whether this confirms the command to stop the motors: it was accepted, or a stop setting was read back as set."""
     match measurement:
         case CommandReply(to=to, accepted=True):
             return to == DISARMING
@@ -158,20 +158,20 @@ def confirms_motors_off(measurement: Measurement | None, stop_settings: Collecti
 
 
 class Action(StrEnum):
-    """What a vehicle is told to do, by whatever messages its autopilot wants."""
+    """Actions of a vehicle, independent of the messages that its autopilot needs for them."""
 
     ARM = "arm"
     TAKE_OFF = "take off"
     LAND = "land"
     MOTORS_OFF = "motors off"
-    """On the ground: some autopilots refuse it in the air."""
+    """On the ground only: some autopilots refuse it in flight."""
     KILL = "stop its motors"
     """At any height."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A parameter by its name on the vehicle, with the value to send."""
+    """Parameter name on the vehicle and the value to send."""
 
     parameter: str
     value: float
@@ -184,7 +184,7 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class PacketReceived:
-    """A packet from the vehicle; None where it measures nothing."""
+    """A packet from the vehicle; `measurement` is None if it contains none."""
 
     measurement: Measurement | None
     now_s: float
@@ -198,7 +198,7 @@ class AbortRequested:
 
 @dataclass(frozen=True, slots=True)
 class MotorsOffRequested:
-    """By a person, who has seen what the program has not: at any height."""
+    """Request of a person to stop the motors at any height."""
 
     reason: str
     now_s: float
@@ -206,8 +206,8 @@ class MotorsOffRequested:
 
 @dataclass(frozen=True, slots=True)
 class SecondaryAltitudeReceived:
-    """The second source of altitude spoke. `altitude_m` is on the vehicle's datum; `is_new` where it really saw the
-    vehicle, and not once more what it saw before."""
+    """Sample of the second source of altitude. `altitude_m` is on the vehicle's datum; `is_new` is false if the sample
+    repeats an old one or the vehicle is not tracked."""
 
     altitude_m: float
     is_new: bool
@@ -216,7 +216,7 @@ class SecondaryAltitudeReceived:
 
 @dataclass(frozen=True, slots=True)
 class DuplicateVehicleDetected:
-    """Two vehicles speak under one system id; `why` says how that shows."""
+    """Two vehicles use the same system id; `why` is the evidence."""
 
     why: str
     now_s: float
@@ -224,7 +224,7 @@ class DuplicateVehicleDetected:
 
 @dataclass(frozen=True, slots=True)
 class ActionDone:
-    """The vehicle has taken what an action sends."""
+    """The vehicle has acknowledged all messages of an action."""
 
     action: Action
     now_s: float
@@ -239,7 +239,7 @@ class ActionRefused:
 
 @dataclass(frozen=True, slots=True)
 class GainsRestored:
-    """The safe gains were written and read back; `problem` says why not."""
+    """The safe gains were written and read back; otherwise `problem` is the reason."""
 
     now_s: float
     problem: str = ""
@@ -265,7 +265,7 @@ class PerformAction:
 
 @dataclass(frozen=True, slots=True)
 class SendGain:
-    """Once, without waiting for an answer."""
+    """Send a gain once, without waiting for a reply."""
 
     setting: Setting
 
@@ -277,7 +277,7 @@ class RestoreGains:
 
 @dataclass(frozen=True, slots=True)
 class RecordSample:
-    """A sample that belongs to the record, with what it was to be, and where the second source saw the vehicle."""
+    """A sample of the record, with its set point and the altitude of the second source."""
 
     position: Position
     set_point_m: float

@@ -1,5 +1,6 @@
-"""Failures of a trial: how each is noticed, what is done, what the trial is then worth, and what a person is told; and
-the limits that a trial must keep. The order of the table is that of severity: the first failure that holds counts.
+"""Failures of a trial: detection, reaction, outcome and message of each; and the limits of a trial.
+
+The table is ordered by severity: of several failures the first one counts.
 """
 
 from collections.abc import Mapping
@@ -9,14 +10,14 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 Outcome = Literal["refused", "aborted", "invalid", "quarantine"]
-"""refused: nothing flew. aborted: a safety limit was met, which says something about the gains. invalid: the
-measurement is no good. quarantine: as invalid, and the vehicle's state is in doubt."""
+"""refused: nothing flew. aborted: a safety limit was exceeded, which counts against the gains. invalid: the measurement
+is unusable. quarantine: as invalid, and the vehicle's state is uncertain."""
 
 Reaction = Literal["none", "restore gains", "disarm", "land, gains first", "land", "repeat land", "cease", "note"]
 
 
 class Failure(StrEnum):
-    """By the numbers of the documentation."""
+    """Failures by their numbers in docs/real-flight.md."""
 
     NO_HEARTBEAT = "F1"
     PARAMETER = "F2"
@@ -41,7 +42,8 @@ class Failure(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """`detection`: when it holds; `reaction`: what the program does at once; `text`: what a person is told."""
+    """Response to a failure. `detection`: condition of the failure; `reaction`: immediate action; `text`: message to
+    the operator."""
 
     detection: str
     reaction: Reaction
@@ -52,7 +54,7 @@ class Response:
 RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
     {
         Failure.NO_HEARTBEAT: Response(
-            "no heartbeat within 5 s", "none", "refused", "No heartbeat was heard; nothing was sent."
+            "no heartbeat within 5 s", "none", "refused", "No heartbeat was received; nothing was sent."
         ),
         Failure.PARAMETER: Response(
             "a gain unconfirmed after five attempts, 0.5 s apart, or read back unequal",
@@ -61,7 +63,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "The vehicle did not confirm its gains; it was not armed.",
         ),
         Failure.NOT_ARMED: Response(
-            "arming refused, or not armed 2 s after it", "disarm", "refused", "The vehicle would not arm."
+            "arming refused, or not armed 2 s after it", "disarm", "refused", "The vehicle did not arm."
         ),
         Failure.NO_LIFT_OFF: Response(
             "take-off refused, or less than 0.15 m above the ground by the autopilot's time",
@@ -73,23 +75,23 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "no packet for 1 s, or three heartbeats missed",
             "repeat land",
             "invalid",
-            "The link was lost in the air; Land was repeated, the vehicle's own failsafe decides.",
+            "The link was lost in flight. Land was repeated; the vehicle's own failsafe decides.",
         ),
         Failure.ENVELOPE: Response(
-            "a limit of altitude, place, speed or oscillation, or the vehicle's own fence",
+            "a limit of altitude, position, speed or oscillation, or the vehicle's own fence",
             "land, gains first",
             "aborted",
-            "A safety limit was met.",
+            "A safety limit was exceeded.",
         ),
         Failure.BATTERY: Response(
-            "below the limit for 1 s, or unknown for 10 s", "land", "invalid", "The battery is low, or unknown."
+            "below the limit for 1 s, or unknown for 10 s", "land", "invalid", "The battery voltage is low or unknown."
         ),
-        Failure.OPERATOR: Response("asked for", "land, gains first", "aborted", "Aborted."),
+        Failure.OPERATOR: Response("requested by the operator", "land, gains first", "aborted", "Aborted."),
         Failure.FROZEN: Response(
-            "packets, but a clock that stands still for 0.25 s",
+            "packets arrive, but the vehicle's clock stands still for 0.25 s",
             "land",
             "invalid",
-            "The vehicle's position stood still while it went on talking.",
+            "The vehicle's position froze while packets still arrived.",
         ),
         Failure.GLITCHES: Response(
             "more than three lone samples that jump by 0.3 m or are faster than 6 m/s",
@@ -101,50 +103,50 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "two sources more than 0.3 m apart for 0.3 s", "land", "invalid", "Two sources of altitude disagree."
         ),
         Failure.LOST_POSITION: Response(
-            "none of its positions could be believed for 0.5 s, more than 15 a second are doubted, "
-            "or its altitude stays 0.5 m behind its climb rate as it takes off",
+            "no plausible position for 0.5 s, more than 15 implausible ones a second, "
+            "or an altitude that stays 0.5 m behind the climb rate during take-off",
             "land",
             "invalid",
             "The vehicle's position was lost.",
         ),
         Failure.SLOW_CLOCK: Response(
-            "the record not whole 3 s after it had to be, by the ground's clock",
+            "the record incomplete 3 s after its end, by the ground's clock",
             "land",
             "invalid",
-            "The vehicle's clock goes slower than its clock_speed says.",
+            "The vehicle's clock is slower than its clock_speed.",
         ),
         Failure.TAKEN_OVER: Response(
-            "a mode in which a person flies it, in heartbeats that agree",
+            "a manual mode, in heartbeats that agree",
             "cease",
             "quarantine",
-            "Somebody took the vehicle over by hand; it was left alone.",
+            "A pilot took over manual control; no more commands were sent.",
         ),
         Failure.UNEXPECTED: Response(
-            "another mode or block, a disarming or a reboot that was not asked for, in messages that agree",
+            "another mode or block, a disarming or a reboot that was not commanded, in messages that agree",
             "land",
             "quarantine",
-            "The vehicle changed its state without being asked; it was told to land, and its motors were not stopped.",
+            "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.",
         ),
         Failure.INTERRUPTED: Response(
-            "one heartbeat in a mode in which a person flies it, and the next in another",
+            "one heartbeat in a manual mode, and the next in another",
             "note",
             "invalid",
-            "A person may have flown the vehicle for a moment.",
+            "A pilot may have flown the vehicle briefly.",
         ),
         Failure.OWN_LANDING: Response(
-            "a landing that was not asked for: its own failsafe, or an exception of its flight plan",
+            "a landing that was not commanded: its own failsafe, or an exception of its flight plan",
             "land",
             "invalid",
             "The vehicle began to land by itself.",
         ),
         Failure.DOUBLED: Response(
-            "sequence numbers that come twice with other contents, or two clocks by turns, under one system id",
+            "repeated sequence numbers with different contents, or two alternating clocks, under one system id",
             "land",
             "quarantine",
-            "Two vehicles speak under one system id; both were told to land, and no motors were stopped.",
+            "Two vehicles use the same system id. Both were commanded to land; no motors were stopped.",
         ),
         Failure.FALL: Response(
-            "the ground met at more than 2 m/s",
+            "ground contact at more than 2 m/s",
             "note",
             "quarantine",
             "The vehicle fell.",
@@ -153,14 +155,14 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
 )
 
 
-HELP: Final = "fly it by hand, or stop its motors"
-"""What is left to a person where a vehicle does not obey."""
-UNHEEDED: Final = f"It was told to land, and does not come down: {HELP}."
+HELP: Final = "fly it manually, or stop its motors"
+"""What the operator can still do if a vehicle does not respond to Land."""
+UNHEEDED: Final = f"It was commanded to land but does not descend: {HELP}."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """A limit that is not kept, in words."""
+    """A detected failure with its explanation."""
 
     failure: Failure
     why: str
@@ -169,33 +171,36 @@ class Finding:
 GAIN_FAILURES: Final = frozenset(
     {failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"}
 )
-"""Failures that speak against the gains: the safe ones are sent before Land. A vehicle that lifted off late, its
+"""Failures that count against the gains: the safe gains are sent before Land. A vehicle that lifts off late, with its
 integrator wound up, is treated in the same way."""
 
 
 MAX_WITNESS_GAP: Final = 1.05
-"""Periods of its heartbeat that lie between two of them which agree: one that said otherwise would come between."""
+"""Heartbeat periods between two heartbeats that confirm each other: a contradicting one would arrive between them."""
 HEARTBEATS_MISSED: Final = 3.5
-"""Periods of its heartbeat after which a vehicle that has sent none is lost."""
+"""Heartbeat periods without a heartbeat after which the vehicle counts as lost."""
 GROUND_M: Final = 0.15
-"""Nearer to the ground than this a vehicle may stand on it."""
+"""Height below which a vehicle may be standing on the ground."""
 REPEAT_S: Final = 1.0
-"""How often an order is repeated that a vehicle has not obeyed."""
+"""Interval at which a command is repeated until the vehicle responds."""
 _LAND_REPEATED_S: Final = 5.0
-"""For so long Land is repeated as often as any other order."""
+"""Time for which Land is repeated every `REPEAT_S`."""
 UNHEEDED_S: Final = 5.0
-"""A vehicle that has not begun to land so long after it was told does not obey."""
+"""Time after the command to land after which a vehicle that does not descend is reported."""
 DESCENDING_M_S: Final = -0.2
-"""A vehicle that sinks faster than this is landing."""
+"""A vehicle that descends faster than this is landing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """`set_point_m` is on the vehicle's own datum, as altitudes are; `ceiling_m` counts from the ground under it. Modes
-    are as `Heartbeat` names them: `flying_modes` and `landing_modes` are empty where any will do, `hovering_modes`
-    follow upon the climb, in `manual_modes` a person flies, `mode_names` is what people call them. Heartbeats come
-    every `heartbeat_s`. `blocks` are a flight plan's by number, `arming_blocks` and so on the names of those that the
-    vehicle may be in, empty where it has none."""
+    """Limits of a trial.
+
+    `set_point_m` is on the vehicle's own datum, like altitudes; `ceiling_m` is above the ground under the vehicle.
+    Modes are named as in `Heartbeat`: `flying_modes` and `landing_modes` are empty if any mode is allowed, the vehicle
+    enters `hovering_modes` after the climb, in `manual_modes` a pilot flies, and `mode_names` are for display.
+    Heartbeats are sent every `heartbeat_s`. `blocks` are the names of the flight plan's blocks by number;
+    `arming_blocks`, `flying_blocks` and `landing_blocks` are those that the vehicle may be in, empty if it has none.
+    """
 
     set_point_m: float
     heartbeat_s: float
@@ -222,11 +227,11 @@ class Limits:
 
     @property
     def confirmation_s(self) -> float:
-        """How far apart two heartbeats are that agree without another between them having said otherwise."""
+        """Minimum time between two heartbeats that confirm each other."""
         return MAX_WITNESS_GAP * self.heartbeat_s
 
     def stretched(self, patience: float) -> "Limits":
-        """The same with so many times the patience for packets that do not come."""
+        """Return the limits with all timeouts for packets multiplied by this factor."""
         return replace(
             self,
             heartbeat_s=self.heartbeat_s * patience,
@@ -238,6 +243,6 @@ class Limits:
 
 
 def land_every_s(asked_for_s: float, land_again_s: float) -> float:
-    """How often Land is repeated that was first asked for `asked_for_s` ago. After some seconds only as often as the
-    autopilot bears: where every order begins the landing anew, it would never be over."""
+    """Return the interval at which Land is repeated, s, `asked_for_s` after the first command. After some seconds it is
+    `land_again_s`, because on some autopilots every command restarts the landing, which would then never end."""
     return REPEAT_S if asked_for_s < _LAND_REPEATED_S else land_again_s

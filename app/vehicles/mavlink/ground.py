@@ -1,4 +1,4 @@
-"""The height of the ground under a vehicle between arming and the take-off command: pure functions of a trial."""
+"""Height of the ground under a vehicle between arming and the take-off command, as pure functions of a trial."""
 
 import statistics
 from collections.abc import Sequence
@@ -14,15 +14,14 @@ from app.vehicles.mavlink.trial_transitions import Trial
 
 _IN_PLACE_M: Final = 0.3
 _SHIFT_M: Final = 0.3
-"""By how much any altitude may shift on the ground as the motors start."""
+"""Greatest shift of the altitude on the ground as the motors start, unless the autopilot resets it then."""
 _CLIMBED_M: Final = 0.1
-"""A vehicle that has climbed less, by its climb rate, has not moved."""
+"""A vehicle that has climbed by less than this, by its climb rate, has not moved."""
 
 
 def measure(trial: Trial, now_s: float) -> Trial:
-    """The trial with heights that count from where the vehicle stands now, for its altitude shifts as its motors start,
-    and begins anew on an autopilot that counts from the ground. Where it may have moved, the ground stays where it
-    was."""
+    """Return the trial with the ground where the vehicle stands now, because its altitude shifts as its motors start,
+    and is reset by an autopilot that counts from the ground. If it may have moved, the ground is unchanged."""
     watch, plan, samples = trial.watch, trial.plan, trial.ground_samples
     stood = samples[len(samples) // 2 :]
     if not stood or watch.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
@@ -44,7 +43,7 @@ def measure(trial: Trial, now_s: float) -> Trial:
 
 
 def find_departure(trial: Trial) -> Finding | None:
-    """That a vehicle which has not been told to climb may have left the ground, by its altitude."""
+    """Find that a vehicle without a take-off command may have left the ground, by its altitude."""
     last = trial.watch.last
     if last is None or abs(away_m := last.altitude_m - trial.plan.ground_m) <= GROUND_M:
         return None
@@ -53,7 +52,7 @@ def find_departure(trial: Trial) -> Finding | None:
 
 
 def find_disagreement(trial: Trial, now_s: float) -> Finding | None:
-    """Between the vehicle's altitude on the ground and that of the second source, which was last seen before any
+    """Find a disagreement between the vehicle's altitude on the ground and the second source's last one before a
     shift."""
     seen_m, last = secondary_altitude.current_altitude_m(trial.watch.second, now_s), trial.watch.last
     if seen_m is None or last is None:
@@ -66,5 +65,5 @@ def find_disagreement(trial: Trial, now_s: float) -> Finding | None:
 
 
 def _climbed_m(samples: Sequence[Position]) -> float:
-    """By its climb rate alone."""
+    """Return the climb by climb rate alone, m."""
     return sum(later.climb_rate_m_s * (later.time_boot_s - earlier.time_boot_s) for earlier, later in pairwise(samples))

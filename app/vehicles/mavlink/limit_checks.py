@@ -1,4 +1,4 @@
-"""The limits of a trial held against what is remembered of the vehicle: what is not kept, in words."""
+"""Checks of the limits of a trial against the observation of the vehicle; each returns the finding or None."""
 
 from typing import Final
 
@@ -13,9 +13,9 @@ from app.vehicles.mavlink.observation import (
 )
 
 _IN_TURN: Final = 0.8
-"""Heartbeats nearer than so many periods are not of one vehicle."""
+"""Minimum interval of one vehicle's heartbeats, in periods; closer ones are of two vehicles."""
 _OWN_CEILING_M: Final = 0.5
-"""How far below our ceiling a vehicle's own may be."""
+"""Maximum distance of a vehicle's own ceiling below ours."""
 _LOW_BATTERY_S: Final = 1.0
 _NO_BATTERY_S: Final = 10.0
 _IMPACT_BELOW_M: Final = 0.5
@@ -24,7 +24,7 @@ _CLIMBED_WITHIN_M: Final = 1.0
 
 
 def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
-    """The gravest limit that a vehicle does not keep that has not been told to take off."""
+    """Return the most severe failure of a vehicle before the take-off command, if any."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
     return (
@@ -37,46 +37,47 @@ def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Fin
 
 
 def find_taken_over(watch: TrialObservation, limits: Limits) -> Finding | None:
-    """A person flies it now."""
+    """Find that a pilot flies the vehicle now."""
     mode = mode_of(watch, limits)
     if not watch.armed or mode not in limits.manual_modes:
         return None
-    return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle went into mode {_named(mode, limits)}.")
+    return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle entered mode {_named(mode, limits)}.")
 
 
 def find_interruption(before: TrialObservation, watch: TrialObservation, limits: Limits) -> Finding | None:
-    """A pilot's mode that only the last heartbeat of the observation `before` told of, and the one after it no more,
-    unless it came between two of the vehicle's own."""
+    """Find a manual mode that only the last heartbeat of the observation `before` reported and the next one did not,
+    unless it arrived between two heartbeats of the vehicle."""
     was_by_hand = before.armed and before.mode in limits.manual_modes
     in_turn_s = _IN_TURN * limits.heartbeat_s
     is_in_turn = min(before.heartbeat_gap_s, watch.heartbeat_gap_s) >= in_turn_s
     if not (was_by_hand and is_in_turn) or watch.mode in limits.manual_modes:
         return None
-    return Finding(failure=Failure.INTERRUPTED, why=f"One heartbeat told of the mode {_named(before.mode, limits)}.")
+    return Finding(failure=Failure.INTERRUPTED, why=f"One heartbeat reported mode {_named(before.mode, limits)}.")
 
 
 def find_unexpected(
     watch: TrialObservation, limits: Limits, modes: frozenset[str], blocks: frozenset[str] = frozenset()
 ) -> Finding | None:
-    """`modes` and `blocks` are those that it may be in, empty where any will do."""
+    """Find a reboot, a disarming, or a mode or block that is not allowed; `modes` and `blocks` are the allowed ones,
+    empty if any is."""
     why, mode = "", mode_of(watch, limits)
     if watch.rebooted:
         why = "The vehicle rebooted."
     elif is_disarmed(watch, limits):
         why = "The vehicle disarmed itself in the air."
     elif modes and mode and mode not in modes:
-        why = f"The vehicle went into mode {_named(mode, limits)}."
+        why = f"The vehicle entered mode {_named(mode, limits)}."
     elif blocks and watch.block and watch.block not in blocks:
-        why = f"Its flight plan went to the block “{watch.block}”."
+        why = f"Its flight plan entered the block “{watch.block}”."
     return Finding(failure=Failure.UNEXPECTED, why=why) if why else None
 
 
 def find_interrupted_climb(watch: TrialObservation, limits: Limits) -> Finding | None:
-    """A vehicle that hovers before it was ever near its set point: its own failsafe, or a person, has stopped it."""
+    """Find a vehicle that hovers before it has been near its set point: its failsafe or a person has stopped it."""
     mode = mode_of(watch, limits)
     if mode not in limits.hovering_modes or watch.highest_m >= limits.set_point_m - _CLIMBED_WITHIN_M:
         return None
-    why = f"The vehicle went into mode {_named(mode, limits)} before it had climbed."
+    why = f"The vehicle entered mode {_named(mode, limits)} before it had climbed."
     return Finding(failure=Failure.UNEXPECTED, why=why)
 
 
@@ -85,13 +86,13 @@ def _named(mode: str, limits: Limits) -> str:
 
 
 def find_own_landing(watch: TrialObservation, limits: Limits, ground_m: float, *, mode_known: bool) -> Finding | None:
-    """For a vehicle that should fly. `mode_known`: its mode is not the one from before the command. So high up it is
-    the vehicle's own ceiling, somewhat below ours, that was met."""
+    """Find a landing of a vehicle that should fly. `mode_known`: its mode is not the one before the command. Close
+    below our ceiling, the vehicle's own ceiling is the cause, and the failure is that of the envelope."""
     why = ""
     if mode_known and (mode := mode_of(watch, limits)) in limits.landing_modes - limits.flying_modes:
-        why = f"It went into mode {_named(mode, limits)}."
+        why = f"It entered mode {_named(mode, limits)}."
     elif watch.block in limits.landing_blocks:
-        why = f"Its flight plan went to the block “{watch.block}”."
+        why = f"Its flight plan entered the block “{watch.block}”."
     if not why or watch.last is None:
         return None
     if (height_m := watch.last.altitude_m - ground_m) > limits.ceiling_m - _OWN_CEILING_M:
@@ -105,7 +106,7 @@ def find_doubled(watch: TrialObservation) -> Finding | None:
 
 def find_link(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     if now_s - watch.heard_s > limits.silent_s:
-        return Finding(failure=Failure.LINK, why=f"Nothing was heard for {limits.silent_s:g} s.")
+        return Finding(failure=Failure.LINK, why=f"Nothing was received for {limits.silent_s:g} s.")
     if now_s - watch.heartbeat_s > HEARTBEATS_MISSED * limits.heartbeat_s:
         return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
     return None
@@ -135,17 +136,17 @@ def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Findin
 
 
 def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
-    """To be asked after `find_link`: silence is a lost link."""
+    """Find a lost position; to be called after `find_link`, because silence is a lost link."""
     why = ""
     if now_s - watch.accepted_s > limits.lost_s and watch.heard_s - watch.accepted_s > limits.lost_s:
-        why = f"None of its positions could be believed for {limits.lost_s:g} s."
+        why = f"None of its positions was plausible for {limits.lost_s:g} s."
     elif has_unreliable_position(watch):
-        why = "Its position jumps to and fro."
+        why = "Its position jumps back and forth."
     return Finding(failure=Failure.LOST_POSITION, why=why) if why else None
 
 
 def find_altitude_behind(watch: TrialObservation) -> Finding | None:
-    """For a vehicle that was told to climb and is on the ground by its altitude."""
+    """Find that a vehicle commanded to climb is on the ground by its altitude but climbs by its climb rate."""
     if not is_behind_climb_rate(watch):
         return None
     why = f"By its climb rate it rose by {watch.behind_m:.1f} m more than by its altitude."
@@ -156,16 +157,16 @@ def find_battery(watch: TrialObservation, now_s: float) -> Finding | None:
     if watch.low_since_s is not None and now_s - watch.low_since_s > _LOW_BATTERY_S:
         return Finding(failure=Failure.BATTERY, why=f"The battery was at {watch.battery_v:.1f} V.")
     if now_s - watch.battery_s > _NO_BATTERY_S:
-        return Finding(failure=Failure.BATTERY, why=f"No battery voltage was heard for {_NO_BATTERY_S:g} s.")
+        return Finding(failure=Failure.BATTERY, why=f"No battery voltage was received for {_NO_BATTERY_S:g} s.")
     return None
 
 
 def find_fall(watch: TrialObservation, limits: Limits, ground_m: float) -> Finding | None:
-    """It comes to the ground faster than anything that lands."""
+    """Find ground contact at a speed above that of any landing."""
     last = watch.last
     if last is None or watch.doubted is not None or watch.leapt:
         return None
     near = last.altitude_m - ground_m < _IMPACT_BELOW_M
     if not near or last.climb_rate_m_s >= -limits.impact_m_s:
         return None
-    return Finding(failure=Failure.FALL, why=f"It came to the ground at {-last.climb_rate_m_s:.1f} m/s.")
+    return Finding(failure=Failure.FALL, why=f"It hit the ground at {-last.climb_rate_m_s:.1f} m/s.")

@@ -1,8 +1,8 @@
-"""One conversation with one vehicle.
+"""MAVLink link to one vehicle.
 
-A thread of its own hears the vehicle, or whoever receives does, where the transport is given. A command leaves from the
-thread that sends it, without waiting: handed to the other thread, it would stand in line with every thread of the
-program that computes (bench/link.py measures it).
+The link receives in its own thread, or, with a given transport, in the thread that calls `receive`. Commands are sent
+without waiting in the thread of the caller: passed to the link's thread, they would wait for the threads that compute
+(bench/link.py measures it).
 """
 
 import threading
@@ -37,20 +37,20 @@ __all__ = ["Link", "LinkError", "LinkHealth", "LossCounter", "Received"]
 
 HEARTBEAT_EVERY_S: Final = 1.0
 UNATTENDED_AFTER_S: Final = 3.0
-"""When nobody has listened for so long, the program hangs: no heartbeat then pretends otherwise, and the vehicle's own
-answer to a lost ground station is not kept from acting."""
+"""If `receive` has not been called for this long, the program hangs. No more heartbeats are sent then, so that the
+vehicle's own failsafe for a lost ground station can act."""
 MAX_QUEUED_MESSAGES: Final = 20_000
-"""Messages kept for a program that does not ask for them; then the oldest are dropped, and counted."""
+"""Maximum number of messages that wait for `receive`; beyond it the oldest are dropped, and counted."""
 STEP_S: Final = 1.0 / 256.0
-"""How far the clock is advanced between two looks at a transport that no thread reads."""
+"""Step of the clock between two reads of a transport without a thread."""
 MAX_SEQUENCE_LEAD: Final = 128
-"""A sequence number so far ahead is one from the past: packets may overtake each other."""
+"""A sequence number further ahead than this is an old one, because packets may overtake each other."""
 GONE_AFTER_S: Final = 1.5
-"""A peer that has said nothing for so long may have moved to another port of the same host."""
+"""A peer that has sent nothing for this long may have moved to another port of the same host."""
 RIVAL_TIMEOUT_S: Final = 3.0
-"""How long the heartbeat of another peer with the vehicle's own system id is remembered."""
+"""Time for which a heartbeat of another peer with the vehicle's system id counts."""
 UNKNOWN_PEER_INTERVAL_S: Final = 0.2
-"""How often a datagram of another peer is looked into: a flood of them costs nothing."""
+"""Interval at which a datagram of another peer is parsed, so that a flood of them costs nothing."""
 
 MAV_TYPE_GCS: Final = 6
 MAV_STATE_ACTIVE: Final = 4
@@ -58,7 +58,7 @@ MAV_STATE_ACTIVE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A message and when it came, in seconds of the link's clock."""
+    """A message and its time of receipt, in seconds of the link's clock."""
 
     message: Message
     received_s: float
@@ -66,21 +66,21 @@ class Received:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkHealth:
-    """What has passed so far; times in seconds of the link's clock."""
+    """Statistics of a link; times in seconds of the link's clock."""
 
     received: int
     """Messages of the vehicle that the dialect knows."""
     lost: int
     """Messages missing by the vehicle's sequence numbers."""
     bad: int
-    """Stretches of noise: wrong checksums, wrong signatures."""
+    """Sections of bad data: wrong checksums, wrong signatures."""
     foreign: int
     """Datagrams of other senders and messages of other systems, all dropped."""
     overrun: int
-    """Messages dropped because nobody called `receive`."""
+    """Messages dropped because `receive` was not called."""
     sent: int
     unsent: int
-    """Messages that could not leave: no peer yet, no connection, no room."""
+    """Messages that could not be sent: no peer yet, no connection, full buffer."""
     last_packet_s: float | None
     last_heartbeat_s: float | None
 
@@ -89,13 +89,13 @@ class LossCounter:
     """Counts missing messages by the sequence numbers of each component."""
 
     def __init__(self, uncounted: tuple[str, ...]) -> None:
-        """`uncounted`: beginnings of the names of messages that are numbered by another counter."""
+        """`uncounted` are the prefixes of the names of messages with a separate sequence counter."""
         self._uncounted = uncounted
         self._latest: dict[int, int] = {}
         self.lost = 0
 
     def count(self, kind: str, component: int, number: int) -> None:
-        """Take note of a message with its sequence number, 0 to 255; late and repeated ones count as nothing."""
+        """Count a message by its sequence number, 0 to 255; late and repeated messages are ignored."""
         if kind.startswith(self._uncounted):
             return
         ahead = (number - self._latest.get(component, number - 1)) % 256
@@ -105,12 +105,12 @@ class LossCounter:
 
 
 class Link:
-    """Sends to and hears one vehicle; safe to use from any thread.
+    """Sends to and receives from one vehicle; safe to use from any thread.
 
-    `target_system` is the vehicle's system id; None takes the first autopilot that is heard, `make` its make (MAVLink's
-    number), None any. Its other components are handed on, too; they are no sign of the autopilot's life. With `tlog`,
-    both directions are appended to that file. With `signing_key`, everything is signed. With `transport`, that one is
-    used and no thread is started: `receive` reads it, letting the clock advance while nothing comes.
+    `target_system` is the vehicle's system id, None for the first autopilot received; `make` is its MAV_AUTOPILOT, None
+    for any. Messages of its other components are received, too, but do not count as packets of the autopilot. With
+    `tlog`, both directions are appended to that file. With `signing_key`, everything is signed. With `transport`, no
+    thread is started: `receive` reads the transport and advances the clock while nothing arrives.
     """
 
     def __init__(
@@ -127,7 +127,8 @@ class Link:
         signing_key: bytes | None = None,
         transport: Transport | None = None,
     ) -> None:
-        """Raises LinkError when the address or the file cannot be opened, InputError for signing that cannot be."""
+        """Open the link. Raises LinkError if the address or the file cannot be opened, InputError if the dialect cannot
+        be signed."""
         self._address, self._dialect, self._clock = address, dialect, clock
         self._identity = (system, component, signing_key)
         self._codec = self._new_codec()
@@ -170,21 +171,21 @@ class Link:
 
     @property
     def doubled(self) -> str:
-        """Why it is believed that two vehicles speak under the one system id; empty while one does."""
+        """Evidence that two vehicles use the system id; empty without evidence."""
         now_s = self._clock.now_s()
         with self._news:
             if now_s - self._rival_s < RIVAL_TIMEOUT_S:
-                return "Another vehicle with its system id speaks from another port."
+                return "Another vehicle with its system id sends from another port."
             return self._speakers.reason(now_s)
 
     @property
     def other_makes(self) -> frozenset[int]:
-        """Autopilots that were heard and are not of the make that this link is for, by MAVLink's numbers."""
+        """Other autopilots that were received, by MAV_AUTOPILOT."""
         return frozenset(self._other_makes)
 
     @property
     def log_problem(self) -> str | None:
-        """Why the telemetry log is not complete, None while it is."""
+        """Reason why the telemetry log is incomplete, None if it is complete."""
         return self._tlog.problem if self._tlog else None
 
     @property
@@ -203,9 +204,9 @@ class Link:
             )
 
     def send(self, kind: str, **fields: FieldValue) -> None:
-        """Send the message `kind` ("PARAM_SET"); it has left, or was counted as unsent, when this returns, at once.
+        """Send the message `kind` ("PARAM_SET") without waiting; on return it was sent or counted as unsent.
 
-        Raises ValueError for a message or fields that the dialect does not have, LinkError when the link is closed.
+        Raises ValueError for a message or fields that the dialect does not have, LinkError if the link is closed.
         """
         message = self._dialect.message(kind, fields)
         with self._sending:
@@ -214,9 +215,9 @@ class Link:
             self._write(message)
 
     def receive(self, timeout_s: float) -> list[Received]:
-        """Everything heard since the last call, oldest first; waits at most `timeout_s` of the clock for the first.
+        """Return all messages since the last call, oldest first; wait at most `timeout_s` of the clock for the first.
 
-        Every message is given once, whoever asks. Raises LinkError when the link is closed and nothing is left.
+        Every message is returned once, to any caller. Raises LinkError if the link is closed and no message is left.
         """
         with self._news:
             self._listeners += 1
@@ -232,15 +233,15 @@ class Link:
         return heard
 
     def log_to(self, path: Path | None) -> None:
-        """Write what passes from now on to another telemetry log, None to none; returns once the one before is stored.
-        Raises LinkError when the file cannot be opened; the log before goes on then."""
+        """Record all packets from now on in another telemetry log, or in none; return once the previous log is stored.
+        Raises LinkError if the file cannot be opened; the previous log then continues."""
         following = TlogWriter(path) if path else None
         before, self._tlog = self._tlog, following
         if before:
             before.close()
 
     def close(self) -> None:
-        """End the conversation; returns once the log is stored. Again is harmless."""
+        """Close the link; return once the log is stored. Calling it again has no effect."""
         with self._sending:
             self._is_closing = True
             if not self._is_closed:
@@ -267,7 +268,7 @@ class Link:
                 return
             self._clock.wait_s(STEP_S)
 
-    # ---- in the link's own thread, where it has one
+    # ---- in the link's own thread, if it has one
 
     def _run(self) -> None:
         try:
@@ -280,7 +281,7 @@ class Link:
             self._end()
 
     def _attend(self, timeout_s: float) -> None:
-        """Send the heartbeat that is due, then hear what comes; `timeout_s` on the wall."""
+        """Send a heartbeat if it is due, then receive; `timeout_s` is wall time."""
         self._send_heartbeat()
         for data, peer in self._transport.read(timeout_s):
             self._take_in(data, peer)
@@ -292,7 +293,7 @@ class Link:
             self._news.notify_all()
 
     def _patience_s(self) -> float:
-        """How long to wait for news, s on the wall."""
+        """Return the time to wait for packets, s of wall time."""
         return self._clock.wall_s(max(self._next_heartbeat_s - self._clock.now_s(), 0.0))
 
     def _send_heartbeat(self) -> None:
@@ -306,7 +307,7 @@ class Link:
                 self._write(self._heartbeat)
 
     def _write(self, message: Message) -> None:
-        """Under the lock of sending."""
+        """Send a message; the caller holds the lock for sending."""
         frame = self._codec.pack(message)
         if self._transport.write(frame):
             self._sent += 1
@@ -328,7 +329,8 @@ class Link:
                 self._look_at_rival(data, peer, now_s)
 
     def _process_unknown_peer(self, data: bytes, peer: Peer) -> None:
-        """With a codec of its own: what a stranger sends must not stand in the way of the vehicle's first packet."""
+        """Process a datagram with a separate codec, because data of an unknown peer must not interfere with the
+        vehicle's first packet."""
         messages = self._new_codec().parse(data)
         if any(self._is_vehicle(message) for message in messages):
             self._transport.adopt(peer)
@@ -337,7 +339,7 @@ class Link:
             self._foreign += 1
 
     def _look_at_rival(self, data: bytes, peer: Peer, now_s: float) -> None:
-        """The vehicle, come back from another port of its host; or another one while it is still heard."""
+        """Find out whether the vehicle has moved to another port of its host, or another one uses its system id."""
         if not any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
             return
         since_s = self._last_packet_s if self._last_packet_s is not None else self._opened_s
@@ -347,7 +349,7 @@ class Link:
             self._rival_s = now_s
 
     def _is_vehicle(self, message: Message) -> bool:
-        """Whether the message shows its sender to be the vehicle that this link is for."""
+        """Whether the message identifies its sender as the vehicle of this link."""
         if not is_autopilots_heartbeat(message):
             return False
         make = int(number(message, "autopilot"))
@@ -372,7 +374,7 @@ class Link:
             self._news.notify_all()
 
     def _accepts(self, message: Message, now_s: float) -> bool:
-        """Count and record the message; whether it is to be handed on."""
+        """Count and record the message; return whether `receive` should return it."""
         if message.get_type() == BAD_DATA:
             self._bad += 1
             return False
@@ -385,7 +387,7 @@ class Link:
         frame = bytes(message.get_msgbuf())
         self._losses.count(message.get_type(), source_component(message), sequence(message))
         self._record(frame)
-        if not is_known(message):  # neither its checksum nor its signature was looked at: no sign of life
+        if not is_known(message):  # neither its checksum nor its signature was checked
             return False
         self._received += 1
         if self._vehicle_component in (None, source_component(message)):
@@ -417,5 +419,5 @@ _GROUND_STATION: Final[dict[str, FieldValue]] = {
 
 
 def _boot_s(message: Message) -> float | None:
-    """The vehicle's own time by the one kind of message whose time counts: others may go on when that stands still."""
+    """Return the vehicle's time from LOCAL_POSITION_NED; the time of other messages may advance when that is frozen."""
     return number(message, "time_boot_ms") / 1000.0 if message.get_type() == "LOCAL_POSITION_NED" else None

@@ -1,8 +1,8 @@
-"""What is remembered of a vehicle during a trial, and what may be believed of it: a pure memory.
+"""Observation of a vehicle during a trial, and plausibility of its messages, as pure functions.
 
-One message decides nothing that leaves the vehicle alone. That it disarmed, changed its mode or rebooted is believed
-of two witnesses that are apart in time, with none between them that says otherwise; a position that cannot follow from
-the one before, or whose clock cannot, is doubted until more of its kind have come and none of the others.
+No single message may end the control of the vehicle. A disarming, a change of mode or a reboot counts only if two
+messages apart in time confirm it and none between them contradicts. A position that cannot follow from the previous
+one, by itself or by its clock, is doubted until more of the same kind have arrived and none of the previous kind.
 """
 
 from dataclasses import dataclass, replace
@@ -24,34 +24,34 @@ from app.vehicles.mavlink.secondary_altitude import SecondaryAltitude
 
 RESTING_M_S: Final = 0.1
 FRESH_S: Final = 0.5
-"""A sample older than this says nothing about where the vehicle is now."""
+"""Greatest age of a sample that counts as the current position."""
 AGREED_S: Final = 1.0
-"""For how long every witness has to have seen the vehicle on the ground before its motors may be stopped."""
+"""Time for which every source must show the vehicle on the ground before its motors may be stopped."""
 
 _ATTENDED_S: Final = 0.1
-"""The most that one packet tells of the time before it: what a stall delayed may come in any order."""
+"""Longest time before a packet that it accounts for: packets delayed by a stall may arrive in any order."""
 _JUMP_M: Final = 0.3
 _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
 _MAX_GLITCHES: Final = 3
 _DOUBTED_LIMIT: Final = 10.0
 _RESTLESS_DRAINS_S: Final = 5.0
-"""Doubted samples a second that are borne; ten more than that, and the position jumps to and fro."""
+"""Tolerated doubted samples per second; with `_DOUBTED_LIMIT` more than that, the position is unreliable."""
 _AHEAD_S: Final = 2.0
-"""By how much the vehicle's clock may gain on ours between two packets: the second may have come the quicker way."""
+"""Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
 _BACK_S: Final = 1.0
-"""A clock that falls back by less is a packet that came late."""
+"""If the clock goes back by less than this, the packet was late."""
 _SAME_CLOCK_S: Final = 0.5
 _REBOOTED_S: Final = 0.4
 BEHIND_M: Final = 0.5
-"""An altitude that has stayed so far behind the climb rate does not follow it."""
+"""An altitude that has fallen behind the integrated climb rate by more than this does not follow it."""
 _DRIFT_M: Final = 1.0
-"""How far off an altitude may be that drifted while it flew."""
+"""Greatest drift of an altitude during a flight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherClock:
-    """Positions by another clock than that of the record: from `first_s` on (ours), the last one at `last_s`."""
+    """Positions by a clock other than the record's: the first at `first_s` by our clock, the last at `last_s`."""
 
     first_s: float
     last_s: float
@@ -60,11 +60,11 @@ class OtherClock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialObservation:
-    """What was heard so far. Times in s by the ground's clock, apart from those inside a Position.
+    """State of a vehicle by its messages so far. Times are in s by the ground's clock, except inside a Position.
 
-    `heard_s`: any packet; `advanced_s`: a position with a new time stamp; `accepted_s`: one that was not doubted.
-    `armed` and `mode` are as the last heartbeat has them, and since when all of them agree. `leapt`: the altitude once
-    went on from somewhere else than where it was.
+    Times of the last packet (`heard_s`), of the last position with a new time stamp (`advanced_s`) and of the last one
+    that was not doubted (`accepted_s`). `armed` and `mode` are from the last heartbeat, `armed_since_s` and
+    `mode_since_s` since when all heartbeats agree with it. `leapt`: the altitude has continued from another value.
     """
 
     heard_s: float
@@ -73,7 +73,7 @@ class TrialObservation:
     accepted_s: float
     battery_s: float
     heartbeat_gap_s: float = 0.0
-    """Between the last two heartbeats."""
+    """Time between the last two heartbeats."""
     battery_v: float | None = None
     low_since_s: float | None = None
     stuck_s: float = 0.0
@@ -96,23 +96,23 @@ class TrialObservation:
     landed_s: float = 0.0
     grounded_since_s: float | None = None
     highest_m: float = float("-inf")
-    """Of its altitudes since the command."""
+    """Greatest altitude since the command."""
     lifted: bool = False
-    """Whether it was ever above the ground."""
+    """Whether it has been above the ground."""
     behind_m: float = 0.0
-    """How far its altitude stayed behind its climb rate, before it was first above the ground."""
+    """How far its altitude is behind its integrated climb rate, until it is first above the ground."""
     second: SecondaryAltitude | None = None
     rebooted: bool = False
     breached: str = ""
-    """Which limit of its own fence it has crossed; empty while none."""
+    """Limit of its own fence that it has crossed; empty if none."""
     doubled: str = ""
-    """Why it is believed that two speak under its id; empty while one does."""
+    """Evidence that two vehicles use its system id; empty without evidence."""
 
 
 def begin(
     now_s: float, *, last: Position | None = None, battery_v: float | None = None, stood_s: float = 0.0
 ) -> TrialObservation:
-    """Nothing is late yet. `last` is where the vehicle stands, and was watched standing for `stood_s`."""
+    """Begin an observation with all times now. `last` is the position at which the vehicle has stood for `stood_s`."""
     return TrialObservation(
         heard_s=now_s,
         heartbeat_s=now_s,
@@ -127,7 +127,7 @@ def begin(
 
 
 def reset_altitude(watch: TrialObservation) -> TrialObservation:
-    """The memory of a vehicle on the ground whose altitude begins anew: what it was before says nothing any more."""
+    """Return the observation of a vehicle on the ground whose altitude was reset, without its earlier altitudes."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
     return replace(watch, leapt=False, lifted=False, behind_m=0.0, side=-1, crossings=0, second=second)
 
@@ -135,7 +135,7 @@ def reset_altitude(watch: TrialObservation) -> TrialObservation:
 def update(
     watch: TrialObservation, measurement: Measurement | None, now_s: float, limits: Limits
 ) -> tuple[TrialObservation, tuple[Position, ...]]:
-    """The memory after one packet (None: one that measures nothing), and the positions that it makes certain."""
+    """Return the observation after one packet (None: one without a measurement), and the positions that it confirms."""
     stuck_s = watch.stuck_s + min(now_s - watch.heard_s, _ATTENDED_S)
     watch = replace(watch, heard_s=now_s, stuck_s=stuck_s)
     match measurement:
@@ -159,15 +159,15 @@ def update(
 
 
 def sight(watch: TrialObservation, sighted: SecondaryAltitudeReceived) -> TrialObservation:
-    """The memory after the second source of altitude spoke."""
+    """Return the observation after a sample of the second source of altitude."""
     second = watch.second or SecondaryAltitude(heard_s=sighted.now_s)
     vehicle_m = watch.last.altitude_m if watch.last is not None and is_fresh(watch, sighted.now_s) else None
     return replace(watch, second=secondary_altitude.update(second, sighted, vehicle_m))
 
 
 def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObservation:
-    """Note since when every witness has it on the ground: its own position by height and speed, what it says of itself,
-    and the second source. A lone sample that jumps says nothing either way."""
+    """Note since when every source shows it on the ground: its position by height and speed, the landed state that it
+    reports, and the second source of altitude. A single sample that jumps is ignored."""
     if watch.doubted is not None and is_fresh(watch, now_s):
         return watch
     watch = replace(watch, lifted=watch.lifted or is_airborne(watch, now_s, ground_m))
@@ -176,7 +176,7 @@ def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObser
     return replace(watch, grounded_since_s=since_s if grounded else None)
 
 
-# ---- what may be believed
+# ---- conclusions
 
 
 def too_many_glitches(watch: TrialObservation) -> bool:
@@ -192,63 +192,63 @@ def is_fresh(watch: TrialObservation, now_s: float) -> bool:
 
 
 def is_still(watch: TrialObservation, now_s: float, ground_m: float, *, within_m: float = _DRIFT_M) -> bool:
-    """Neither climbing nor sinking so near to the ground, as a fresh sample has it."""
+    """Whether it neither climbs nor sinks within `within_m` of the ground, by a fresh sample."""
     last = watch.last
     low = last is not None and last.altitude_m - ground_m < within_m
     return low and last is not None and is_fresh(watch, now_s) and abs(last.climb_rate_m_s) < RESTING_M_S
 
 
 def is_grounded(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
-    """On the ground by height and by speed, as a fresh sample has it."""
+    """Whether it is on the ground by height and speed, by a fresh sample."""
     return watch.doubted is None and is_still(watch, now_s, ground_m, within_m=GROUND_M)
 
 
 def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
-    """Above the ground by height, as a fresh sample has it."""
+    """Whether it is above the ground, by the altitude of a fresh sample."""
     return watch.last is not None and is_fresh(watch, now_s) and watch.last.altitude_m - ground_m > GROUND_M
 
 
 def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
-    """By what it says of itself, or by where the second source sees it, whatever its altitude."""
+    """Whether its own landed state or the second source shows it in the air, independent of its altitude."""
     says_so = watch.landed is False and now_s - watch.landed_s < AGREED_S
     seen_m = secondary_altitude.current_altitude_m(watch.second, now_s)
     return says_so or (seen_m is not None and seen_m - ground_m > GROUND_M)
 
 
 def is_behind_climb_rate(watch: TrialObservation) -> bool:
-    """Whether its altitude stands still while it rises, by its climb rate."""
+    """Whether its altitude does not follow its climb rate."""
     return watch.behind_m > BEHIND_M
 
 
 def is_disarmed(watch: TrialObservation, limits: Limits) -> bool:
-    """By two heartbeats at least, and none between them that says otherwise."""
+    """Whether it is disarmed by at least two heartbeats with none between them that contradicts."""
     return not watch.armed and watch.heartbeat_s - watch.armed_since_s >= limits.confirmation_s
 
 
 def mode_of(watch: TrialObservation, limits: Limits) -> str:
-    """The mode that heartbeats agree upon; empty while they do not."""
+    """Return the mode in which heartbeats agree; empty while they do not."""
     return watch.mode if watch.heartbeat_s - watch.mode_since_s >= limits.confirmation_s else ""
 
 
 def may_stop_motors(watch: TrialObservation, now_s: float) -> bool:
-    """Whether its motors may be stopped without a person's word."""
+    """Whether its motors may be stopped without a request of a person."""
     return not find_doubt_of_ground(watch, now_s)
 
 
 def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
-    """Why it may not be on the ground; empty once every witness has had it there for a second, and where it is has
-    never leapt."""
+    """Return why it may not be on the ground; empty once every source has shown it there for a second, if its altitude
+    has never jumped."""
     since_s = watch.grounded_since_s
     if watch.doubled:
-        return "two vehicles may be speaking under its system id"
+        return "two vehicles may be using its system id"
     if watch.rebooted:
         return "it rebooted during the flight"
     if watch.leapt:
-        return "its altitude leapt during the flight"
+        return "its altitude jumped during the flight"
     if is_behind_climb_rate(watch):
         return "its altitude did not follow its climb rate"
     if since_s is None or now_s - since_s < AGREED_S:
-        return f"not every witness has had it on the ground for {AGREED_S:g} s"
+        return f"not every source has shown it on the ground for {AGREED_S:g} s"
     return ""
 
 
@@ -293,8 +293,8 @@ def _hear_position(
 
 
 def _hear_other_clock(watch: TrialObservation, position: Position, now_s: float, newest: Position) -> TrialObservation:
-    """Late, repeated, or ahead: out of order. Only a clock that fell back and goes on from there by itself, with
-    nothing more from the one before, is that of a vehicle that has rebooted."""
+    """Process a position whose time is late, repeated or too far ahead. The vehicle has rebooted only if the clock went
+    back and continues from there, and no more positions by the previous clock arrive."""
     other = watch.other
     goes_on = other is not None and _is_same_clock(other, position, now_s)
     first_s = other.first_s if other is not None and goes_on else now_s
@@ -314,13 +314,13 @@ def _is_same_clock(other: OtherClock, position: Position, now_s: float) -> bool:
 
 
 def _follows(one: Position, other: Position) -> bool:
-    """Whether a vehicle can have come from one sample to the other."""
+    """Whether a vehicle can have moved from one sample to the other."""
     sudden = abs(other.climb_rate_m_s) > _JUMP_M_S >= abs(one.climb_rate_m_s)
     return not (sudden or _leaps(one, other))
 
 
 def _leaps(one: Position, other: Position) -> bool:
-    """Whether the other is farther from where the first one's speed leads than a vehicle can accelerate."""
+    """Whether the other altitude differs from the first one's extrapolation by more than possible accelerations."""
     elapsed_s = other.time_boot_s - one.time_boot_s
     off_m = other.altitude_m - (one.altitude_m + one.climb_rate_m_s * elapsed_s)
     return abs(off_m) > _JUMP_M + 0.5 * _ACCELERATION_M_S2 * elapsed_s**2

@@ -1,4 +1,4 @@
-"""From a vehicle's options to a radio that speaks with it, and to the limits of its trials."""
+"""Opening of a vehicle's link by its options, and the limits of its trials."""
 
 import datetime as dt
 from collections.abc import Callable
@@ -18,12 +18,12 @@ from app.vehicles.mavlink.transports import Transport
 
 TAKEOFF_ALTITUDE_M: Final = 3.0
 MAX_UNSCALED_SPEED: Final = 4.0
-"""Up to this speed of its clock a simulated vehicle is waited for as a real one is. Beyond, waiting for packets takes
-longer by its time, because a busy computer's pauses are on the wall."""
+"""Up to this clock speed the timeouts of a simulated vehicle are those of a real one. Beyond, they are longer by its
+clock, because the pauses of a busy computer are in wall time."""
 
 
 def timeout_factor_of(options: Options) -> float:
-    """How many times longer than a real vehicle this one is waited for."""
+    """Return the factor on the timeouts of a real vehicle."""
     return max(1.0, float(options["clock_speed"]) / MAX_UNSCALED_SPEED)
 
 
@@ -35,9 +35,12 @@ def open_radio(
     on_wait: Callable[[list[PacketReceived]], None] = lambda _heard: None,
     transport: Transport | None = None,
 ) -> AutopilotLink:
-    """`clock` is the vehicle's time, by default that of its options; `overhear` and `on_wait` are as of AutopilotLink;
-    `transport` is read by whoever listens, in place of a thread that reads the address. Raises LinkError when its link
-    or its log cannot be opened, InputError for a signing key that cannot be read or used."""
+    """Open the link to a vehicle.
+
+    `clock` is the vehicle's time, by default that of its options; for `overhear` and `on_wait` see AutopilotLink;
+    `transport` replaces the address and the thread that reads it. Raises LinkError if the link or its log cannot be
+    opened, InputError for a signing key that cannot be read or used.
+    """
     profile = PROFILES[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
     key_file = str(options["signing_key_file"])
@@ -69,7 +72,7 @@ def open_radio(
 
 
 def limits_of(options: Options, radio: AutopilotLink) -> Limits:
-    """Those of a vehicle that stands at its own zero."""
+    """Return the limits of a vehicle that stands at its own zero."""
     profile = radio.profile
     return Limits(
         set_point_m=TAKEOFF_ALTITUDE_M,
@@ -89,12 +92,12 @@ def limits_of(options: Options, radio: AutopilotLink) -> Limits:
 
 
 def _described(profile: Profile) -> dict[str, str]:
-    """Modes in which it obeys no Land, with what a person has to know of them."""
+    """Return the display names of the modes in which it does not execute Land, with what to do in them."""
     return {mode: f"{profile.mode_names[mode]}: {what}; {HELP}" for mode, what in profile.deaf_modes.items()}
 
 
 def _log_path(folder: str) -> Path | None:
-    """A file of its own for every opening, in UTC; no folder, no log."""
+    """Return a new file name for every opening, with its time in UTC; None without a folder."""
     if not folder:
         return None
     return Path(folder) / f"{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%S.%f}.tlog"

@@ -1,5 +1,5 @@
-"""Gains on the vehicle: which it may hold, which it was given, and which it was found to hold. Written and read back
-with one request in flight, in five attempts of 0.5 s each.
+"""Gains and other parameters of the vehicle, written and read back with one request in flight and five attempts of
+0.5 s each.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,23 +15,23 @@ from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink
 
 LIST_ATTEMPTS: Final = 3
 LIST_ENDS_S: Final = 2.0
-"""The list is over when nothing of it has come for so long."""
+"""The list has ended if no parameter has arrived for this long."""
 
 
 def find_gain_set(radio: AutopilotLink) -> GainSet:
-    """The gains by the names that this vehicle has for them. Raises VehicleError when it answers to none."""
+    """Return the gains by the names on this vehicle. Raises VehicleError if it has none of the known names."""
     for gain_set in radio.profile.gain_sets:
         if read_parameter(radio, gain_set[0].parameter) is not None:
             return gain_set
     tried = ", ".join(gain_set[0].parameter for gain_set in radio.profile.gain_sets)
     raise VehicleError(
-        f"{RESPONSES[Failure.PARAMETER].text} It did not answer to {tried}.",
-        hint=f"See that it runs {radio.profile.title}, and that nobody else is asking it for parameters.",
+        f"{RESPONSES[Failure.PARAMETER].text} It did not reply to requests for {tried}.",
+        hint=f"Check that it runs {radio.profile.title}, and that no other program requests its parameters.",
     )
 
 
 def write_gains(radio: AutopilotLink, gain_set: GainSet, gains: Gains) -> dict[str, float]:
-    """Write every gain, then read every one back: what the vehicle holds. Raises VehicleError for silence."""
+    """Write all gains, then return those read back. Raises VehicleError if the vehicle does not reply."""
     for gain in gain_set:
         wanted = gain.sent(gains[gain.gain])
         if write_parameter(radio, gain.parameter, wanted) is None:
@@ -40,7 +40,8 @@ def write_gains(radio: AutopilotLink, gain_set: GainSet, gains: Gains) -> dict[s
 
 
 def read_gains(radio: AutopilotLink, gain_set: GainSet, asked: Gains | None = None) -> dict[str, float]:
-    """What the vehicle holds, in the very numbers `asked` where it holds these. Raises VehicleError for silence."""
+    """Return the gains on the vehicle, exactly as in `asked` where they are equal in single precision. Raises
+    VehicleError if the vehicle does not reply."""
     held_now: dict[str, float] = {}
     for gain in gain_set:
         wire = read_parameter(radio, gain.parameter)
@@ -51,18 +52,18 @@ def read_gains(radio: AutopilotLink, gain_set: GainSet, asked: Gains | None = No
 
 
 def read_parameter(radio: AutopilotLink, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
-    """None when the vehicle does not answer: it has no such parameter, or no ears."""
+    """Return the value of a parameter, None if the vehicle does not reply."""
     return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter, attempts=attempts)
 
 
 def write_parameter(radio: AutopilotLink, parameter: str, value: float) -> float | None:
-    """What it answers to have; None when it does not answer."""
+    """Write a parameter; return the value in the vehicle's reply, None if it does not reply."""
     return _ask(radio, radio.profile.set_parameter(radio.aim, parameter, value), parameter)
 
 
 def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[str, float]:
-    """Every parameter of the vehicle, by the list that it sends; what is lost of that is asked for one by one. Raises
-    VehicleError when it sends none, or not all."""
+    """Read all parameters of the vehicle as a list; those that are lost are requested one by one. Raises VehicleError
+    if none arrive, or not all."""
     heard: dict[int, Parameter] = {}
     radio.listen(0.0)
     for _ in range(LIST_ATTEMPTS):
@@ -74,14 +75,14 @@ def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> d
         on_progress(len(heard), _count(heard))
     if not heard or not _is_complete(heard):
         raise VehicleError(
-            f"Its parameters did not come: {len(heard)} of {_count(heard) or 'an unknown number'}.",
-            hint="See that the link is good, and that nobody else is asking for them; then try again.",
+            f"Not all of its parameters were received: {len(heard)} of {_count(heard) or 'an unknown number'}.",
+            hint="Check the link, and that no other program requests them, then try again.",
         )
     return {heard[place].name: heard[place].value for place in sorted(heard)}
 
 
 def _list(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[int, Parameter]:
-    """What comes by itself, until all has come or nothing more does."""
+    """Receive the list until it is complete or no more parameters arrive."""
     heard: dict[int, Parameter] = {}
     last_s = radio.clock.now_s()
     while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.timeout_factor and not _is_complete(heard):
@@ -113,7 +114,7 @@ def _is_complete(heard: Mapping[int, Parameter]) -> bool:
 
 
 def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:
-    """In the order in which they are sent in the air: what clears an integrator comes last."""
+    """Return the gains in the order for sending in flight: those that clear an integrator come last."""
     ordered = sorted(gain_set, key=lambda gain: gain.integrates)
     return tuple(Setting(gain.parameter, gain.sent(gains[gain.gain])) for gain in ordered)
 
@@ -128,18 +129,18 @@ def _ask(radio: AutopilotLink, request: Outgoing, parameter: str, *, attempts: i
 
 def _unconfirmed(gain: GainParameter) -> VehicleError:
     return VehicleError(
-        f"{RESPONSES[Failure.PARAMETER].text} {gain.parameter} was asked {ATTEMPTS} times, every "
+        f"{RESPONSES[Failure.PARAMETER].text} {gain.parameter} was requested {ATTEMPTS} times, every "
         f"{REPLY_TIMEOUT_S:g} s.",
-        hint="See that the vehicle is still there and that its identity (system and aircraft number) is right.",
+        hint="Check that the vehicle is connected and that its system id and aircraft id are correct.",
     )
 
 
 class GainStore:
-    """`staged` are those that were written for the next flight and read back equal, None while there are none; `held`
-    those that were read back last, whichever they were."""
+    """Safe gains, staged gains and held gains of a vehicle. `staged` were written for the next flight and read back
+    equal, None without such gains; `held` are those read back last."""
 
     def __init__(self, radio: AutopilotLink, safe: Gains) -> None:
-        """Raises GainsError for safe gains that the autopilot cannot hold."""
+        """Check the safe gains. Raises GainsError if the autopilot cannot hold them."""
         self._radio = radio
         self._gain_set: GainSet | None = None
         self.safe: Final[Gains] = check_gains(safe, radio.profile.gain_sets[0])
@@ -147,7 +148,8 @@ class GainStore:
         self.held: dict[str, float] = {}
 
     def stage(self, gains: Gains) -> dict[str, float]:
-        """Raises GainsError for gains that may not be written (nothing is changed then), VehicleError for silence."""
+        """Write gains for the next flight and return those read back. Raises GainsError, and changes nothing, for gains
+        that may not be written; VehicleError if the vehicle does not reply."""
         wanted = check_gains(gains, self._found())
         self.staged = None
         held = self._write(wanted)
@@ -155,17 +157,17 @@ class GainStore:
         return dict(held)
 
     def read(self) -> dict[str, float]:
-        """Raises VehicleError for silence."""
+        """Read the gains. Raises VehicleError if the vehicle does not reply."""
         self.held = read_gains(self._radio, self._found(), self.wanted)
         return dict(self.held)
 
     def restore(self) -> dict[str, float]:
-        """Write the safe gains; what was read back. Raises VehicleError for silence."""
+        """Write the safe gains and return those read back. Raises VehicleError if the vehicle does not reply."""
         self.staged = None
         return dict(self._write(self.safe))
 
     def restore_or_explain(self) -> str:
-        """Restore the safe gains; why they cannot be verified, or nothing."""
+        """Restore the safe gains; return why they cannot be verified, or an empty string."""
         try:
             held = self.restore()
         except VehicleError as error:
@@ -174,16 +176,16 @@ class GainStore:
 
     @property
     def wanted(self) -> Gains:
-        """What the vehicle should hold now."""
+        """Gains that the vehicle should hold now."""
         return self.safe if self.staged is None else self.staged
 
     @property
     def safe_settings(self) -> tuple[Setting, ...]:
-        """The safe gains as an abort sends them."""
+        """Safe gains in the order in which an abort sends them."""
         return settings(self._found(), self.safe)
 
     def check(self) -> CheckItem:
-        """Read the gains, and judge whether they are those that they should be."""
+        """Read the gains and check that they are those wanted."""
         try:
             held, found = self.read(), ""
         except InterruptedByOrderError:
@@ -200,7 +202,7 @@ class GainStore:
         )
 
     def _found(self) -> GainSet:
-        """By the names that this vehicle has for them. Raises VehicleError when it answers to none."""
+        """Return the gains by the names on this vehicle. Raises VehicleError if it has none of the known names."""
         if self._gain_set is None:
             self._gain_set = find_gain_set(self._radio)
         return self._gain_set

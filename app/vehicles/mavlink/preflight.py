@@ -1,6 +1,6 @@
-"""Before anything flies: who answers there, whether it stands still on the ground, and whether its failsafes are on.
+"""Preflight checks: identity of the vehicle, standing still on the ground, failsafes enabled.
 
-Everything is judged as an item; what refuses a flight and what a person is shown are the same items.
+Each check results in an item; the items shown to the operator are the ones that refuse a flight.
 """
 
 import statistics
@@ -23,7 +23,7 @@ HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
 POSITIONS_HZ: Final = 40.0
 SIGHTINGS_HZ: Final = 10.0
-ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight from here was interrupted."
+ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight of this program was interrupted."
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
@@ -31,16 +31,16 @@ _GOES_ON_S: Final = 1.0
 _DISARMED: Final = "disarmed"
 _VERSION_ATTEMPTS: Final = 2
 _UID_ATTEMPTS: Final = 10
-"""Of a vehicle that is known to tell its hardware id: twice as long as for a parameter."""
+"""Attempts if the vehicle is known to report its hardware id: twice as many as for a parameter."""
 _NAME_ATTEMPTS: Final = 2
 _CHECKS_ATTEMPTS: Final = 2
-_NO_POSITION: Final = "Wait until it knows where it is (GPS, cameras or its own sensors), then check again."
-_LAND_FIRST: Final = "Land it, see that its motors have stopped, then verify its gains and release it."
+_NO_POSITION: Final = "Wait until it has a position (GPS, cameras or its own sensors), then check again."
+_LAND_FIRST: Final = "Land it, check that its motors have stopped, then verify its gains and release it."
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Where the vehicle stands, on its own datum, and where a second source saw it meanwhile, on the source's."""
+    """Position of the standing vehicle on its own datum, and its altitudes from a second source, on the source's."""
 
     altitude_m: float
     last: Position
@@ -49,35 +49,35 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class GroundObservation:
-    """What was heard of a vehicle on the ground within `seconds`."""
+    """Messages of a vehicle on the ground within `seconds`."""
 
     positions: tuple[Position, ...]
     seconds: float
     seen_m: tuple[float, ...] = ()
     disarmed: bool = False
-    """By every heartbeat of that time, of which there were some."""
+    """Whether there were heartbeats and all of them reported disarmed."""
 
     @property
     def ground(self) -> Ground:
-        """Raises ValueError when no position came."""
+        """Position of the ground. Raises ValueError without a position."""
         altitude_m = statistics.median(position.altitude_m for position in self.positions)
         return Ground(altitude_m, self._last, self.seen_m)
 
     @property
     def _last(self) -> Position:
-        """The newest that goes on from the one before it: a lone one by another clock is nobody's."""
+        """Newest position that continues the one before it; a single one by another clock is ignored."""
         for newer, older in pairwise(reversed(self.positions)):
             if 0.0 < newer.time_boot_s - older.time_boot_s < _GOES_ON_S:
                 return newer
         return self.positions[-1]
 
 
-# ---- meeting the vehicle
+# ---- connecting to the vehicle
 
 
 def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = None) -> None:
-    """Wait for the heartbeat of an autopilot of the right make, sending nothing. Raises VehicleError when none comes
-    within 5 s (longer where the vehicle's clock is fast), or another vehicle's than the `pinned` one's."""
+    """Wait for a heartbeat of the right autopilot, sending nothing. Raises VehicleError if none arrives within 5 s
+    (longer if the vehicle's clock is fast), or if it is of another vehicle than the `pinned` one."""
     within_s = HEARTBEAT_S * radio.timeout_factor
     until_s = radio.clock.now_s() + within_s
     while radio.clock.now_s() < until_s:
@@ -86,11 +86,11 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
         if heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot:
             return _set_target(radio, heartbeat, pinned)
     makes = sorted(radio.link.other_makes)
-    others = f" Others were heard: MAVLink's autopilots {makes}." if makes else ""
+    others = f" Other autopilots were received, by MAV_AUTOPILOT: {makes}." if makes else ""
     raise VehicleError(
-        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Listened {within_s:g} s at {address} for {radio.profile.title} "
+        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title} "
         f"(dialect {radio.profile.dialect.name}).{others}",
-        hint="See that the vehicle is on, sends to this computer's port, and has the autopilot that was named.",
+        hint="Check that the vehicle is on, sends to this computer's port, and has the autopilot in its options.",
     )
 
 
@@ -98,7 +98,7 @@ def _set_target(radio: AutopilotLink, heartbeat: Heartbeat, pinned: Identity | N
     if pinned is not None and pinned.system_id != heartbeat.system:
         raise VehicleError(
             f"Another vehicle answers: system {heartbeat.system} instead of {pinned.system_id}.",
-            hint="Connect the vehicle that was registered, or register this one.",
+            hint="Connect the registered vehicle, or register this one.",
         )
     radio.aim = replace(
         radio.aim,
@@ -109,7 +109,8 @@ def _set_target(radio: AutopilotLink, heartbeat: Heartbeat, pinned: Identity | N
 
 
 def read_vehicle_info(radio: AutopilotLink) -> str:
-    """Read the flight plan and the firmware's version, changing nothing; what is wrong with the plan, or nothing."""
+    """Read the flight plan and the firmware's version, changing nothing; return the plan's problem, or an empty
+    string."""
     problem = ""
     try:
         radio.aim = replace(radio.aim, blocks=radio.profile.explore(radio.request, radio.aim))
@@ -123,13 +124,13 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
 
 
 def identify(radio: AutopilotLink, pinned: Identity | None = None) -> None:
-    """Ask a vehicle that has not told its version and its hardware's id, or not since it was last away. Some never
-    answer, and Paparazzi tells unasked; one whose hardware id is pinned is asked for 5 s."""
+    """Request version and hardware id, if neither has been received since the vehicle was last absent. Some never
+    reply, and Paparazzi sends them unrequested; if the pinned vehicle has a hardware id, it is requested for 5 s."""
     radio.hear_pending()
     asking, is_needed = radio.profile.ask_version(radio.aim), bool(find_untold_uid(radio, pinned))
     if asking is not None and (is_needed or not (radio.seen.version or radio.seen.uid)):
         attempts = _UID_ATTEMPTS if is_needed else _VERSION_ATTEMPTS
-        radio.request(asking, lambda heard: isinstance(heard, Version), attempts=attempts)
+        radio.request(asking, lambda reply: isinstance(reply, Version), attempts=attempts)
 
 
 def _has(radio: AutopilotLink, parameter: str) -> bool:
@@ -137,8 +138,8 @@ def _has(radio: AutopilotLink, parameter: str) -> bool:
 
 
 def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
-    """Find out whether a vehicle without a setting that stops its motors obeys the command that does. It is asked only
-    of one that was just watched standing, disarmed by every heartbeat: in the air, the command would drop it."""
+    """Find out whether a vehicle without a setting that stops its motors accepts the command that does. The command is
+    sent only if the vehicle was just observed standing, disarmed by every heartbeat: in the air, it would fall."""
     if radio.aim.stop_settings or not radio.profile.stop_settings or radio.link.doubled:
         return
     stands = watched.disarmed and _moved_m(watched.positions) <= _STANDS_WITHIN_M and bool(watched.positions)
@@ -149,31 +150,32 @@ def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
 
 
 def identity_change(radio: AutopilotLink, pinned: Identity | None) -> str:
-    """How the vehicle differs from the one that was pinned, where both tell; nothing when it does not."""
+    """Return how the vehicle differs from the pinned one, in what both report; empty if it does not."""
     version, uid = radio.seen.version, radio.seen.uid
     if pinned is None:
         return ""
     if is_another(radio, pinned):
         return (
-            f"Another vehicle answers, and nothing is written to it: its hardware id is {uid}, that of the pinned one "
-            f"is {pinned.uid}. Register it as a vehicle of its own, or release it to take it as this one from now on."
+            f"Another vehicle answers, and nothing is written to it: its hardware id is {uid} instead of {pinned.uid}. "
+            f"Register it as a new vehicle, or release it to accept it in place of this one."
         )
     if not version or not pinned.version or version == pinned.version:
         return ""
-    return f"Its firmware is now version {version}; it was {pinned.version}."
+    return f"Its firmware has changed from version {pinned.version} to {version}."
 
 
 def is_another(radio: AutopilotLink, pinned: Identity | None) -> bool:
-    """By its hardware's id, where it and the pinned one have told theirs."""
+    """Whether its hardware id differs from the pinned one, if both are known."""
     uid = radio.seen.uid
     return pinned is not None and bool(uid and pinned.uid) and uid != pinned.uid
 
 
 def find_untold_uid(radio: AutopilotLink, pinned: Identity | None) -> str:
-    """That a vehicle whose hardware id is pinned has told none since it was last away; empty where it has."""
+    """Return the problem that a vehicle with a pinned hardware id has reported none since it was last absent; empty if
+    it has."""
     if pinned is None or not pinned.uid or radio.seen.uid:
         return ""
-    return "It did not tell its hardware id, so it may be another vehicle than the pinned one; nothing was written."
+    return "It did not report its hardware id, so it may be another vehicle; nothing was written."
 
 
 def is_armed(radio: AutopilotLink) -> bool:
@@ -181,18 +183,18 @@ def is_armed(radio: AutopilotLink) -> bool:
 
 
 def require_disarmed(radio: AutopilotLink) -> None:
-    """Raises SafeGainsError: nobody knows what an armed vehicle is doing, so nothing but Land may be sent to it."""
+    """Raise SafeGainsError if the vehicle is armed: its state is unknown then, so only Land may be sent to it."""
     if is_armed(radio):
         raise SafeGainsError(ARMED, hint=_LAND_FIRST)
 
 
 def prepare(radio: AutopilotLink, telemetry_hz: float) -> None:
-    """Ask for telemetry. Raises VehicleError when it is refused."""
+    """Request telemetry. Raises VehicleError if it is refused."""
     _set_up(radio, radio.profile.prepare(radio.aim, telemetry_hz))
 
 
 def make_armable(radio: AutopilotLink) -> None:
-    """Bring a vehicle that is certainly disarmed out of a mode in which it does not arm. Raises VehicleError when it
+    """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm. Raises VehicleError if it
     refuses."""
     heartbeat = radio.seen.heartbeat
     steps = radio.profile.make_armable(radio.aim, heartbeat.mode) if heartbeat is not None else ()
@@ -205,16 +207,16 @@ def make_armable(radio: AutopilotLink) -> None:
 
 def _set_up(radio: AutopilotLink, steps: tuple[Step, ...]) -> None:
     if why := radio.set_up(steps):
-        raise VehicleError(f"The vehicle could not be set up. {why}", hint="Read what it said, then try again.")
+        raise VehicleError(f"The vehicle could not be set up. {why}", hint="Correct what it reports, then try again.")
 
 
-# ---- judging it
+# ---- checks
 
 
 def observe(
     radio: AutopilotLink, secondary: AlignedAltitudeSource | None, *, watched_s: float = WATCHED_S
 ) -> GroundObservation:
-    """Listen for so long, and up to 10 s for the battery's voltage and a heartbeat that is late."""
+    """Receive for `watched_s`, and for up to 10 s until there is a battery voltage and a heartbeat."""
     radio.listen(0.0)
     radio.seen.positions.clear()
     if secondary is not None:
@@ -234,7 +236,7 @@ def observe(
 def evaluate_items(
     radio: AutopilotLink, watched: GroundObservation, *, min_battery_v: float, plan_problem: str
 ) -> tuple[CheckItem, ...]:
-    """All but the gains and the second source. Asks for the parameters that switch failsafes on."""
+    """Evaluate all checks except those of the gains and the second source; requests the parameters of the failsafes."""
     items = [
         _heartbeat(radio),
         _single_vehicle_item(radio),
@@ -258,30 +260,30 @@ def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservat
         title="Second source of altitude",
         passed=rate_hz >= SIGHTINGS_HZ,
         found=secondary.source.trouble.removesuffix(".")
-        or f"{rate_hz:.0f} sightings a second by {secondary.source.name}",
-        needed=f"{SIGHTINGS_HZ:g} a second or more",
-        hint="See that it tracks the vehicle and streams, or fly without it.",
+        or f"{rate_hz:.0f} samples per second of {secondary.source.name}",
+        needed=f"{SIGHTINGS_HZ:g} per second or more",
+        hint="Check that it tracks the vehicle and streams, or fly without it.",
     )
 
 
 def evaluate_uid(radio: AutopilotLink, pinned: Identity) -> CheckItem:
-    """For a vehicle whose hardware id is pinned."""
+    """Compare the hardware id with the pinned one."""
     passed = radio.seen.uid == pinned.uid
     return CheckItem(
         name="hardware_id",
         title="Hardware id",
         passed=passed,
-        found=radio.seen.uid or "not told",
-        needed=f"{pinned.uid}, that of the pinned one",
+        found=radio.seen.uid or "not reported",
+        needed=f"{pinned.uid}, as registered",
         hint=""
         if passed
-        else "See which vehicle it is, then try again. If it tells none any more, connect it again and release it.",
+        else "Check which vehicle it is, then try again. If it no longer reports one, connect it again and release it.",
     )
 
 
 def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radius_m: float) -> CheckItem:
-    """For a flight plan that lands the vehicle by itself so far from HOME, which is where its position counts from, and
-    beyond a larger distance flies it HOME, obeying nobody."""
+    """Check the distance from HOME, the zero of its position: beyond `plan_radius_m` the flight plan lands the vehicle
+    by itself, and beyond a larger distance it flies HOME and ignores all commands."""
     last = watched.positions[-1] if watched.positions else None
     away_m = None if last is None else max(abs(last.north_m), abs(last.east_m))
     passed = away_m is not None and away_m + radius_m <= plan_radius_m
@@ -289,22 +291,21 @@ def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radiu
         name="home",
         title="Distance from HOME",
         passed=passed,
-        found="waiting for a position" if away_m is None else f"{away_m:.1f} m, and may drift {radius_m:g} m",
-        needed=f"{plan_radius_m:g} m or less together, where its flight plan lands it (plan_radius_m)",
-        hint="" if passed else "Put it nearer to where it was switched on, or lower radius_m.",
+        found="waiting for a position" if away_m is None else f"{away_m:.1f} m, plus radius_m of {radius_m:g} m",
+        needed=f"{plan_radius_m:g} m or less in total, because its flight plan lands it there (plan_radius_m)",
+        hint="" if passed else "Move it closer to the place where it was switched on, or reduce radius_m.",
     )
 
 
 def require(items: Sequence[CheckItem]) -> None:
-    """Raises VehicleError naming everything that is not as it must be before a flight, SafeGainsError when the vehicle
-    is armed."""
+    """Raise VehicleError naming every failed check, or SafeGainsError if the vehicle is armed."""
     failed = [item for item in items if not item.passed]
     if any(item.name == _DISARMED for item in failed):
         raise SafeGainsError(ARMED, hint=_LAND_FIRST)
     if failed:
-        told = "; ".join(f"{item.title}: {item.found}, needed: {item.needed}" for item in failed)
+        found = "; ".join(f"{item.title}: {item.found}, needed: {item.needed}" for item in failed)
         hints = " ".join(dict.fromkeys(item.hint for item in failed if item.hint))
-        raise VehicleError(f"The vehicle is not ready to fly. {told}.", hint=hints or "Correct this, then try again.")
+        raise VehicleError(f"The vehicle is not ready to fly. {found}.", hint=hints or "Correct this, then try again.")
 
 
 def _heartbeat(radio: AutopilotLink) -> CheckItem:
@@ -319,9 +320,9 @@ def _heartbeat(radio: AutopilotLink) -> CheckItem:
         passed=make and age_s < oldest_s,
         found=f"{radio.profile.title}{version}, system {radio.aim.system}, {age_s:.1f} s ago"
         if make
-        else "another make of autopilot",
+        else "another autopilot",
         needed=f"{radio.profile.title}, within {oldest_s:g} s",
-        hint="See that it is on and in reach.",
+        hint="Check that it is on and in range.",
     )
 
 
@@ -329,11 +330,11 @@ def _single_vehicle_item(radio: AutopilotLink) -> CheckItem:
     doubled = radio.link.doubled
     return CheckItem(
         name="alone",
-        title="Its system id",
+        title="System id",
         passed=not doubled,
-        found=doubled.removesuffix(".") or f"one vehicle speaks as system {radio.aim.system}",
-        needed="one vehicle under one system id",
-        hint="Switch the other vehicle off, or give each an id of its own." if doubled else "",
+        found=doubled.removesuffix(".") or f"one vehicle uses system id {radio.aim.system}",
+        needed="one vehicle per system id",
+        hint="Switch the other vehicle off, or give each its own id." if doubled else "",
     )
 
 
@@ -344,8 +345,8 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
         name="motors_off",
         title="Motors off",
         passed=bool(ways),
-        found=" and ".join(ways) or "it answers to no way to stop its motors",
-        needed="a way to stop its motors that it confirms",
+        found=" and ".join(ways) or "the vehicle confirms no command that stops its motors",
+        needed="a confirmed way to stop its motors",
         hint="" if ways else "Build it with settings/rotorcraft_basic.xml (docs/real-flight.md), then connect again.",
     )
 
@@ -356,41 +357,41 @@ def _own_checks(radio: AutopilotLink) -> CheckItem:
         _ask_checks(radio)
     return CheckItem(
         name="own_checks",
-        title="Its own checks before arming",
+        title="Arming checks of the autopilot",
         passed=ready,
-        found="they pass" if ready else f"they do not pass; {_reasons(radio)}",
-        needed="that it would arm",
+        found="passed" if ready else f"not passed; {_reasons(radio)}",
+        needed="passed",
         hint="" if ready else _checks_hint(radio),
     )
 
 
 def _ask_checks(radio: AutopilotLink) -> None:
-    """Have their results told by events, where the vehicle knows events: those from before connecting were missed."""
+    """Request the results of the arming checks as events, if the vehicle supports them; earlier events were missed."""
     asking = radio.profile.ask_checks(radio.aim)
     if asking is not None:
         radio.request(
             asking,
-            lambda heard: isinstance(heard, VehicleEvent) and heard.number == HEALTH_SUMMARY,
+            lambda reply: isinstance(reply, VehicleEvent) and reply.number == HEALTH_SUMMARY,
             attempts=_CHECKS_ATTEMPTS,
         )
 
 
 def _reasons(radio: AutopilotLink) -> str:
-    """What the vehicle names and what it says."""
+    """Return the failing components and the last status texts."""
     failing = radio.seen.arming_checks.failing(_mode(radio))
-    said = " / ".join(radio.seen.spoken)
-    named = f"it names: {', '.join(failing)}" if failing else ""
-    spoken = f"it said: {said or 'nothing'}" if said or not failing else ""
-    return "; ".join(part for part in (named, spoken) if part)
+    texts = " / ".join(radio.seen.spoken)
+    components = f"failing: {', '.join(failing)}" if failing else ""
+    messages = f"messages: {texts or 'none'}" if texts or not failing else ""
+    return "; ".join(part for part in (components, messages) if part)
 
 
 def _checks_hint(radio: AutopilotLink) -> str:
     profile, arming_modes = radio.profile, radio.seen.arming_checks.arming_modes
-    hints = ["See to what it says; a vehicle that has just started may still be settling."]
+    hints = ["Correct what it reports; after power-on, wait until it has settled."]
     if _mode(radio) not in arming_modes and (others := sorted(profile.flying_modes & arming_modes)):
-        hints.append(f"It would arm in the mode {' or '.join(profile.mode_names[mode] for mode in others)}.")
+        hints.append(f"It can be armed in mode {' or '.join(profile.mode_names[mode] for mode in others)}.")
     if profile.ask_checks(radio.aim) is not None:
-        hints.append("QGroundControl shows its reasons in words.")
+        hints.append("QGroundControl shows the reasons in full.")
     return " ".join(hints)
 
 
@@ -420,23 +421,23 @@ def _motion(watched: GroundObservation) -> tuple[CheckItem, ...]:
             name="position",
             title="Position",
             passed=rate_hz >= POSITIONS_HZ,
-            found=f"{rate_hz:.1f} times a second",
-            needed=f"{POSITIONS_HZ:g} times a second or more",
-            hint="Set its telemetry up for tuning (docs/real-flight.md)." if positions else _NO_POSITION,
+            found=f"{rate_hz:.1f} per second",
+            needed=f"{POSITIONS_HZ:g} per second or more",
+            hint="Configure its telemetry for tuning (docs/real-flight.md)." if positions else _NO_POSITION,
         ),
         CheckItem(
             name="clock",
-            title="Its clock",
+            title="Vehicle clock",
             passed=passed_s > 0.0,
             found=f"{passed_s:.2f} s passed in {watched.seconds:.2f} s" if positions else "waiting for a position",
-            needed="time that passes",
+            needed="an advancing clock",
             hint="Restart the vehicle." if positions else _NO_POSITION,
         ),
         CheckItem(
             name="still",
             title="Standing still",
             passed=bool(positions) and moved_m <= _STANDS_WITHIN_M,
-            found=f"its altitude moved by {moved_m:.2f} m" if positions else "waiting for a position",
+            found=f"its altitude changed by {moved_m:.2f} m" if positions else "waiting for a position",
             needed=f"{_STANDS_WITHIN_M:g} m or less",
             hint="Put it on firm ground and let its position settle." if positions else _NO_POSITION,
         ),
@@ -453,9 +454,9 @@ def _battery(battery_v: float | None, min_battery_v: float) -> CheckItem:
         name="battery",
         title="Battery",
         passed=battery_v is not None and battery_v >= min_battery_v,
-        found="no voltage told" if battery_v is None else f"{battery_v:.1f} V",
+        found="no voltage reported" if battery_v is None else f"{battery_v:.1f} V",
         needed=f"{min_battery_v:g} V or more",
-        hint="Put a charged battery in, or correct the limit.",
+        hint="Insert a charged battery, or correct the limit.",
     )
 
 
@@ -465,7 +466,7 @@ def _flight_plan(problem: str) -> CheckItem:
         title="Flight plan",
         passed=not problem,
         found=problem or "has the blocks",
-        needed="the blocks that a take-off and a landing take",
+        needed="the blocks for take-off and landing",
         hint="Load a flight plan with these blocks (docs/real-flight.md), then connect again." if problem else "",
     )
 
@@ -474,9 +475,9 @@ def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
     value = read_parameter(radio, requirement.parameter)
     return CheckItem(
         name=f"failsafe {requirement.parameter}",
-        title=f"Its own failsafe {requirement.parameter}",
+        title=f"Failsafe {requirement.parameter}",
         passed=value is not None and requirement.is_met(value),
-        found="not told" if value is None else f"{value:g}" if value else "off",
+        found="not reported" if value is None else f"{value:g}" if value else "off",
         needed=requirement.what,
-        hint="Switch it on in the autopilot: when the link is lost, nothing else brings it down.",
+        hint="Enable it in the autopilot: if the link is lost, only this failsafe lands the vehicle.",
     )

@@ -1,4 +1,4 @@
-"""Speaking with one vehicle in its profile's terms: asking with repetitions, one request in flight, and listening."""
+"""Communication with one vehicle by its profile: repeated requests, one in flight at a time, and reception."""
 
 from collections import deque
 from collections.abc import Callable
@@ -36,13 +36,13 @@ _SPOKEN: Final = 5
 
 @dataclass(slots=True)
 class VehicleMemory:
-    """The latest of what a vehicle said; positions with the time of their receipt. `block` is the number of its flight
-    plan's block."""
+    """Latest measurements of a vehicle; positions with their time of receipt. `block` is the number of the current
+    block of its flight plan."""
 
     heartbeat: Heartbeat | None = None
     heartbeat_s: float = float("-inf")
     disarmed_since_s: float | None = None
-    """Since when every heartbeat has said so."""
+    """Since when every heartbeat has reported disarmed."""
     version: str = ""
     uid: str = ""
     block: int | None = None
@@ -56,7 +56,7 @@ class VehicleMemory:
     _pieces: str = ""
 
     def forget_vehicle(self) -> None:
-        """Who it is, and what its own checks found."""
+        """Discard its identity and the results of its arming checks."""
         self.version = self.uid = ""
         self.arming_checks = ArmingChecks()
 
@@ -83,7 +83,7 @@ class VehicleMemory:
                 pass
 
     def _hear(self, said: StatusText) -> None:
-        """Pieces are put together in their order; one that is lost is not waited for."""
+        """Assemble the chunks of a status text in order; a lost chunk is not waited for."""
         if said.number != self._piece_of or said.place == 0:
             self._piece_of, self._pieces = said.number, ""
         self._pieces += said.text
@@ -93,9 +93,12 @@ class VehicleMemory:
 
 
 class AutopilotLink:
-    """A link with a profile; an answer is waited for `patience_s`. Only the autopilot's own component is listened to;
-    `overhear` gets every message besides, of whichever. Whatever waits for the vehicle `listen`s: `on_wait` is told
-    then of what came, every `patience_s` at least, and what it raises ends what is under way. For one thread."""
+    """Link to an autopilot by its profile, for use by one thread.
+
+    Replies are waited for `patience_s`. Only messages of the autopilot's own component are measured; `overhear` is
+    called with every message of any component. Operations that wait for the vehicle call `listen`, which calls
+    `on_wait` with the packets received, at least every `patience_s`; an exception from it ends the operation.
+    """
 
     def __init__(
         self,
@@ -119,44 +122,45 @@ class AutopilotLink:
 
     @property
     def timeout_factor(self) -> float:
-        """How many times longer than a real vehicle this one is waited for."""
+        """Factor on the timeouts of a real vehicle."""
         return self.patience_s / REPLY_TIMEOUT_S
 
     @property
     def silence_s(self) -> float:
-        """A vehicle that has sent no heartbeat for so long is not there."""
+        """Time without a heartbeat after which the vehicle counts as absent, s."""
         return HEARTBEATS_MISSED * self.profile.heartbeat_s * self.timeout_factor
 
     @property
     def is_disarmed(self) -> bool:
-        """By two heartbeats at least, and none between them that says otherwise."""
+        """Whether it is disarmed by at least two heartbeats with none between them that contradicts."""
         seen = self.seen
         return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= self.witness_gap_s
 
     @property
     def witness_gap_s(self) -> float:
-        """How far two heartbeats must be apart to be two witnesses."""
+        """Minimum time between two heartbeats that confirm each other, s."""
         return MAX_WITNESS_GAP * self.profile.heartbeat_s * self.timeout_factor
 
     @property
     def block(self) -> str:
-        """The block of its flight plan that the vehicle is in, by name; empty where it does not tell."""
+        """Name of the current block of its flight plan; empty if not reported."""
         names = {number: name for name, number in self.aim.blocks.items()}
         return "" if self.seen.block is None else names.get(self.seen.block, f"block {self.seen.block}")
 
     def send(self, *messages: Outgoing) -> None:
-        """Raises LinkError when the link is closed."""
+        """Send messages. Raises LinkError if the link is closed."""
         for message in messages:
             self.link.send(message.kind, **message.fields)
 
     def listen(self, timeout_s: float) -> list[PacketReceived]:
-        """As `receive`, on behalf of what takes time: raises whatever `on_wait` does."""
+        """Receive during an operation that waits; raises as `receive` and `on_wait` do."""
         heard = self.receive(timeout_s)
         self._on_wait(heard)
         return heard
 
     def receive(self, timeout_s: float) -> list[PacketReceived]:
-        """What has come since the last call, waiting at most so long for the first. Raises LinkError as `send`."""
+        """Return the packets since the last call, waiting at most `timeout_s` for the first. Raises LinkError as
+        `send` does."""
         messages = self.link.receive(timeout_s)
         if self._overhear is not None:
             for message in messages:
@@ -173,23 +177,23 @@ class AutopilotLink:
         return heard
 
     def hear_pending(self) -> None:
-        """Take in what has come, and forget who a vehicle is that is not there."""
+        """Process the packets that have arrived, and discard the identity of an absent vehicle."""
         self.listen(0.0)
         self._forget_absent(self.clock.now_s())
 
     def _forget_absent(self, now_s: float) -> None:
-        """Another may come in its place."""
+        """Discard the identity after an absence, because another vehicle may take its place."""
         if now_s - self.seen.heartbeat_s > self.silence_s:
             self.seen.forget_vehicle()
 
     def _is_autopilots(self, message: Message) -> bool:
-        """Not of another component on board; of any while the autopilot's is not known."""
+        """Whether the message is of the autopilot's component, or of any while that is unknown."""
         return self.aim.component in (0, source_component(message))
 
     def request(
         self, request: Outgoing, fits: Callable[[Measurement], bool], *, attempts: int = ATTEMPTS
     ) -> Measurement | None:
-        """The answer to a request that is repeated every 0.5 s; None when there is none. Raises LinkError."""
+        """Send a request every 0.5 s until a reply fits; return it, or None without a reply. Raises LinkError."""
         self.listen(0.0)
         for _ in range(attempts):
             self.send(request)
@@ -201,7 +205,8 @@ class AutopilotLink:
         return None
 
     def set_up(self, steps: tuple[Step, ...]) -> str:
-        """Carry out steps on the ground, waiting for them; why they were refused, or nothing. Raises LinkError."""
+        """Carry out steps on the ground and wait for them; return why they were refused, or an empty string. Raises
+        LinkError."""
         conversation = CommandSequence(Action.ARM, steps, self, description="be set up")
         while True:
             ended = conversation.proceed(self.listen(self.patience_s / 10.0))
@@ -210,8 +215,8 @@ class AutopilotLink:
 
 
 class CommandSequence:
-    """Steps under way: each begins when the one before it was answered; nothing here waits. `description` says what the
-    vehicle was told, where that is not the action."""
+    """Steps in progress: each begins when the previous one was acknowledged; no method waits. `description` names the
+    steps in messages, by default by the action."""
 
     def __init__(self, action: Action, steps: tuple[Step, ...], radio: AutopilotLink, *, description: str = "") -> None:
         self._action, self._radio, self._told = action, radio, description or action
@@ -221,7 +226,7 @@ class CommandSequence:
         self._send()
 
     def proceed(self, heard: list[PacketReceived]) -> ActionDone | ActionRefused | None:
-        """Take in what came and send what is due; how it ended, once it has."""
+        """Process packets and send the next messages; return the result once the sequence has ended."""
         for each in heard:
             if self._steps and (accepted := _verdict(self._steps[0], each.measurement)) is not None:
                 if not accepted and self._steps[0].needed:
@@ -254,18 +259,18 @@ class CommandSequence:
 
     def _refused(self, measurement: Measurement | None) -> ActionRefused:
         why = measurement.why if isinstance(measurement, CommandReply) else ""
-        said = f" It said: {' / '.join(self._radio.seen.spoken)}." if self._radio.seen.spoken else ""
+        texts = f" Its messages: {' / '.join(self._radio.seen.spoken)}." if self._radio.seen.spoken else ""
         return ActionRefused(
-            self._action, f"The vehicle refused to {self._told} ({why}).{said}", self._radio.clock.now_s()
+            self._action, f"The vehicle refused to {self._told} ({why}).{texts}", self._radio.clock.now_s()
         )
 
     def _unanswered(self) -> ActionRefused:
-        why = f"The vehicle did not answer when it was to {self._told}."
+        why = f"The vehicle did not reply to the command to {self._told}."
         return ActionRefused(self._action, why, self._radio.clock.now_s())
 
 
 def _verdict(step: Step, measurement: Measurement | None) -> bool | None:
-    """Whether what was heard ends the step, and how; None when it is no answer to it."""
+    """Return whether a reply accepts the step; None if it is not a reply to it."""
     match measurement:
         case CommandReply(to=to, accepted=accepted) if to == step.awaits:
             return accepted

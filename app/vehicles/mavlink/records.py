@@ -1,5 +1,5 @@
-"""The record of a trial: its samples as a trajectory, with both sources of altitude where there are two, aligned, one
-of them scored; and in words how it ended.
+"""Record of a trial: its samples as a trajectory, with both sources of altitude, aligned, if there are two, one of
+which is scored; its ending and the reason.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,18 +18,18 @@ from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.trial_machine import Trial
 
 Scored = Literal["vehicle", "mocap"]
-"""Whose altitude is scored."""
+"""Source of the scored altitude."""
 
 MAX_DIFFERENCE_M: Final = 0.3
-"""Further apart than this, the sources are said to disagree."""
+"""Difference between the sources above which a disagreement is reported."""
 _STEPPED: Final = ("set_point_m",)
-"""Channels that jump: between two samples the first holds."""
+"""Channels that jump: between two samples the first one is held."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlignedRecord:
-    """`settings` tell delay and differences of the two sources, `remark` what a person has to know of them: empty when
-    all is well."""
+    """A trajectory with both sources. `settings` contain their delay and differences, `remark` what the user must know
+    about them; empty without problems."""
 
     trajectory: Trajectory
     settings: Mapping[str, OptionValue] = field(default_factory=dict)
@@ -39,14 +39,16 @@ class AlignedRecord:
 def add_secondary_altitude(
     trajectory: Trajectory, seen: Sequence[tuple[float, float]], *, name: str, zero_s: float, scored: Scored
 ) -> AlignedRecord:
-    """The vehicle's own record with what the second source, `name`, saw of the flight: when each sighting was received,
-    s, and the altitude, m, on any datum; `zero_s` is the record's time 0 on the clock of the receipts. Where `mocap` is
-    scored the record runs on its times, and the vehicle's own altitude is `altitude_2_m`; else the other way round. A
-    source that saw too little leaves the record as it is."""
+    """Add the altitude of the second source, `name`, to the vehicle's own record.
+
+    `seen` are the times of measurement, s, and altitudes, m, on any datum; `zero_s` is the record's time 0 on the clock
+    of these times. If `mocap` is scored, the record has the times of the second source and the vehicle's own altitude
+    is `altitude_2_m`; otherwise vice versa. If the source has fewer than two samples in the record, it is unchanged.
+    """
     other_s, other_m = _rising(seen, zero_s)
     inside = (other_s >= trajectory.time_s[0]) & (other_s <= trajectory.time_s[-1])
     if np.count_nonzero(inside) < 2:
-        unseen = f"Nothing was seen by {name}, the second source of altitude; the vehicle's own is scored."
+        unseen = f"No altitudes came from {name}, the second source; the vehicle's own altitude is scored."
         return AlignedRecord(trajectory=trajectory, remark=unseen)
     alignment, remarks = _aligned(trajectory, other_s, other_m)
     second_m = resample(trajectory.time_s, other_s, other_m, alignment)
@@ -60,7 +62,7 @@ def add_secondary_altitude(
             f"({apart.rms_m:.2f} m root mean square)."
         )
     if gap := _longest_gap(other_s - alignment.delay_s, trajectory):
-        remarks.append(f"{name[0].upper()}{name[1:]} saw nothing for {gap[1]:.1f} s from {gap[0]:.1f} s on.")
+        remarks.append(f"{name[0].upper()}{name[1:]} has no samples for {gap[1]:.1f} s from {gap[0]:.1f} s on.")
     both = (
         _on_the_second_s_times(trajectory, other_s - alignment.delay_s, other_m - alignment.datum_m)
         if scored == "mocap"
@@ -75,14 +77,15 @@ def add_secondary_altitude(
 
 
 def _rising(seen: Sequence[tuple[float, float]], zero_s: float) -> tuple[Samples, Samples]:
-    """Times and altitudes, each of shape (k,), without those that came later than they should."""
+    """Return times and altitudes, each of shape (k,), without samples that are out of order."""
     received_s, altitude_m = np.array(seen, dtype=np.float64).reshape(-1, 2).T
     later = np.diff(np.maximum.accumulate(received_s), prepend=-np.inf) > 0.0
     return received_s[later] - zero_s, altitude_m[later]
 
 
 def _aligned(trajectory: Trajectory, other_s: Samples, other_m: Samples) -> tuple[Alignment, list[str]]:
-    """By what both saw of the flight; by their receipts, and said so, where that is too little."""
+    """Align the second source with the record by the flight itself, or, with a remark, by the times of receipt if it
+    has too few samples."""
     time_s, altitude_m = trajectory.time_s, trajectory["altitude_m"]
     try:
         return align(time_s, altitude_m, other_s, other_m, rest_until_s=0.0), []
@@ -91,11 +94,11 @@ def _aligned(trajectory: Trajectory, other_s: Samples, other_m: Samples) -> tupl
         rested = time_s <= max(0.0, time_s[0])
         alignment = Alignment(delay_s=0.0, datum_m=float(np.median(apart_m[rested])))
         reasons = "; ".join(problem.reason for problem in error.problems)
-        return alignment, [f"The second source of altitude was aligned by its receipt alone: {reasons}."]
+        return alignment, [f"The second source of altitude was aligned by its time of receipt alone: {reasons}."]
 
 
 def _longest_gap(other_s: Samples, trajectory: Trajectory) -> tuple[float, float] | None:
-    """Begin and length of the longest time inside the record without a sample, where scoring would miss it."""
+    """Return begin and length of the longest gap between samples in the record, s, if it exceeds the scoring limit."""
     first_s, last_s = trajectory.time_s[0], trajectory.time_s[-1]
     inside_s = other_s[(other_s > first_s) & (other_s < last_s)]
     marks_s = np.concatenate(([first_s], inside_s, [last_s]))
@@ -105,7 +108,7 @@ def _longest_gap(other_s: Samples, trajectory: Trajectory) -> tuple[float, float
 
 
 def _on_the_second_s_times(trajectory: Trajectory, second_s: Samples, second_m: Samples) -> Trajectory:
-    """Every channel of the vehicle's on the times of the second source, as far as the vehicle's record goes."""
+    """Resample the vehicle's channels at the times of the second source within the vehicle's record."""
     inside = (second_s >= trajectory.time_s[0]) & (second_s <= trajectory.time_s[-1])
     time_s = np.round(second_s[inside], 6)
     before = np.searchsorted(trajectory.time_s, second_s[inside], side="right") - 1
@@ -123,7 +126,7 @@ _OTHER: Final = "altitude_2_m"
 
 
 def channels_of(kept: RecordSample, datum_m: float, scored: Scored) -> dict[str, float]:
-    """A sample's channels; altitudes count from `datum_m` on the vehicle's own."""
+    """Return a sample's channels; altitudes count from `datum_m` on the vehicle's own datum."""
     own_m = kept.position.altitude_m - datum_m
     channels = {
         _SCORED: own_m,
@@ -140,8 +143,8 @@ def channels_of(kept: RecordSample, datum_m: float, scored: Scored) -> dict[str,
 
 
 def trajectory_of(samples: Sequence[RecordSample], start_s: float, datum_m: float) -> Trajectory:
-    """What the vehicle said, by its own clock, from the command on; channels that some samples lack are left out, and
-    what a second source saw is not in it: each sample holds only the last that had come."""
+    """Return the vehicle's own samples as a trajectory by its clock from `start_s` on. Channels that some samples lack
+    are omitted, and so is the second source, of which each sample contains only the last value received."""
     rows = [channels_of(replace(sample, second_m=None), datum_m, "vehicle") for sample in samples]
     names = [name for name in rows[-1] if all(name in row for row in rows)] if rows else []
     time_s = np.array([round(sample.position.time_boot_s - start_s, 6) for sample in samples])
@@ -150,7 +153,7 @@ def trajectory_of(samples: Sequence[RecordSample], start_s: float, datum_m: floa
 
 
 def ending_of(trial: Trial) -> Ending:
-    """What the record is worth, whatever became of the vehicle."""
+    """Return the ending of the record, independent of a quarantine of the vehicle."""
     outcome = None if trial.failure is None else RESPONSES[trial.failure].outcome
     if outcome is None:
         return "completed"
@@ -158,11 +161,11 @@ def ending_of(trial: Trial) -> Ending:
 
 
 def reason_of(trial: Trial) -> str:
-    """Why the flight ended early or does not count, and what else is to be known of its record."""
+    """Return why the flight ended early or does not count, and remarks on its record."""
     if trial.failure is None or trial.failure is Failure.OPERATOR:
-        said = trial.why
+        reason = trial.why
     else:
-        said = f"{RESPONSES[trial.failure].text} {trial.why}"
+        reason = f"{RESPONSES[trial.failure].text} {trial.why}"
     dropped = trial.watch.glitches if trial.failure is not Failure.GLITCHES else 0
     flag = f"{dropped} of its samples jumped and were dropped." if dropped else ""
-    return " ".join(part for part in (said, flag) if part)
+    return " ".join(part for part in (reason, flag) if part)

@@ -1,4 +1,4 @@
-"""Land and motors off outside of a trial: repeated until the vehicle says that it has obeyed."""
+"""Land and motors off outside a trial, repeated until telemetry confirms them."""
 
 from itertools import takewhile
 from typing import Final
@@ -9,21 +9,23 @@ from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, UNHEEDED, UN
 from app.vehicles.mavlink.radio import AutopilotLink
 
 STOPPING_S: Final = 5.0
-"""For so long an order to stop the motors is repeated: later, somebody may be flying it by hand."""
+"""Time for which the command to stop the motors is repeated; later, a pilot may be flying the vehicle."""
 SINKING_S: Final = 1.0
-"""A vehicle that has sunk for so long is landing; one gust is no landing."""
+"""Time of descent after which the vehicle counts as landing, longer than a gust."""
 LANDED_WITHIN_S: Final = 20.0
-"""Longer than a landing takes: whoever flies the vehicle after it was landing for so long is somebody else."""
+"""Longer than a landing takes: a flight after a landing of this length was begun by somebody else."""
 
 
 class RepeatedCommand:
-    """Sent again until the vehicle has obeyed. Motors off is over once the motors stand, or after some seconds. Land is
-    over once the motors stand, a person flies the vehicle, or it has had the time to land; while it is landing, nothing
-    is sent."""
+    """Land or motors off, sent again until telemetry confirms it.
+
+    Motors off ends once the motors have stopped, or after some seconds. Land ends once the motors have stopped, a pilot
+    flies the vehicle, or it has had the time to land; while the vehicle is landing, nothing is sent.
+    """
 
     def __init__(self, radio: AutopilotLink, action: Action, *, by_person: bool = True) -> None:
-        """Sends it; one that no person has given waits while the newest heartbeat is in a pilot's mode. Raises
-        VehicleError when it takes a block of a flight plan that is not known."""
+        """Send the command; if it is not `by_person`, wait while the newest heartbeat shows a manual mode. Raises
+        VehicleError if it needs a block of the flight plan that is unknown."""
         self._radio, self._action = radio, action
         self._asked_s = radio.clock.now_s()
         self._answered = False
@@ -36,12 +38,12 @@ class RepeatedCommand:
 
     @property
     def trouble(self) -> str:
-        """That it does not land, though it is told to; empty where there is nothing to say."""
+        """Message that the vehicle does not land although commanded to; otherwise empty."""
         waits = self._action is Action.LAND and self._radio.clock.now_s() - self._asked_s > UNHEEDED_S
         return UNHEEDED if waits and not self.is_over and self._landing_since_s is None else ""
 
     def proceed(self, heard: list[PacketReceived]) -> None:
-        """Take in what came, and send it again when it is due."""
+        """Process packets, and send the command again if it is due."""
         for each in heard:
             self._note(each)
         now_s = self._radio.clock.now_s()
@@ -57,7 +59,7 @@ class RepeatedCommand:
         return heartbeat is not None and heartbeat.mode in self._radio.profile.manual_modes
 
     def _may_be_by_hand(self, now_s: float) -> bool:
-        """By the newest heartbeat, until the next one is due: Land would take it out of a pilot's hand."""
+        """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
         is_news = now_s - self._radio.seen.heartbeat_s < self._radio.witness_gap_s
         return self._action is Action.LAND and is_news and self._is_in_pilots_mode()
 
@@ -79,20 +81,20 @@ class RepeatedCommand:
         return REPEAT_S
 
     def _send(self) -> None:
-        """Every message once, waiting for no answer."""
+        """Send every message once, without waiting for a reply."""
         self._sent_s = self._radio.clock.now_s()
         try:
             steps = self._radio.profile.steps(self._action, self._radio.aim)
         except KeyError as error:
             raise VehicleError(
-                f"The vehicle cannot be told to {self._action} from here: it did not name a block {error}.",
+                f"This program cannot command the vehicle to {self._action}: its flight plan listed no block {error}.",
                 hint="Land it with the remote control or its own ground station.",
             ) from error
         for step in steps:
             self._radio.send(*step.sends)
 
     def _has_stopped(self) -> bool:
-        """By what came since it was given: two heartbeats, or one and an answer."""
+        """Whether the motors have stopped, by two heartbeats since the command, or by one and a reply."""
         seen = self._radio.seen
         if seen.heartbeat is None or seen.heartbeat_s <= self._asked_s:
             return False
@@ -106,7 +108,7 @@ class RepeatedCommand:
         return self._landing_since_s is not None and now_s - self._landing_since_s >= LANDED_WITHIN_S
 
     def _is_landing(self, now_s: float) -> bool:
-        """By what came since it was given, of which the newest counts: a vehicle that flies again is told again."""
+        """Whether the vehicle is landing, by the newest messages since the command; if it flies again, Land is sent."""
         if self._action is Action.KILL:
             return False
         seen, profile = self._radio.seen, self._radio.profile

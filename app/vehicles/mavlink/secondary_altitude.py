@@ -1,4 +1,4 @@
-"""A second source of altitude held against the vehicle's own: a pure memory, and the rules that it is to keep."""
+"""Comparison of the second source of altitude with the vehicle's own, as pure functions."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -11,13 +11,13 @@ APART_S: Final = 0.3
 
 _MAX_AGE_S: Final = 0.5
 _ATTENDED_S: Final = 0.1
-"""The most that one sighting tells of the time before it: what a stall delayed may come at once."""
+"""Longest time before a sample that it accounts for: samples delayed by a stall may arrive at once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SecondaryAltitude:
-    """What the second source showed so far; times in s by the ground's clock. `altitude_m` is on the vehicle's datum,
-    None until it saw the vehicle; `blind_s`: for how long it has been heard without seeing anything new."""
+    """State of the second source; times in s by the ground's clock. `altitude_m` is on the vehicle's datum, None before
+    the first valid sample; `blind_s` is the time for which its samples have not been new."""
 
     heard_s: float
     altitude_m: float | None = None
@@ -27,7 +27,7 @@ class SecondaryAltitude:
 
 
 def update(second: SecondaryAltitude, sighted: SecondaryAltitudeReceived, vehicle_m: float | None) -> SecondaryAltitude:
-    """The memory after the source spoke, while the vehicle says that it is at `vehicle_m` (None: it does not say)."""
+    """Return the state after a sample of the source, with the vehicle's own altitude `vehicle_m` (None: unknown)."""
     waited_s = min(max(sighted.now_s - second.heard_s, 0.0), _ATTENDED_S)
     second = replace(second, heard_s=max(sighted.now_s, second.heard_s))
     if not sighted.is_new:
@@ -42,19 +42,19 @@ def update(second: SecondaryAltitude, sighted: SecondaryAltitudeReceived, vehicl
 
 
 def current_altitude_m(second: SecondaryAltitude | None, now_s: float) -> float | None:
-    """Where the source sees the vehicle; None while it sees nothing new, or nothing at all."""
+    """Return the source's altitude; None while its samples are not new, or none arrive."""
     if second is None or second.blind_s > 0.0 or now_s - second.heard_s > _MAX_AGE_S:
         return None
     return second.altitude_m
 
 
 def find_blind(second: SecondaryAltitude | None, now_s: float, *, stuck_s: float, silent_s: float) -> Finding | None:
-    """A source that says nothing new for `stuck_s` while it is heard, or nothing at all for `silent_s`."""
+    """Find a source whose samples have not been new for `stuck_s`, or that has sent none for `silent_s`."""
     why = ""
     if second is not None and second.blind_s > stuck_s:
-        why = f"The second source of altitude did not see it for more than {stuck_s:g} s."
+        why = f"The second source of altitude did not track it for more than {stuck_s:g} s."
     elif second is not None and now_s - second.heard_s > silent_s:
-        why = f"Nothing came from the second source of altitude for {silent_s:g} s."
+        why = f"Nothing was received from the second source of altitude for {silent_s:g} s."
     return Finding(failure=Failure.FROZEN, why=why) if why else None
 
 

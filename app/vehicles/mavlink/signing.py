@@ -1,6 +1,6 @@
-"""MAVLink 2 signing: frames carry a keyed hash, and whatever arrives without a good one is bad data.
+"""MAVLink 2 signing: frames contain a keyed hash, and frames without a valid one count as bad data.
 
-Both ends hold the same 32 bytes. Nothing of MAVLink 1 can be signed, so Paparazzi cannot.
+Both ends have the same key of 32 bytes. MAVLink 1, and so Paparazzi, has no signing.
 """
 
 import datetime as dt
@@ -16,7 +16,7 @@ _TICK_NS: Final = 10_000
 
 
 class SigningState(Protocol):
-    """What the MAVLink library keeps about the signing of one link."""
+    """Signing state of one link in the MAVLink library."""
 
     secret_key: bytes | None
     timestamp: int
@@ -25,7 +25,7 @@ class SigningState(Protocol):
 
 
 def parse_key(text: str) -> bytes:
-    """The key that 64 hexadecimal digits write. Raises InputError, which does not repeat the text: it is a secret."""
+    """Parse a key of 64 hexadecimal digits. Raises InputError, which does not contain the text: it is secret."""
     try:
         key = bytes.fromhex(text.strip())
     except ValueError:
@@ -35,7 +35,7 @@ def parse_key(text: str) -> bytes:
 
 
 def read_key(file: Path) -> bytes:
-    """The key that is written in that file. Raises InputError."""
+    """Read a key from a file. Raises InputError."""
     try:
         return parse_key(file.expanduser().read_text(encoding="ascii"))
     except (OSError, ValueError) as error:
@@ -47,7 +47,7 @@ def read_key(file: Path) -> bytes:
 
 
 def check_key(key: bytes) -> None:
-    """Raises InputError unless `key` has the length of a signing key."""
+    """Raise InputError unless `key` has the length of a signing key."""
     if len(key) != KEY_BYTES:
         raise InputError(
             "This is not a signing key.",
@@ -59,7 +59,7 @@ def check_key(key: bytes) -> None:
 
 
 def enable(state: SigningState, key: bytes, *, link_id: int = 0) -> None:
-    """Sign what is sent and accept nothing unsigned. Raises InputError for a key of a wrong length."""
+    """Sign sent frames and accept only signed ones. Raises InputError for a key of a wrong length."""
     check_key(key)
     state.secret_key = key
     state.link_id = link_id
@@ -68,11 +68,11 @@ def enable(state: SigningState, key: bytes, *, link_id: int = 0) -> None:
 
 
 def refresh(state: SigningState, *, seen: int) -> None:
-    """Bring the time stamp of the next frame up to now and to the latest one `seen` from the other end, whose clock may
-    be ahead: it must neither fall behind nor repeat."""
+    """Set the time stamp of the next frame to now, or to the latest one `seen` from the other end if that is ahead:
+    time stamps must not go back or repeat."""
     state.timestamp = max(state.timestamp, seen, timestamp_now())
 
 
 def timestamp_now() -> int:
-    """Units of 10 µs since 2015, as the signature counts them."""
+    """Return the time in units of 10 µs since 2015, as in signatures."""
     return (time.time_ns() - _EPOCH_NS) // _TICK_NS

@@ -1,4 +1,4 @@
-"""How a connected vehicle is, as last heard."""
+"""Current state of a connected vehicle, from the messages received."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ class _Count:
 
 
 class StatusReader:
-    """Reads a radio, sending and waiting for nothing. Losses are counted over the last ten seconds or so."""
+    """Reads the state of a vehicle without sending or waiting. Losses are counted over about the last ten seconds."""
 
     def __init__(self, radio: AutopilotLink) -> None:
         self._radio = radio
@@ -31,7 +31,7 @@ class StatusReader:
         self._counts: deque[_Count] = deque([opened], maxlen=round(LOSS_OVER_S / _EVERY_S) + 1)
 
     def read(self, *, step: str, datum_m: float, held: Mapping[str, float], trouble: str) -> Condition:
-        """Altitude counts from `datum_m` on the vehicle's own."""
+        """Return the current state; altitude counts from `datum_m` on the vehicle's own datum."""
         radio, now_s = self._radio, self._radio.clock.now_s()
         health, heartbeat = radio.link.health, radio.seen.heartbeat
         recent = [(at_s, position) for at_s, position in radio.seen.positions if now_s - at_s <= RATE_OVER_S]
@@ -53,7 +53,7 @@ class StatusReader:
         )
 
     def _mode(self, number: str) -> str:
-        """The block of the flight plan where the vehicle tells of one and flies by it, for that says more."""
+        """Return the display name of the mode, or of the block if the vehicle flies by a flight plan."""
         profile = self._radio.profile
         name = profile.mode_names.get(number, number)
         return name if number in profile.deaf_modes else self._radio.block or name

@@ -1,6 +1,6 @@
-"""Telemetry logs: every frame of both directions with its time, as ground stations write and read them.
+"""Telemetry logs in the format of ground stations: all frames of both directions with their times.
 
-A record is the time in µs since 1970 as 8 bytes, most significant first, whose two lowest bits are zero, and the frame.
+A record is the time in µs since 1970, big-endian in 8 bytes with the two lowest bits zero, and the frame.
 """
 
 import queue
@@ -16,17 +16,17 @@ STORED_WITHIN_S: Final = 5.0
 
 
 class TlogWriter:
-    """Appends frames to a file in a thread of its own: whoever hands one over never waits for the disk."""
+    """Appends frames to a file in its own thread, so that callers never wait for the disk."""
 
     def __init__(self, path: Path) -> None:
-        """Raises LinkError when the file cannot be opened."""
+        """Open the file. Raises LinkError if it cannot be opened."""
         self._path = path
         try:
             self._file = path.open("ab", buffering=0)
         except OSError as error:
             raise LinkError(
                 f"The telemetry log {path} cannot be written: {error.strerror or error}.",
-                hint="See that the folder exists and may be written to.",
+                hint="Check that the folder exists and is writable.",
             ) from error
         self._frames: queue.SimpleQueue[tuple[int, bytes] | None] = queue.SimpleQueue()
         self._closing = threading.Event()
@@ -36,15 +36,15 @@ class TlogWriter:
 
     @property
     def problem(self) -> str | None:
-        """Why the file is not complete, None while it is."""
+        """Reason why the file is incomplete, None if it is complete."""
         return self._problem
 
     def write(self, time_us: int, frame: bytes) -> None:
-        """Have `frame` stored within a fraction of a second; `time_us` since 1970."""
+        """Queue `frame`, which is stored within a fraction of a second; `time_us` is since 1970."""
         self._frames.put((time_us, frame))
 
     def close(self) -> None:
-        """Return once everything is stored, or after 5 s; `problem` tells the difference."""
+        """Return once all frames are stored, or after 5 s, in which case `problem` is set."""
         self._closing.set()
         self._frames.put(None)
         self._thread.join(STORED_WITHIN_S)
@@ -64,7 +64,7 @@ class TlogWriter:
                 unstored = self._store(unstored + b"".join(record(*each) for each in frames))
 
     def _store(self, data: bytes) -> bytes:
-        """Write `data`; what the disk did not take, to be tried again before all that follows."""
+        """Write `data`; return the unwritten rest, to be written before the next frames."""
         try:
             while data:
                 data = data[self._file.write(data) :]
@@ -76,5 +76,5 @@ class TlogWriter:
 
 
 def record(time_us: int, frame: bytes) -> bytes:
-    """One frame as it stands in the file."""
+    """Return one frame's record in the file."""
     return struct.pack(">Q", time_us & ~3) + frame

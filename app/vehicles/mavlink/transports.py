@@ -1,7 +1,7 @@
-"""Bytes to and from a vehicle, over UDP, TCP or a serial line; times are seconds on the wall.
+"""Transports of bytes to and from a vehicle over UDP, TCP or a serial line; times are seconds of wall time.
 
-A connection that breaks is silence, not an error: it is opened again behind the scenes, so that a link lost in the air
-is met in one way, whatever carries it.
+A broken connection appears as silence, not as an error, and is reopened automatically, so that the loss of a link in
+flight is handled in the same way for all transports.
 """
 
 import contextlib
@@ -27,42 +27,42 @@ from app.vehicles.mavlink.addresses import (
 )
 
 Peer = tuple[str, int]
-"""Who sent something: host and port, or device and baud rate."""
+"""Sender of data: host and port, or device and baud rate."""
 
 BATCH: Final = 64
-"""Datagrams handed over at once; what is left comes at once with the next read, after whatever there is to send."""
+"""Maximum number of datagrams per read, so that sending is possible between reads."""
 LARGEST_READ: Final = 65536
 RECEIVE_BUFFER: Final = 1 << 20
 BACKLOG: Final = 4096
-"""Bytes that may wait for a stalled stream: 0.7 s at 57 600 baud. Commands would only come late after more of them."""
+"""Bytes that may wait for a stalled stream: 0.7 s at 57 600 baud. Beyond that, commands would be late."""
 REOPEN_EVERY_S: Final = 1.0
 CONNECT_WITHIN_S: Final = 2.0
 UNACKNOWLEDGED_MS: Final = 5000
 
 
 class LinkError(VehicleError):
-    """The link to a vehicle could not be opened, or does not work any more."""
+    """The link to a vehicle could not be opened, or has failed."""
 
 
 class Transport(Protocol):
-    """Bytes to and from one peer. One thread reads and closes; any may `write` and `wake` until then."""
+    """Transport to and from one peer. One thread reads and closes; any thread may `write` and `wake` until then."""
 
     @property
     def remote(self) -> Peer | None:
-        """The peer that is written to; None while it is not known (`adopt`)."""
+        """Peer that `write` sends to; None until it is known (`adopt`)."""
         ...
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
-        """What has come in, a datagram or a piece of a stream each, from whomever: over UDP anybody can send. Waits at
-        most so long for the first, or `wake`."""
+        """Return the data received, each a datagram or a piece of a stream, with its sender: over UDP anybody can send.
+        Waits at most `timeout_s` for the first, or until `wake`."""
         ...
 
     def write(self, data: bytes) -> bool:
-        """Send without waiting; whether it could be: false while there is no peer or connection, or no room."""
+        """Send without waiting; return false without a peer or connection, or if the buffer is full."""
         ...
 
     def adopt(self, peer: Peer) -> None:
-        """From now on write to `peer`."""
+        """Send to `peer` from now on."""
         ...
 
     def wake(self) -> None:
@@ -73,7 +73,7 @@ class Transport(Protocol):
 
 
 def open_transport(address: Address) -> Transport:
-    """Open what `address` names. Raises LinkError when it cannot be opened."""
+    """Open the transport of an address. Raises LinkError if it cannot be opened."""
     match address:
         case UdpAddress(host, port, local_port):
             ours = ("127.0.0.1" if is_loopback_host(host) else "0.0.0.0", local_port or 0)  # noqa: S104
@@ -90,7 +90,8 @@ class UdpTransport:
     """Datagrams between our address and one peer's."""
 
     def __init__(self, local: Peer, remote: Peer | None) -> None:
-        """Raises LinkError when `local` is taken: two that listen at one port would steal each other's packets."""
+        """Bind the socket. Raises LinkError if `local` is in use: two receivers on one port would lose packets to each
+        other."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
@@ -120,7 +121,7 @@ class UdpTransport:
             return False
         try:
             self._socket.sendto(data, self._remote)
-        except OSError:  # no room, or the network is down: it may be up again for the next one
+        except OSError:  # the buffer is full or the network is down; the next one may succeed
             return False
         return True
 
@@ -143,10 +144,10 @@ class _Stream(Protocol):
 
 
 class StreamTransport:
-    """A stream of bytes to one peer; opened again every second once it has broken."""
+    """Stream of bytes to and from one peer; after it has broken, opening is retried every second."""
 
     def __init__(self, peer: Peer, opened: Callable[[], _Stream]) -> None:
-        """`opened` opens the stream or raises OSError. Raises LinkError when that fails now."""
+        """Open the stream by `opened`, which raises OSError on failure. Raises LinkError if that fails now."""
         self._peer = peer
         self._opened = opened
         try:
@@ -155,7 +156,7 @@ class StreamTransport:
             raise _cannot_open(f"{peer[0]}:{peer[1]}", error) from error
         self._waiter = _Waiter()
         self._next_try_s = 0.0
-        # Of the stream, other threads use but the descriptor, under this lock; a broken one is closed by the reader.
+        # Other threads use only the stream's descriptor, under this lock; the reader closes a broken stream.
         self._writing = threading.Lock()
         self._backlog = bytearray()
         self._is_broken = False
@@ -190,7 +191,7 @@ class StreamTransport:
             return not self._is_broken
 
     def adopt(self, peer: Peer) -> None:
-        """There is but one."""
+        """Do nothing: there is only one peer."""
 
     def wake(self) -> None:
         self._waiter.wake()
@@ -201,7 +202,7 @@ class StreamTransport:
         self._waiter.close()
 
     def _receive(self, stream: _Stream) -> bytes:
-        """What a readable stream holds; one that holds nothing has ended."""
+        """Read a readable stream; if it contains nothing, it has ended."""
         try:
             data = os.read(stream.fileno(), LARGEST_READ)
         except BlockingIOError:
@@ -213,7 +214,7 @@ class StreamTransport:
         return data
 
     def _flush(self, stream: _Stream) -> None:
-        """Write what the stream takes now; the rest follows when it takes more."""
+        """Write as much of the backlog as the stream accepts now."""
         try:
             del self._backlog[: os.write(stream.fileno(), self._backlog)]
         except BlockingIOError:
@@ -241,7 +242,7 @@ class StreamTransport:
 
 
 class _Waiter:
-    """Waits for one descriptor, or for another thread's wake."""
+    """Waits for one descriptor, or for `wake` from another thread."""
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
@@ -253,7 +254,7 @@ class _Waiter:
         self._events = 0
 
     def watch(self, descriptor: int, *, writable: bool = False) -> None:
-        """Wait for `descriptor` to be readable, and writable if so asked."""
+        """Watch `descriptor` for readability, and with `writable` also for writability."""
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if writable else 0)
         if self._watched is None:
             self._selector.register(descriptor, events)
@@ -267,7 +268,7 @@ class _Waiter:
         self._watched = None
 
     def wait(self, timeout_s: float) -> int:
-        """The events of the watched descriptor, 0 after the time-out or a wake."""
+        """Return the events of the watched descriptor, 0 after the timeout or a wake."""
         found = 0
         for key, events in self._selector.select(max(timeout_s, 0.0)):
             if key.fd == self._watched:
@@ -278,7 +279,7 @@ class _Waiter:
         return found
 
     def wake(self) -> None:
-        with contextlib.suppress(OSError):  # full of wakes, or closed by who waited
+        with contextlib.suppress(OSError):  # full of wakes, or closed by the waiting thread
             self._button.send(b"!")
 
     def close(self) -> None:
@@ -292,13 +293,13 @@ def _connected(host: str, port: int) -> socket.socket:
     connection.setblocking(False)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux: a vehicle switched off does not say good-bye
+    if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux: a vehicle that is switched off does not close the connection
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
     return connection
 
 
 def _serial_port(device: str, baud: int) -> serial.Serial:
-    """Opened and set up by pyserial, but read and written by its descriptor: pyserial's `write` waits for room."""
+    """Open a serial port by pyserial; it is read and written by its descriptor: pyserial's `write` may block."""
     try:
         return serial.Serial(device, baud, timeout=0, exclusive=True)
     except (ValueError, OverflowError, termios.error) as error:  # such as a baud rate that no device knows
@@ -316,5 +317,5 @@ def _resolved(address: Address, host: str, port: int) -> Peer:
 def _cannot_open(what: str, error: OSError) -> LinkError:
     return LinkError(
         f"{what} could not be opened: {error.strerror or error}.",
-        hint="See that the address is right, the vehicle is there, and no other program uses it.",
+        hint="Check that the address is correct, the vehicle is connected, and no other program uses it.",
     )

@@ -1,4 +1,4 @@
-"""Carries out a trial: feeds the machine what is heard and what is wanted, and does what it says."""
+"""Execution of a trial: passes received packets and requests to the trial machine, and carries out its commands."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -32,21 +32,21 @@ from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
 from app.vehicles.mavlink.trial_transitions import LANDING, State
 
 LISTEN_S: Final = 0.01
-"""How long the loop is deaf to an abort, at the most."""
+"""Longest delay before the loop processes an abort."""
 SINKS_M: Final = 0.3
-"""A vehicle that has come down by less in five seconds does not land."""
+"""A vehicle that has descended by less than this in five seconds is not landing."""
 STALL_S: Final = 0.2
-"""When this program itself stood still for so long, what came meanwhile is heard before silence is judged."""
+"""After a stall of this program of this length, pending packets are received before silence is evaluated."""
 LONGEST_STALL_S: Final = 1.0
-"""When it stood still for longer before the take-off command, what was wanted then may not be wanted now."""
+"""After a longer stall before the take-off command, the request to fly may be out of date, so the flight is refused."""
 _SAMPLE_EVERY_S: Final = 0.015
-"""Of telemetry; records keep every sample."""
+"""Minimum interval of live telemetry; records keep every sample."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
-    """How a trial ended, and its samples; `error` is what the caller's own functions raised meanwhile. `offset_s` takes
-    the vehicle's clock to ours, as the packet shows that came fastest."""
+    """Final state and samples of a trial; `error` is the first exception of the caller's functions. `offset_s` converts
+    the vehicle's clock to ours, by the packet with the least latency."""
 
     trial: Trial
     samples: tuple[RecordSample, ...]
@@ -61,9 +61,9 @@ def _no_secondary() -> Sequence[SecondaryAltitudeReceived]:
 class TrialRunner:
     """One trial of a vehicle that stands disarmed on the ground with its gains confirmed.
 
-    `restore` writes the safe gains, reads them back, and says what is wrong with them, or nothing. `look` gives what a
-    second source of altitude has seen since the last call; `channels` are those of a sample with that datum, for
-    whoever watches.
+    `restore` writes the safe gains, reads them back, and returns the problem, or an empty string. `look` returns the
+    samples of the second source of altitude since the last call; `channels` converts a record's sample and a datum to
+    the channels of live telemetry.
     """
 
     def __init__(
@@ -96,26 +96,26 @@ class TrialRunner:
 
     @property
     def datum_m(self) -> float:
-        """Where altitudes count from, on the vehicle's own datum."""
+        """Zero of the record's altitudes, on the vehicle's own datum."""
         return self._trial.plan.datum_m
 
     @property
     def trouble(self) -> str:
-        """That it does not land, though it was told to; empty where there is nothing to say."""
+        """Message that the vehicle does not land although commanded to; otherwise empty."""
         trial, now_s = self._trial, self._radio.clock.now_s()
         if trial.state not in LANDING or now_s - self._sank_s < UNHEEDED_S:
             return ""
         return UNHEEDED if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m) else ""
 
     def _note_sinking(self) -> None:
-        """Since when it has not come down by so much that it shows."""
+        """Note since when the vehicle has not descended by `SINKS_M`."""
         trial, last = self._trial, self._trial.watch.last
         altitude_m = float("inf") if last is None else last.altitude_m
         if trial.state not in LANDING or altitude_m < self._sank_to_m - SINKS_M:
             self._sank_s, self._sank_to_m = self._radio.clock.now_s(), altitude_m
 
     def fly(self) -> TrialResult:
-        """Until the trial is over, whatever is raised meanwhile: what would end the program lands the vehicle first."""
+        """Run until the trial is over. Any exception, even one that would end the program, first lands the vehicle."""
         self._guarded(lambda: self._carry_out(self._begin_with))
         while not self._trial.is_over:
             self._guarded(self._listen)
@@ -125,7 +125,7 @@ class TrialRunner:
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
             work()
-        except LinkError:  # silence: the machine notices
+        except LinkError:  # counts as silence, which the trial machine detects
             self._radio.clock.wait_s(LISTEN_S)
         except BaseException as error:  # noqa: BLE001 - kept for the caller; the vehicle comes first
             self._error = self._error or error
@@ -138,7 +138,7 @@ class TrialRunner:
             heard += self._radio.receive(LISTEN_S)
         self._listened_s = now_s
         if self._trial.state is State.ARM and stalled_s > LONGEST_STALL_S * self._radio.timeout_factor:
-            why = f"This program stood still for {stalled_s:.0f} s, so the take-off was not commanded."
+            why = f"This program stalled for {stalled_s:.0f} s, so the take-off was not commanded."
             self._advance(ActionRefused(Action.ARM, why, now_s))
         for each in in_order(heard, self._look()):
             if isinstance(each, PacketReceived) and isinstance(each.measurement, Position):
@@ -151,7 +151,7 @@ class TrialRunner:
             self._advance(ended)
 
     def _judge(self) -> None:
-        if self._trial.state is State.RESTORE:  # an interruption came between; nothing else leads on from there
+        if self._trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
             self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
         if (stop := self._wanted()) is not None:
             wanted = MotorsOffRequested if stop.motors_off else AbortRequested
@@ -160,7 +160,7 @@ class TrialRunner:
         self._note_sinking()
 
     def _wanted(self) -> StopRequest | None:
-        """A failure of the program lands the vehicle; motors off counts more, also afterwards."""
+        """Return the stop request. An internal error lands the vehicle; a request for motors off takes precedence."""
         stop = self._asked_stop()
         if self._error is None or (stop is not None and stop.motors_off):
             return stop
@@ -169,7 +169,7 @@ class TrialRunner:
     def _asked_stop(self) -> StopRequest | None:
         try:
             return self._should_stop()
-        except BaseException as error:  # noqa: BLE001 - kept for the caller; it is asked again
+        except BaseException as error:  # noqa: BLE001 - kept for the caller; it is called again
             self._error = self._error or error
             return None
 
@@ -177,7 +177,7 @@ class TrialRunner:
         before = self._trial.state
         self._trial, commands = advance(self._trial, event)
         if self._trial.state is not before:
-            self._conversation = None  # whatever was being asked for is not wanted any more
+            self._conversation = None  # the commands of the previous state are obsolete
         self._carry_out(commands)
 
     def _carry_out(self, commands: tuple[Command, ...]) -> None:
@@ -201,7 +201,7 @@ class TrialRunner:
             return self._restore()
         except VehicleError as error:
             return str(error)
-        except BaseException as error:  # noqa: BLE001 - kept for the caller; once more, for the gains come first
+        except BaseException as error:  # noqa: BLE001 - kept for the caller; retried, because the gains come first
             self._error = self._error or error
             return self._restore()
 
@@ -218,7 +218,7 @@ class TrialRunner:
     def _show(self, sample: Sample) -> None:
         try:
             self._on_sample(sample)
-        except BaseException as error:  # noqa: BLE001 - kept for the caller; commands that follow must not be lost
+        except BaseException as error:  # noqa: BLE001 - kept for the caller; the commands that follow must be sent
             self._error = error
 
 
@@ -231,6 +231,6 @@ def _describe_error(error: BaseException) -> str:
 def in_order(
     heard: Sequence[PacketReceived], sighted: Sequence[SecondaryAltitudeReceived]
 ) -> list[PacketReceived | SecondaryAltitudeReceived]:
-    """As they came: after a stall of this program, where the vehicle was seen then is not held against where it says
-    that it is now."""
+    """Return all events in the order of receipt, so that after a stall of this program old samples of the second source
+    are not compared with newer positions of the vehicle."""
     return sorted((*heard, *sighted), key=lambda event: event.now_s)

@@ -1,6 +1,6 @@
 """One trial from arming to the safe gains read back, as a pure reducer: (trial, event) → (trial, commands).
 
-It knows no autopilot and no clock: events carry their time, commands are data that `trial.py` carries out.
+It depends on no autopilot and no clock: events carry their time, and commands are data that `trial.py` carries out.
 """
 
 from collections.abc import Callable, Mapping
@@ -52,22 +52,22 @@ BASELINE_S: Final = 1.0
 ARMED_WITHIN_S: Final = 2.0
 LANDED_S: Final = 2.0
 DOWN_S: Final = 1.0
-"""On the ground for so long while it should hover: its integrator winds up."""
+"""Longest time on the ground while it should hover: its integrator winds up."""
 LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
 _ASKING_S: Final = 15.0
-"""The longest that arming may take altogether, with every repetition."""
+"""Longest time that arming may take, with all repetitions."""
 
 
 def begin(plan: Plan, watch: TrialObservation, now_s: float) -> Step:
-    """A vehicle that stands disarmed on the ground with its gains confirmed is told to arm."""
+    """Begin the trial of a vehicle that stands disarmed on the ground with its gains confirmed: command it to arm."""
     return Trial(plan=plan, state=State.ARM, since_s=now_s, watch=watch), (PerformAction(Action.ARM),)
 
 
 def advance(trial: Trial, event: Event) -> Step:
-    """The trial after an event, and what is to be done now."""
+    """Return the trial after an event, and the commands to carry out."""
     if trial.is_over:
         return trial, ()
     kept: tuple[Command, ...] = ()
@@ -96,7 +96,7 @@ def _hear(trial: Trial, event: PacketReceived) -> Step:
 
 
 def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
-    """Note a pilot's mode that only one heartbeat told of."""
+    """Note a manual mode that only one heartbeat reported."""
     if trial.state not in _STATES_WITH_TRIAL_GAINS or not _modes(trial):
         return trial
     finding = limit_checks.find_interruption(trial.watch, watch, trial.plan.limits)
@@ -104,7 +104,7 @@ def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
 
 
 def _with_fall(trial: Trial) -> Trial:
-    """A fall is noted wherever it happens, unless a person has asked for it."""
+    """Note a fall in any state, unless a person has requested motors off."""
     if trial.stopped or trial.commanded_s is None or trial.doubt:
         return trial
     fall = limit_checks.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
@@ -148,7 +148,7 @@ def _not_armed(trial: Trial, event: Event) -> Finding | None:
         why = "It disarmed itself."
     elif trial.armed_s is None:
         late = trial.asked_s is not None and event.now_s - trial.asked_s > ARMED_WITHIN_S
-        why = "It did not say that it is armed." if late or event.now_s - trial.since_s > _ASKING_S else ""
+        why = "It did not report that it is armed." if late or event.now_s - trial.since_s > _ASKING_S else ""
     return Finding(failure=Failure.NOT_ARMED, why=why) if why else None
 
 
@@ -174,7 +174,7 @@ def _record(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     trial = _resting(trial, now_s)
     if _has_rested(trial, DOWN_S, now_s):
-        return fail(trial, Finding(failure=Failure.ENVELOPE, why="It came down by itself."), now_s)
+        return fail(trial, Finding(failure=Failure.ENVELOPE, why="It descended to the ground by itself."), now_s)
     if not _is_whole(trial) or _may_be_by_hand(trial, now_s):
         return _overtime(trial, now_s)
     if watching.too_many_glitches(trial.watch):
@@ -188,18 +188,18 @@ def _is_whole(trial: Trial) -> bool:
 
 
 def _overtime(trial: Trial, now_s: float) -> Step:
-    """The ground's own clock ends a record, too, that the vehicle's does not."""
+    """End by the ground's clock a record that the vehicle's clock does not end."""
     plan, last, start_s = trial.plan, trial.watch.last, trial.commanded_boot_s
     commanded_s = trial.commanded_s if trial.commanded_s is not None else now_s
     passed_s = now_s - commanded_s
     if passed_s <= plan.record_s + plan.limits.slow_s or last is None or start_s is None:
         return trial, ()
-    why = f"By its clock {last.time_boot_s - start_s:.1f} s had passed of {passed_s:.1f} s."
+    why = f"Its clock advanced by {last.time_boot_s - start_s:.1f} s in {passed_s:.1f} s."
     return fail(trial, Finding(failure=Failure.SLOW_CLOCK, why=why), now_s)
 
 
 def _landing(trial: Trial, event: Event) -> Step:
-    """Land and abort-land: the safe gains that are still to be sent, Land until the vehicle descends, the ground."""
+    """Handle land and abort-land: send the remaining safe gains, repeat Land until it descends, await touchdown."""
     now_s = event.now_s
     if trial.awaited is not None:
         return send_gains(trial, event)
@@ -214,7 +214,7 @@ def _landing(trial: Trial, event: Event) -> Step:
         return _come_down(trial, now_s)
     if now_s - trial.since_s > LANDING_S:
         return quarantine(trial, f"It has not landed within {LANDING_S:g} s.", now_s)
-    if _is_land_due(trial, now_s) and not _obeys(trial, now_s):
+    if _is_land_due(trial, now_s) and not _confirms_landing(trial, now_s):
         return replace(trial, repeated_s=now_s), (PerformAction(Action.LAND),)
     return trial, ()
 
@@ -225,28 +225,28 @@ def _is_land_due(trial: Trial, now_s: float) -> bool:
 
 
 def _may_be_by_hand(trial: Trial, now_s: float) -> bool:
-    """By the newest heartbeat, until the next one is due: Land would take it out of a pilot's hand."""
+    """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
     watch, limits = trial.watch, trial.plan.limits
     is_pilots = bool(_modes(trial)) and watch.armed and watch.mode in limits.manual_modes
     return is_pilots and now_s - watch.heartbeat_s < limits.confirmation_s
 
 
 def _doubting(trial: Trial) -> Trial:
-    """While it lands for another reason, what puts it in doubt is remembered."""
+    """Note a finding that makes the vehicle's state uncertain while it lands for another reason."""
     finding = _changed(trial) if trial.commanded_s is not None else limit_checks.find_doubled(trial.watch)
     return trial if finding is None else note(trial, finding)
 
 
 def _come_down(trial: Trial, now_s: float) -> Step:
-    """Its motors are stopped, unless nobody knows any more whose they are."""
+    """Stop the motors of a landed vehicle, unless its state or identity is uncertain."""
     if trial.failure is not Failure.FALL and _changed(trial):
         return quarantine(trial, "", now_s)
     return disarm(trial, now_s)
 
 
 def _resting(trial: Trial, now_s: float) -> Trial:
-    """Note since when it has been at rest: on the ground by every witness, or near it by speed alone once its motors
-    are off, for some autopilots' altitude drifts. A lone sample that jumps says nothing either way."""
+    """Note since when it has been at rest: on the ground by every source, or, once its motors are off, near the ground
+    by speed alone, because the altitude of some autopilots drifts. A single sample that jumps is ignored."""
     if trial.watch.doubted is not None and watching.is_fresh(trial.watch, now_s):
         return trial
     if not watching.is_disarmed(trial.watch, trial.plan.limits):
@@ -262,7 +262,7 @@ def _has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
 
 
 def _has_landed(trial: Trial, now_s: float) -> bool:
-    """At rest for 2 s; or it has disarmed itself near the ground, as some do, and a fresh position says so."""
+    """Whether it has been at rest for 2 s, or has disarmed itself near the ground, as some do, by a fresh position."""
     is_high = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     near = watching.is_fresh(trial.watch, now_s) and not is_high
     disarmed = watching.is_disarmed(trial.watch, trial.plan.limits)
@@ -288,11 +288,11 @@ def _disarming(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     trial = _answered(_doubting(trial), event)
     if _is_stopped(trial, event):
-        said = " Its motors have stopped, it says." if trial.stopped else ""
-        return enter(replace(trial, why=trial.why + said), State.RESTORE, now_s), (RestoreGains(),)
+        confirmed = " It confirmed that its motors have stopped." if trial.stopped else ""
+        return enter(replace(trial, why=trial.why + confirmed), State.RESTORE, now_s), (RestoreGains(),)
     airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     if airborne and not trial.stopped:
-        why = "It was found in the air while its motors were to be stopped."
+        why = "It was in the air when its motors should be stopped."
         return abort(replace(trial, doubt=trial.doubt or why), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
         return quarantine(trial, _why_not_stopped(trial, now_s), now_s)
@@ -306,19 +306,19 @@ def _disarming(trial: Trial, event: Event) -> Step:
 def _why_not_stopped(trial: Trial, now_s: float) -> str:
     doubt = "" if trial.stopped else watching.find_doubt_of_ground(trial.watch, now_s)
     if doubt:
-        return f"Its motors were not told to stop: {doubt}."
-    return f"It has not said within {DISARMED_WITHIN_S:g} s that its motors stopped."
+        return f"Its motors were not commanded to stop: {doubt}."
+    return f"It has not confirmed within {DISARMED_WITHIN_S:g} s that its motors stopped."
 
 
 def _answered(trial: Trial, event: Event) -> Trial:
-    """Note that it has answered the order to stop its motors: with what its heartbeat says, a second witness."""
+    """Note a reply to the command to stop its motors, which together with one heartbeat confirms the stop."""
     heard = event.measurement if isinstance(event, PacketReceived) else None
     answered = confirms_motors_off(heard, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
     return replace(trial, answered=trial.answered or answered)
 
 
 def _is_stopped(trial: Trial, event: Event) -> bool:
-    """By two heartbeats, or by one and its answer to the order."""
+    """Whether its motors have stopped, by two heartbeats, or by one and its reply to the command."""
     if not isinstance(event, PacketReceived) or not isinstance(event.measurement, Heartbeat) or event.measurement.armed:
         return False
     return trial.answered or watching.is_disarmed(trial.watch, trial.plan.limits)
@@ -349,7 +349,7 @@ _RECORDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.ABOR
 
 
 def _finding(trial: Trial, now_s: float) -> Finding | None:
-    """The gravest limit that is not kept between the command and the end of the record."""
+    """Return the most severe failure between the command and the end of the record, if any."""
     plan, watch = trial.plan, trial.watch
     return (
         _taken_over(trial)
@@ -371,12 +371,12 @@ def _envelope(trial: Trial) -> Finding | None:
 
 
 def _taken_over(trial: Trial) -> Finding | None:
-    """By a person, as heartbeats show that have certainly seen the command."""
+    """Whether a pilot has taken over, by heartbeats sent certainly after the command."""
     return limit_checks.find_taken_over(trial.watch, trial.plan.limits) if _modes(trial) else None
 
 
 def _changed(trial: Trial) -> Finding | None:
-    """What is not told of a vehicle that lands; that its motors stop then is no surprise."""
+    """Return an unexpected change of state during a landing, in which disarming is expected."""
     watch = replace(trial.watch, armed=True)
     return limit_checks.find_doubled(watch) or limit_checks.find_unexpected(
         watch, trial.plan.limits, _modes(trial), _blocks(trial)
@@ -384,34 +384,34 @@ def _changed(trial: Trial) -> Finding | None:
 
 
 def _modes(trial: Trial) -> frozenset[str]:
-    """The modes that the vehicle may be in; any (empty) until a heartbeat that has certainly seen what it was told, and
-    while it stays in its mode from before: it has not followed."""
+    """Return the modes that the vehicle may be in. Any (empty) until a heartbeat sent certainly after the command, and
+    while the vehicle stays in its previous mode, because it has not executed the command then."""
     limits, watch = trial.plan.limits, trial.watch
     if trial.commanded_s is not None:
-        told_s = trial.commanded_s
-        has_stayed = not watch.lifted and watch.mode_since_s <= told_s + _MODE_KNOWN_S
+        command_s = trial.commanded_s
+        has_stayed = not watch.lifted and watch.mode_since_s <= command_s + _MODE_KNOWN_S
         has_stayed = has_stayed and watch.mode == trial.commanded_in
     elif trial.state is State.ABORT_LAND:
-        told_s = trial.since_s
-        has_stayed = watch.mode_since_s <= told_s
+        command_s = trial.since_s
+        has_stayed = watch.mode_since_s <= command_s
     else:
         return frozenset()
-    if has_stayed or watch.heartbeat_s - told_s < _MODE_KNOWN_S:
+    if has_stayed or watch.heartbeat_s - command_s < _MODE_KNOWN_S:
         return frozenset()
     return limits.flying_modes | limits.landing_modes
 
 
 def _blocks(trial: Trial) -> frozenset[str]:
-    """The blocks of its flight plan that the vehicle may be in. At first it may still tell of those before, and some
-    plans lead back to them once it has landed."""
+    """Return the blocks of its flight plan that the vehicle may be in. At first it may still report the previous ones,
+    and some plans return to them after the landing."""
     limits = trial.plan.limits
     allowed = limits.flying_blocks | limits.landing_blocks
     early = trial.commanded_s is None or trial.watch.block_s - trial.commanded_s < _MODE_KNOWN_S
     return allowed | limits.arming_blocks if early or trial.state not in _STATES_WITH_TRIAL_GAINS else allowed
 
 
-def _obeys(trial: Trial, now_s: float) -> bool:
-    """Whether the vehicle's telemetry agrees that it is landing: it descends, or is near the ground."""
+def _confirms_landing(trial: Trial, now_s: float) -> bool:
+    """Whether telemetry confirms that the vehicle is landing: it descends, or is near the ground."""
     last = trial.watch.last
     if last is None or not watching.is_fresh(trial.watch, now_s):
         return False

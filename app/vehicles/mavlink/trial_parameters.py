@@ -1,4 +1,4 @@
-"""Parameters beside the gains that a take-off needs otherwise than they are: set for a trial, and put back after it."""
+"""Parameters, in addition to the gains, that a trial changes for its take-off and restores afterwards."""
 
 import json
 import os
@@ -17,16 +17,18 @@ from app.vehicles.mavlink.radio import AutopilotLink
 
 @dataclass(frozen=True, slots=True)
 class ChangedParameter:
-    """What a parameter was before a trial, and what it was set to."""
+    """Value of a parameter before and during a trial."""
 
     before: float
     during: float
 
 
 def files_for(folder: Path, address: Address, vehicle: Identity, *, is_simulated: bool) -> tuple[Path, ...]:
-    """Where it is kept for this vehicle, whoever flies it, for those of one type may have one address by turns; then
-    the files that were kept under other addresses of the same hardware id. Simulated vehicles may all tell the same
-    one, so their address is part of who they are."""
+    """Return the file for this vehicle, and then those of the same hardware id under other addresses.
+
+    The file is named by address and identity, because vehicles of one type may use one address in turn. Simulated
+    vehicles may all report the same hardware id, so only the file of their address is used.
+    """
     identity = _joined(f"{vehicle.autopilot} {vehicle.system_id} {vehicle.uid}")
     own = folder / f"{_joined(str(address))}-{identity}.json"
     if is_simulated or not vehicle.uid:
@@ -39,9 +41,11 @@ def _joined(described: str) -> str:
 
 
 class TrialParameters:
-    """What was changed is remembered until it is put back, as read back; in the first of the files that `files` names
-    once the vehicle is known, where there is one, also beyond this process. All of them are read. A value is put back
-    only if it is still the one that the trial set: any other, somebody has set since.
+    """Changes of parameters by trials, kept until the old values are restored and read back.
+
+    `files` is called once the vehicle is known. All the files are read; changes are stored in the first, so that they
+    survive this process; without files they are kept in memory. A value is restored only if it is still the one that
+    the trial set, because any other was set by somebody else since.
     """
 
     def __init__(self, radio: AutopilotLink, files: Callable[[], tuple[Path, ...]] = tuple) -> None:
@@ -49,8 +53,8 @@ class TrialParameters:
         self._changed: dict[str, ChangedParameter] | None = None
 
     def set(self) -> None:
-        """Raises VehicleError when the vehicle does not tell what it has, or does not take what a take-off needs, or
-        when what it has cannot be kept."""
+        """Set the parameters for take-off. Raises VehicleError if the vehicle does not report the current values or
+        does not accept the new ones, or if the current values cannot be stored."""
         for setting in self._radio.profile.take_off_settings(self._radio.aim):
             held = read_parameter(self._radio, setting.parameter)
             if held is None:
@@ -61,31 +65,31 @@ class TrialParameters:
                     raise _unset(setting)
 
     def restore(self) -> str:
-        """Why they are not as they were, or nothing."""
+        """Restore the old values; return the problem, or an empty string."""
         try:
             for name, changed in tuple(self._remembered().items()):
                 held = read_parameter(self._radio, name)
                 if held is None or (held == changed.during and not self._write(Setting(name, changed.before))):
-                    return f"{name} was {changed.before:g}, and could not be put back."
+                    return f"{name} could not be restored to {changed.before:g}."
                 self._keep({other: one for other, one in self._remembered().items() if other != name})
         except VehicleError as error:
             return str(error)
         return ""
 
     def _write(self, setting: Setting) -> bool:
-        """Whether it is read back."""
+        """Write a parameter; return whether the value was read back."""
         write_parameter(self._radio, setting.parameter, setting.value)
         return read_parameter(self._radio, setting.parameter) == setting.value
 
-    # ---- beyond this process
+    # ---- storage
 
     @cached_property
     def _files(self) -> tuple[Path, ...]:
         return self._named()
 
     def _remembered(self) -> dict[str, ChangedParameter]:
-        """What this process has changed, or one before it on a vehicle of this make and system id. Raises VehicleError
-        when the file cannot be read."""
+        """Return the changes of this process, or of an earlier one on a vehicle with this autopilot and system id.
+        Raises VehicleError if a file cannot be read."""
         if self._changed is None:
             read = [self._read(file) for file in self._files]
             self._changed = {name: one for changed in reversed(read) for name, one in changed.items()}
@@ -105,7 +109,7 @@ class TrialParameters:
             raise _unusable(file, error) from error
 
     def _keep(self, changed: dict[str, ChangedParameter]) -> None:
-        """On disk first. Raises VehicleError when it cannot be."""
+        """Keep the changes, on disk first. Raises VehicleError if they cannot be stored."""
         if self._files:
             own, *others = self._files
             try:
@@ -135,14 +139,14 @@ class TrialParameters:
 
 def _unusable(file: Path, error: Exception) -> VehicleError:
     return VehicleError(
-        f"What a trial has set on the vehicle is kept in {file}, which cannot be used: {error}.",
-        hint="See that there is room on the disk. If the file is damaged, see by hand that the vehicle's take-off "
-        "parameters are as they should be, and remove it.",
+        f"The file {file}, which keeps parameters that a trial changed on the vehicle, cannot be used: {error}.",
+        hint="Check that the disk is not full. If the file is damaged, correct the vehicle's take-off parameters by "
+        "hand, then delete the file.",
     )
 
 
 def _unset(setting: Setting) -> VehicleError:
     return VehicleError(
-        f"The vehicle could not be set up: {setting.parameter} is not {setting.value:g}, as its take-off needs.",
-        hint="See that the vehicle is still there and that nobody else writes its parameters; then try again.",
+        f"The vehicle could not be set up: the take-off needs {setting.parameter} = {setting.value:g}.",
+        hint="Check that the vehicle is connected and that no other program writes its parameters, then try again.",
     )

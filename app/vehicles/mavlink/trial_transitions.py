@@ -1,5 +1,5 @@
-"""States of one trial on a MAVLink vehicle, and its transitions from one to the next, each with the commands that
-belong to it: pure functions of a trial and the time. When each is made is decided in `trial_machine`.
+"""States of one trial on a MAVLink vehicle, and the transitions between them with their commands, as pure functions of
+a trial and the time. `trial_machine` decides when each transition is made.
 """
 
 from collections.abc import Callable, Mapping
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
-from app.vehicles.base import MOTORS_OFF_ASKED
+from app.vehicles.base import MOTORS_OFF_REQUESTED
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     Action,
@@ -25,16 +25,16 @@ from app.vehicles.mavlink.observation import TrialObservation
 
 
 class State(StrEnum):
-    """One trial, from the first heartbeat to the safe gains read back.
+    """States of one trial, from the first heartbeat to the safe gains read back.
 
         connect → preflight → set gains → arm → take-off → record → land ──→ disarm → restore → idle
            ↓                               │       │          ├──→ abort-land ─↗↘
         observing                          │       │          └──→ link lost ──→ quarantined
                                            └───────┴──→ disarm
 
-    A failure before arming leads back to idle. From arm on every end leads through disarm and restore, or into
-    quarantine, where nothing but a person helps. Stopping the motors leads to disarm from every state. A vehicle that
-    was met armed, or armed by somebody else, is only observed.
+    A failure before arming leads back to idle. From arm on, every trial ends through disarm and restore, or in
+    quarantine, which only a person can end. Stopping the motors leads to disarm from every state. A vehicle that is
+    armed on connection, or was armed by somebody else, is only observed.
     """
 
     IDLE = "idle"
@@ -69,18 +69,18 @@ TRANSITIONS: Final[Mapping[State, frozenset[State]]] = {
     State.QUARANTINE: frozenset({State.IDLE}),
     State.OBSERVE: frozenset({State.IDLE}),
 }
-"""From quarantine and observing a person leads on, nobody else. Disarm goes back to abort-land when the vehicle is
-found in the air; what ends in idle from arm on has been disarmed and has its safe gains back."""
+"""Only a person's release leads out of quarantine and observing. Disarm returns to abort-land if the vehicle is in the
+air. A trial that ends in idle after arming has been disarmed and has its safe gains restored."""
 
 COMMANDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.LAND, State.ABORT_LAND})
-"""An operator's abort has a meaning in these."""
+"""States in which an operator's abort has an effect."""
 
 LANDING: Final = frozenset({State.LAND, State.ABORT_LAND})
-"""It has been told to land, and is heard."""
+"""States in which the vehicle has been commanded to land and the link is up."""
 
 OVER: Final = frozenset({State.IDLE, State.QUARANTINE})
 QUARANTINE_STATES: Final = frozenset({State.QUARANTINE, State.OBSERVE})
-"""Nothing that changes the vehicle may be sent but Land and motors off, until a person has released it."""
+"""States in which only Land and motors off may be sent, until a person releases the vehicle."""
 
 
 GAIN_S: Final = 0.1
@@ -89,9 +89,12 @@ GAINS_S: Final = 0.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What a trial is to do: the safe gains in the order in which an abort sends them, where the ground is on the
-    vehicle's datum, whether what it is told to climb to counts from there, how long to record after the command, how
-    soon the vehicle has to lift off, how long a landing is left alone before it is asked for again, and its limits."""
+    """Plan of a trial.
+
+    `safe_gains` are in the order in which an abort sends them; `ground_m` is the ground on the vehicle's datum;
+    `climbs_from_ground`: the commanded altitude counts from there; `record_s`: length of the record after the take-off
+    command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again.
+    """
 
     safe_gains: tuple[Setting, ...]
     limits: Limits
@@ -104,11 +107,11 @@ class Plan:
 
     @property
     def datum_m(self) -> float:
-        """Where the record's altitude counts from, on the vehicle's datum."""
+        """Zero of the record's altitude, on the vehicle's datum."""
         return self.ground_m if self.climbs_from_ground else 0.0
 
     def on_ground_at(self, ground_m: float) -> "Plan":
-        """The same from another height of the ground."""
+        """Return the plan with another height of the ground."""
         moved = replace(self, ground_m=ground_m)
         set_point_m = self.limits.set_point_m + moved.datum_m - self.datum_m
         return replace(moved, limits=replace(self.limits, set_point_m=set_point_m))
@@ -116,12 +119,14 @@ class Plan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """Where a trial is. `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command,
-    `commanded_in` the mode that it was in then;
-    `failure` is the first that happened; `stopped`: a person has asked for its motors to be stopped, `answered`: it
-    has answered an order to stop them. `ground_samples`: its positions between arming and the command;
-    `ground_shift_m`: by how much its altitude on the ground grew meanwhile. `doubt`: why it is quarantined in the end,
-    however it lands."""
+    """State of a trial.
+
+    `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command, `commanded_in` its mode
+    then. `failure` is the first failure. `stopped`: a person has requested motors off; `answered`: the vehicle has
+    replied to the command to stop them. `ground_samples` are its positions between arming and the take-off command,
+    `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is the reason why it will be
+    quarantined at the end, however it lands.
+    """
 
     plan: Plan
     state: State
@@ -152,7 +157,7 @@ class Trial:
 
     @property
     def outcome(self) -> Outcome | None:
-        """What the trial is worth; None when nothing went wrong."""
+        """Outcome of the trial; None without a failure."""
         if self.state is State.QUARANTINE:
             return "quarantine"
         if self.failure is None:
@@ -165,7 +170,7 @@ Step = tuple[Trial, tuple[Command, ...]]
 
 
 def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
-    """What a failure leads to, from a state in which the vehicle obeys."""
+    """Make the transition for a failure, from a state in which the vehicle can be commanded."""
     trial = note(trial, finding)
     if trial.state is State.ARM:
         return disarm(trial, now_s) if finding.failure is not Failure.DOUBLED else _abort_landing(trial, now_s)
@@ -186,7 +191,7 @@ def _lose_link(trial: Trial, now_s: float) -> Step:
 
 
 def _give_up_take_off(trial: Trial, now_s: float) -> Step:
-    """Motors off where every witness has it on the ground. In the air its integrator is wound up."""
+    """Stop the motors if every source shows it on the ground; in the air, abort, because its integrator is wound up."""
     return disarm(trial, now_s) if trial.watch.grounded_since_s is not None else abort(trial, now_s)
 
 
@@ -195,7 +200,7 @@ def _abort_landing(trial: Trial, now_s: float) -> Step:
 
 
 def note(trial: Trial, finding: Finding) -> Trial:
-    """The first failure is the trial's; one that puts the vehicle in doubt is remembered beside it."""
+    """Note a failure: the first one is the trial's; one that calls for quarantine is also kept as `doubt`."""
     if RESPONSES[finding.failure].outcome == "quarantine" and not trial.doubt:
         trial = replace(trial, doubt=finding.why)
     if trial.failure is not None:
@@ -214,19 +219,19 @@ def abort(trial: Trial, now_s: float) -> Step:
 
 
 def abort_with_safe_gains(trial: Trial, now_s: float) -> Step:
-    """The gains are suspect: the first safe gain leaves at once, Land follows the last."""
+    """Send the first safe gain at once; the others follow, and then Land."""
     first, *others = trial.plan.safe_gains
     trial = replace(trial, awaited=first, unsent=tuple(others), gains_since_s=now_s, sent_s=now_s)
     return trial, (SendGain(first),)
 
 
 def land(trial: Trial, state: State, now_s: float) -> Step:
-    """Land now; it is repeated from `state`."""
+    """Command Land and enter `state`, which repeats it."""
     return replace(enter(trial, state, now_s), repeated_s=now_s), (PerformAction(Action.LAND),)
 
 
 def disarm(trial: Trial, now_s: float) -> Step:
-    """Motors off at once where every witness has had the vehicle on the ground for a second; else only once it has."""
+    """Enter disarm; stop the motors now if every source has shown the vehicle on the ground for a second, or later."""
     trial = replace(enter(trial, State.DISARM, now_s), answered=False)
     if not watching.may_stop_motors(trial.watch, now_s):
         return trial, ()
@@ -234,10 +239,10 @@ def disarm(trial: Trial, now_s: float) -> Step:
 
 
 def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
-    """At once, wherever the vehicle is; a trial that had not failed is aborted by it. It is repeated from disarm."""
+    """Stop the motors at once, at any height; disarm repeats the command. A trial that has not failed is aborted."""
     if trial.stopped:
         return trial, ()
-    why, failure = joined(trial.why, f"{MOTORS_OFF_ASKED}{reason}."), trial.failure or Failure.OPERATOR
+    why, failure = joined(trial.why, f"{MOTORS_OFF_REQUESTED}{reason}."), trial.failure or Failure.OPERATOR
     trial = replace(trial, failure=failure, why=why, stopped=True, answered=False, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)
@@ -254,7 +259,7 @@ def joined(*parts: str) -> str:
 
 
 def send_gains(trial: Trial, event: Event) -> Step:
-    """One request in flight: the next safe gain when the last was echoed or 0.1 s have passed; Land after 0.3 s."""
+    """Send the next safe gain once the last was echoed or 0.1 s have passed, and Land after 0.3 s at the latest."""
     now_s = event.now_s
     echoed = (
         isinstance(event, PacketReceived)
@@ -279,4 +284,4 @@ _REACTIONS: Final[Mapping[Reaction, Callable[[Trial, float], Step]]] = {
     "repeat land": _lose_link,
     "disarm": _give_up_take_off,
 }
-"""By what the failure's row in the table says, for a vehicle that has been told to take off and obeys."""
+"""Transition for each reaction of `RESPONSES`, for a vehicle that has been commanded to take off."""

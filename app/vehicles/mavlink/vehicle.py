@@ -1,4 +1,4 @@
-"""A vehicle that speaks MAVLink, between opening and closing."""
+"""A vehicle with a MAVLink autopilot, between opening and closing."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -38,21 +38,21 @@ from app.vehicles.mavlink.trial_parameters import TrialParameters, files_for
 from app.vehicles.mavlink.trial_transitions import QUARANTINE_STATES, TRANSITIONS, State
 
 STANDSTILL_S: Final = 1.0
-"""Watched once more before arming, for between staging and flying a person may have taken his time."""
+"""Observation before arming, because a long time may have passed since the gains were staged."""
 
 _LISTEN_S: Final = 0.1
 _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
-_ANOTHER: Final = "See which vehicle it is, then ask again."
-_KEPT_LANDING: Final = f"It goes on being told to land. If it does not come down, {HELP}."
+_ANOTHER: Final = "Check which vehicle it is, then try again."
+_KEPT_LANDING: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
 _SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
 
 
 class MavlinkVehicle:
-    """One vehicle at the other end of one link.
+    """One vehicle on one link.
 
-    Whatever ends a flight ends it with the safe gains read back, or in quarantine: then everything further that would
-    change the vehicle raises SafeGainsError, apart from Land and motors off.
+    Every flight ends with the safe gains read back, or in quarantine: then all further changes of the vehicle raise
+    SafeGainsError, except Land and motors off.
     """
 
     kind: Final = records.SOURCE
@@ -72,18 +72,19 @@ class MavlinkVehicle:
         transport: Transport | None = None,
         on_wait: Callable[[], None] = lambda: None,
     ) -> None:
-        """Connect, wait for the vehicle (the one of that `identity`, where it is given), and write the safe gains, once
-        it is known to be disarmed. Unless they were `decided` by a person for this very vehicle, they are only compared
-        with what it holds, which may be its owner's; where that differs, nothing is written.
+        """Connect, wait for the vehicle (with a given `identity`, for that one), and write the safe gains once it is
+        known to be disarmed. Unless a person has `decided` on these safe gains for this very vehicle, they are only
+        compared with those that it holds, which may be its owner's; if they differ, nothing is written.
 
         `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
-        closed with the vehicle; `transport` takes the place of the address, and of the thread that reads it. The folder
-        `trial_parameters` keeps what a trial changes beside the gains, for whoever connects next if this process dies.
-        `on_wait` is called while the vehicle is waited for on the ground; what it raises ends what is under way.
+        closed with the vehicle; `transport` replaces the address and the thread that reads it. The folder
+        `trial_parameters` keeps the parameters that a trial changes in addition to the gains, so that the next
+        connection can restore them if this process dies. `on_wait` is called while waiting for the vehicle on the
+        ground; an exception from it ends the operation.
 
-        With `observes`, a vehicle that is armed or does not hold its safe gains is kept, and only observed (`concern`);
-        without, it raises SafeGainsError, and VehicleError for one that is not ready to fly. Raises VehicleError when
-        nobody answers or somebody else does, GainsError for safe gains that it cannot hold.
+        With `observes`, a vehicle that is armed or does not hold its safe gains stays connected and is only observed
+        (see `concern`). Otherwise it raises SafeGainsError, and a vehicle that is not ready to fly VehicleError. Raises
+        VehicleError if no vehicle or another one answers, GainsError for safe gains that it cannot hold.
         """
         self.is_real: Final = is_real
         self._options = dict(options)
@@ -111,15 +112,15 @@ class MavlinkVehicle:
             self._radio.link.close()
             raise
 
-    # ---- as every vehicle
+    # ---- interface of every vehicle
 
     @property
     def safe_gains(self) -> Gains:
         return self._gains.safe
 
     def stage(self, gains: Gains) -> dict[str, float]:
-        """Write every gain and return what was read back. Raises GainsError for gains that may not be written (nothing
-        is changed then), VehicleError when the vehicle does not confirm, SafeGainsError in quarantine."""
+        """Write every gain and return the values read back. Raises GainsError, and changes nothing, for gains that may
+        not be written; VehicleError if the vehicle does not confirm them; SafeGainsError in quarantine."""
         self._require_not_quarantined()
         self._identify()
         self._require_not_quarantined()
@@ -133,22 +134,22 @@ class MavlinkVehicle:
             raise
 
     def read_gains(self) -> dict[str, float]:
-        """What the vehicle holds now."""
+        """Return the gains that the vehicle holds now."""
         return self._gains.read()
 
     def fly(
         self,
-        order: FlightOptions,  # noqa: ARG002 - the vehicle owns its time, and chance is its own
+        order: FlightOptions,  # noqa: ARG002 - speed and seed do not apply to a real vehicle
         *,
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
     ) -> FlightRecord:
         """Arm, take off to 3 m, record, land, disarm, and restore the safe gains.
 
-        The vehicle owns its time: `order.speed` is not looked at, its seed means nothing. `should_stop` is asked once
-        everything is ready for arming, and then every 10 ms. Raises VehicleError when nothing was staged, the vehicle
-        is not ready, does not hold the staged gains any more or could not be told to take off, which is then
-        `not_flown`; what `on_sample` and `should_stop` raise lands the vehicle, and is raised again once it is down.
+        `order.speed` and `order.seed` are ignored. `should_stop` is called once the vehicle is ready for arming, and
+        then every 10 ms. Raises VehicleError, with `not_flown` set, if no gains were staged, the vehicle is not ready
+        or no longer holds the staged gains, or could not be commanded to take off. An exception from `on_sample` or
+        `should_stop` lands the vehicle, and is raised again once it is on the ground.
         """
         try:
             self._require_not_quarantined()
@@ -170,34 +171,36 @@ class MavlinkVehicle:
         return self._record(flown, ground)
 
     def close(self) -> None:
-        """End the conversation; the vehicle is left as it is."""
+        """Close the link; the vehicle is left unchanged."""
         self._radio.link.close()
         if self._lookout is not None:
             self._lookout.source.close()
 
-    # ---- as a vehicle whose link stays open
+    # ---- interface of a vehicle whose link stays open
 
     @property
     def identity(self) -> Identity:
-        """As it tells it, with some only after a while; what it has not told is as it was pinned."""
+        """Identity as reported, which may take some time; parts not reported are those of the pinned identity."""
         radio, seen = self._radio, self._radio.seen
-        told = Identity(system_id=radio.aim.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid)
-        return told.completed_by(self._pinned)
+        reported = Identity(
+            system_id=radio.aim.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid
+        )
+        return reported.completed_by(self._pinned)
 
     @property
     def concern(self) -> str:
-        """Why it may only be observed; empty when it may fly."""
+        """Reason why the vehicle may only be observed; empty if it may fly."""
         if self._state not in QUARANTINE_STATES:
             return ""
         return " ".join(part for part in (self._why, self._asked) if part)
 
     @property
     def has_standing_order(self) -> bool:
-        """Whether it has not obeyed yet what `land` or `motors_off` asked for."""
+        """Whether a command of `land` or `motors_off` is still being repeated."""
         return self._order is not None and not self._order.is_over
 
     def condition(self) -> Condition:
-        """How it is, as last heard: nothing is waited for. Altitude counts as in a record."""
+        """Return the state last received, without waiting. Altitude counts as in a record."""
         step = self._state if self._flight is None else self._flight.state
         problem = self._radio.link.log_problem
         troubles = (
@@ -214,8 +217,8 @@ class MavlinkVehicle:
         )
 
     def attend(self, timeout_s: float) -> None:
-        """Listen for so long; the vehicle hears this ground station's heartbeats meanwhile. What `land` or `motors_off`
-        asked for is repeated every second until telemetry agrees. Raises LinkError when the link is closed."""
+        """Receive for `timeout_s` while sending the ground station's heartbeats. A command of `land` or `motors_off` is
+        repeated every second until telemetry confirms it. Raises LinkError if the link is closed."""
         until_s = self._radio.clock.now_s() + timeout_s
         while (left_s := until_s - self._radio.clock.now_s()) > 0.0:
             heard = self._radio.receive(min(left_s, _LISTEN_S))
@@ -223,34 +226,34 @@ class MavlinkVehicle:
             self._repeat_order(heard)
 
     def check(self) -> tuple[CheckItem, ...]:
-        """Everything that has to be so before a flight; what is not so is an item, not an error. It takes two seconds
-        and more. Raises LinkError when the link is closed."""
+        """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
+        error. Raises LinkError if the link is closed."""
         return self._check(preflight.WATCHED_S)[1]
 
     def parameters(self, on_progress: Callable[[int, int], None]) -> dict[str, float]:
-        """Every parameter; `on_progress` is told how many came, of how many. Raises VehicleError when they do not come,
-        SafeGainsError while the vehicle is only observed."""
+        """Read every parameter; `on_progress` receives how many have arrived, and the total. Raises VehicleError if
+        they do not arrive, SafeGainsError while the vehicle is only observed."""
         self._require_not_quarantined()
         return parameters.read_all(self._radio, on_progress)
 
     def restore(self) -> dict[str, float]:
-        """Write the safe gains and return what was read back, which is them; a vehicle in doubt stays so. Raises
-        SafeGainsError when it is armed, is another one, or does not take them, VehicleError when it does not tell its
-        known hardware id."""
+        """Write the safe gains and return the values read back, which are equal; a vehicle that is only observed stays
+        so. Raises SafeGainsError if it is armed, is another one, or does not accept them; VehicleError if it does not
+        report its known hardware id."""
         self._identify()
         preflight.require_disarmed(self._radio)
         if preflight.is_another(self._radio, self._pinned):
             raise SafeGainsError(self.concern, hint=_ANOTHER)
         self._require_uid()
         if problem := self._put_back():
-            raise SafeGainsError(f"The vehicle does not take what it had: {problem}", hint=_SET_BY_HAND)
+            raise SafeGainsError(f"The vehicle does not accept its earlier values: {problem}", hint=_SET_BY_HAND)
         return dict(self._gains.held)
 
     def change_safe_gains(self, safe_gains: Gains) -> None:
-        """Take other safe gains, which a person has named, and write them and read them back; while nobody has decided
-        about this vehicle, they are only compared, as at connecting. A vehicle in doubt stays so, and is given them by
-        its release. What goes wrong becomes a concern. Raises GainsError for gains that it cannot hold: nothing is
-        changed then."""
+        """Replace the safe gains by those of a person, write them and read them back. Until a person has decided on
+        this vehicle, they are only compared, as on connection. A vehicle that is only observed stays so, and its
+        release writes them. A failure becomes the `concern`. Raises GainsError, and changes nothing, for gains that the
+        vehicle cannot hold."""
         changed = GainStore(self._radio, safe_gains)
         changed.held, self._gains = self._gains.held, changed
         if self._decided and self._state in QUARANTINE_STATES:
@@ -260,29 +263,29 @@ class MavlinkVehicle:
             self._why = ""
 
     def _put_back(self) -> str:
-        """The safe gains, and what a trial set beside them; what is wrong with them, or nothing."""
+        """Restore the safe gains and the other parameters of a trial; return the problem, or an empty string."""
         return self._gains.restore_or_explain() or self._parameters.restore()
 
     def land(self, reason: str) -> None:
-        """Tell it to land, at once and whatever it says of itself. Raises VehicleError when it cannot be told."""
-        self._asked = f"Land was asked for: {reason}."
+        """Command the vehicle to land at once, in any state. Raises VehicleError if it cannot be commanded."""
+        self._asked = f"Land was requested: {reason}."
         self._order = RepeatedCommand(self._radio, Action.LAND)
 
     def motors_off(self, reason: str) -> None:
-        """Stop its motors, at once and at any height."""
-        self._asked = f"Motors off was asked for: {reason}."
+        """Stop the motors at once, at any height."""
+        self._asked = f"Motors off was requested: {reason}."
         self._order = RepeatedCommand(self._radio, Action.KILL)
 
     def log_to(self, path: Path | None) -> None:
-        """Write what passes from now on, in both directions, to this telemetry log; None ends the log. Raises LinkError
-        when the file cannot be opened: the log before goes on then."""
+        """Record all packets from now on, in both directions, in this telemetry log; None ends the log. Raises
+        LinkError if the file cannot be opened; the previous log then continues."""
         self._radio.link.log_to(path)
 
     def release(self) -> None:
-        """A person has looked at it, also at who it is now: out of observation, once it is disarmed and holds its safe
-        gains, read back. One that tells no hardware id any more is accepted as it is. Raises VehicleError when it is
-        not heard, is armed, does not hold them, or differs from the pinned one in what that person has not seen; it
-        stays as it was then."""
+        """End the observation after a person has inspected the vehicle and its identity. It must be disarmed and hold
+        its safe gains, read back. A vehicle that no longer reports a hardware id is accepted without one. Raises
+        VehicleError, and changes nothing, if it is not received, is armed, does not hold them, or differs from the
+        pinned one in a way that `concern` has not shown yet."""
         seen = self._why
         self._await_heartbeat()
         self._identify()
@@ -319,8 +322,8 @@ class MavlinkVehicle:
             self._enter(State.IDLE)
 
     def _took_safe_gains(self) -> bool:
-        """Write or compare the safe gains; whether it holds them and nothing else was found meanwhile. It is only
-        observed where not."""
+        """Write or compare the safe gains; return whether the vehicle holds them and nothing else was found. Otherwise
+        it is only observed."""
         was_observed = self._state in QUARANTINE_STATES
         try:
             self._set_up()
@@ -334,23 +337,23 @@ class MavlinkVehicle:
         return True
 
     def _set_up(self) -> None:
-        """Raises VehicleError when the vehicle is armed, refuses, does not take its safe gains, or holds others that
-        nobody decided to write over."""
+        """Set up telemetry and safe gains. Raises VehicleError if the vehicle is armed, refuses, does not accept its
+        safe gains, or holds others that no person has decided to overwrite."""
         preflight.require_disarmed(self._radio)
         preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
         if self._decided:
             self.restore()
         elif (found := self._gains.read()) != self._gains.safe:
             raise SafeGainsError(
-                f"It holds {written(found)}, and {written(self._gains.safe)} are named as its safe gains; nothing was "
-                "written.",
-                hint="If what it holds is safe, name that as its safe gains. Else release it, which writes the others.",
+                f"It holds {written(found)}, but its safe gains are {written(self._gains.safe)}; nothing was written.",
+                hint="If its current gains are safe, save them as its safe gains. Otherwise release it, which writes "
+                "the safe gains.",
             )
         elif problem := self._parameters.restore():
             raise SafeGainsError(problem, hint=_SET_BY_HAND)
 
     def _trial_parameters(self) -> TrialParameters:
-        """Those of whoever answers by the time when they are first needed."""
+        """Return the trial parameters of the vehicle that is connected when they are first needed."""
         if self._kept_in is None:
             return TrialParameters(self._radio)
         folder, address = self._kept_in, addresses.parse(str(self._options["address"]))
@@ -360,7 +363,7 @@ class MavlinkVehicle:
         )
 
     def _require_ready(self) -> None:
-        """Raises SafeGainsError while it may only be observed, VehicleError when it is not ready to fly."""
+        """Raise SafeGainsError while it may only be observed, VehicleError if it is not ready to fly."""
         if self._state in QUARANTINE_STATES:
             raise SafeGainsError(self.concern, hint=_SET_BY_HAND)
         preflight.require(self.check())
@@ -374,24 +377,27 @@ class MavlinkVehicle:
         asked_s = self._radio.clock.now_s()
         while self._radio.seen.heartbeat_s < asked_s:
             if self._radio.clock.now_s() - asked_s > _HEARD_WITHIN_S * self._radio.timeout_factor:
-                raise VehicleError("The vehicle is not heard.", hint="See that it is on and in reach, then try again.")
+                raise VehicleError(
+                    "No heartbeat of the vehicle was received.",
+                    hint="Check that it is on and in range, then try again.",
+                )
             self._listen(_LISTEN_S)
 
     def _identify(self) -> None:
-        """Before anything is written: one that has been away may be another by now."""
+        """Identify the vehicle before anything is written: after an absence it may be another one."""
         preflight.identify(self._radio, self._pinned)
         self._listen(0.0)
         if self._pinned is not None and self._state not in QUARANTINE_STATES:
             self._pinned = self._pinned.completed_by(self.identity)
 
     def _require_uid(self) -> None:
-        """Raises VehicleError when the pinned vehicle's hardware id is known, and this one has not told its own."""
+        """Raise VehicleError if the pinned hardware id is known, and this vehicle has not reported its own."""
         if untold := preflight.find_untold_uid(self._radio, self._pinned):
-            raise VehicleError(untold, hint="Try again. If it tells none any more, connect it again and release it.")
+            raise VehicleError(untold, hint="Try again. If it no longer reports one, connect it again and release it.")
 
     def _listen(self, timeout_s: float) -> None:
-        """Between flights: a vehicle that somebody else arms, or that tells another version or hardware id than the
-        pinned one, is only observed from then on."""
+        """Receive between flights. A vehicle that somebody else arms, or that reports another version or hardware id
+        than the pinned one, is only observed from then on."""
         self._radio.listen(timeout_s)
         self._judge_heard()
 
@@ -405,8 +411,8 @@ class MavlinkVehicle:
             self._why = f"{self._why} {change}"
 
     def _while_waiting(self, heard: list[PacketReceived]) -> None:
-        """What takes time keeps no order waiting, neither one that stands nor one that comes. Giving the safe gains
-        back goes to its end all the same."""
+        """Repeat a pending Land or motors off and accept new commands during operations that wait. Restoring the safe
+        gains is never interrupted."""
         self._repeat_order(heard)
         try:
             self._on_wait()
@@ -428,7 +434,7 @@ class MavlinkVehicle:
             )
 
     def _observe_ground(self, watched_s: float) -> Ground:
-        """Where it stands. Raises VehicleError when it is not ready to fly, SafeGainsError when it is armed."""
+        """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         watched, items = self._check(watched_s)
         self._require_not_quarantined()
         preflight.require(items)
@@ -485,8 +491,8 @@ class MavlinkVehicle:
         return flown
 
     def _keep_landing(self, trial: Trial) -> None:
-        """A vehicle that could not be landed within its trial is told to land all the same, as long as it is armed and
-        no person flies it."""
+        """Keep commanding Land to a vehicle that did not land within its trial, while it is armed and no pilot flies
+        it."""
         by_hand = limit_checks.find_taken_over(trial.watch, trial.plan.limits) is not None
         if not by_hand and not self._radio.is_disarmed and self._order is None:
             with suppress(LinkError):
@@ -507,8 +513,8 @@ class MavlinkVehicle:
         return plan.on_ground_at(ground.altitude_m)
 
     def _give_back(self) -> None:
-        """The safe gains again, for nothing flies on the staged ones; in quarantine where they cannot be verified. One
-        that is armed by now keeps what it has, and is observed."""
+        """Restore the safe gains, because the staged gains are not flown; quarantine the vehicle if they cannot be
+        verified. A vehicle that is armed keeps its gains, and is observed."""
         if self._state in QUARANTINE_STATES:
             return
         self._gives_back = True
@@ -528,13 +534,14 @@ class MavlinkVehicle:
         return "mocap" if self._options["scored_source"] == "mocap" else "vehicle"
 
     def _record(self, flown: TrialResult, ground: Ground) -> FlightRecord:
-        """Raises VehicleError when the vehicle was never told to take off, for another reason than the operator's."""
+        """Return the record. Raises VehicleError if the vehicle was never commanded to take off, unless the operator
+        aborted."""
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
         reason = records.reason_of(trial)
         if start_s is None and trial.failure is Failure.OPERATOR:
             return self._not_begun(ground, reason)
         if start_s is None:
-            refusal = VehicleError(reason, hint="Look at the vehicle, correct this, then fly again.")
+            refusal = VehicleError(reason, hint="Inspect the vehicle, correct this, then fly again.")
             refusal.not_flown = True
             raise refusal
         both = AlignedRecord(trajectory=records.trajectory_of(flown.samples, start_s, trial.plan.datum_m))
@@ -553,23 +560,23 @@ class MavlinkVehicle:
         )
 
     def _not_begun(self, ground: Ground, reason: str) -> FlightRecord:
-        """Aborted before anything was commanded: the one instant on the ground."""
+        """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
         return FlightRecord(trajectory=trajectory, ending="aborted", reason=reason, settings=self._options)
 
-    # ---- trust
+    # ---- states
 
     def _require_not_quarantined(self) -> None:
         if self._state is State.QUARANTINE:
             raise SafeGainsError(
                 f"The vehicle is quarantined: {self._why}",
-                hint="Land it if it flies, see that its motors have stopped, verify its gains, then release it.",
+                hint="Land it if it flies, check that its motors have stopped, verify its gains, then release it.",
             )
         if self._state is State.OBSERVE:
             raise SafeGainsError(
                 f"The vehicle is only observed: {self._why}",
-                hint="See that it stands with its motors stopped, then release it.",
+                hint="Check that it is on the ground with its motors stopped, then release it.",
             )
 
     def _enter(self, state: State) -> None:

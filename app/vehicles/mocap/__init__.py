@@ -1,1 +1,1 @@
-"""Altitude from outside the vehicle: motion capture over NatNet, or MAVLink's odometry messages."""
+"""Altitude from motion capture, over NatNet or as MAVLink odometry messages."""

@@ -1,4 +1,4 @@
-"""Where a second source of altitude is heard, written as one text.
+"""Addresses of second sources of altitude, written as one text.
 
 natnet:HOST?body=ID[&up=y|z][&local=ADDRESS][&multicast=GROUP|no]   a rigid body of Motive at HOST
 odometry                    ODOMETRY or VISION_POSITION_ESTIMATE on the vehicle's own link
@@ -18,14 +18,14 @@ MULTICAST: Final = "239.255.42.99"
 COMMAND_PORT: Final = 1510
 DATA_PORT: Final = 1511
 _UNICAST: Final = "no"
-_WORDS: Final = ("body", "up", "local", "multicast", "command_port", "data_port")
+_KEYS: Final = ("body", "up", "local", "multicast", "command_port", "data_port")
 _UP: Final[dict[str, Literal["y", "z"]]] = {"y": "y", "z": "z"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NatNetAddress:
-    """`up` is the axis that Motive streams as up, `local` the address of our interface towards it (empty: the one that
-    leads there), `multicast` the group that it streams to, empty for unicast."""
+    """A rigid body of Motive. `up` is the axis that Motive streams as up, `local` the address of our network interface
+    (empty: the one with the route to Motive), `multicast` the group that it streams to, empty for unicast."""
 
     host: str
     body: int
@@ -41,7 +41,7 @@ class NatNetAddress:
 
 @dataclass(frozen=True, slots=True)
 class OdometryAddress:
-    """The vehicle's own link."""
+    """Odometry on the vehicle's own link."""
 
     def __str__(self) -> str:
         return "odometry"
@@ -49,7 +49,7 @@ class OdometryAddress:
 
 @dataclass(frozen=True, slots=True)
 class StreamAddress:
-    """Another MAVLink link."""
+    """Odometry on another MAVLink link."""
 
     link: links.Address
 
@@ -61,7 +61,7 @@ SourceAddress = NatNetAddress | OdometryAddress | StreamAddress
 
 
 def parse(text: str) -> SourceAddress:
-    """The source that `text` writes. Raises InputError saying what is wrong."""
+    """Parse an address. Raises InputError with the reason if it is invalid."""
     kind, colon, rest = text.strip().partition(":")
     if kind == "natnet" and rest:
         return _natnet(text, rest)
@@ -75,43 +75,43 @@ def parse(text: str) -> SourceAddress:
 def _natnet(text: str, rest: str) -> NatNetAddress:
     host, _, query = rest.partition("?")
     pairs = parse_qsl(query, keep_blank_values=True)
-    told = dict(pairs)
-    if not set(told) <= set(_WORDS) or len(told) < len(pairs):
-        raise _error(text, f"takes {', '.join(_WORDS)}, each once, got {query!r}")
-    if not host or "body" not in told:
+    settings = dict(pairs)
+    if not set(settings) <= set(_KEYS) or len(settings) < len(pairs):
+        raise _error(text, f"takes {', '.join(_KEYS)}, each once, got {query!r}")
+    if not host or "body" not in settings:
         raise _error(text, "needs Motive's host and the streaming id of the rigid body: natnet:HOST?body=ID")
-    if told.get("up", "y") not in _UP:
-        raise _error(text, f"up must be y or z, as Motive's streaming pane says, got {told['up']!r}")
-    multicast = told.get("multicast", MULTICAST)
+    if settings.get("up", "y") not in _UP:
+        raise _error(text, f"up must be y or z, as in Motive's streaming pane, got {settings['up']!r}")
+    multicast = settings.get("multicast", MULTICAST)
     return NatNetAddress(
         host=host,
-        body=_whole(text, "body", told["body"]),
-        up=_UP[told.get("up", "y")],
-        local=_ip(text, "local", told["local"]) if "local" in told else "",
+        body=_whole(text, "body", settings["body"]),
+        up=_UP[settings.get("up", "y")],
+        local=_ip(text, "local", settings["local"]) if "local" in settings else "",
         multicast="" if multicast == _UNICAST else _group(text, multicast),
-        command_port=_port(text, "command_port", told.get("command_port", str(COMMAND_PORT))),
-        data_port=_port(text, "data_port", told.get("data_port", str(DATA_PORT))),
+        command_port=_port(text, "command_port", settings.get("command_port", str(COMMAND_PORT))),
+        data_port=_port(text, "data_port", settings.get("data_port", str(DATA_PORT))),
     )
 
 
-def _whole(text: str, word: str, digits: str) -> int:
+def _whole(text: str, key: str, digits: str) -> int:
     if not (digits.isascii() and digits.isdigit()):
-        raise _error(text, f"{word} must be a whole number from 0 on, got {digits!r}")
+        raise _error(text, f"{key} must be a whole number, 0 or more, got {digits!r}")
     return int(digits)
 
 
-def _port(text: str, word: str, digits: str) -> int:
-    port = _whole(text, word, digits)
+def _port(text: str, key: str, digits: str) -> int:
+    port = _whole(text, key, digits)
     if not 0 < port <= links.LARGEST_PORT:
-        raise _error(text, f"{word} must lie in 1 … {links.LARGEST_PORT}, got {port}")
+        raise _error(text, f"{key} must lie in 1 … {links.LARGEST_PORT}, got {port}")
     return port
 
 
-def _ip(text: str, word: str, address: str) -> str:
+def _ip(text: str, key: str, address: str) -> str:
     try:
         return str(ipaddress.IPv4Address(address))
     except ValueError as error:
-        raise _error(text, f"{word} must be an IPv4 address of this computer, got {address!r}") from error
+        raise _error(text, f"{key} must be an IPv4 address of this computer, got {address!r}") from error
 
 
 def _group(text: str, address: str) -> str:

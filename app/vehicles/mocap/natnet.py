@@ -1,4 +1,4 @@
-"""A rigid body that Motive (or whatever speaks NatNet) streams."""
+"""Rigid body streamed by Motive or another NatNet server."""
 
 import contextlib
 import socket
@@ -21,9 +21,9 @@ ANSWERED_WITHIN_S: Final = 1.0
 ATTEMPTS: Final = 3
 SEEN_WITHIN_S: Final = 2.0
 POLL_S: Final = 0.004
-_TELLS_TRACKING: Final = Version(2, 6)
+_FIRST_WITH_TRACKING: Final = Version(2, 6)
 _GARBLED: Final = (struct.error, ValueError, TypeError, LookupError, OverflowError, MemoryError, NatNetError)
-"""What the library raises for packets that are not as the protocol says."""
+"""Exceptions of the library for packets that violate the protocol."""
 _UP: Final = {"y": 1, "z": 2}
 
 
@@ -48,7 +48,7 @@ class _Event(Protocol):
 
 
 class _Client(Protocol):
-    """The library's client: every packet is taken in by the thread that calls `connect` or `update_sync`."""
+    """The library's client; packets are processed in the thread that calls `connect` or `update_sync`."""
 
     on_data_frame_received_event: _Event
     protocol_version: Version
@@ -59,15 +59,15 @@ class _Client(Protocol):
 
 
 class NatNetSource:
-    """Heard in a thread of its own, which looks for packets every 4 ms."""
+    """Source of altitude received over NatNet, in its own thread, which polls for packets every 4 ms."""
 
     def __init__(self, address: NatNetAddress, clock: Clock) -> None:
-        """Find the server and wait for the body. Raises VehicleError when nobody answers there, no frames come, or
-        the body is not among those streamed."""
+        """Connect to the server and wait for the body. Raises VehicleError if the server does not answer, no frames
+        arrive, or the body is not among those streamed."""
         self.name: Final = f"rigid body {address.body} of the motion capture at {address.host}"
         self._address, self._clock = address, clock
         self._stream = PoseStream()
-        self._heard_bodies: set[int] = set()
+        self._streamed_bodies: set[int] = set()
         self._frame_s: float | None = None
         self._client = self._connect()
         self._closing = threading.Event()
@@ -82,14 +82,14 @@ class NatNetSource:
     @property
     def trouble(self) -> str:
         if not self._thread.is_alive():
-            return f"The {self.name} is not listened to any more."
+            return f"Reception of {self.name} has stopped."
         if self._frame_s is not None and (silent_s := time.monotonic() - self._frame_s) > SILENT_S:
-            return f"Nothing has come of {self.name} for {silent_s:.0f} s."
+            return f"Nothing was received of {self.name} for {silent_s:.0f} s."
         newest = self._stream.newest
         return f"The cameras do not see {self.name}." if newest is not None and not newest.tracking_valid else ""
 
     def on_message(self, received: Received) -> None:
-        """The vehicle's own link is another."""
+        """Ignore messages of the vehicle's link."""
 
     def take(self) -> Sequence[SourceSample]:
         return self._stream.take()
@@ -105,7 +105,7 @@ class NatNetSource:
             server = socket.gethostbyname(host)
             local = self._address.local or _interface_towards(server, self._address.command_port)
         except OSError as error:
-            raise _unreachable(self._address, f"there is no way to it: {error.strerror or error}") from error
+            raise _unreachable(self._address, f"there is no route to it: {error.strerror or error}") from error
         client: _Client = NatNetClient(
             server_ip_address=server,
             local_ip_address=local,
@@ -128,11 +128,11 @@ class NatNetSource:
 
     def _meet(self) -> None:
         version = self._client.protocol_version
-        if version < _TELLS_TRACKING:
+        if version < _FIRST_WITH_TRACKING:
             raise VehicleError(
-                f"The motion capture at {self._address.host} speaks NatNet {version}, which does not tell whether a "
-                f"body is tracked.",
-                hint=f"Let it stream NatNet {_TELLS_TRACKING} or newer.",
+                f"The motion capture at {self._address.host} streams NatNet {version}, which does not report whether "
+                f"a body is tracked.",
+                hint=f"Set it to NatNet {_FIRST_WITH_TRACKING} or newer.",
             )
         until_s = time.monotonic() + SEEN_WITHIN_S
         while self._stream.newest is None and time.monotonic() < until_s:
@@ -144,15 +144,15 @@ class NatNetSource:
     def _absent(self) -> VehicleError:
         if self._frame_s is None:
             return VehicleError(
-                f"The motion capture at {self._address.host} answers, but no frames came within {SEEN_WITHIN_S:g} s.",
-                hint="See that Motive streams live, to the multicast group (or unicast) and over the interface that "
+                f"The motion capture at {self._address.host} answers, but sent no frames within {SEEN_WITHIN_S:g} s.",
+                hint="Check that Motive streams live, to the multicast group (or unicast) and over the interface that "
                 "the address names: &multicast=GROUP or no, &local=ADDRESS of this computer.",
             )
-        heard = ", ".join(map(str, sorted(self._heard_bodies))) or "none"
+        streamed = ", ".join(map(str, sorted(self._streamed_bodies))) or "none"
         return VehicleError(
             f"The motion capture at {self._address.host} streams no rigid body {self._address.body}; it streams these "
-            f"ids: {heard}.",
-            hint="Take the streaming id that Motive shows with the body, as ?body=ID, and see that it is enabled.",
+            f"ids: {streamed}.",
+            hint="Use the streaming id that Motive shows with the body, as ?body=ID, and check that it is enabled.",
         )
 
     def _run(self) -> None:
@@ -160,14 +160,14 @@ class NatNetSource:
             self._take_in()
 
     def _take_in(self) -> None:
-        """A garbled packet or a network that is down is silence: who listens notices."""
+        """Process the packets that have arrived. Malformed packets and network failures are treated as silence."""
         with contextlib.suppress(OSError, *_GARBLED):
             self._client.update_sync()
 
     def _hear(self, frame: _Frame) -> None:
         self._frame_s = time.monotonic()
         for body in frame.rigid_bodies:
-            self._heard_bodies.add(body.id_num)
+            self._streamed_bodies.add(body.id_num)
             if body.id_num == self._address.body:
                 self._stream.put(
                     body.pos[_UP[self._address.up]],
@@ -179,7 +179,7 @@ class NatNetSource:
 
 
 def _interface_towards(server: str, port: int) -> str:
-    """The address of ours from which packets to `server` leave; none is sent. Raises OSError when there is no way."""
+    """Return our address on the route to `server`; no packet is sent. Raises OSError if there is no route."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.connect((server, port))
         return str(probe.getsockname()[0])
@@ -187,6 +187,6 @@ def _interface_towards(server: str, port: int) -> str:
 
 def _unreachable(address: NatNetAddress, why: str) -> VehicleError:
     return VehicleError(
-        f"The motion capture at {address.host} (NatNet, port {address.command_port}) is not there: {why}.",
-        hint="See that Motive runs there with streaming switched on, and that no firewall keeps its answers away.",
+        f"The motion capture at {address.host} (NatNet, port {address.command_port}) is not available: {why}.",
+        hint="Check that Motive runs there with streaming enabled, and that no firewall blocks its replies.",
     )

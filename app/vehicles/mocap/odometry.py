@@ -1,4 +1,4 @@
-"""Motion capture as MAVLink carries it: ODOMETRY and VISION_POSITION_ESTIMATE, on the vehicle's link or another."""
+"""Motion capture over MAVLink: ODOMETRY and VISION_POSITION_ESTIMATE, on the vehicle's link or another."""
 
 import threading
 import time
@@ -17,18 +17,19 @@ from app.vehicles.mocap.addresses import StreamAddress
 from app.vehicles.mocap.stream import SILENT_S, PoseStream
 
 _UP_FRAMES: Final = frozenset({4, 13, 15, 17, 19, 21})
-"""MAV_FRAME: the local ones whose third axis points up (ENU and FLU; 13 to 19 are the names of old)."""
-HEARD_WITHIN_S: Final = 2.0
+"""Local frames of MAV_FRAME whose third axis points up (ENU and FLU; 13 to 19 are deprecated)."""
+RECEIVED_WITHIN_S: Final = 2.0
 _SYSTEM: Final = 255
 _COMPONENT: Final = 190
 _READ_S: Final = 0.1
 _LOST: Final = -1.0
-"""ODOMETRY's quality when odometry has failed; 0: it does not tell."""
+"""ODOMETRY's quality when odometry has failed; 0: not reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """By the sender's clock, altitude up on the sender's zero; `values` are all that the message says of it."""
+    """Pose at a time of the sender's clock; altitude is positive up from the sender's zero; `values` are all components
+    in the message."""
 
     time_s: float
     altitude_m: float
@@ -39,7 +40,7 @@ class Pose:
 def _odometry(message: Message) -> Pose:
     up = 1.0 if int(number(message, "frame_id")) in _UP_FRAMES else -1.0
     values = tuple(number(message, field) for field in ("x", "y", "z", "vx", "vy", "vz"))
-    # MAVLink 1 has no room for the quality.
+    # In MAVLink 1 the message has no quality.
     failed = "quality" in message.get_fieldnames() and number(message, "quality") == _LOST
     return Pose(number(message, "time_usec") / 1e6, up * values[2], values, not failed)
 
@@ -55,20 +56,20 @@ READERS: Final[Mapping[str, Callable[[Message], Pose]]] = MappingProxyType(
 
 
 class OdometrySource:
-    """The odometry messages among those that `hear` is given. The kind that comes first is the one taken:
-    two estimates by turns would be none."""
+    """Odometry among the messages passed to `on_message`. Only the message type that arrives first is used, because
+    two alternating estimates would not be one stream."""
 
     def __init__(self, name: str, clock: Clock) -> None:
         self.name: Final = name
         self._clock = clock
         self._stream = PoseStream()
         self._kind = ""
-        self._heard_s = clock.now_s()
+        self._received_s = clock.now_s()
 
     @property
     def trouble(self) -> str:
-        if (silent_s := self._clock.now_s() - self._heard_s) > SILENT_S:
-            return f"No {self.name} has come for {silent_s:.0f} s."
+        if (silent_s := self._clock.now_s() - self._received_s) > SILENT_S:
+            return f"No {self.name} was received for {silent_s:.0f} s."
         newest = self._stream.newest
         return f"The {self.name} has failed." if newest is not None and not newest.tracking_valid else ""
 
@@ -77,7 +78,7 @@ class OdometrySource:
         kind = message.get_type()
         if kind not in READERS or kind != (self._kind or kind):
             return
-        self._kind, self._heard_s = kind, arrived_s
+        self._kind, self._received_s = kind, arrived_s
         pose = READERS[kind](message)
         self._stream.put(
             pose.altitude_m,
@@ -88,24 +89,24 @@ class OdometrySource:
         )
 
     @property
-    def is_heard(self) -> bool:
-        """Whether any odometry has come yet."""
+    def has_received(self) -> bool:
+        """Whether any odometry has arrived yet."""
         return self._stream.newest is not None
 
     def take(self) -> Sequence[SourceSample]:
         return self._stream.take()
 
     def close(self) -> None:
-        """The link is another's."""
+        """Do nothing: the link belongs to the vehicle."""
 
 
 class StreamSource:
-    """Odometry on a link of its own, heard in a thread of its own. Nothing is sent; whoever first says something that
-    is odometry is listened to."""
+    """Odometry on its own link, received in its own thread. Nothing is sent; the first peer that sends odometry is
+    used."""
 
     def __init__(self, address: StreamAddress, clock: Clock) -> None:
-        """Wait for the first odometry. Raises LinkError when the address cannot be opened, VehicleError when none
-        comes."""
+        """Wait for the first odometry. Raises LinkError if the address cannot be opened, VehicleError if none
+        arrives."""
         self._inner: Final = OdometrySource(f"odometry at {address}", clock)
         self._clock = clock
         self._transport = open_transport(address.link)
@@ -125,28 +126,28 @@ class StreamSource:
 
     @property
     def trouble(self) -> str:
-        return self._inner.trouble if self._thread.is_alive() else f"The {self.name} is not listened to any more."
+        return self._inner.trouble if self._thread.is_alive() else f"Reception of {self.name} has stopped."
 
     def on_message(self, received: Received) -> None:
-        """The vehicle's own link is another."""
+        """Ignore messages of the vehicle's link."""
 
     def take(self) -> Sequence[SourceSample]:
         return self._inner.take()
 
     def close(self) -> None:
-        """Again is harmless."""
+        """Close the link; calling it again has no effect."""
         if not self._closing.is_set():
             self._closing.set()
             self._transport.wake()
         self._thread.join()
 
     def _meet(self, address: StreamAddress) -> None:
-        until_s = time.monotonic() + HEARD_WITHIN_S
-        while not self._inner.is_heard:
+        until_s = time.monotonic() + RECEIVED_WITHIN_S
+        while not self._inner.has_received:
             if time.monotonic() > until_s:
                 raise VehicleError(
-                    f"No ODOMETRY and no VISION_POSITION_ESTIMATE came at {address} within {HEARD_WITHIN_S:g} s.",
-                    hint="See that the motion capture's bridge runs and sends to this computer's port.",
+                    f"No ODOMETRY and no VISION_POSITION_ESTIMATE arrived at {address} within {RECEIVED_WITHIN_S:g} s.",
+                    hint="Check that the motion capture's bridge runs and sends to this computer's port.",
                 )
             time.sleep(_READ_S / 10.0)
 
@@ -159,12 +160,12 @@ class StreamSource:
             self._transport.close()
 
     def _take_in(self, data: bytes, peer: Peer) -> None:
-        is_stranger = self._transport.remote is None
+        is_unknown = self._transport.remote is None
         if self._transport.remote not in (None, peer):
             return
-        codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT) if is_stranger else self._codec
+        codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT) if is_unknown else self._codec
         messages = [message for message in codec.parse(data) if is_known(message)]
-        if is_stranger and any(message.get_type() in READERS for message in messages):
+        if is_unknown and any(message.get_type() in READERS for message in messages):
             self._transport.adopt(peer)
         now_s = self._clock.now_s()
         for message in messages:

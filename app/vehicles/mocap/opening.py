@@ -1,4 +1,4 @@
-"""Opens the second source of altitude that a text names."""
+"""Opening of a second source of altitude by its address."""
 
 from app.core.clock import Clock
 from app.vehicles.mavlink.altitude_sources import AltitudeSource
@@ -8,8 +8,8 @@ from app.vehicles.mocap.odometry import OdometrySource, StreamSource
 
 
 def open_source(text: str, clock: Clock) -> AltitudeSource:
-    """Raises InputError for a text that names none, VehicleError when nothing is heard there; what the vehicle's own
-    link is to bring is not waited for."""
+    """Open the source at this address. Raises InputError for an invalid address, VehicleError if nothing is received
+    there; odometry on the vehicle's own link is not waited for."""
     match parse(text):
         case NatNetAddress() as address:
             return NatNetSource(address, clock)

@@ -1,4 +1,4 @@
-"""What a stream of poses says, as samples of altitude: put on our clock, and whether each says anything new."""
+"""Conversion of a stream of poses into samples of altitude on our clock, with repetitions marked."""
 
 import math
 from collections import deque
@@ -8,24 +8,24 @@ from app.vehicles.mavlink.altitude_sources import SourceSample
 
 SILENT_S: Final = 1.0
 KEPT: Final = 20_000
-"""Samples kept for a program that does not ask for them; then the oldest are dropped."""
+"""Maximum number of samples that wait for `take`; beyond it the oldest are dropped."""
 
 _WINDOW_S: Final = 60.0
-"""Longer than a flight, so that the latency taken off is one and the same in all of it."""
+"""Longer than a flight, so that the same latency is subtracted throughout."""
 _RESTART_S: Final = 1.0
-"""A source whose clock goes back by so much has started anew; by less, a packet came late."""
+"""A source whose clock goes back by more than this has restarted; if by less, a packet was late."""
 
 
 class ClockOffset:
-    """A source's time stamps on our clock, as if every message had travelled as fast as the fastest of the last minute:
-    without what the network and a busy computer hold back."""
+    """Conversion of a source's time stamps to our clock with the latency of the fastest message of the last minute,
+    which removes the variable delays of the network and of a busy computer."""
 
     def __init__(self) -> None:
         self._fastest: deque[tuple[float, float]] = deque()
-        """Time stamps with arrival minus time stamp, both rising: each is the least of those from it on."""
+        """Time stamps, each with its arrival minus its time stamp, both increasing: a monotonic queue of minima."""
 
     def seen_s(self, time_s: float, arrived_s: float) -> float:
-        """When what was stamped `time_s` and came at `arrived_s` would have come at its fastest."""
+        """Return when a message stamped `time_s` that arrived at `arrived_s` would have arrived with least latency."""
         offset_s = arrived_s - time_s
         if self._fastest and time_s < self._fastest[-1][0] - _RESTART_S:
             self._fastest.clear()
@@ -38,10 +38,10 @@ class ClockOffset:
 
 
 class PoseStream:
-    """Poses in, samples out; one thread may put while another takes.
+    """Queue that converts poses into samples; one thread may put while another takes.
 
-    A pose says something new when its time has advanced and it is not, to the last bit, the one before: cameras never
-    see the same twice, but a system that has lost a body may go on to repeat where it was.
+    A pose is new if its time has advanced and it differs from the previous one in at least one bit: measured poses
+    always differ, but a system that has lost a body may repeat the last pose.
     """
 
     def __init__(self) -> None:
@@ -50,12 +50,13 @@ class PoseStream:
         self._time_s = float("-inf")
         self._pose: tuple[float, ...] = ()
         self.newest: SourceSample | None = None
-        """The last sample that came, whether it was taken or not."""
+        """The last sample put, taken or not."""
 
     def put(
         self, altitude_m: float, pose: tuple[float, ...], *, time_s: float, arrived_s: float, tracking_valid: bool
     ) -> None:
-        """`time_s` by the source's clock, `arrived_s` by ours. An altitude that is not finite is none."""
+        """Add a pose; `time_s` is by the source's clock, `arrived_s` by ours. A non-finite altitude counts as not
+        tracked."""
         later = math.isfinite(time_s) and (time_s > self._time_s or time_s < self._time_s - _RESTART_S)
         sample = SourceSample(
             received_s=arrived_s,
@@ -70,12 +71,12 @@ class PoseStream:
         self._samples.append(sample)
 
     def take(self) -> list[SourceSample]:
-        """What came since the last call, oldest first."""
+        """Return the samples since the last call, oldest first."""
         return [self._samples.popleft() for _ in range(len(self._samples))]
 
 
 def _is_same(pose: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """To the last bit, where a number that is missing (NaN) is as missing as another."""
+    """Whether two poses are equal bit by bit; NaN (missing) equals NaN."""
     return len(pose) == len(other) and all(
         a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(pose, other, strict=True)
     )

@@ -44,7 +44,7 @@ def trust(client: TestClient, campaign: Json) -> float:
 
 def aborted(client: TestClient, database: Database, campaign: Json, *, on_request: bool) -> Json:
     trial = create_trial(client, campaign["id"], fly={"speed": None})
-    reason = "aborted by the operator" if on_request else "A safety limit was met."
+    reason = "aborted by the operator" if on_request else "A safety limit was exceeded."
     land(
         database, lift_off(database), create_record(ending="aborted", reason=reason, until_s=4.0, on_request=on_request)
     )
@@ -149,11 +149,11 @@ def test_the_report_says_which_aborts_count(client: TestClient, database: Databa
     [
         ("aborted", "enough", {"enough"}, True),
         ("aborted", "enough 4 of its samples jumped and were dropped.", {"enough"}, True),
-        ("aborted", "Motors off was asked for: people below.", {"people below"}, True),
-        ("aborted", "A safety limit was met. It rose to 4.6 m.", {"enough"}, False),
-        ("aborted", "A safety limit was met. It rose to 4.6 m. Motors off was asked for: hot.", {"hot"}, False),
+        ("aborted", "Motors off was requested: people below.", {"people below"}, True),
+        ("aborted", "A safety limit was exceeded. It rose to 4.6 m.", {"enough"}, False),
+        ("aborted", "A safety limit was exceeded. It rose to 4.6 m. Motors off was requested: hot.", {"hot"}, False),
         ("invalid", "enough", {"enough"}, False),
-        ("aborted", "A safety limit was met.", set(), False),
+        ("aborted", "A safety limit was exceeded.", set(), False),
     ],
 )
 def test_a_flight_was_ended_on_request_only_where_no_limit_had_ended_it(

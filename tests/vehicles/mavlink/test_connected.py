@@ -90,7 +90,7 @@ def test_the_version_is_asked_of_autopilots_that_answer_and_a_new_one_is_a_conce
             known = vehicle.identity
             assert (known.system_id, known.autopilot, known.version.count(".")) == (1, "ardupilot", 2)
         with connected(rig, replace(known, version="3.2.1")) as vehicle:
-            assert vehicle.concern == f"Its firmware is now version {known.version}; it was 3.2.1."
+            assert vehicle.concern == f"Its firmware has changed from version 3.2.1 to {known.version}."
             with pytest.raises(SafeGainsError, match="only observed"):
                 vehicle.stage(OWN_SAFE["ardupilot"])
             vehicle.release()
@@ -101,7 +101,7 @@ def test_a_new_version_that_is_told_only_later_is_a_concern_until_a_person_has_l
     """Paparazzi tells its version every few seconds, unasked."""
     with LockstepRig() as rig, connected(rig, replace(PINNED, version="5.8.0")) as vehicle:
         attend_until(vehicle, lambda: bool(vehicle.concern))
-        assert vehicle.concern == f"Its firmware is now version {vehicle.identity.version}; it was 5.8.0."
+        assert vehicle.concern == f"Its firmware has changed from version 5.8.0 to {vehicle.identity.version}."
         with pytest.raises(SafeGainsError, match="only observed"):
             vehicle.stage(TUNED)
         vehicle.release()
@@ -118,8 +118,8 @@ def test_another_vehicle_of_the_same_make_and_version_is_only_observed_until_a_p
             known = vehicle.identity
             assert int(known.uid, 16) != 0
         with connected(rig, replace(known, uid="00112233")) as vehicle:
-            assert f"its hardware id is {known.uid}, that of the pinned one is 00112233" in vehicle.concern
-            assert "Register it as a vehicle of its own, or release it to take it as this one" in vehicle.concern
+            assert f"its hardware id is {known.uid} instead of 00112233" in vehicle.concern
+            assert "Register it as a new vehicle, or release it to accept it in place of this one" in vehicle.concern
             written = list(rig.writes)
             with pytest.raises(SafeGainsError, match="hardware id"):
                 vehicle.stage(OWN_SAFE[autopilot])
@@ -138,11 +138,11 @@ def test_a_vehicle_that_does_not_tell_its_known_hardware_id_is_given_nothing_unt
         rig.drone.autopilot.uid = 0  # type: ignore[attr-defined]
         pin = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0000000000000007")
         with connected(rig, pin) as vehicle:
-            assert "It did not tell its hardware id" in vehicle.concern
+            assert "It did not report its hardware id" in vehicle.concern
             item = next(item for item in vehicle.check() if item.name == "hardware_id")
-            assert (item.passed, item.found) == (False, "not told")
-            assert item.needed == "0000000000000007, that of the pinned one"
-            with pytest.raises(VehicleError, match="did not tell its hardware id"):
+            assert (item.passed, item.found) == (False, "not reported")
+            assert item.needed == "0000000000000007, as registered"
+            with pytest.raises(VehicleError, match="did not report its hardware id"):
                 vehicle.restore()
             assert not rig.told("PARAM_SET")
             vehicle.release()
@@ -207,7 +207,7 @@ def test_another_vehicle_than_the_pinned_one_whose_answers_are_lost_while_it_con
         rig.lost_until_s = rig.now_s() + 3.0
         with connected(rig, pin) as vehicle:
             assert rig.now_s() > rig.lost_until_s
-            assert f"hardware id is {vehicle.identity.uid}, that of the pinned one is {pin.uid}" in vehicle.concern
+            assert f"hardware id is {vehicle.identity.uid} instead of {pin.uid}" in vehicle.concern
             assert rig.writes == []
 
 
@@ -217,7 +217,7 @@ def test_a_new_version_that_is_told_late_while_a_vehicle_connects_is_a_concern()
             known = vehicle.identity
         rig.lost_until_s = rig.now_s() + 3.0
         with connected(rig, replace(known, version="1.2.3")) as vehicle:
-            assert vehicle.concern == f"Its firmware is now version {known.version}; it was 1.2.3."
+            assert vehicle.concern == f"Its firmware has changed from version 1.2.3 to {known.version}."
 
 
 def test_a_swapped_vehicle_whose_answers_are_lost_at_first_is_asked_on() -> None:
@@ -242,10 +242,10 @@ def test_a_vehicle_that_was_away_and_whose_answers_are_lost_is_not_flown() -> No
             vehicle.attend(3.0)
             written = list(rig.writes)
             rig.lost_until_s = math.inf
-            with pytest.raises(VehicleError, match="Hardware id: not told, needed: ") as refusal:
+            with pytest.raises(VehicleError, match="Hardware id: not reported, needed: ") as refusal:
                 vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
             assert refusal.value.not_flown
-            assert "It did not tell its hardware id" in vehicle.concern
+            assert "It did not report its hardware id" in vehicle.concern
             assert [name for name in rig.writes[len(written) :] if name.startswith("MPC_")] == []
 
 
@@ -254,9 +254,9 @@ def test_a_person_who_has_not_seen_that_no_hardware_id_is_told_does_not_release_
         vehicle._observe("Somebody else armed it.")
         swap(rig, vehicle, 9)
         rig.lost_until_s = math.inf
-        with pytest.raises(SafeGainsError, match="did not tell its hardware id"):
+        with pytest.raises(SafeGainsError, match="did not report its hardware id"):
             vehicle.release()
-        assert "Somebody else armed it. It did not tell its hardware id" in vehicle.concern
+        assert "Somebody else armed it. It did not report its hardware id" in vehicle.concern
         vehicle.release()
         assert (vehicle.concern, vehicle.identity.uid) == ("", "")
 
@@ -405,7 +405,7 @@ def test_a_vehicle_met_in_the_air_is_observed_landed_and_released_by_a_person() 
                     ask()
             assert not next(item for item in vehicle.check() if item.name == "disarmed").passed
             vehicle.land("it is not ours")
-            assert "Land was asked for: it is not ours." in vehicle.concern
+            assert "Land was requested: it is not ours." in vehicle.concern
             attend_until(vehicle, lambda: rig.drone.body.stands)
             assert LAND_HERE in blocks_told(rig)
             vehicle.motors_off("it has landed")
@@ -470,7 +470,7 @@ def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() ->
             vehicle.stage(OWN_SAFE["ardupilot"])
             record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
             assert record.ending == "aborted"
-            assert record.reason == "Motors off was asked for: people below. Its motors have stopped, it says."
+            assert record.reason == "Motors off was requested: people below. It confirmed that its motors have stopped."
             forced = [
                 at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
             ]
@@ -533,7 +533,7 @@ def test_a_flight_plan_that_lands_by_its_own_exception_is_landed_with() -> None:
         vehicle.stage(TUNED)
         record = vehicle.fly(ORDER, on_sample=leave, should_stop=never)
         assert (record.ending, vehicle.concern, vehicle.read_gains()) == ("invalid", "", SAFE)
-        assert "The vehicle began to land by itself. Its flight plan went to the block “land" in record.reason
+        assert "The vehicle began to land by itself. Its flight plan entered the block “land" in record.reason
         assert rig.drone.body.stands
 
 

@@ -178,7 +178,7 @@ def test_what_the_vehicle_does_not_tell_is_kept_until_it_does(tmp_path: Path) ->
     with ready("px4") as rig:
         rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = math.nan  # type: ignore[attr-defined]  # it tells none
         with connected(rig, trial_parameters=tmp_path) as vehicle:
-            assert "MIS_TAKEOFF_ALT was 2.5, and could not be put back" in vehicle.concern
+            assert "MIS_TAKEOFF_ALT could not be restored to 2.5" in vehicle.concern
             assert file.read_text() == KEPT
             rig.drone.autopilot.parameters["MIS_TAKEOFF_ALT"] = 3.0  # type: ignore[attr-defined]
             vehicle.release()
@@ -242,7 +242,9 @@ def test_a_vehicle_whose_kept_parameters_cannot_be_read_is_only_observed(tmp_pat
     file = tmp_path / KEPT_IN
     file.write_text(damaged)
     with ready("px4") as rig, connected(rig, trial_parameters=tmp_path) as vehicle:
-        assert f"{KEPT_IN}, which cannot be used" in vehicle.concern
+        assert (
+            f"{KEPT_IN}, which keeps parameters that a trial changed on the vehicle, cannot be used" in vehicle.concern
+        )
         assert "MIS_TAKEOFF_ALT" not in rig.writes
         assert file.read_text() == damaged
 
@@ -256,7 +258,7 @@ def test_a_vehicle_that_is_connected_as_the_program_does_it_keeps_that_file(tmp_
         identity = Identity(system_id=1, autopilot="px4", version="")
         vehicle = MAVLINK.connect(options, SAFE["px4"], identity, folder, lambda: None)
         with closing(vehicle):
-            assert f"is kept in {folder}/udp-127.0.0.1-" in vehicle.concern
+            assert f"The file {folder}/udp-127.0.0.1-" in vehicle.concern
 
 
 def test_what_a_refused_run_had_set_is_put_back_too() -> None:
@@ -266,7 +268,7 @@ def test_what_a_refused_run_had_set_is_put_back_too() -> None:
             vehicle.stage(SAFE["px4"])
             rig.drone.autopilot.refuses_arming = True
             rig.drone.autopilot.prearm_failure = lambda: None  # type: ignore[attr-defined]  # it does not tell before
-            with pytest.raises(VehicleError, match="would not arm") as refusal:
+            with pytest.raises(VehicleError, match="did not arm") as refusal:
                 vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
             assert refusal.value.not_flown
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
@@ -321,10 +323,10 @@ def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events:
             vehicle.attend(4.0)
             vehicle._radio.seen.forget_vehicle()
             [own] = [item for item in vehicle.check() if item.name == "own_checks"]
-            said = "it said: Preflight Fail: Arming denied: resolve system health failures first"
-            named = "it names: Local position estimate; " if tells_events else ""
-            assert own.found.startswith(f"they do not pass; {named}{said}")
-            assert own.hint.endswith("QGroundControl shows its reasons in words.")
+            messages = "messages: Preflight Fail: Arming denied: resolve system health failures first"
+            failing = "failing: Local position estimate; " if tells_events else ""
+            assert own.found.startswith(f"not passed; {failing}{messages}")
+            assert own.hint.endswith("QGroundControl shows the reasons in full.")
 
 
 def test_a_px4_says_in_which_mode_it_would_arm() -> None:
@@ -337,7 +339,7 @@ def test_a_px4_says_in_which_mode_it_would_arm() -> None:
         )
         vehicle.attend(1.0)
         [own] = [item for item in vehicle.check() if item.name == "own_checks"]
-        assert "It would arm in the mode Hold." in own.hint
+        assert "It can be armed in mode Hold." in own.hint
 
 
 def test_parameters_of_a_copter_outlive_its_reboot_and_paparazzis_do_not() -> None:
@@ -362,7 +364,7 @@ def test_a_vehicle_that_does_not_know_yet_where_it_is_is_waited_for_not_restarte
         items = {item.name: item for item in vehicle.check()}
         for name in ("position", "clock", "still"):
             assert not items[name].passed
-            assert items[name].hint.startswith("Wait until it knows where it is")
+            assert items[name].hint.startswith("Wait until it has a position")
         assert items["clock"].found == "waiting for a position"
 
 

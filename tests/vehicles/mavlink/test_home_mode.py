@@ -15,7 +15,7 @@ from tests.vehicles.flying import SAFE, TUNED, never, unwatched
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.test_connected import connected
 
-ADVICE = "fly it by hand, or stop its motors"
+ADVICE = "fly it manually, or stop its motors"
 LAND_HERE = 13
 
 
@@ -149,7 +149,7 @@ def test_a_heartbeat_that_tells_home_is_a_finding_of_its_own() -> None:
     with LockstepRig(make=make, faults=["carried-away:3@8"]) as rig, connected(rig) as vehicle:
         record = fly(vehicle)
         assert record.ending == "invalid"
-        assert "The vehicle went into mode Home: it flies back by itself and obeys no Land" in record.reason
+        assert "The vehicle entered mode Home: it flies back by itself and ignores Land" in record.reason
         assert vehicle.condition().mode == "Home"
 
 
@@ -162,8 +162,8 @@ def test_it_is_not_flown_so_far_from_home_that_its_plan_would_act_before_the_tri
         [item] = [each for each in vehicle.check() if each.name == "home"]
         assert item.passed is passes
         assert (item.found, item.needed) == (
-            f"{abs(away_m):.1f} m, and may drift 5 m",
-            "8 m or less together, where its flight plan lands it (plan_radius_m)",
+            f"{abs(away_m):.1f} m, plus radius_m of 5 m",
+            "8 m or less in total, because its flight plan lands it there (plan_radius_m)",
         )
 
 

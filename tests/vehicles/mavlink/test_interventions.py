@@ -47,7 +47,7 @@ def test_motors_off_is_sent_at_once_in_every_state_and_aborts_a_trial_that_had_n
     assert walk.state is (State.RESTORE if state is State.RESTORE else State.DISARM)
     expected = failed if failed[0] is not None else (Failure.OPERATOR, "aborted")
     assert (walk.trial.failure, walk.trial.outcome) == expected
-    assert walk.trial.why.endswith("Motors off was asked for: it flies towards people.")
+    assert walk.trial.why.endswith("Motors off was requested: it flies towards people.")
 
 
 def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_says_so() -> None:
@@ -69,14 +69,14 @@ def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -
     for _ in range(55):
         slide(walk).pass_s(STEP_S)
     assert len(walk.when(Action.KILL)) == 2
-    assert walk.trial.why == "too high Motors off was asked for: it flies towards people."
+    assert walk.trial.why == "too high Motors off was requested: it flies towards people."
 
 
 def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(LAND_BLOCK)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.OWN_LANDING)
-    assert walk.trial.why == "Its flight plan went to the block “land”."
+    assert walk.trial.why == "Its flight plan entered the block “land”."
     walk.touch_down().disarm().restore()
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
 
@@ -86,7 +86,7 @@ def test_a_flight_plan_that_lands_from_its_own_ceiling_speaks_against_the_gains(
     walk.climb_rate_m_s = 1.0
     walk.pass_s(1.4).hear(BlockEntered(LAND_BLOCK))
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
-    assert "Its flight plan went to the block “land”." in walk.trial.why
+    assert "Its flight plan entered the block “land”." in walk.trial.why
     assert walk.gains_sent[0] == walk.plan.safe_gains[0]
 
 
@@ -94,7 +94,7 @@ def test_a_flight_plan_that_goes_where_nobody_sent_it_is_told_to_land() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
-    assert walk.trial.why == "Its flight plan went to the block “Standby”."
+    assert walk.trial.why == "Its flight plan entered the block “Standby”."
     assert walk.actions[-1] is Action.LAND
 
 
@@ -117,7 +117,7 @@ def test_an_autopilot_that_lands_by_its_own_failsafe_is_landed_with() -> None:
     assert (walk.state, walk.trial.failure, walk.trial.why) == (
         State.ABORT_LAND,
         Failure.OWN_LANDING,
-        "It went into mode land.",
+        "It entered mode land.",
     )
 
 
@@ -163,13 +163,13 @@ def test_a_second_source_that_loses_the_vehicle_lands_it() -> None:
     assert walk.state is State.RECORD
     watched(walk, 0.06, is_new=False)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
-    assert walk.trial.why == "The second source of altitude did not see it for more than 0.25 s."
+    assert walk.trial.why == "The second source of altitude did not track it for more than 0.25 s."
 
 
 def test_a_second_source_that_falls_silent_lands_it_after_a_second() -> None:
     walk = hovering().pass_s(0.9)
     assert walk.state is State.RECORD
-    assert walk.pass_s(0.2).trial.why == "Nothing came from the second source of altitude for 1 s."
+    assert walk.pass_s(0.2).trial.why == "Nothing was received from the second source of altitude for 1 s."
 
 
 def test_every_sample_of_the_record_says_where_the_second_source_saw_the_vehicle() -> None:
@@ -199,7 +199,7 @@ def test_land_is_not_repeated_while_the_newest_heartbeat_tells_of_a_pilot(state:
         walk.pass_s(STEP_S)
     assert len(walk.when(Action.LAND)) == told
     assert walk.state is State.QUARANTINE
-    assert walk.trial.why.count("The vehicle went into mode 64.") == 1
+    assert walk.trial.why.count("The vehicle entered mode 64.") == 1
 
 
 def test_a_record_is_not_ended_while_the_newest_heartbeat_tells_of_a_pilot() -> None:
@@ -218,7 +218,7 @@ def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> N
     walk.mode = "4"
     walk.pass_s(1.0)
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
-    assert walk.trial.why == "One heartbeat told of the mode 64."
+    assert walk.trial.why == "One heartbeat reported mode 64."
     while walk.state is State.RECORD:
         walk.pass_s(STEP_S)
     walk.touch_down().disarm().restore()
@@ -309,7 +309,7 @@ def test_a_vehicle_that_hovers_before_it_has_climbed_was_stopped_by_somebody() -
     walk.climb_rate_m_s, walk.mode = 0.0, "hold"
     walk.pass_s(2.1)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
-    assert walk.trial.why == "The vehicle went into mode hold before it had climbed."
+    assert walk.trial.why == "The vehicle entered mode hold before it had climbed."
 
 
 def test_a_vehicle_that_hovers_near_its_set_point_has_climbed_however_it_swings() -> None:

@@ -182,7 +182,7 @@ def test_a_battery_that_says_nothing_for_ten_seconds_counts_as_low() -> None:
     assert limit_checks.find_battery(watch, 20.0) is None
     silent = limit_checks.find_battery(watch, 20.2)
     assert silent is not None
-    assert silent.why == "No battery voltage was heard for 10 s."
+    assert silent.why == "No battery voltage was received for 10 s."
 
 
 def beating(*beats: Heartbeat) -> TrialObservation:
@@ -198,7 +198,7 @@ def test_a_disarming_and_a_strange_mode_are_unexpected_once_heartbeats_agree() -
     named = replace(LIMITS, mode_names={"0": "Failsafe"})
     for beat, why in (
         (disarmed, "The vehicle disarmed itself in the air."),
-        (strange, "The vehicle went into mode Failsafe."),
+        (strange, "The vehicle entered mode Failsafe."),
     ):
         found = [
             limit_checks.find_unexpected(beating(*[beat] * count), named, LIMITS.flying_modes) for count in (1, 2, 3)
@@ -209,10 +209,10 @@ def test_a_disarming_and_a_strange_mode_are_unexpected_once_heartbeats_agree() -
 
 
 def test_a_mode_in_which_a_person_flies_is_a_take_over() -> None:
-    named = replace(LIMITS, mode_names={"64": "By hand"})
+    named = replace(LIMITS, mode_names={"64": "Manual"})
     taken = limit_checks.find_taken_over(beating(*[Heartbeat(9, True, "64")] * 3), named)
     assert taken is not None
-    assert (taken.failure, taken.why) == (Failure.TAKEN_OVER, "The vehicle went into mode By hand.")
+    assert (taken.failure, taken.why) == (Failure.TAKEN_OVER, "The vehicle entered mode Manual.")
     assert limit_checks.find_taken_over(beating(*[Heartbeat(9, False, "64")] * 3), named) is None
 
 

@@ -150,7 +150,7 @@ def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(
         assert link.doubled == ""
         other.send(heartbeat(other, autopilot=9))
         assert becomes(lambda: bool(link.doubled))
-    assert link.doubled == "Another vehicle with its system id speaks from another port."
+    assert link.doubled == "Another vehicle with its system id sends from another port."
 
 
 def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(paparazzi: FakeVehicleEndpoint) -> None:

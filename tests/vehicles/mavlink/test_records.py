@@ -82,7 +82,7 @@ def test_a_source_that_drifts_away_is_told_in_words_and_numbers_and_shown_as_a_g
 def test_what_the_cameras_did_not_see_is_missing_where_they_are_scored_and_told_where_they_are_not() -> None:
     seen = unseen(sightings(), 20.0, 21.2)
     beside = add_secondary_altitude(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="vehicle")
-    assert beside.remark == "Motion capture saw nothing for 1.2 s from 20.0 s on."
+    assert beside.remark == "Motion capture has no samples for 1.2 s from 20.0 s on."
     np.testing.assert_allclose(beside.trajectory["altitude_2_m"], climb_m(TIME_S), atol=0.02)
     scored = add_secondary_altitude(own_record(), seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
     assert [glitch.kind for glitch in find_glitches(Takeoff(), scored.trajectory)] == ["gap"]
@@ -91,7 +91,7 @@ def test_what_the_cameras_did_not_see_is_missing_where_they_are_scored_and_told_
 def test_a_flight_that_hardly_moved_is_aligned_by_receipt_and_says_so() -> None:
     low = sightings(top_m=0.1)
     both = add_secondary_altitude(own_record(0.1), low, name="motion capture", zero_s=ZERO_S, scored="vehicle")
-    assert "aligned by its receipt alone: the two moved by less than 0.3 m" in both.remark
+    assert "aligned by its time of receipt alone: the two moved by less than 0.3 m" in both.remark
     assert both.settings["second_delay_s"] == 0.0
     np.testing.assert_allclose(both.trajectory["altitude_2_m"], climb_m(TIME_S) / 30.0, atol=0.02)
 
@@ -103,4 +103,4 @@ def test_a_source_that_saw_nothing_leaves_the_record_as_it_is(seen: list[tuple[f
     own = own_record()
     both = add_secondary_altitude(own, seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
     assert both.trajectory is own
-    assert both.remark.startswith("Nothing was seen by motion capture, the second source of altitude;")
+    assert both.remark.startswith("No altitudes came from motion capture, the second source;")

@@ -81,9 +81,9 @@ def test_a_vehicle_that_heeds_no_commands_is_stopped_by_its_setting(setting: str
 def test_a_vehicle_that_confirms_no_way_to_stop_its_motors_is_not_flown() -> None:
     with LockstepRig(make=of(DeafToCommands, kill_setting="")) as rig, connected(rig) as vehicle:
         [stopping] = [item for item in vehicle.check() if item.name == "motors_off"]
-        assert (stopping.passed, stopping.found) == (False, "it answers to no way to stop its motors")
+        assert (stopping.passed, stopping.found) == (False, "the vehicle confirms no command that stops its motors")
         vehicle.stage(TUNED)
-        with pytest.raises(VehicleError, match="Motors off: it answers to no way"):
+        with pytest.raises(VehicleError, match="Motors off: the vehicle confirms no command"):
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert not rig.drone.autopilot.took_off
 
@@ -109,7 +109,7 @@ def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_s
 
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
         assert not rig.drone.autopilot.armed
-        assert record.reason == "Motors off was asked for: people below. Its motors have stopped, it says."
+        assert record.reason == "Motors off was requested: people below. It confirmed that its motors have stopped."
 
 
 def test_motors_off_that_the_vehicle_does_not_heed_is_not_said_to_have_stopped_them() -> None:
@@ -131,7 +131,7 @@ def test_motors_off_that_the_vehicle_does_not_heed_is_not_said_to_have_stopped_t
 
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
         assert record.reason.startswith(
-            "Motors off was asked for: people below. It has not said within 5 s that its motors stopped."
+            "Motors off was requested: people below. It has not confirmed within 5 s that its motors stopped."
         )
         assert vehicle.concern
         vehicle.attend(40.0)  # and it is told to land on
@@ -154,16 +154,16 @@ def test_under_the_plan_of_before_a_fall_is_noticed_and_recorded(tenths: int) ->
         record = aborted(vehicle, tenths / 10)
         fell = rig.impact_m_s > HARD_M_S
         assert record.ending == "aborted"
-        assert ("It came to the ground at" in record.reason, bool(vehicle.concern)) == (fell, fell)
+        assert ("It hit the ground at" in record.reason, bool(vehicle.concern)) == (fell, fell)
 
 
 @pytest.mark.parametrize(("at_s", "falls"), [(0.7, True), (2.5, False)])
 def test_the_second_before_it_counts_as_flying_is_a_fall_under_the_plan_of_before(at_s: float, falls: bool) -> None:
     with FallingRig(make=of(landed_after_s=0.0)) as rig, connected(rig) as vehicle:
         record = aborted(vehicle, at_s)
-        assert (rig.impact_m_s > HARD_M_S, "It came to the ground at" in record.reason) == (falls, falls)
+        assert (rig.impact_m_s > HARD_M_S, "It hit the ground at" in record.reason) == (falls, falls)
         if falls:
-            with pytest.raises(SafeGainsError, match="It came to the ground at"):
+            with pytest.raises(SafeGainsError, match="It hit the ground at"):
                 vehicle.stage(TUNED)
 
 
@@ -189,7 +189,7 @@ def test_a_program_that_stood_still_while_it_armed_commands_no_take_off() -> Non
     """Seen: it went through what had come meanwhile, took off five seconds late, and read the abort then."""
     with StallingRig() as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)
-        with pytest.raises(VehicleError, match="stood still for 5 s, so the take-off was not commanded") as failed:
+        with pytest.raises(VehicleError, match="stalled for 5 s, so the take-off was not commanded") as failed:
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert failed.value.not_flown
         assert rig.stalled

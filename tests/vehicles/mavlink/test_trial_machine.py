@@ -311,7 +311,7 @@ def jump_about(walk: TrialDriver) -> None:
 
 
 def be_one_of_two(walk: TrialDriver) -> None:
-    walk.give(DuplicateVehicleDetected("Its sequence numbers come twice, with other contents.", walk.now_s))
+    walk.give(DuplicateVehicleDetected("Its sequence numbers are repeated with different contents.", walk.now_s))
 
 
 WALK: list[tuple[State, Callable[[TrialDriver], None], State, Failure | None]] = [
@@ -470,7 +470,7 @@ def test_a_lost_link_repeats_land_every_second_and_never_stops_the_motors() -> N
     assert Action.MOTORS_OFF not in walk.actions
     walk.pass_s(50.0)
     assert walk.state is State.QUARANTINE
-    assert walk.trial.why == "Nothing was heard for 1 s. The link stayed lost for 60 s."
+    assert walk.trial.why == "Nothing was received for 1 s. The link stayed lost for 60 s."
     assert Action.MOTORS_OFF not in walk.actions
 
 
@@ -543,7 +543,7 @@ def test_an_altitude_that_stays_behind_its_climb_rate_is_lost_and_stops_no_motor
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
-    assert "Its motors were not told to stop: its altitude did not follow its climb rate." in walk.trial.why
+    assert "Its motors were not commanded to stop: its altitude did not follow its climb rate." in walk.trial.why
 
 
 def test_a_refused_take_off_disarms_on_the_ground() -> None:
@@ -654,7 +654,7 @@ def test_a_record_ends_by_the_grounds_clock_too() -> None:
     walk.tempo = 0.3
     walk.pass_s(PLAN.record_s)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.SLOW_CLOCK)
-    assert walk.trial.why.startswith("By its clock ")
+    assert walk.trial.why.startswith("Its clock advanced by ")
 
 
 def test_an_altitude_that_leaps_to_the_ground_stops_no_motors() -> None:
@@ -666,7 +666,7 @@ def test_an_altitude_that_leaps_to_the_ground_stops_no_motors() -> None:
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
-    assert walk.trial.why == f"{ABORT} Its motors were not told to stop: its altitude leapt during the flight."
+    assert walk.trial.why == f"{ABORT} Its motors were not commanded to stop: its altitude jumped during the flight."
 
 
 @pytest.mark.parametrize("says_so", [True, False])
@@ -685,7 +685,7 @@ def test_a_vehicle_that_falls_is_recorded_so_and_left_for_a_person_to_look_at() 
     walk.climb_rate_m_s = 0.0
     walk.touch_down().disarm().restore()
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.OPERATOR)
-    assert walk.trial.why == f"{ABORT} It came to the ground at 3.5 m/s."
+    assert walk.trial.why == f"{ABORT} It hit the ground at 3.5 m/s."
 
 
 def test_after_a_person_has_taken_over_nothing_more_is_sent() -> None:
@@ -718,7 +718,7 @@ def test_a_vehicle_that_is_in_the_air_again_after_its_record_is_landed_and_looke
     walk.altitude_m -= 0.2
     walk.pass_s(4.0).disarm().restore()
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, None)
-    assert walk.trial.why == "It was found in the air while its motors were to be stopped."
+    assert walk.trial.why == "It was in the air when its motors should be stopped."
 
 
 def test_glitches_do_not_end_a_flight_but_too_many_void_it() -> None:
@@ -749,7 +749,7 @@ def test_a_vehicle_that_comes_down_by_itself_is_not_left_to_wind_up_its_integrat
     walk.climb_rate_m_s = 0.0
     assert walk.pass_s(0.9).state is State.RECORD
     assert walk.pass_s(0.2).state is State.ABORT_LAND
-    assert (walk.trial.failure, walk.trial.why) == (Failure.ENVELOPE, "It came down by itself.")
+    assert (walk.trial.failure, walk.trial.why) == (Failure.ENVELOPE, "It descended to the ground by itself.")
 
 
 def test_an_altitude_that_drifts_up_does_not_hide_that_the_vehicle_has_landed_and_disarmed() -> None:

@@ -57,8 +57,8 @@ def test_a_whole_trial_scores_as_the_same_body_does_without_a_link() -> None:
 
 
 FAULTS = [
-    ("link-lost:3@3", "invalid", "The link was lost in the air"),
-    ("frozen-position:2@3", "invalid", "stood still while it went on talking"),
+    ("link-lost:3@3", "invalid", "The link was lost in flight"),
+    ("frozen-position:2@3", "invalid", "froze while packets still arrived"),
     ("low-battery@3", "invalid", "The battery was at 9.0 V"),
     ("no-lift-off@0", "aborted", "It was still on the ground 1.5 s after the command"),
     ("jumping-position:3@3", "invalid", "samples were dropped"),
@@ -176,20 +176,20 @@ def test_nothing_flies_before_its_gains_are_staged() -> None:
 
 def test_without_a_heartbeat_nothing_is_sent() -> None:
     with LockstepRig(faults=["no-heartbeat@connect"]) as rig:
-        with pytest.raises(VehicleError, match=r"No heartbeat was heard.*dialect paparazzi"):
+        with pytest.raises(VehicleError, match=r"No heartbeat was received.*dialect paparazzi"):
             rig.vehicle()
         assert rig.heard == []
 
 
 def test_another_system_than_the_one_named_is_not_listened_to() -> None:
-    with LockstepRig() as rig, pytest.raises(VehicleError, match="No heartbeat was heard"):
+    with LockstepRig() as rig, pytest.raises(VehicleError, match="No heartbeat was received"):
         rig.vehicle(system_id=32.0)
 
 
 def test_another_autopilot_is_not_flown() -> None:
     with LockstepRig("ardupilot") as rig:
         options = rig.options(autopilot="px4")
-        with pytest.raises(VehicleError, match=r"Others were heard: MAVLink's autopilots \[3\]"):
+        with pytest.raises(VehicleError, match=r"Other autopilots were received, by MAV_AUTOPILOT: \[3\]"):
             MavlinkVehicle(options, OWN_SAFE["px4"], is_real=False, clock=rig, transport=rig)
 
 
@@ -201,7 +201,7 @@ def test_a_vehicle_that_takes_no_parameters_is_refused() -> None:
 def test_a_vehicle_that_will_not_arm_is_not_flown_and_has_its_safe_gains_back() -> None:
     with LockstepRig(faults=["arm-refused@connect"]) as rig:
         vehicle = rig.vehicle()
-        with pytest.raises(VehicleError, match="would not arm"):
+        with pytest.raises(VehicleError, match="did not arm"):
             fly(vehicle)
         assert vehicle.read_gains() == SAFE
         vehicle.close()
@@ -210,7 +210,7 @@ def test_a_vehicle_that_will_not_arm_is_not_flown_and_has_its_safe_gains_back() 
 def test_a_position_that_comes_too_seldom_is_refused() -> None:
     with (
         LockstepRig(release="paparazzi-bare") as rig,
-        pytest.raises(VehicleError, match=r"Position: .* times a second, needed: 40"),
+        pytest.raises(VehicleError, match=r"Position: .* per second, needed: 40"),
     ):
         rig.vehicle()
 
@@ -258,7 +258,7 @@ def test_what_runs_on_the_administrators_simulation_hosts_is_no_real_vehicle() -
 def test_a_vehicle_that_does_not_sign_is_not_heard_where_signatures_are_wanted(tmp_path: Path) -> None:
     key = tmp_path / "key.txt"
     key.write_text("3f" * 32 + "\n", encoding="ascii")
-    with LockstepRig("ardupilot") as rig, pytest.raises(VehicleError, match="No heartbeat was heard"):
+    with LockstepRig("ardupilot") as rig, pytest.raises(VehicleError, match="No heartbeat was received"):
         rig.vehicle(signing_key_file=str(key))
 
 
@@ -271,11 +271,11 @@ def test_a_signing_key_that_cannot_be_read_is_refused_without_being_told() -> No
 @pytest.mark.parametrize(
     ("options", "field", "reason"),
     [
-        ({"signing_key_file": "key.txt"}, "signing_key_file", "Paparazzi speaks MAVLink 1"),
+        ({"signing_key_file": "key.txt"}, "signing_key_file", "Paparazzi uses MAVLink 1"),
         ({"scored_source": "gps"}, "scored_source", "must be vehicle or mocap, got gps"),
         ({"scored_source": "mocap"}, "scored_source", "needs a second_source"),
         ({"second_source": "camera"}, "second_source", "must be natnet:HOST?body=ID"),
-        ({"simulated": True, "address": "udp:10.0.0.2:4245"}, "simulated", "is not believed of udp:10.0.0.2:4245"),
+        ({"simulated": True, "address": "udp:10.0.0.2:4245"}, "simulated", "is not possible at udp:10.0.0.2:4245"),
         ({"simulated": True, "address": "serial:/dev/ttyUSB0:57600"}, "simulated", "only a loopback address"),
         ({"autopilot": "betaflight"}, "autopilot", "must be paparazzi, ardupilot, px4"),
         ({"address": "nowhere"}, "address", "must be udp:"),
@@ -318,7 +318,7 @@ def test_the_other_autopilots_fly_a_trial_with_gains_of_their_own(autopilot: str
 
 @pytest.mark.parametrize(("autopilot", "named"), [("ardupilot", "FS_GCS_ENABLE"), ("px4", "NAV_DLL_ACT")])
 def test_a_vehicle_whose_failsafes_are_off_is_not_flown(autopilot: str, named: str) -> None:
-    with LockstepRig(autopilot) as rig, pytest.raises(VehicleError, match=f"Its own failsafe {named}: off"):
+    with LockstepRig(autopilot) as rig, pytest.raises(VehicleError, match=f"Failsafe {named}: off"):
         rig.vehicle()
 
 

@@ -81,26 +81,29 @@ def test_frames_that_are_sent_again_do_not_advance(unicast: NatNetAddress, motiv
 
 
 def test_a_body_that_is_not_streamed_is_named_with_those_that_are(unicast: NatNetAddress, motive: FakeMotive) -> None:
-    with pytest.raises(VehicleError, match=r"streams no rigid body 4; it streams these ids: 3\. Take the streaming id"):
+    with pytest.raises(VehicleError, match=r"streams no rigid body 4; it streams these ids: 3\. Use the streaming id"):
         NatNetSource(replace(unicast, body=4), CLOCK)
 
 
 def test_frames_on_another_group_than_the_one_listened_to_are_missed_in_words(unicast: NatNetAddress) -> None:
     streamed = replace(unicast, multicast="239.255.42.99", data_port=free_port())
     listened = replace(streamed, multicast="239.255.42.98")
-    with FakeMotive(streamed), pytest.raises(VehicleError, match=r"answers, but no frames came .* &multicast=GROUP"):
+    with FakeMotive(streamed), pytest.raises(VehicleError, match=r"answers, but sent no frames .* &multicast=GROUP"):
         NatNetSource(listened, CLOCK)
 
 
 def test_nobody_there_is_said_with_address_and_port(monkeypatch: pytest.MonkeyPatch, unicast: NatNetAddress) -> None:
     monkeypatch.setattr(natnet, "ANSWERED_WITHIN_S", 0.1)
-    with pytest.raises(VehicleError, match=rf"{LOOPBACK} \(NatNet, port {unicast.command_port}\) is not there"):
+    with pytest.raises(VehicleError, match=rf"{LOOPBACK} \(NatNet, port {unicast.command_port}\) is not available"):
         NatNetSource(unicast, CLOCK)
 
 
 def test_a_server_too_old_to_tell_whether_it_tracks_is_refused(unicast: NatNetAddress) -> None:
     old = NatNetServer(unicast, (2, 5, 0, 0))
-    with FakeMotive(unicast, old), pytest.raises(VehicleError, match=r"NatNet 2\.5\.0\.0, which does not tell whether"):
+    with (
+        FakeMotive(unicast, old),
+        pytest.raises(VehicleError, match=r"NatNet 2\.5\.0\.0, which does not report whether"),
+    ):
         NatNetSource(unicast, CLOCK)
 
 
@@ -111,11 +114,11 @@ def test_a_system_that_was_switched_off_is_troubled_and_heard_again_when_it_is_b
     with FakeMotive(unicast, clock_s=900.0):
         source = NatNetSource(unicast, CLOCK)
     with closing(source):
-        assert comes_true(lambda: "Nothing has come of rigid body 3" in source.trouble)
+        assert comes_true(lambda: "Nothing was received of rigid body 3" in source.trouble)
         with FakeMotive(unicast):
             assert comes_true(lambda: source.trouble == "")
             assert all(sample.advances for sample in news(source))
-    assert "not listened to any more" in source.trouble
+    assert "has stopped" in source.trouble
 
 
 @pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")

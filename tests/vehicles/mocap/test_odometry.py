@@ -83,7 +83,7 @@ def test_the_first_kind_heard_is_the_one_taken_and_other_messages_are_passed_ove
 
 def test_a_link_without_odometry_is_troubled(monkeypatch: pytest.MonkeyPatch, own: OdometrySource) -> None:
     monkeypatch.setattr(odometry, "SILENT_S", 0.05)
-    assert comes_true(lambda: own.trouble.startswith("No odometry on the vehicle's own link has come for"))
+    assert comes_true(lambda: own.trouble.startswith("No odometry on the vehicle's own link was received for"))
 
 
 def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
@@ -99,7 +99,7 @@ def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
             assert comes_true(lambda: source.trouble == failed)
     assert heard[-1].altitude_m == pytest.approx(1.2, abs=0.01)
     assert all(sample.advances for sample in heard)
-    assert "not listened to any more" in source.trouble
+    assert "has stopped" in source.trouble
 
 
 def test_a_stranger_on_the_port_is_not_taken_for_the_motion_capture() -> None:
@@ -115,9 +115,9 @@ def test_a_stranger_on_the_port_is_not_taken_for_the_motion_capture() -> None:
 
 
 def test_a_port_where_nothing_is_heard_or_that_is_taken_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(odometry, "HEARD_WITHIN_S", 0.2)
+    monkeypatch.setattr(odometry, "RECEIVED_WITHIN_S", 0.2)
     port = free_port()
-    with pytest.raises(VehicleError, match=rf"No ODOMETRY .* came at mavlink:udpin:{LOOPBACK}:{port} within 0.2 s"):
+    with pytest.raises(VehicleError, match=rf"No ODOMETRY .* arrived at mavlink:udpin:{LOOPBACK}:{port} within 0.2 s"):
         open_source(f"mavlink:udpin:{LOOPBACK}:{port}", CLOCK)
     with socket.socket(type=socket.SOCK_DGRAM) as other:
         other.bind((LOOPBACK, port))

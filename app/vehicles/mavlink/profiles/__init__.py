@@ -1,4 +1,4 @@
-"""The autopilots that can be spoken to."""
+"""Profiles of the supported autopilots."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""ArduCopter: guided mode, and its vertical controllers' gains under the names of before and after release 4.7."""
+"""ArduCopter: guided mode, and its vertical controllers' gains by the names before and since release 4.7."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -26,7 +26,7 @@ _CUSTOM_MODE: Final = 1.0
 
 
 class ArduPilot:
-    """Gains are called as before 4.7; where a vehicle has the new names, its numbers are a tenth."""
+    """Gains have the names before 4.7; on vehicles with the new names, some of the values are a tenth."""
 
     name: Final = "ardupilot"
     title: Final = "ArduCopter"
@@ -84,7 +84,7 @@ class ArduPilot:
         return ()
 
     def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
-        """A direct link is told nothing but heartbeats unless it asks."""
+        """Request telemetry: without requests, only heartbeats are sent on a direct link."""
         return request_telemetry(aim, telemetry_hz)
 
     def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
@@ -97,7 +97,7 @@ class ArduPilot:
         return request_version(aim)
 
     def ask_checks(self, aim: Target) -> None:
-        """It tells in words what does not pass."""
+        """Return None: failed checks are reported as status texts."""
 
     def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
@@ -124,7 +124,7 @@ class ArduPilot:
 
 
 def request_telemetry(aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
-    """Every message that a trial listens to, positions at this rate. Not every autopilot has the last ones."""
+    """Request all messages that a trial needs, positions at this rate. Not every autopilot has the last two."""
     return (
         _request(aim, _LOCAL_POSITION_NED, telemetry_hz),
         _request(aim, _SYS_STATUS, _STATUS_HZ),
@@ -139,7 +139,7 @@ def _request(aim: Target, message: int, rate_hz: float, *, needed: bool = True) 
 
 
 def request_version(aim: Target) -> Outgoing:
-    """AUTOPILOT_VERSION, once."""
+    """Return a request for one AUTOPILOT_VERSION."""
     return base.command(aim, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
 
 

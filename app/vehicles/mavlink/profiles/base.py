@@ -1,4 +1,4 @@
-"""What is particular to an autopilot: its gains, what its messages mean, and the messages that it wants."""
+"""Interface of autopilot profiles: gains, reading of messages, and messages to send; and their common parts."""
 
 import math
 import struct
@@ -37,18 +37,18 @@ from app.vehicles.mavlink.events import (
 ARMED_BIT: Final = 128
 ARM_DISARM: Final = 400
 COPTERS: Final = frozenset({0, 2, 3, 4, 13, 14, 15, 29, 35, 43})
-"""MAV_TYPE of what hovers: quadrotor, coaxial, helicopter, 6, 8, 3, 12 and 10 rotors, any; or not told."""
+"""MAV_TYPE of vehicles that hover: quadrotor, coaxial, helicopter, 6, 8, 3, 12 and 10 rotors, any; and generic."""
 FORCED: Final = 21196.0
 """The second parameter of 400 that stops motors in the air."""
 REAL32: Final = 9
 AUTOPILOT: Final = 1
-"""The component id that autopilots have unless somebody changed it."""
+"""Default component id of autopilots."""
 _FENCES: Final = MappingProxyType({1: "its least altitude", 2: "its greatest altitude", 3: "its boundary"})
 """FENCE_BREACH."""
 _LANDED_STATES: Final = MappingProxyType({1: True, 2: False, 4: False})
 """MAV_LANDED_STATE: on the ground, in the air, landing."""
 _PREARM_CHECK: Final = 1 << 28
-"""Among the sensors of SYS_STATUS: MAV_SYS_STATUS_PREARM_CHECK."""
+"""MAV_SYS_STATUS_PREARM_CHECK, a bit of the sensors in SYS_STATUS."""
 _TEXT_LENGTH: Final = 50
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
@@ -58,9 +58,9 @@ _UNKNOWN_MV: Final = (0.0, 65535.0)
 
 @dataclass(frozen=True, slots=True)
 class GainParameter:
-    """A gain by its name here and on the vehicle, the values that may be written (autopilots take any), and the
-    vehicle's own number for a gain of 1. `whole`: the vehicle keeps the integer part only. `integrates`: writing it may
-    clear an integrator, so it comes last when the vehicle is in the air."""
+    """A gain by its name here and on the vehicle, the range of values that may be written (autopilots accept any), and
+    the `factor` from the gain to the vehicle's value. `whole`: the vehicle keeps only the integer part. `integrates`:
+    writing it may clear an integrator, so it is sent last in flight."""
 
     gain: str
     parameter: str
@@ -71,18 +71,18 @@ class GainParameter:
     integrates: bool = False
 
     def sent(self, value: float) -> float:
-        """What goes on the wire: single precision."""
+        """Return the value to send, in single precision."""
         return _single(value * self.factor)
 
     def read(self, wire: float, asked: float | None = None) -> float:
-        """What the vehicle holds, to the seven digits of single precision; the very number that was asked where it is
-        that one."""
+        """Return the gain for a value of the vehicle, to the seven digits of single precision; exactly `asked` if the
+        value is the one sent for it."""
         if self.whole:
             return int(wire)
         return asked if asked is not None and wire == self.sent(asked) else float(f"{wire / self.factor:.7g}")
 
     def refusal(self, value: float) -> str | None:
-        """Why this value may not be written, or None when it may."""
+        """Return why this value may not be written, or None if it may."""
         if not self.lower <= value <= self.upper:
             return f"must lie in {self.lower:g} … {self.upper:g}, got {shortened(value)}"
         return f"must be a whole number of counts, got {value:g}" if self.whole and value != int(value) else None
@@ -92,7 +92,8 @@ GainSet = tuple[GainParameter, ...]
 
 
 def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
-    """The gains, complete and in order. Raises GainsError for those that may not be written: no autopilot checks."""
+    """Return the gains, complete and in order. Raises GainsError for those that may not be written, because autopilots
+    do not check."""
     known = {gain.gain: gain for gain in gain_set}
     problems = [Problem(f"gains.{name}", "is not a gain of this vehicle") for name in gains if name not in known]
     for name, gain in known.items():
@@ -110,7 +111,7 @@ def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A failsafe that has to be on before a flight: a parameter with one of these values, or any but zero."""
+    """A failsafe that must be enabled before a flight: a parameter with one of these values, or any except zero."""
 
     parameter: str
     what: str
@@ -130,8 +131,8 @@ class Outgoing:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Messages that belong together, and the reply that ends the step (see `Reply.to`), asked for up to `attempts`
-    times; without one the step ends after `pause_s`. What is not `needed` may be refused, or not answered."""
+    """Messages sent together, up to `attempts` times, and the reply that ends the step (see `CommandReply.to`); if it
+    awaits none, the step ends after `pause_s`. A step that is not `needed` may be refused, or have no reply."""
 
     sends: tuple[Outgoing, ...]
     awaits: str = ""
@@ -142,10 +143,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """Whom messages go to, and what is known about it: `component` is its autopilot's, 0 until it is known; `aircraft`
-    is the number that Paparazzi matches most messages with, `blocks` are its flight plan's by name, `stop_settings`
-    those settings that stop its motors which it was found to have, `stops_by_command` whether it was heard to obey the
-    command that does; east and north say where it stands."""
+    """Recipient of messages. `component` is its autopilot's, 0 until it is known; `aircraft` is the id that Paparazzi
+    matches in most messages; `blocks` are the numbers of its flight plan's blocks by name; `stop_settings` are the
+    settings found on it that stop its motors, `stops_by_command`: it has accepted the command that stops them;
+    `east_m` and `north_m` are its place on the ground."""
 
     system: int
     aircraft: int
@@ -160,11 +161,11 @@ class Target:
 
 
 Ask = Callable[[Outgoing, Callable[[Measurement], bool]], Measurement | None]
-"""Send, again if need be, until an answer fits; None when there is none."""
+"""Sends a request, repeatedly if necessary, until a reply fits; returns None without one."""
 
 
 class Profile(Protocol):
-    """One autopilot. Pure data and pure functions: what is sent is decided here, when is decided elsewhere."""
+    """Profile of one autopilot, as data and pure functions: it decides what is sent, not when."""
 
     @property
     def name(self) -> str: ...
@@ -172,26 +173,27 @@ class Profile(Protocol):
     def title(self) -> str: ...
     @property
     def experiment(self) -> str:
-        """The one that tunes its gains."""
+        """Experiment that tunes its gains."""
         ...
 
     @property
     def dialect(self) -> Dialect: ...
     @property
     def autopilot(self) -> int:
-        """The number of its make in a heartbeat."""
+        """MAV_AUTOPILOT in its heartbeats."""
         ...
 
     @property
     def heartbeat_s(self) -> float: ...
     @property
     def lift_off_s(self) -> float:
-        """How long after the command it may still stand on the ground."""
+        """Time after the take-off command for which it may still stand on the ground."""
         ...
 
     @property
     def land_again_s(self) -> float:
-        """How long a landing takes on the ground to be over, where every order to land begins it anew."""
+        """Interval at which Land may be repeated, if every command restarts the landing: the time that the landing
+        takes on the ground to end."""
         ...
 
     @property
@@ -203,29 +205,29 @@ class Profile(Protocol):
     def flying_modes(self) -> frozenset[str]: ...
     @property
     def hovering_modes(self) -> frozenset[str]:
-        """Those of the flying modes that it goes into once it has climbed; none where one mode serves for both."""
+        """Flying modes that it enters after the climb; none if it climbs and hovers in one mode."""
         ...
 
     @property
     def landing_modes(self) -> frozenset[str]: ...
     @property
     def manual_modes(self) -> frozenset[str]:
-        """In which a person flies it."""
+        """Modes in which a pilot flies it."""
         ...
 
     @property
     def mode_names(self) -> Mapping[str, str]:
-        """What people call its modes, by what a heartbeat names them; one that is not here goes by that."""
+        """Display names of its modes by their names in `Heartbeat`; others are displayed by those."""
         ...
 
     @property
     def deaf_modes(self) -> Mapping[str, str]:
-        """Those in which it obeys no order to land, with what it does in them."""
+        """Modes in which it does not execute Land, with a description of its behaviour in them."""
         ...
 
     @property
     def arming_blocks(self) -> frozenset[str]:
-        """Of its flight plan, where it has one: in which it stands on the ground before the take-off."""
+        """Blocks of its flight plan, if it has one, in which it stands on the ground before the take-off."""
         ...
 
     @property
@@ -234,47 +236,47 @@ class Profile(Protocol):
     def landing_blocks(self) -> frozenset[str]: ...
     @property
     def gain_sets(self) -> tuple[GainSet, ...]:
-        """The gains under the names that releases have for them, newest last."""
+        """The gains by their names in the releases of the autopilot, newest last."""
         ...
 
     @property
     def stop_settings(self) -> tuple[str, ...]:
-        """Settings that stop the motors, by the names that releases have for them; none where a command always does."""
+        """Settings that stop the motors, by their names in the releases; none if a command always does."""
         ...
 
     @property
     def requirements(self) -> tuple[Requirement, ...]: ...
     def measure(self, message: Message) -> Measurement | None: ...
     def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:
-        """The blocks of the flight plan, where there is one. Raises VehicleError when one is missing that is needed."""
+        """Return the blocks of the flight plan, if there is one. Raises VehicleError if a required one is missing."""
         ...
 
     def conclude(self, aim: Target) -> tuple[Outgoing, ...]:
-        """What ends an exploration, however it went."""
+        """Return the messages that end an exploration, successful or not."""
         ...
 
     def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
-        """Ask for telemetry, which changes nothing that lasts."""
+        """Return the steps that request telemetry, without lasting changes."""
         ...
 
     def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:
-        """What brings a disarmed vehicle out of a mode in which it does not arm; nothing for other modes."""
+        """Return the steps out of a mode in which it does not arm; none for other modes."""
         ...
 
     def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:
-        """Parameters that have to be so for a take-off to the altitude of `aim`."""
+        """Return the parameters required for a take-off to the altitude of `aim`."""
         ...
 
     def ask_version(self, aim: Target) -> Outgoing | None:
-        """None where it tells unasked, or never."""
+        """Return the request for its version; None if it sends that unrequested, or never."""
         ...
 
     def ask_checks(self, aim: Target) -> Outgoing | None:
-        """Have it run its own checks before arming and tell the results by events; None where it knows none."""
+        """Return the request to run its arming checks and send the results as events; None if unsupported."""
         ...
 
     def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
-        """Raises KeyError when it takes a block of the flight plan that `aim` does not have."""
+        """Return the steps of an action. Raises KeyError if it needs a block of the flight plan that `aim` lacks."""
         ...
 
     def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing: ...
@@ -282,8 +284,8 @@ class Profile(Protocol):
 
 
 def set_parameter(aim: Target, parameter: str, value: float, *, component: int = 0) -> Outgoing:
-    """A floating-point parameter, the only type that gains have. Some vehicles heed no PARAM_SET to all components (0),
-    among them MAVSDK's."""
+    """Return the message that sets a floating-point parameter, the type of all gains. Some vehicles, such as MAVSDK's,
+    ignore a PARAM_SET to all components (0)."""
     return Outgoing(
         "PARAM_SET",
         {
@@ -308,7 +310,8 @@ def list_parameters(aim: Target) -> Outgoing:
 
 
 def read_place(aim: Target, place: int) -> Outgoing:
-    """A parameter by its place in the vehicle's list, never past its end: Paparazzi reads on behind its table."""
+    """Return a request for the parameter at a place in the vehicle's list, which must not be past its end, because
+    Paparazzi reads beyond its table."""
     return Outgoing(
         "PARAM_REQUEST_READ",
         {"target_system": aim.aircraft, "target_component": 0, "param_id": "", "param_index": place},
@@ -316,7 +319,7 @@ def read_place(aim: Target, place: int) -> Outgoing:
 
 
 def command(aim: Target, code: int, *parameters: float) -> Outgoing:
-    """COMMAND_LONG; what is not given is 0."""
+    """Return a COMMAND_LONG; missing parameters are 0."""
     filled = (*parameters, *(0.0 for _ in range(7 - len(parameters))))
     return Outgoing(
         "COMMAND_LONG",
@@ -331,7 +334,7 @@ def command(aim: Target, code: int, *parameters: float) -> Outgoing:
 
 
 def position(message: Message) -> Position:
-    """LOCAL_POSITION_NED, turned upside down."""
+    """Read LOCAL_POSITION_NED, with altitude positive up."""
     return Position(
         time_boot_s=number(message, "time_boot_ms") / 1000.0,
         altitude_m=-number(message, "z"),
@@ -342,7 +345,7 @@ def position(message: Message) -> Position:
 
 
 def heartbeat(message: Message, mode: str) -> Heartbeat | None:
-    """None where it is not a copter's autopilot's but that of something else on board."""
+    """Read a HEARTBEAT; None if it is not of the autopilot of a copter."""
     if not is_autopilots_heartbeat(message) or number(message, "type") not in COPTERS:
         return None
     return Heartbeat(
@@ -355,12 +358,12 @@ def heartbeat(message: Message, mode: str) -> Heartbeat | None:
 
 
 def battery(message: Message) -> Battery:
-    """SYS_STATUS, whose voltage is in mV."""
+    """Read SYS_STATUS, whose voltage is in mV."""
     millivolts = number(message, "voltage_battery")
-    told, health = (int(number(message, f"onboard_control_sensors_{word}")) for word in ("present", "health"))
+    present, health = (int(number(message, f"onboard_control_sensors_{bits}")) for bits in ("present", "health"))
     return Battery(
         voltage_v=None if millivolts in _UNKNOWN_MV else millivolts / 1000.0,
-        may_arm=bool(health & _PREARM_CHECK) if told & _PREARM_CHECK else None,
+        may_arm=bool(health & _PREARM_CHECK) if present & _PREARM_CHECK else None,
     )
 
 
@@ -371,7 +374,7 @@ def parameter(message: Message) -> Parameter:
 
 
 def answer(message: Message) -> CommandReply | None:
-    """COMMAND_ACK; None while the vehicle is still at it."""
+    """Read COMMAND_ACK; None while the command is in progress."""
     result = int(number(message, "result"))
     if result == _IN_PROGRESS:
         return None
@@ -380,46 +383,46 @@ def answer(message: Message) -> CommandReply | None:
 
 
 def disarm(aim: Target, *, forced: bool = False) -> Outgoing:
-    """`forced`: in the air too, where an autopilot would refuse it."""
+    """Return the command to disarm; `forced` also in flight, where an autopilot would refuse it."""
     return command(aim, ARM_DISARM, 0.0, FORCED if forced else 0.0)
 
 
 def parse_status_text(message: Message) -> StatusText:
-    """STATUSTEXT; in MAVLink 2 a long one comes in pieces, the last of which is not full."""
-    said = text(message, "text")
+    """Read STATUSTEXT; in MAVLink 2 a long text is sent in chunks, the last of which is not full."""
+    chunk = text(message, "text")
     number_of, place = (int(getattr(message, field, 0)) for field in ("id", "chunk_seq"))
-    return StatusText(said, number_of, place, is_last=not number_of or len(said) < _TEXT_LENGTH)
+    return StatusText(chunk, number_of, place, is_last=not number_of or len(chunk) < _TEXT_LENGTH)
 
 
 def breach(message: Message) -> FenceBreach | None:
-    """FENCE_STATUS."""
+    """Read FENCE_STATUS; None without a breach."""
     kind = int(number(message, "breach_type"))
     return FenceBreach(_FENCES.get(kind, "")) if number(message, "breach_status") else None
 
 
 def landed_state(message: Message) -> LandedState | None:
-    """EXTENDED_SYS_STATE; None where the vehicle does not know, or is only about to take off."""
-    told = _LANDED_STATES.get(int(number(message, "landed_state")))
-    return None if told is None else LandedState(on_ground=told)
+    """Read EXTENDED_SYS_STATE; None if the state is undefined or taking off."""
+    on_ground = _LANDED_STATES.get(int(number(message, "landed_state")))
+    return None if on_ground is None else LandedState(on_ground=on_ground)
 
 
 def version(message: Message) -> Version | None:
-    """AUTOPILOT_VERSION: a byte each for major, minor and patch, and the hardware's id, of which the longer `uid2` is
-    the newer; None where neither is told."""
+    """Read AUTOPILOT_VERSION: major, minor and patch in one byte each, and the hardware id, preferably the newer and
+    longer `uid2`; None if it has neither."""
     packed = int(number(message, "flight_sw_version"))
-    told = f"{packed >> 24}.{packed >> 16 & 0xFF}.{packed >> 8 & 0xFF}" if packed else ""
+    release = f"{packed >> 24}.{packed >> 16 & 0xFF}.{packed >> 8 & 0xFF}" if packed else ""
     uid = _hardware_id(message)
-    return Version(told, uid) if told or uid else None
+    return Version(release, uid) if release or uid else None
 
 
 def _hardware_id(message: Message) -> str:
-    """In hexadecimal digits; empty where it is not told. Raises AttributeError as `number` does."""
+    """Return the hardware id in hexadecimal digits; empty if not reported. Raises AttributeError as `number` does."""
     short, long = getattr(message, "uid"), bytes(getattr(message, "uid2"))  # noqa: B009 - the library has no types
     return long.hex() if any(long) else f"{short:016x}" if short else ""
 
 
 def bytewise_integer(value: float) -> int:
-    """The 32-bit integer whose bytes a float field carries."""
+    """Return the 32-bit integer whose bytes are in a float field."""
     return int(struct.unpack("<i", struct.pack("<f", value))[0])
 
 
@@ -441,12 +444,11 @@ READERS: Final[Readers] = MappingProxyType(
         "AUTOPILOT_VERSION": version,
     }
 )
-"""What most autopilots mean by their messages, by the message's name."""
+"""Readers that most autopilots have in common, by message name."""
 
 
 def read(readers: Readers, message: Message) -> Measurement | None:
-    """None for a message that measures nothing, or holds what is no number: no vehicle can be there, and no value is
-    that."""
+    """Read a message; None if it contains no measurement, or a value that is not finite."""
     reader = readers.get(message.get_type())
     measurement = None if reader is None else reader(message)
     return measurement if measurement is not None and _is_finite(measurement) else None

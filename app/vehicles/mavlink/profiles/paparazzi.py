@@ -1,4 +1,4 @@
-"""Paparazzi: MAVLink 1, flight plan blocks instead of modes, gains that are integers."""
+"""Paparazzi: MAVLink 1, flight plan blocks instead of modes, integer gains."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -25,7 +25,7 @@ START_ENGINE: Final = "Start Engine"
 TAKE_OFF: Final = "Takeoff"
 LAND: Final = "land here"
 AFTER_LAND: Final = ("land", "flare", "landed")
-"""The blocks that "land here" leads through in stock plans. It is passed at once, so the vehicle tells of the first."""
+"""Blocks after "land here" in stock plans. That is left at once, so the vehicle reports the first of these."""
 BLOCKS: Final = (HOLDING, START_ENGINE, TAKE_OFF, LAND)
 
 _LOCAL_ENU: Final = 4
@@ -34,7 +34,7 @@ _SETTLE_S: Final = 0.5
 _NAV: Final = "4"
 _HOME: Final = "home"
 _HOME_NUMBER: Final = 2
-"""Of the autopilot's mode, in the heartbeat of those releases that tell it: by its base mode it is NAV."""
+"""Number of the autopilot's mode HOME, in the heartbeats of releases that send it; its base mode is that of NAV."""
 
 
 class Paparazzi:
@@ -53,10 +53,10 @@ class Paparazzi:
     hovering_modes: Final[frozenset[str]] = frozenset()
     landing_modes: Final = frozenset({_NAV})
     mode_names: Final = MappingProxyType(
-        {_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "By hand", "80": "By hand"}
+        {_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "Manual", "80": "Manual"}
     )
     manual_modes: Final = frozenset({"64", "80"})
-    deaf_modes: Final = MappingProxyType({_HOME: "it flies back by itself and obeys no Land"})
+    deaf_modes: Final = MappingProxyType({_HOME: "it flies back by itself and ignores Land"})
     arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
     flying_blocks: Final = frozenset({TAKE_OFF})
     landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
@@ -71,11 +71,11 @@ class Paparazzi:
     requirements: Final[tuple[Requirement, ...]] = ()
 
     def measure(self, message: Message) -> Measurement | None:
-        """Only LOCAL_POSITION_NED tells the altitude: the other messages of it mix their units."""
+        """Read a message; altitude only from LOCAL_POSITION_NED, because other messages mix their units."""
         return base.read(_READERS, message)
 
     def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:
-        """The list is asked for once; the acknowledgement that ends it comes before every change of block."""
+        """Request the list of blocks once; the acknowledgement that ends it is sent before every change of block."""
         request = Outgoing("SCRIPT_REQUEST_LIST", _to(aim))
         counted = ask(request, lambda heard: isinstance(heard, BlockCount))
         if not isinstance(counted, BlockCount):
@@ -92,7 +92,7 @@ class Paparazzi:
         return blocks
 
     def conclude(self, aim: Target) -> tuple[Outgoing, ...]:
-        """Ends the listing of blocks, which else keeps every change of block away for 15 s."""
+        """Return the end of the listing of blocks, which otherwise prevents every change of block for 15 s."""
         return (_acknowledge(aim),)
 
     def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
@@ -105,10 +105,10 @@ class Paparazzi:
         return ()
 
     def ask_version(self, aim: Target) -> None:
-        """It tells every few seconds."""
+        """Return None: it sends its version every few seconds."""
 
     def ask_checks(self, aim: Target) -> None:
-        """It tells in words what does not pass."""
+        """Return None: failed checks are reported as status texts."""
 
     def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
         match action:
@@ -134,7 +134,7 @@ class Paparazzi:
 
 
 def _to(aim: Target) -> dict[str, float]:
-    """Blocks and waypoints go by the MAVLink system id, all else by the aircraft's own."""
+    """Return the recipient of messages on blocks and waypoints: the MAVLink system id. Others have the aircraft id."""
     return {"target_system": aim.system, "target_component": 0}
 
 
@@ -148,7 +148,7 @@ def _block(aim: Target, name: str) -> tuple[Outgoing, ...]:
 
 
 def _climb_here(aim: Target) -> Outgoing:
-    """The waypoint that the take-off climbs to, straight above the vehicle."""
+    """Return the message that sets the waypoint of the take-off straight above the vehicle."""
     fields = {
         "seq": aim.waypoint,
         "frame": _LOCAL_ENU,
@@ -166,12 +166,12 @@ def _climb_here(aim: Target) -> Outgoing:
 def _without_blocks(what: str) -> VehicleError:
     return VehicleError(
         f"The vehicle cannot be flown by its flight plan. {what}",
-        hint=f"It takes Paparazzi v5.8 or newer and a flight plan with the blocks {', '.join(BLOCKS)}.",
+        hint=f"Use Paparazzi v5.8 or newer and a flight plan with the blocks {', '.join(BLOCKS)}.",
     )
 
 
 def _heartbeat(message: Message) -> Measurement | None:
-    """Its mode is the base mode without the bit for armed, but for HOME."""
+    """Read a HEARTBEAT; the mode is the base mode without the armed bit, except for HOME."""
     mode = str(int(number(message, "base_mode")) & ~base.ARMED_BIT)
     is_home = mode == _NAV and number(message, "custom_mode") == _HOME_NUMBER
     return base.heartbeat(message, _HOME if is_home else mode)
@@ -195,7 +195,8 @@ def _entered(message: Message) -> Measurement:
 
 
 def _version(message: Message) -> Version | None:
-    """In decimal digits: 51000 is 5.10.0. Its `uid` is not its hardware's: its simulation tells one, too."""
+    """Read the version from decimal digits: 51000 is 5.10.0. Its `uid` is not a hardware id: its simulation also sends
+    one."""
     packed = int(number(message, "flight_sw_version"))
     return Version(f"{packed // 10000}.{packed // 100 % 100}.{packed % 100}") if packed else None
 

@@ -24,7 +24,7 @@ _INT32: Final = 6
 
 
 class Px4:
-    """Integer parameters come bytewise in a float."""
+    """PX4's profile. Integer parameters are encoded bytewise in a float."""
 
     name: Final = "px4"
     title: Final = "PX4"
@@ -79,7 +79,7 @@ class Px4:
         return request_telemetry(aim, telemetry_hz)
 
     def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:
-        """Told to land when it has landed and disarmed already, it stays in that mode, and does not arm in it."""
+        """Leave the landing mode, in which it does not arm, and in which it stays if Land arrives after the landing."""
         if mode not in self.landing_modes:
             return ()
         return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),)
