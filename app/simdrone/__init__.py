@@ -1,5 +1,5 @@
-"""A simulated drone that answers MAVLink as real autopilots do: what a ground station can be tried against.
+"""Simulated drones that behave like real autopilots over MAVLink, for tests of ground stations.
 
-It is an independent reading of how the autopilots behave, and shares nothing with the ground side but addresses,
+They are an independent implementation of the autopilots' behaviour, and share with the ground side only addresses,
 transports, clocks and dialects.
 """

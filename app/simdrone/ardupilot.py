@@ -1,6 +1,6 @@
-"""ArduCopter as it answers on the wire, up to 4.6 and from 4.7 on, where the vertical gains have other names.
+"""Simulated ArduCopter, up to 4.6 and from 4.7 on, in which the vertical gains have other names.
 
-Its altitude controller is a simplified cascade with ArduPilot's gains, not a replica; see copter/cascade.py.
+Its altitude controller is a simplified cascade with ArduPilot's gains, not a replica; see copter_control.py.
 """
 
 import math
@@ -55,7 +55,7 @@ _DEFAULTS: Final = {
     "acceleration_d": 0.0,
 }
 SCALE_4_7: Final = 0.1
-"""The newer acceleration gains over the older ones."""
+"""Ratio of the newer acceleration gains to the older ones."""
 
 _COMMON: Final = (
     Parameter("SYSID_THISMAV", Kind.INT16, 1),
@@ -120,7 +120,7 @@ _FIRMWARE: Final = FirmwareProfile(
 
 
 class ArduPilot(Copter):
-    """Up to 4.6. Return-to-launch only lands here: the vehicle never leaves its place."""
+    """ArduCopter up to 4.6. Return-to-launch only lands, because the vehicle does not move horizontally."""
 
     firmware: ClassVar[FirmwareProfile] = _FIRMWARE
     names: ClassVar[Mapping[str, str]] = NAMES_4_6
@@ -142,7 +142,7 @@ class ArduPilot(Copter):
         return next((mode for mode in self.firmware.modes if mode.custom_mode == main), None)
 
     def take_off(self, param7: float) -> int:
-        """Metres above the place of takeoff; from the ground, armed and in GUIDED only."""
+        """Take off to `param7` metres above the place of takeoff; only from the ground, armed and in GUIDED."""
         if self.mode.name != "GUIDED" or not self.armed or self.flyer.flies or not math.isfinite(param7):
             return FAILED
         self.climb(param7, self.parameters["WPNAV_SPEED_UP"] / 100.0)
@@ -152,12 +152,12 @@ class ArduPilot(Copter):
         return self.parameters["LAND_SPEED"] / 100.0
 
     def link_loss(self) -> tuple[float, Reaction]:
-        """Every action lands; 0 is none."""
+        """Return timeout and reaction: Land for every action of FS_GCS_ENABLE except 0."""
         action = Reaction.LAND if self.parameters["FS_GCS_ENABLE"] else Reaction.NONE
         return self.parameters["FS_GCS_TIMEOUT"], action
 
     def fence(self) -> tuple[float, Reaction]:
-        """Of the fences, the one of altitude; every action but the report lands."""
+        """Return limit and reaction of the altitude fence: Land for every action except the report."""
         is_on = self.parameters["FENCE_ENABLE"] and int(self.parameters["FENCE_TYPE"]) & _ALTITUDE_FENCE
         if not is_on:
             return math.inf, Reaction.NONE
@@ -168,12 +168,12 @@ class ArduPilot(Copter):
         return self.parameters["DISARM_DELAY"]
 
     def counts_heartbeat(self, message: Message) -> bool:
-        """Only its own ground station's."""
+        """Count only heartbeats of its own ground station, SYSID_MYGCS."""
         return message.get_srcSystem() == self.parameters["SYSID_MYGCS"]
 
 
 class ArduPilot47(ArduPilot):
-    """From 4.7 on: other names, and acceleration gains of a tenth."""
+    """ArduCopter from 4.7 on: other names, and acceleration gains of a tenth."""
 
     firmware: ClassVar[FirmwareProfile] = replace(
         _FIRMWARE, version=0x040700FF, parameters=_COMMON + _gains(NAMES_4_7, SCALE_4_7)

@@ -1,4 +1,4 @@
-"""The airframe of a simulated drone: it outlives its flights, and falls when its motors stop in the air. And the
+"""Airframe of a simulated drone, which persists between flights and falls if its motors stop in the air, and the
 interface of the autopilots that fly it.
 """
 
@@ -20,7 +20,7 @@ from app.vehicles.simulated import Simulation
 from app.vehicles.twin import TWIN, TwinFlight
 
 TICK_STEPS: Final = 2
-"""Steps of the simulation between two looks of an autopilot at its radio, its timers and its flight plan."""
+"""Steps of the simulation between two updates of the autopilot's radio, timers and flight plan."""
 TICK_S: Final = TICK_STEPS / RATE_HZ
 FULL_BATTERY_V: Final = 11.1
 
@@ -30,17 +30,17 @@ _FULL_COMMAND: Final = 9600
 
 
 class Flight(Simulation, Protocol):
-    """A simulation whose autopilot's memory can be reached: the loop's state comes first in it."""
+    """A simulation with access to its autopilot's memory, which begins with the state of the loop."""
 
     autopilot: Integers
 
 
 Launch = Callable[[int], Flight]
-"""A new flight, standing on the ground, from its seed."""
+"""Creates a flight, standing on the ground, from its seed."""
 
 
 def vertical_command(mode: int, target: int, kp: int = 0, ki: int = 0, kd: int = 0) -> Integers:
-    """A command of the vertical loop, in its own integers."""
+    """Return a command of the vertical loop, in its integers."""
     command = np.empty(COMMAND_SIZE, dtype=np.int64)
     command[[MODE, TARGET, KP, KI, KD]] = (mode, target, kp, ki, kd)
     return command
@@ -50,15 +50,15 @@ MOTORS_OFF: Final = vertical_command(THROTTLE, 0)
 
 
 def throttle_command(share: float) -> Integers:
-    """Thrust as a share of full, for autopilots with a loop of their own."""
+    """Return a command of thrust as a share of full, for autopilots with their own loop."""
     return vertical_command(THROTTLE, round(min(max(share, 0.0), 1.0) * _FULL_COMMAND))
 
 
 class Body:
-    """The vehicle between power-on and power-off. Altitude is that above the ground it stands on.
+    """The vehicle between power-on and power-off. Altitude is above the ground at its place.
 
-    A flight is launched when the motors first push and is over when they rest on the ground; each has a seed of its
-    own, counted up from the first. In between nothing moves and nothing is computed.
+    A flight begins with the first thrust and ends when the motors are off on the ground; the seed is incremented for
+    every flight. Between flights nothing is computed.
     """
 
     def __init__(self, launch: Launch, *, seed: int) -> None:
@@ -70,20 +70,20 @@ class Body:
         self.thrust = 0.0
         self.battery_v = FULL_BATTERY_V
         self.north_m = 0.0
-        """From where it was switched on."""
+        """Position relative to the place where it was switched on."""
         self.steered_m_s = self.wind_m_s = 0.0
-        """How fast its autopilot, and how fast the wind, moves it north while it is off the ground."""
+        """Speeds north, by its autopilot and by the wind, while it is off the ground."""
         self.motors_dead = False
-        """A fault: whatever is commanded, nothing turns."""
+        """Fault: the motors do not turn."""
 
     @property
     def is_resting(self) -> bool:
-        """On the ground with its motors still, and no flight begun since."""
+        """Whether it is on the ground with its motors off."""
         return self._flight is None
 
     @property
     def stands(self) -> bool:
-        """On the ground, by height and speed."""
+        """Whether it is on the ground, by height and speed."""
         return abs(self.altitude_m) < _STANDS_BELOW_M and abs(self.climb_rate_m_s) < _STANDS_BELOW_M_S
 
     @property
@@ -91,7 +91,7 @@ class Body:
         return 0.0 if self.is_resting or self.stands else self.steered_m_s + self.wind_m_s
 
     def advance(self, steps: int, command: Integers) -> None:
-        """Let so many steps of 1/512 s pass under `command`. Raises VehicleError when the simulation broke down."""
+        """Advance by `steps` steps of 1/512 s under `command`. Raises VehicleError if the simulation diverged."""
         if self.motors_dead:
             command = MOTORS_OFF
         wants_to_rest = command[MODE] == THROTTLE and command[TARGET] == 0
@@ -104,7 +104,7 @@ class Body:
         row = self._flight.advance(steps, command)[-1]
         if not np.isfinite(row).all():
             raise VehicleError(
-                "The simulated drone broke down: its state is no longer a number.", hint="Start it again."
+                "The simulation of the drone diverged: its state is no longer finite.", hint="Start it again."
             )
         self.altitude_m, self.climb_rate_m_s = float(row[ALTITUDE]), float(row[CLIMB_RATE])
         self.thrust, self.battery_v = float(row[THRUST]), float(row[BATTERY])
@@ -123,7 +123,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """A vehicle kind whose simulation a drone can fly, and that simulation, from options and seed."""
+    """A vehicle kind whose simulation a drone can fly; `flight` creates it from options and seed."""
 
     kind: VehicleKind
     flight: Callable[[dict[str, float], int], Flight]
@@ -135,7 +135,7 @@ AIRFRAMES: Final[Mapping[str, Airframe]] = MappingProxyType(
 
 
 def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> Body:
-    """The body of a drone that flies as the vehicle kind of this name. Raises InputError for what does not exist."""
+    """Return the body of a drone that flies as this vehicle kind. Raises InputError for an unknown kind or option."""
     if vehicle not in AIRFRAMES:
         raise InputError(
             "A simulated drone cannot have this body.",
@@ -144,14 +144,14 @@ def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> 
         )
     airframe = AIRFRAMES[vehicle]
     numbers = {name: float(value) for name, value in airframe.kind.check(options, field="vehicle").items()}
-    airframe.flight(numbers, seed).advance(TICK_STEPS, MOTORS_OFF)  # what is compiled on first use is compiled now
+    airframe.flight(numbers, seed).advance(TICK_STEPS, MOTORS_OFF)  # compile now what is compiled on first use
     return Body(lambda flight_seed: airframe.flight(numbers, flight_seed), seed=seed)
 
 
 Fields = Mapping[str, FieldValue]
 
 ARMED: Final = 128
-"""The bit of HEARTBEAT.base_mode."""
+"""Bit of HEARTBEAT.base_mode."""
 
 # MAV_RESULT
 ACCEPTED: Final = 0
@@ -162,8 +162,8 @@ FAILED: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class OutgoingMessage:
-    """A message on its way out, not yet packed. `counter` names the sequence counter that numbers it: Paparazzi has
-    one for each of its source files. `system` is the sender's id where it is not the vehicle's own."""
+    """An outgoing message, not yet packed. `counter` names its sequence counter: Paparazzi has one for each of its
+    source files. `system` is the sender's id if it is not the vehicle's own."""
 
     kind: str
     fields: Fields
@@ -172,54 +172,55 @@ class OutgoingMessage:
 
 
 class Autopilot(Protocol):
-    """Flies its body, hears bytes and has letters to send; its time is counted in ticks since it was switched on."""
+    """A simulated autopilot: it flies its body, receives bytes and returns messages to send. Its time is counted in
+    ticks since it was switched on."""
 
     dialect: Dialect
     system: int
     component: int
     refuses_arming: bool
-    """A fault: arming is refused in this autopilot's own manner."""
+    """Fault: arming is refused as this autopilot does it."""
     ignores_parameters: bool
-    """A fault: PARAM_SET changes nothing and is not answered."""
+    """Fault: PARAM_SET changes nothing and has no reply."""
     took_off: bool
-    """Whether a takeoff was ever commanded."""
+    """Whether a takeoff has been commanded."""
 
     @property
     def armed(self) -> bool: ...
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a pilot flies it, and nobody has switched it out of that since."""
+        """Whether it is in the mode in which a pilot flies it."""
         ...
 
     def held(self, parameter: str) -> float:
-        """What a parameter is now, whatever was said of it on the wire. Raises KeyError for an unknown name."""
+        """Return the true value of a parameter, whatever was sent. Raises KeyError for an unknown name."""
         ...
 
     def receive(self, data: bytes) -> None:
-        """Take in what the radio received."""
+        """Process bytes received by the radio."""
         ...
 
     def take_over(self) -> None:
-        """A pilot switches to a mode of theirs, and holds it where it is."""
+        """Switch to the pilot's mode, in which a pilot holds it in place."""
         ...
 
     def hand_back(self) -> None:
-        """The pilot switches back to the mode in which it is told what to do."""
+        """Switch back from the pilot's mode to the automatic one."""
         ...
 
     def restore_persistent(self, before: Self) -> None:
-        """Take over what outlives a reboot from itself as it was."""
+        """Copy what survives a reboot from the autopilot before it."""
         ...
 
     def tick(self) -> list[OutgoingMessage]:
-        """Let one tick of TICK_S pass: answer what was heard, fly the body on, and return what is to be sent."""
+        """Advance by one tick of TICK_S: process received messages, fly the body, and return the messages to send."""
         ...
 
 
 @dataclass(slots=True)
 class Timetable:
-    """Telemetry at fixed periods, rounded down to whole ticks."""
+    """Schedule of telemetry at fixed periods, rounded down to whole ticks."""
 
     ticks: dict[str, int] = field(default_factory=dict)
 
@@ -231,7 +232,7 @@ class Timetable:
         return table
 
     def set(self, kind: str, period_s: float) -> None:
-        """From now on send `kind` every `period_s` seconds; 0 or less: never."""
+        """Send `kind` every `period_s` seconds from now on; never if 0 or less."""
         if period_s > 0.0:
             self.ticks[kind] = whole_ticks(period_s)
         else:
@@ -242,5 +243,5 @@ class Timetable:
 
 
 def whole_ticks(seconds: float) -> int:
-    """At least one."""
+    """Return the duration in whole ticks, at least one."""
     return max(int(seconds / TICK_S), 1)

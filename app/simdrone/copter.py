@@ -1,4 +1,4 @@
-"""The MAVLink 2 services that ArduPilot and PX4 share: parameters, commands, modes, rates, failsafes."""
+"""MAVLink 2 services common to ArduPilot and PX4: parameters, commands, modes, rates, failsafes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -22,13 +22,13 @@ from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number,
 
 COMPONENT: Final = 1
 FORCE: Final = 21196
-"""The second parameter of 400 that makes it unconditional."""
+"""Second parameter of command 400 that makes it unconditional."""
 
 ESTIMATE_AFTER_S: Final = 3.0
-"""Since the start, until the position is known well enough to arm and to be told."""
+"""Time from the start until the position is known well enough to arm and to be sent."""
 _ESTIMATED: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
 _SIMULATED: Final = int.from_bytes(b"GAINLIN\0", "big")
-"""The hardware id of a simulated drone, but for its last byte."""
+"""Hardware id of a simulated drone, except its last byte."""
 _GROUND_STATION: Final = 6
 _LIST_EVERY_TICKS: Final = 2
 _TELL_TICKS: Final = whole_ticks(30.0)
@@ -81,41 +81,41 @@ class Copter(ABC):
         self._out: list[OutgoingMessage] = []
         self.tune()
 
-    # ------------------------------------------------------------ what differs
+    # ------------------------------------------------------------ differences between autopilots
 
     @abstractmethod
     def tune(self) -> None:
-        """Hand the parameters to the controller."""
+        """Pass the parameters to the controller."""
 
     @abstractmethod
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:
-        """The mode that command 176 asks for."""
+        """Return the mode requested by command 176."""
 
     @abstractmethod
     def take_off(self, param7: float) -> int:
-        """Obey command 22; the result."""
+        """Execute command 22; return the result."""
 
     @abstractmethod
     def landing_speed_m_s(self) -> float: ...
 
     @abstractmethod
     def link_loss(self) -> tuple[float, Reaction]:
-        """After how many seconds without a ground station, and what then."""
+        """Return the timeout without a ground station, s, and the reaction."""
 
     @abstractmethod
     def fence(self) -> tuple[float, Reaction]:
-        """Above which altitude, and what then."""
+        """Return the altitude limit, m, and the reaction."""
 
     @abstractmethod
     def idle_limit_s(self) -> float:
-        """How long it stays armed on the ground."""
+        """Return the time for which it stays armed on the ground, s."""
 
     def counts_heartbeat(self, _message: Message) -> bool:
-        """Whether this ground station's heartbeat counts."""
+        """Return whether the heartbeat of this ground station counts."""
         return True
 
     def prearm_failure(self) -> str | None:
-        """Why its own checks before arming do not pass, as it tells all the time; None when they do."""
+        """Return why its arming checks do not pass, as reported regularly; None if they pass."""
         return self.firmware.no_estimate if self.refuses_arming or not self._has_estimate else None
 
     @property
@@ -149,14 +149,14 @@ class Copter(ABC):
         return out
 
     def restore_persistent(self, before: Self) -> None:
-        """A reboot: parameters are stored, and the hardware is the same."""
+        """Copy the parameters and the hardware id after a reboot."""
         self.parameters, self.uid = before.parameters, before.uid
         self.tune()
 
     # ------------------------------------------------------------ flying
 
     def climb(self, height_m: float, speed_m_s: float) -> None:
-        """Take off, or climb on."""
+        """Take off, or continue to climb."""
         self.took_off = True
         self.flyer.take_off(height_m, speed_m_s)
 
@@ -213,7 +213,7 @@ class Copter(ABC):
             self._disarm()
 
     def _watch_link(self) -> None:
-        """A ground station that was never heard cannot be lost."""
+        """React to a lost ground station, if there has been one."""
         limit_s, reaction = self.link_loss()
         if reaction is Reaction.NONE or self._ground_heard_s is None or not self.flyer.flies:
             return
@@ -235,7 +235,7 @@ class Copter(ABC):
             self.tell_checks()
 
     def tell_checks(self) -> None:
-        """What its own checks before arming found, where they do not pass."""
+        """Report the failed arming check, if any."""
         if (reason := self.prearm_failure()) is not None:
             self.say(self.firmware.unready + reason)
 
@@ -249,7 +249,7 @@ class Copter(ABC):
     # ------------------------------------------------------------ sending
 
     def say(self, words: str) -> None:
-        """STATUSTEXT, as critical; what does not fit into one goes in several, under one number."""
+        """Send a critical STATUSTEXT; a long text is sent in several chunks with one number."""
         self._texts = self._texts % _LAST_TEXT + 1 if len(words) > _TEXT_LENGTH else self._texts
         for chunk, start in enumerate(range(0, len(words), _TEXT_LENGTH)):
             number = self._texts if len(words) > _TEXT_LENGTH else 0
@@ -259,7 +259,7 @@ class Copter(ABC):
             )
 
     def send(self, kind: str) -> None:
-        """One of the reports, now."""
+        """Send one of the reports now."""
         self._out.append(OutgoingMessage(kind, copter_telemetry.REPORTS[kind].fields(self._snapshot())))
 
     def _report(self) -> None:
@@ -311,7 +311,7 @@ class Copter(ABC):
         fields = {"command": command, "result": result, "progress": 0, "result_param2": 0, **sender}
         self._out.append(OutgoingMessage("COMMAND_ACK", fields))
 
-    # ------------------------------------------------------------ hearing
+    # ------------------------------------------------------------ receiving
 
     def _hear_heartbeat(self, message: Message) -> None:
         if number(message, "type") == _GROUND_STATION and self.counts_heartbeat(message):
@@ -321,14 +321,14 @@ class Copter(ABC):
         self._listing = 0
 
     def _hear_param_read(self, message: Message) -> None:
-        """What does not exist is met with silence."""
+        """Send a parameter; a request for an unknown one has no reply."""
         index = int(number(message, "param_index"))
         place = self.parameters.place(text(message, "param_id")) if index < 0 else index
         if place is not None and place < len(self.parameters):
             self._send_parameter(place)
 
     def _hear_param_set(self, message: Message) -> None:
-        """Answered with what is held then, whatever that is; no range is checked."""
+        """Set a parameter without a range check; reply with the value then held."""
         place = self.parameters.place(text(message, "param_id"))
         if place is None or self.ignores_parameters:
             return
@@ -342,14 +342,14 @@ class Copter(ABC):
         self._send_parameter(place)
 
     def _hear_set_mode(self, message: Message) -> None:
-        """The older way, without an answer."""
+        """Set the mode by the older message, which has no reply."""
         custom = int(number(message, "custom_mode"))
         mode = next((mode for mode in self.firmware.modes if mode.custom_mode == custom), None)
         if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
             self.enter(mode)
 
     def _hear_data_stream(self, message: Message) -> None:
-        """The older way to ask for telemetry, all of it at one rate."""
+        """Set the rate of all telemetry by the older message."""
         rate_hz = number(message, "req_message_rate") if number(message, "start_stop") else 0.0
         for kind in self.firmware.streams:
             self._timetable.set(kind, 1.0 / rate_hz if rate_hz > 0.0 else 0.0)
@@ -386,7 +386,7 @@ class Copter(ABC):
         return ACCEPTED
 
     def _obey_interval(self, message: Message) -> int:
-        """Microseconds; 0 is the default, below that never."""
+        """Set the interval of a message in microseconds; 0 is the default, less than 0 never."""
         kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
         if kind is None:
             return FAILED
@@ -418,7 +418,7 @@ class Copter(ABC):
 
 
 def _whole(value: float) -> int:
-    """Command parameters are floats; what is no number asks for nothing."""
+    """Return a command parameter as an integer; -1 if it is not finite or too large."""
     return int(value) if abs(value) < 1e9 else -1
 
 

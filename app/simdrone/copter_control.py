@@ -1,8 +1,8 @@
-"""Cascaded altitude controllers with the gains of ArduPilot and PX4 by their own names, and the set point that they
-follow: climb to an altitude, hold it, come down.
+"""Cascaded altitude controllers with the gains of ArduPilot and PX4, and guidance of their set point: climb to an
+altitude, hold it, land.
 
-They are not replicas: the loops have the shape of the real ones (altitude, climb rate, acceleration) and their gains
-act in the same places and units, but filters, limits and the shaping of set points are simplified.
+They are not replicas: the loops have the structure of the real ones (altitude, climb rate, acceleration), with gains in
+the same places and units, but filters, limits and set point shaping are simplified.
 """
 
 import math
@@ -14,7 +14,7 @@ from app.core.models.vertical import GRAVITY_M_S2
 from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, throttle_command
 
 HOVER_THRUST: Final = 0.62
-"""What both believe to hover on; their integrators carry the rest."""
+"""Hover thrust assumed by both controllers; their integrators correct it."""
 
 _FASTEST_M_S: Final = 3.0
 _STRONGEST_M_S2: Final = 8.0
@@ -24,7 +24,7 @@ _ACCELERATION_FILTER_S: Final = 0.02
 
 @dataclass(frozen=True, slots=True)
 class SetPoint:
-    """Where the vehicle should be, and how that moves; up."""
+    """Set point of altitude and its derivatives; positive up."""
 
     altitude_m: float
     climb_m_s: float = 0.0
@@ -32,14 +32,14 @@ class SetPoint:
 
 
 class Cascade(Protocol):
-    """An altitude controller, asked once a tick."""
+    """An altitude controller, called once per tick."""
 
     def reset(self) -> None:
-        """Forget the past: the vehicle stands on the ground."""
+        """Reset the state, on the ground."""
         ...
 
     def thrust(self, target: SetPoint, altitude_m: float, climb_m_s: float) -> float:
-        """The thrust, a share of full, that leads to the set point."""
+        """Return the thrust as a share of full."""
         ...
 
 
@@ -65,7 +65,7 @@ class ThreeStage:
         return HOVER_THRUST + 0.1 * (self.acceleration_p * error + self.acceleration_d * change) + self._integral
 
     def _sense(self, climb_m_s: float) -> None:
-        """Acceleration, from the climb rate, through a first-order filter."""
+        """Update the acceleration from the climb rate by a first-order filter."""
         before = climb_m_s if self._climb is None else self._climb
         measured = (climb_m_s - before) / TICK_S
         self._acceleration += TICK_S / (TICK_S + _ACCELERATION_FILTER_S) * (measured - self._acceleration)
@@ -73,7 +73,7 @@ class ThreeStage:
 
 
 class TwoStage:
-    """PX4: P on altitude (1/s), PID on climb rate, giving an acceleration that thrust is scaled to."""
+    """PX4: P on altitude (1/s), PID on climb rate, whose output is an acceleration that is converted to thrust."""
 
     def __init__(self) -> None:
         self.altitude_p = self.climb_p = self.climb_i = self.climb_d = 0.0
@@ -101,14 +101,14 @@ def _limit(value: float, most: float) -> float:
 
 _LANDED_AFTER_S: Final = 1.0
 _DEEPEST_SET_POINT_M: Final = 1.0
-"""How far below the vehicle the set point of a landing may be: on the ground it presses down, and no more."""
+"""Greatest distance of the set point of a landing below the vehicle; limits the downward command on the ground."""
 _GENTLE_M_S2: Final = 1.5
-"""How fast the set point of a takeoff gains and loses speed."""
+"""Acceleration of the set point of a takeoff."""
 _ARRIVED_WITHIN_M: Final = 0.002
 
 
 class Phase(Enum):
-    """What it is about."""
+    """Phases of a flight."""
 
     IDLE = "on the ground, motors still"
     CLIMBING = "to its height of takeoff"
@@ -117,7 +117,7 @@ class Phase(Enum):
 
 
 class AltitudeGuidance:
-    """Flies a body in altitude above the ground, metres up."""
+    """Guidance of a body's altitude above the ground, m, positive up."""
 
     def __init__(self, body: Body, cascade: Cascade) -> None:
         self._body = body
@@ -130,7 +130,7 @@ class AltitudeGuidance:
 
     @property
     def is_landed(self) -> bool:
-        """By height and speed."""
+        """Whether it is on the ground, by height and speed."""
         return self._body.stands
 
     @property
@@ -138,7 +138,7 @@ class AltitudeGuidance:
         return self.phase is not Phase.IDLE
 
     def take_off(self, height_m: float, speed_m_s: float) -> None:
-        """From the ground, or on from where it is."""
+        """Climb from the ground or from the current altitude."""
         if self.phase is Phase.IDLE:
             self._cascade.reset()
         self._target_m = self._body.altitude_m
@@ -146,7 +146,7 @@ class AltitudeGuidance:
         self.phase = Phase.CLIMBING
 
     def hold(self) -> None:
-        """The height it has now."""
+        """Hold the current altitude."""
         if self.flies:
             self._target_m = self._goal_m = self._body.altitude_m
             self.phase = Phase.HOLDING
@@ -158,11 +158,11 @@ class AltitudeGuidance:
             self.phase = Phase.LANDING
 
     def stop(self) -> None:
-        """Motors off, wherever it is."""
+        """Stop the motors at any height."""
         self.phase = Phase.IDLE
 
     def tick(self) -> None:
-        """Let one tick pass; a landing ends on the ground."""
+        """Advance by one tick; a landing ends on the ground."""
         if self.phase is Phase.IDLE:
             self._body.advance(TICK_STEPS, MOTORS_OFF)
             return
@@ -175,7 +175,7 @@ class AltitudeGuidance:
                 self.stop()
 
     def _set_point(self) -> SetPoint:
-        """The one of this tick."""
+        """Return the set point of this tick."""
         match self.phase:
             case Phase.CLIMBING:
                 return self._climb_on(self._goal_m - self._target_m)
@@ -187,7 +187,7 @@ class AltitudeGuidance:
                 return SetPoint(self._target_m)
 
     def _climb_on(self, left_m: float) -> SetPoint:
-        """Gather speed, and shed it in time for the goal."""
+        """Accelerate, and decelerate in time for the goal."""
         if left_m <= _ARRIVED_WITHIN_M:
             self._target_m = self._goal_m
             self.phase = Phase.HOLDING

@@ -1,5 +1,5 @@
-"""Parameters of ArduPilot and PX4: named, typed values, the two ways of carrying them in a float, and the data in which
-the two differ: modes, rates, texts.
+"""Parameters of ArduPilot and PX4: named, typed values and their two encodings in a float; and the data in which the
+two differ: modes, rates, texts.
 """
 
 import math
@@ -34,7 +34,7 @@ def real(name: str, default: float) -> Parameter:
 
 
 class Parameters:
-    """The values held, by name and by place."""
+    """Parameter values by name and by place."""
 
     def __init__(self, known: Sequence[Parameter]) -> None:
         self._known = tuple(known)
@@ -51,7 +51,7 @@ class Parameters:
         self._values[self._places[name]] = value
 
     def place(self, name: str) -> int | None:
-        """Case matters."""
+        """Return the place of a parameter, by its case-sensitive name."""
         return self._places.get(name)
 
     def at(self, place: int) -> tuple[Parameter, float]:
@@ -60,8 +60,8 @@ class Parameters:
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """How a value travels: `encode(value, kind)` gives the float of the message, `decode(float, kind)` the value,
-    None where it is none. `is_strict`: a wrong type changes nothing."""
+    """Encoding of values: `encode(value, kind)` returns the float of the message, `decode(float, kind)` the value, or
+    None if it is invalid. `is_strict`: a message with a wrong type changes nothing."""
 
     encode: Callable[[float, Kind], float]
     decode: Callable[[float, Kind], float | None]
@@ -73,7 +73,7 @@ def _as_number(value: float, _kind: Kind) -> float:
 
 
 def _from_number(carried: float, kind: Kind) -> float | None:
-    """Integers are rounded."""
+    """Decode a value; integers are rounded."""
     if not math.isfinite(carried):
         return None
     return carried if kind is Kind.REAL32 else float(round(carried))
@@ -94,14 +94,14 @@ def _from_bytes(carried: float, kind: Kind) -> float | None:
 
 
 BY_VALUE = Coding(_as_number, _from_number, is_strict=False)
-"""ArduPilot: the number itself, whatever its type; the type of the message does not matter."""
+"""ArduPilot: the number itself for all types; the type of the message is ignored."""
 
 BYTEWISE = Coding(_as_bytes, _from_bytes, is_strict=True)
-"""PX4: the four bytes of an integer, read as a float."""
+"""PX4: the four bytes of an integer as those of a float."""
 
 
 class Behaviour(Enum):
-    """What a flight mode makes the vehicle do."""
+    """Behaviour of the vehicle in a flight mode."""
 
     STAY = "where it is"
     TAKE_OFF = "to the height of takeoff, once armed"
@@ -109,7 +109,7 @@ class Behaviour(Enum):
 
 
 class Reaction(Enum):
-    """What a failsafe does."""
+    """Reactions of a failsafe."""
 
     NONE = "nothing"
     WARN = "say so"
@@ -119,7 +119,7 @@ class Reaction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class FlightMode:
-    """A mode: its number in HEARTBEAT.custom_mode, the bits that go with it, and what it does."""
+    """A flight mode with its HEARTBEAT.custom_mode and base_mode, and its behaviour."""
 
     name: str
     custom_mode: int
@@ -130,8 +130,9 @@ class FlightMode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareProfile:
-    """What is data in an autopilot. `modes` holds every mode, the first being that after the start, and those that the
-    services need by name; `refused` is the result of a refusal, `texts` what is said with one."""
+    """Data of an autopilot. `modes` contains all modes, of which the first is that after the start; `land`, `hold`,
+    `by_hand` and `automatic` are names of modes; `refused` is the result of a refusal, and the texts from `no_estimate`
+    on are those sent with it or with a failsafe."""
 
     dialect: Dialect
     autopilot: int
@@ -139,19 +140,19 @@ class FirmwareProfile:
     parameters: tuple[Parameter, ...]
     coding: Coding
     periods_s: Mapping[str, float]
-    """Of the messages that it sends unasked."""
+    """Periods of the messages that it sends unrequested."""
     streams: tuple[str, ...]
-    """Those that REQUEST_DATA_STREAM asks for; none where it is not heeded."""
+    """Messages that REQUEST_DATA_STREAM requests; none if it is ignored."""
     modes: tuple[FlightMode, ...]
     land: str
     hold: str
     by_hand: str
-    """A pilot's."""
+    """Mode in which a pilot flies."""
     automatic: str
-    """The one that a pilot switches back to."""
+    """Mode that a pilot switches back to."""
     refused: int
     unready: str
-    """Says, every now and then, why it would not arm; the reason follows."""
+    """Prefix of the regular status text on why it cannot be armed."""
     no_estimate: str
     not_armable: str
     not_landed: str

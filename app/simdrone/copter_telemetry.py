@@ -1,4 +1,4 @@
-"""Messages that ArduPilot and PX4 both send, from what they know of themselves."""
+"""Messages that both ArduPilot and PX4 send, from a snapshot of their state."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ _SENSORS: Final = 1 | 2 | 4 | 8 | 32 | (1 << 10) | (1 << 11) | (1 << 15) | (1 <<
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Heights: `local_m` in the local frame, `altitude_m` above the place of takeoff; both up."""
+    """State of the autopilot; `local_m` is in the local frame, `altitude_m` above the place of takeoff, both up."""
 
     boot_s: float
     north_m: float
@@ -46,7 +46,7 @@ class Snapshot:
     breach_type: int
     breaches: int
     ready: bool
-    """Whether its own checks let it be armed."""
+    """Whether its arming checks pass."""
 
     @property
     def boot_ms(self) -> int:
@@ -169,7 +169,7 @@ def fence_status(now: Snapshot) -> Fields:
 
 
 def autopilot_version(now: Snapshot) -> Fields:
-    """Capable of MAVLink 2 and of parameters as floats; no more is claimed than is answered."""
+    """Return AUTOPILOT_VERSION, with only the implemented capabilities: MAVLink 2 and parameters as floats."""
     custom = dict.fromkeys(("flight_custom_version", "middleware_custom_version", "os_custom_version"), [0] * 8)
     numbers = dict.fromkeys(("middleware_sw_version", "os_sw_version", "board_version", "vendor_id", "product_id"), 0)
     return {"capabilities": 2 | (1 << 13), "flight_sw_version": now.version, **numbers, "uid": now.uid, **custom}
@@ -180,7 +180,7 @@ _ATTITUDE: Final = ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A message by its number, and what it says."""
+    """A message's number, and the function of its fields."""
 
     number: int
     fields: Callable[[Snapshot], Fields]

@@ -1,8 +1,7 @@
-"""A simulated drone: an autopilot on its body, with its faults, from bytes to bytes; served on a link, or in lock-step
-with its ground side.
+"""A simulated drone: an autopilot with its body and faults, served on a link, or in lockstep with its ground side.
 
-In lock-step the drone's time is the clock of both, and passes only while the ground waits: whatever the machine does
-meanwhile, the same inputs give the same packets at the same instants.
+In lockstep the drone's time is the clock of both sides and advances only while the ground side waits, so that the same
+inputs give the same packets at the same instants, independent of the machine.
 """
 
 import threading
@@ -22,8 +21,8 @@ BOOT_S: Final = 2.0
 
 
 class Drone:
-    """Time passes in ticks of TICK_S; `switch_on(body)` gives an autopilot fresh from its start. What motion capture
-    sees of the body leaves by `outlet`."""
+    """A drone whose time advances in ticks of TICK_S. `switch_on(body)` returns an autopilot after its start. Motion
+    capture of the body is sent by `outlet`."""
 
     def __init__(
         self,
@@ -45,20 +44,20 @@ class Drone:
 
     @property
     def time_s(self) -> float:
-        """Since it was switched on."""
+        """Time since it was switched on, s."""
         return self._ticks * TICK_S
 
     def inject_fault(self, fault: str, duration_s: float = float("inf")) -> None:
-        """Let a fault of `FAULTS` set in with the next tick."""
+        """Begin a fault of `FAULTS` with the next tick."""
         self._faults.add(PlannedFault(fault, None, self.time_s + duration_s))
 
     def receive(self, data: bytes) -> None:
-        """What came over the link."""
+        """Process bytes received over the link."""
         if not self._faults.is_deaf and self.time_s >= self._silent_until_s:
             self.autopilot.receive(data)
 
     def tick(self) -> list[bytes]:
-        """Let one tick pass; the packets that leave. Raises VehicleError when the simulation broke down."""
+        """Advance by one tick; return the packets sent. Raises VehicleError if the simulation diverged."""
         self._faults.update(self.time_s, self._takeoff_s, self)
         self._ticks += 1
         seen = self._outlet.send(self.cameras.look(self.time_s, self.body.altitude_m)) if self._outlet else []
@@ -71,7 +70,7 @@ class Drone:
         return self._faults.frames([self._packed(letter) for letter in letters])
 
     def reboot(self) -> None:
-        """Start the autopilot anew, in whatever state the body is; what is wrong with it stays wrong."""
+        """Restart the autopilot in any state of the body; its faults persist."""
         before, self.autopilot = self.autopilot, self._switch_on(self.body)
         self.autopilot.restore_persistent(before)
         self.autopilot.refuses_arming = before.refuses_arming
@@ -93,7 +92,7 @@ PEER: Final[Peer] = ("lockstep", 0)
 class Lockstep:
     """The ground side's clock and its transport: `MavlinkVehicle(…, clock=lockstep, transport=lockstep)`.
 
-    `muted`: the drone hears, and nothing that it says arrives.
+    `muted`: the drone receives, but none of its packets arrive.
     """
 
     remote: Final = PEER
@@ -106,17 +105,17 @@ class Lockstep:
     # ---- the clock of both sides
 
     def now_s(self) -> float:
-        """Seconds since the drone was switched on."""
+        """Return the time since the drone was switched on, s."""
         return self.drone.time_s
 
     def wait_s(self, seconds: float) -> None:
-        """Let the drone live for so long, in whole ticks. Raises VehicleError when the simulation broke down."""
+        """Advance the drone by this time, in whole ticks. Raises VehicleError if the simulation diverged."""
         until_s = self.drone.time_s + seconds
         while self.drone.time_s < until_s:
             self.tick()
 
-    def wall_s(self, seconds: float) -> float:  # noqa: ARG002 - whatever the vehicle's time
-        """Nothing takes time on the wall."""
+    def wall_s(self, seconds: float) -> float:  # noqa: ARG002 - independent of the vehicle's time
+        """Return 0: nothing takes wall time."""
         return 0.0
 
     # ---- the ground side's transport
@@ -131,37 +130,37 @@ class Lockstep:
         return True
 
     def adopt(self, peer: Peer) -> None:
-        """There is but one."""
+        """Do nothing: there is only one peer."""
 
     def wake(self) -> None:
-        """Nobody waits."""
+        """Do nothing: no thread waits."""
 
     def close(self) -> None:
-        """What the drone says from now on is said to nobody."""
+        """Discard the packets that have not been read."""
         self._frames.clear()
 
     # ----
 
     def tick(self) -> None:
-        """Let one tick of the drone pass."""
+        """Advance the drone by one tick."""
         frames = self.drone.tick()
         if not self.muted:
             self._frames.extend(self.arriving(frames))
 
     def arriving(self, frames: list[bytes]) -> list[bytes]:
-        """What arrives of the packets of one tick: all, unless a link does something to them."""
+        """Return the packets of one tick that arrive; subclasses override it to disturb the link."""
         return frames
 
 
 LARGEST_LAG_S: Final = 2.0
-"""Vehicle time that a busy machine may still catch up; what is more is lost, and the drone's clock late by it."""
+"""Lag of vehicle time that is caught up on a busy machine; a longer lag is lost, and the drone's clock stays late."""
 TICKS_AT_ONCE: Final = 8
-"""Ticks between two looks at the link when there is time to catch up."""
+"""Maximum number of ticks between two reads of the link while catching up."""
 _SHORTEST_WAIT_S: Final = 0.0005
 
 
 class Server:
-    """Runs one drone on one transport until it is stopped. The transport is closed by its owner."""
+    """Runs one drone on one transport until it is stopped. The owner of the transport closes it."""
 
     def __init__(self, drone: Drone, transport: Transport, clock: Clock) -> None:
         self._drone = drone
@@ -172,7 +171,7 @@ class Server:
         """Vehicle time lost because the machine was too slow for this speed."""
 
     def run(self) -> None:
-        """Until `stop`. Raises VehicleError when the simulation broke down."""
+        """Run until `stop`. Raises VehicleError if the simulation diverged."""
         start_s = self._clock.now_s()
         while not self._stopping.is_set():
             behind_s = self._clock.now_s() - start_s - self._drone.time_s
@@ -190,7 +189,7 @@ class Server:
         self._transport.wake()
 
     def _hear(self, wait_s: float) -> None:
-        """What has come; a wait too short to be worth it is made a little longer."""
+        """Receive from the link; very short waits are rounded up."""
         for data, peer in self._transport.read(max(wait_s, _SHORTEST_WAIT_S) if wait_s > 0.0 else 0.0):
             if self._transport.remote is None:
                 self._transport.adopt(peer)

@@ -1,4 +1,4 @@
-"""What can go wrong with a simulated drone, on demand: each fault is one class and one line in `FAULTS`."""
+"""Faults that can be injected into a simulated drone: each is one class and one line in `FAULTS`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,7 +25,7 @@ _WIND_M_S: Final = 2.0
 
 
 class FaultTarget(Protocol):
-    """What a fault can reach."""
+    """Parts of a drone that a fault can change."""
 
     body: Body
     autopilot: Autopilot
@@ -35,32 +35,32 @@ class FaultTarget(Protocol):
 
 
 class Fault:
-    """The neutral fault: nothing is wrong. Others override what they spoil."""
+    """Base of all faults, without effect; faults override what they change."""
 
     name: ClassVar[str]
 
     def begin(self, drone: FaultTarget) -> None:
-        """Called when the fault sets in."""
+        """Begin the fault."""
 
     def end(self, drone: FaultTarget) -> None:
-        """Called when it is over."""
+        """End the fault."""
 
     def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        """What becomes of the messages of one tick."""
+        """Return the changed messages of one tick."""
         return list(letters)
 
     def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
-        """What becomes of the packets of one tick."""
+        """Return the changed packets of one tick."""
         return list(frames)
 
     @property
     def is_deaf(self) -> bool:
-        """Whether nothing is heard."""
+        """Whether nothing is received."""
         return False
 
 
 class NoHeartbeat(Fault):
-    """Everything is sent but HEARTBEAT."""
+    """HEARTBEAT is not sent."""
 
     name = "no-heartbeat"
 
@@ -69,7 +69,7 @@ class NoHeartbeat(Fault):
 
 
 class ParamUnconfirmed(Fault):
-    """PARAM_SET changes nothing and is never answered."""
+    """PARAM_SET changes nothing and has no reply."""
 
     name = "param-unconfirmed"
 
@@ -81,7 +81,7 @@ class ParamUnconfirmed(Fault):
 
 
 class ArmRefused(Fault):
-    """The autopilot refuses to arm, in its own manner."""
+    """The autopilot refuses to arm, with its own messages."""
 
     name = "arm-refused"
 
@@ -93,7 +93,7 @@ class ArmRefused(Fault):
 
 
 class NoLiftOff(Fault):
-    """The motors do not turn, though the autopilot believes so. In the air the drone falls."""
+    """The motors do not turn, without the autopilot detecting it. In the air the drone falls."""
 
     name = "no-lift-off"
 
@@ -105,11 +105,11 @@ class NoLiftOff(Fault):
 
 
 class LinkLost(Fault):
-    """Not a packet passes, either way; the autopilot flies on."""
+    """No packets pass in either direction; the autopilot continues to fly."""
 
     name = "link-lost"
 
-    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002  none of them passes
+    def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:  # noqa: ARG002 - none of them passes
         return []
 
     @property
@@ -118,7 +118,7 @@ class LinkLost(Fault):
 
 
 class Deaf(Fault):
-    """Nothing that is sent to it is heard; what it says arrives."""
+    """The drone receives nothing; its own packets arrive."""
 
     name = "deaf"
 
@@ -128,7 +128,7 @@ class Deaf(Fault):
 
 
 class TakenOver(Fault):
-    """A pilot switches it to a mode of theirs, in which they hold it where it is, and back at the end."""
+    """A pilot switches to a manual mode and holds the drone in place, and switches back at the end."""
 
     name = "taken-over"
 
@@ -141,7 +141,7 @@ class TakenOver(Fault):
 
 @dataclass
 class FrozenPosition(Fault):
-    """Packets arrive, but those of the position repeat the last one, its time too."""
+    """Position messages repeat the last one, with its time; other packets are unchanged."""
 
     name: ClassVar[str] = "frozen-position"
     _held: dict[str, OutgoingMessage] = field(default_factory=dict)
@@ -154,7 +154,7 @@ class FrozenPosition(Fault):
 
 @dataclass
 class JumpingPosition(Fault):
-    """Every 25th position is one metre too high, alone."""
+    """Every 25th position is one metre too high."""
 
     name: ClassVar[str] = "jumping-position"
     _count: int = 0
@@ -172,7 +172,7 @@ class JumpingPosition(Fault):
 
 
 class LowBattery(Fault):
-    """The battery reads 9.0 V, and 10 % where a share is sent."""
+    """The battery voltage is reported as 9.0 V, and the remaining charge as 10 %."""
 
     name = "low-battery"
 
@@ -181,8 +181,8 @@ class LowBattery(Fault):
 
 
 class Reboot(Fault):
-    """The autopilot starts anew: its motors stop, its gains are the defaults, its clock begins at 0, and it is silent
-    for two seconds."""
+    """The autopilot restarts: its motors stop, its clock begins at 0, it sends nothing for two seconds, and its
+    parameters are the defaults unless it stores them."""
 
     name = "reboot"
 
@@ -235,7 +235,7 @@ class WrongSystem(Fault):
 
 
 class CarriedAway(Fault):
-    """Off the ground the drone is carried north at 2 m/s, and does not hold against it."""
+    """In the air the drone drifts north at 2 m/s without correction."""
 
     name = "carried-away"
 
@@ -247,7 +247,7 @@ class CarriedAway(Fault):
 
 
 class MocapLost(Fault):
-    """Motion capture does not see the drone any more, says so, and repeats where it was."""
+    """Motion capture loses the drone, reports it as not tracked, and repeats its last place."""
 
     name = "mocap-lost"
 
@@ -259,7 +259,7 @@ class MocapLost(Fault):
 
 
 class MocapFrozen(Fault):
-    """Motion capture sends its last frame again and again."""
+    """Motion capture repeats its last frame."""
 
     name = "mocap-frozen"
 
@@ -271,7 +271,7 @@ class MocapFrozen(Fault):
 
 
 class MocapDrift(Fault):
-    """The altitude that motion capture tells goes away from the true one, by 0.1 m/s."""
+    """The altitude of motion capture drifts from the true one by 0.1 m/s."""
 
     name = "mocap-drift"
 
@@ -311,33 +311,34 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """A fault and when: `start_s` after the takeoff command, None from the beginning; infinite: for good."""
+    """A fault and its time: `start_s` after the takeoff command, None from the beginning; with an infinite
+    `duration_s` it does not end."""
 
     fault: str
     start_s: float | None
     duration_s: float = float("inf")
 
     def is_active(self, now_s: float, takeoff_s: float | None) -> bool:
-        """At `now_s`, both in seconds since the drone was switched on."""
+        """Whether it is active at `now_s`; both times are in seconds since the drone was switched on."""
         if self.start_s is None:
             return now_s < self.duration_s
         return takeoff_s is not None and 0.0 <= now_s - takeoff_s - self.start_s < self.duration_s
 
 
 def parse_fault(text: str) -> PlannedFault:
-    """What `FORM` writes. Raises InputError saying what is wrong."""
+    """Parse a fault of `FORM`. Raises InputError with the reason if it is invalid."""
     what, at, when = text.partition("@")
     name, colon, duration = what.partition(":")
     if name not in FAULTS:
         raise _unusable(f"must be one of {', '.join(FAULTS)}, got {name!r}")
     if not at:
-        raise _unusable(f"must say when: {FORM}")
+        raise _unusable(f"must have a time: {FORM}")
     start_s = None if when == CONNECT else _seconds(when)
     return PlannedFault(name, start_s, _seconds(duration)) if colon else PlannedFault(name, start_s)
 
 
 class Faults:
-    """The faults planned for one drone, and which of them are at work."""
+    """Planned and active faults of one drone."""
 
     def __init__(self, planned: Sequence[PlannedFault]) -> None:
         self._waiting: list[tuple[PlannedFault, Fault]] = []
@@ -346,11 +347,11 @@ class Faults:
             self.add(plan)
 
     def add(self, plan: PlannedFault) -> None:
-        """One more, even while the drone flies."""
+        """Add a fault, also in flight."""
         self._waiting.append((plan, FAULTS[plan.fault]()))
 
     def update(self, now_s: float, takeoff_s: float | None, drone: FaultTarget) -> None:
-        """Let those begin whose time has come, and those end whose time is over; none comes twice."""
+        """Begin and end faults at their times; each occurs once."""
         for entry in [each for each in self._waiting if each[0].is_active(now_s, takeoff_s)]:
             self._waiting.remove(entry)
             self._working.append(entry)
@@ -375,7 +376,7 @@ class Faults:
 
 
 def _drained(fields: Mapping[str, FieldValue]) -> dict[str, FieldValue]:
-    """Those fields that speak of a battery, low."""
+    """Return the fields with low values for the battery."""
     low: dict[str, FieldValue] = dict(fields)
     if "voltage_battery" in low:
         low["voltage_battery"] = _LOW_MV
@@ -394,13 +395,13 @@ def _seconds(text: str) -> float:
     except ValueError:
         seconds = float("nan")
     if not (is_finite(seconds) and seconds >= 0.0):
-        raise _unusable(f"a time must be a number of seconds from 0 on, got {text!r}")
+        raise _unusable(f"a time must be a number of seconds, 0 or more, got {text!r}")
     return seconds
 
 
 def _unusable(reason: str) -> InputError:
     return InputError(
-        "This fault cannot be had.",
+        "This fault is not valid.",
         problems=(Problem("fault", reason),),
         hint="For example link-lost:8@6, reboot@5 or no-heartbeat@connect.",
     )

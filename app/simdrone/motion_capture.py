@@ -1,4 +1,4 @@
-"""Motion capture as a simulated drone is seen by it: what cameras in its room make out, and three ways to say so."""
+"""Simulated motion capture of a simulated drone, and three protocols to send it."""
 
 import random
 import socket
@@ -31,7 +31,7 @@ _COMPONENT: Final = 197
 
 @dataclass(frozen=True, slots=True)
 class MocapFrame:
-    """What the cameras saw once: the body's place, x north, y east, z up, and when by their own clock."""
+    """One frame: the body's position, x north, y east, z up, m, and its time by the motion capture's clock, s."""
 
     frame: int
     time_s: float
@@ -40,7 +40,7 @@ class MocapFrame:
 
 
 class MotionCapture:
-    """Look 100 times a second, and say it 20 ms later."""
+    """Motion capture at 100 Hz with a latency of 20 ms."""
 
     def __init__(self, seed: int = 1) -> None:
         self._random = random.Random(seed)  # noqa: S311  noise
@@ -48,15 +48,15 @@ class MotionCapture:
         self._frame = 0
         self._drift_m = 0.0
         self.blind = False
-        """A fault: the body is not tracked, and its last place is repeated."""
+        """Fault: the body is not tracked, and its last position is repeated."""
         self.stuck = False
-        """A fault: the last frame is sent again and again."""
+        """Fault: the last frame is repeated."""
         self.drifts = False
-        """A fault: the altitude goes away from the true one, by 0.1 m/s."""
+        """Fault: the altitude drifts from the true one by 0.1 m/s."""
         self._last = MocapFrame(0, 0.0, (0.0, 0.0, 0.0), tracked=False)
 
     def look(self, time_s: float, altitude_m: float) -> list[MocapFrame]:
-        """What is said in the tick that ends at `time_s`; the body stands or hovers over one spot."""
+        """Return the frames sent in the tick that ends at `time_s`; the body's horizontal position is constant."""
         frame = int(time_s * RATE_HZ)
         if frame > self._frame:
             self._frame = frame
@@ -76,18 +76,18 @@ class MotionCapture:
 
 
 class MocapOutput(Protocol):
-    """Says what the cameras saw."""
+    """Output of motion capture frames."""
 
     def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
-        """Send it; what is to go over the drone's own link is returned."""
+        """Send frames; return the messages to send over the drone's own link."""
         ...
 
     def close(self) -> None: ...
 
 
 class VehicleLinkOutput:
-    """VISION_POSITION_ESTIMATE among the drone's own messages, as every version of MAVLink carries it; it cannot say
-    that the body is not tracked, so nothing is said then."""
+    """Output as VISION_POSITION_ESTIMATE among the drone's own messages, which every version of MAVLink has. It cannot
+    report that the body is not tracked, so nothing is sent then."""
 
     def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         return [
@@ -95,11 +95,11 @@ class VehicleLinkOutput:
         ]
 
     def close(self) -> None:
-        """Nothing was opened."""
+        """Do nothing: no resource is open."""
 
 
 class OdometryOutput:
-    """ODOMETRY on a link of its own."""
+    """Output as ODOMETRY on a separate link."""
 
     def __init__(self, address: StreamAddress) -> None:
         self._transport: Transport = open_transport(address.link)
@@ -115,10 +115,11 @@ class OdometryOutput:
 
 
 class NatNetServer:
-    """Motive as its clients see it: answers who it is, and streams one rigid body in the manner of NatNet 4.1."""
+    """Simulated Motive: replies to connection requests, and streams one rigid body in NatNet 4.1."""
 
     def __init__(self, address: NatNetAddress, version: Version = NAT_NET) -> None:
-        """`version` is the protocol's that it says it speaks. Raises LinkError when the port is taken."""
+        """Open the server; `version` is the protocol version that it reports. Raises LinkError if the port is in
+        use."""
         self._address, self._version = address, version
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -129,7 +130,7 @@ class NatNetServer:
             self._socket.close()
             raise LinkError(
                 f"NatNet's port {address.command_port} of {address.host} could not be opened: {error.strerror}.",
-                hint="See that no other program has it, or choose another with &command_port=.",
+                hint="Check that no other program uses it, or choose another with &command_port=.",
             ) from error
         group = (address.multicast, address.data_port)
         self._listeners: set[tuple[str, int]] = {group} if address.multicast else set()
@@ -159,12 +160,12 @@ class NatNetServer:
     def _send(self, packet: bytes, listener: tuple[str, int]) -> None:
         try:
             self._socket.sendto(packet, listener)
-        except OSError:  # it has gone
+        except OSError:  # the listener has closed
             self._listeners.discard(listener)
 
 
 def open_outlet(address: SourceAddress) -> MocapOutput:
-    """Raises LinkError when it cannot be opened."""
+    """Open the output for a source's address. Raises LinkError if it cannot be opened."""
     match address:
         case NatNetAddress():
             return NatNetServer(address)
@@ -175,12 +176,12 @@ def open_outlet(address: SourceAddress) -> MocapOutput:
 
 
 def server_packet(version: Version) -> bytes:
-    """NAT_SERVERINFO: name, version of the application, version of the protocol, the clock's rate."""
+    """Return NAT_SERVERINFO: name, application version, protocol version, clock rate."""
     return _packet(_SERVER_INFO, struct.pack("<256s4B4BQ", b"Gainline sim-drone", 3, 1, 0, 0, *version, _TICKS_HZ))
 
 
 def frame_packet(glimpse: MocapFrame, body: int, *, up: str) -> bytes:
-    """NAT_FRAMEOFDATA of NatNet 4.1: every list with its count and its size in bytes, only that of bodies filled."""
+    """Return NAT_FRAMEOFDATA of NatNet 4.1: lists with count and size in bytes, all empty except that of bodies."""
     north, east, height = glimpse.position_m
     place = (north, height, east) if up == "y" else (north, -east, height)
     pose = struct.pack("<I3f4ffH", body, *place, 0.0, 0.0, 0.0, 1.0, 0.0002, int(glimpse.tracked))

@@ -1,7 +1,7 @@
-"""Paparazzi's rotorcraft firmware as a ground station meets it over MAVLink 1.
+"""Simulated Paparazzi rotorcraft firmware over MAVLink 1.
 
-The vertical loop is the exact replica. Everything else is what the real one was seen to do on the wire, its dangers
-included: it obeys what stops motors in the air, never asks whether a gain makes sense, and answers much with silence.
+The vertical loop is the exact replica. All other behaviour was observed on the wire of the real one, including its
+hazards: it stops motors in the air on command, accepts any gain, and does not reply to many requests.
 """
 
 import math
@@ -48,13 +48,13 @@ BY_HAND: Final = 12
 NAV: Final = 13
 MODES: Final = (KILL, FAILSAFE, HOME, BY_HAND, NAV, 19)
 _WITHOUT_PLAN: Final = (KILL, FAILSAFE, HOME, BY_HAND)
-"""In these no block is flown."""
+"""Modes in which no block is flown."""
 _KEEP_THEIR_BLOCK: Final = (HOME, BY_HAND)
 FAILSAFE_DESCENT_M_S: Final = 1.3
 HOMING_M_S: Final = 3.0
 
 GROUND_COUNTS: Final = 25
-"""Height of the local origin's plane below the vehicle on the ground, 1/256 m: there it reads 0.098 m."""
+"""Height of the vehicle on the ground above the local origin, 1/256 m (0.098 m)."""
 GROUND_M: Final = GROUND_COUNTS / (1 << POSITION_BITS)
 
 COMPONENT: Final = 190
@@ -77,13 +77,13 @@ _GROUNDED_S: Final = 1.0
 _FLYING_S: Final = 1.0
 _TOUCHES_BELOW_M: Final = 0.03
 _REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
-"""By how much the reference (ζ 0.85, 100 °/s) trails a set point that moves, over its speed."""
+"""Time by which the reference (ζ 0.85, 100 °/s) lags behind a moving set point."""
 
 
 class Paparazzi:
-    """One autopilot from switching on; see `Autopilot`. `tuned_telemetry` says whether it was built with a telemetry
-    file that sends the position at 51 Hz; otherwise it comes at 1.25 Hz. `kill_setting`, `landed_after_s` and
-    `max_distance_m` as in its settings and its flight plan; `tells_mode`: its heartbeat has the mode's number."""
+    """One autopilot from power-on; see `Autopilot`. `tuned_telemetry`: it was built with a telemetry file that sends
+    the position at 51 Hz; otherwise the rate is 1.25 Hz. `kill_setting`, `landed_after_s` and `max_distance_m` are as
+    in its settings and its flight plan; `tells_mode`: its heartbeat contains the mode's number."""
 
     def __init__(
         self,
@@ -132,7 +132,7 @@ class Paparazzi:
         self._radio.put(data)
 
     def restore_persistent(self, before: Self) -> None:
-        """Its settings are those that were compiled in."""
+        """Copy nothing: its settings are compiled in."""
 
     def tick(self) -> list[OutgoingMessage]:
         self._ticks += 1
@@ -152,7 +152,7 @@ class Paparazzi:
 
     @property
     def height_m(self) -> float:
-        """In the local frame, up."""
+        """Height in the local frame, up."""
         return self._body.altitude_m + GROUND_M
 
     @property
@@ -185,7 +185,7 @@ class Paparazzi:
             self._settings[self._kill_setting] = 0.0 if self._motors_on else 1.0
 
     def _set_mode(self, mode: int) -> None:
-        """Modes that the airframe does not know are passed over."""
+        """Set the mode; modes that the airframe does not have are ignored."""
         if mode not in MODES:
             return
         self._settings["aut_mod"] = mode
@@ -201,7 +201,7 @@ class Paparazzi:
             self.took_off = True
 
     def _navigate(self) -> None:
-        """Too far from HOME it flies there by itself, and runs no block any more until its mode is set again."""
+        """Run the flight plan. Too far from HOME it flies there by itself, and runs no block until its mode is set."""
         distance_m = abs(self._body.north_m)
         if self.mode == NAV and distance_m > self._max_distance_m:
             self._set_mode(HOME)
@@ -213,7 +213,7 @@ class Paparazzi:
             self._enter(following)
 
     def _homing_m_s(self) -> float:
-        """Slower over the last metres."""
+        """Return the speed towards HOME, slower over the last metres."""
         return min(max(self._body.north_m, -HOMING_M_S), HOMING_M_S)
 
     def _command(self) -> Integers:
@@ -236,8 +236,9 @@ class Paparazzi:
         return self._vertical(CLIMB, fix(-FAILSAFE_DESCENT_M_S, SPEED_BITS))
 
     def _descent(self) -> Integers:
-        """Down at a constant rate. On the ground the reference sinks on below the vehicle, which the replica's climb
-        mode (of an older version) would not let it do: the thrust fades as it does in the recorded landings."""
+        """Return the command to descend at a constant rate. On the ground the reference continues below the vehicle,
+        which the replica's climb mode (of an older version) prevents, so that the thrust fades as in the recorded
+        landings."""
         if self._touched_s is None and self._body.altitude_m < _TOUCHES_BELOW_M:
             self._touched_s, self._touched_m = self.boot_s, self.height_m
         if self._touched_s is None:
@@ -246,7 +247,7 @@ class Paparazzi:
         return self._altitude(self._touched_m - sunk_m)
 
     def _altitude(self, target_m: float) -> Integers:
-        """The loop is the same wherever its origin lies, and the body's is the ground."""
+        """Return the command to an altitude in the local frame, converted to the body's origin, the ground."""
         return self._vertical(ALT, fix(target_m, POSITION_BITS) - GROUND_COUNTS)
 
     def _vertical(self, mode: int, target: int) -> Integers:
@@ -254,7 +255,7 @@ class Paparazzi:
         return vertical_command(mode, target, kp, ki, kd)
 
     def _watch_thrust(self) -> None:
-        """It counts as flying once its motors have pushed for a while, and until they have not for as long."""
+        """Update whether it counts as flying: thrust above idle, or not, for a second."""
         pushes = self._body.thrust > _IDLE_THRUST
         self._thrust_s = self._thrust_s + TICK_S if pushes else 0.0
         self._idle_s = 0.0 if pushes else self._idle_s + TICK_S
@@ -296,7 +297,7 @@ class Paparazzi:
         self._out.append(OutgoingMessage(kind, fields, counter))
 
     def _send_setting(self, index: int) -> None:
-        """A number past the end shows whatever lies behind the table."""
+        """Send a setting; an index past the end sends what is behind the table, as the real one does."""
         name, value = self._settings.at(index) if index < len(self._settings) else ("", math.nan)
         self._send(
             "PARAM_VALUE",
@@ -307,7 +308,7 @@ class Paparazzi:
             param_index=index,
         )
 
-    # ------------------------------------------------------------ hearing
+    # ------------------------------------------------------------ receiving
 
     def _listen(self) -> None:
         for message in self._codec.parse(self._radio.take()):
@@ -327,7 +328,7 @@ class Paparazzi:
             self._send_setting(place)
 
     def _hear_param_set(self, message: Message) -> None:
-        """Wrong types, values that are no numbers and names that are not found are met with silence."""
+        """Set a parameter; wrong types, NaN and unknown names have no reply."""
         name, value = text(message, "param_id"), number(message, "param_value")
         place = self._settings.find(name)
         if place is None or self.ignores_parameters or math.isnan(value):
@@ -375,8 +376,7 @@ class Paparazzi:
         self._send("SCRIPT_ITEM", counter="blocks", seq=seq, name=BLOCKS[seq].name, **_sender(message))
 
     def _hear_block(self, message: Message) -> None:
-        """Go to a block, unless somebody is still reading the list, or no block is flown; there is no answer either
-        way."""
+        """Enter a block, unless the list is being read or no block is flown; there is no reply in any case."""
         if not self._is_listing_blocks and self.mode not in _KEEP_THEIR_BLOCK:
             self._enter(int(number(message, "seq")))
 
@@ -400,7 +400,7 @@ class Paparazzi:
 
 
 class _Radio:
-    """The receive buffer: what arrives between two looks must fit in, or all of it is lost."""
+    """Receive buffer: data between two polls that does not fit is lost entirely."""
 
     def __init__(self) -> None:
         self._waiting = bytearray()
@@ -420,7 +420,7 @@ class _Radio:
 
 
 def _sender(message: Message) -> dict[str, int]:
-    """The target of an answer."""
+    """Return the target of a reply."""
     return {"target_system": message.get_srcSystem(), "target_component": message.get_srcComponent()}
 
 

@@ -1,8 +1,7 @@
-"""The flight plan of the simulated Paparazzi, its blocks and waypoints, and the settings of the AR.Drone 2 airframe, in
+"""Flight plan of the simulated Paparazzi with its blocks and waypoints, and the settings of the AR.Drone 2 airframe in
 order, with their values after the start.
 
-A setting's name is what 16 characters hold of the C variable's; longer ones end alike, and none of 16 characters is
-ever found.
+Setting names are the C variables' truncated to 16 characters; a name of 16 characters is never found by a request.
 """
 
 import math
@@ -14,21 +13,21 @@ from app.core.control.paparazzi import INT32_MAX, INT32_MIN
 
 DESCENT_M_S: Final = 0.8
 LANDED_AFTER_S: Final = 3.0
-"""By this program's flight plan. Plans without such a guard stop the thrust of a vehicle that is told to land in the
-first second, before it counts as flying."""
+"""Value in this program's flight plan. Plans without such a guard stop the thrust of a vehicle that is commanded to
+land in the first second, before it counts as flying."""
 DEFAULT_ALTITUDE_M: Final = 2.0
 MAX_DISTANCE_M: Final = 50.0
-"""max_dist_from_home: farther than that from HOME, the origin, no block is flown any more."""
+"""max_dist_from_home: greatest distance from HOME, the origin, at which blocks are flown."""
 HOME_HEIGHT_M: Final = 1.0
-"""home_mode_height: at which it flies back then, and stays."""
+"""home_mode_height: height at which it flies back to HOME and stays."""
 
 CLIMB: Final = 2
 WAYPOINTS: Final = ("dummy", "HOME", "CLIMB", "STDBY", "p1", "p2", "p3", "p4", "CAM", "TD")
-"""By index. Their names are not transmitted."""
+"""Waypoints by index. Their names are not transmitted."""
 
 
 class Vertical(Enum):
-    """What a block does with height."""
+    """Vertical mode of a block."""
 
     THROTTLE = "no thrust"
     WAYPOINT = "the altitude of its waypoint"
@@ -36,7 +35,7 @@ class Vertical(Enum):
 
 
 class Engine(Enum):
-    """What entering a block does with the motors."""
+    """Effect on the motors of entering a block."""
 
     LEAVE = "nothing"
     KILL = "stop"
@@ -45,9 +44,9 @@ class Engine(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One block. `after` is the block that follows at once, where it only passes through; `landed` the one that
-    follows when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up) and `max_distance_m` (along an
-    axis from HOME) are exceptions that lead to "land here"."""
+    """One block. `after` is the block that follows at once, if any; `landed` the one that follows when the vehicle no
+    longer flies. `max_time_s`, `max_height_m` (local z, up) and `max_distance_m` (along an axis from HOME) are
+    exceptions that lead to "land here"."""
 
     name: str
     vertical: Vertical = Vertical.WAYPOINT
@@ -84,7 +83,7 @@ BLOCKS: Final = (
     Block("landed", Vertical.THROTTLE),
     Block("HOME", waypoint="HOME"),
 )
-"""The plan's blocks in order; the horizontal figures of some are not flown, only their height."""
+"""The plan's blocks in order; of blocks with horizontal figures only the height is flown."""
 
 BY_NAME: Final = {block.name: seq for seq, block in enumerate(BLOCKS)}
 LAND_HERE: Final = BY_NAME["land here"]
@@ -93,14 +92,14 @@ HOLDING_POINT: Final = BY_NAME["Holding point"]
 
 
 class FlightPlan:
-    """Where in the plan the vehicle is."""
+    """Current block of the plan."""
 
     def __init__(self, *, landed_after_s: float) -> None:
-        """`landed_after_s`: how long it descends before it may believe to have landed."""
+        """Begin in "Holding point"; `landed_after_s` is the minimum time of descent before a landing is detected."""
         self._landed_after_s = landed_after_s
         self.seq = HOLDING_POINT
         self.time_s = 0.0
-        """Since the block was entered."""
+        """Time since the block was entered, s."""
         self.altitudes_m = dict.fromkeys(WAYPOINTS, DEFAULT_ALTITUDE_M)
 
     @property
@@ -109,18 +108,18 @@ class FlightPlan:
 
     @property
     def target_m(self) -> float:
-        """The altitude of the block's waypoint, in the local frame."""
+        """Altitude of the block's waypoint, in the local frame."""
         return self.altitudes_m[self.block.waypoint]
 
     def enter(self, seq: int, height_m: float) -> None:
-        """Go to a block at this height (local frame, up); a number past the end means the last one."""
+        """Enter a block at this height (local frame, up); a number past the end means the last one."""
         self.seq = min(seq, len(BLOCKS) - 1)
         self.time_s = 0.0
         if self.seq == LAND_HERE:
             self.altitudes_m["TD"] = height_m
 
     def next(self, elapsed_s: float, height_m: float, distance_m: float, *, flies: bool) -> int | None:
-        """Let time pass in the block, so far from HOME; the block that the plan leads to, if to another."""
+        """Advance time in the block; return the next block if the plan leaves this one. `distance_m` is from HOME."""
         self.time_s += elapsed_s
         block = self.block
         if block.after is not None:
@@ -133,28 +132,28 @@ class FlightPlan:
 NAME_LIMIT: Final = 16
 KILL_SETTING: Final = "kil_thr"
 NEWER_KILL_SETTING: Final = "aut_kil_thr"
-"""The same in a tree of 2017 that calls itself 5.10, whose variables are those of one structure."""
+"""Name in a source tree of 2017 (version 5.10), in which the variables are in one structure."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One setting; a whole default stands for an integer in the autopilot, into which every value is cut."""
+    """One setting; an integer default marks an integer in the autopilot, to which values are truncated."""
 
     name: str
     default: int | float
 
     def held(self, value: float) -> float:
-        """What is left of `value` in the autopilot's variable."""
+        """Return `value` as held in the autopilot's variable."""
         if isinstance(self.default, float):
             return value
         return float(min(max(math.trunc(value), INT32_MIN), INT32_MAX)) if math.isfinite(value) else float(INT32_MIN)
 
 
 class Settings:
-    """The values held, from the defaults on."""
+    """Values of the settings, initially the defaults."""
 
     def __init__(self, kill_setting: str) -> None:
-        """`kill_setting`: what this release calls the one that kills the throttle; empty where there is none."""
+        """`kill_setting` is this release's name of the setting that stops the throttle; empty if there is none."""
         named = (replace(each, name=kill_setting) if each.name == KILL_SETTING else each for each in SETTINGS)
         self._settings = tuple(setting for setting in named if setting.name)
         self._values: list[float] = [float(setting.default) for setting in self._settings]
@@ -171,14 +170,14 @@ class Settings:
         self._values[place] = self._settings[place].held(value)
 
     def count(self, name: str) -> int:
-        """A setting that is an integer in the autopilot."""
+        """Return a setting that is an integer in the autopilot."""
         return int(self[name])
 
     def at(self, index: int) -> tuple[str, float]:
         return self._settings[index].name, self._values[index]
 
     def find(self, name: str) -> int | None:
-        """The place of the setting that this name finds first, if any; case matters."""
+        """Return the place of the first setting with this name, if any; case-sensitive."""
         return self._places.get(name) if len(name) < NAME_LIMIT else None
 
 

@@ -1,4 +1,4 @@
-"""What Paparazzi sends unasked: messages, their periods and their peculiarities."""
+"""Telemetry of Paparazzi: messages, their periods and their peculiarities."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -24,10 +24,10 @@ PERIODS_S: Final[Mapping[str, float]] = MappingProxyType(
         "AUTOPILOT_VERSION": 11.1,
     }
 )
-"""With a telemetry file made for tuning."""
+"""Periods with a telemetry file for tuning."""
 
 BARE_POSITION_PERIOD_S: Final = 0.8
-"""Without one."""
+"""Period without such a file."""
 
 _LATITUDE_E7: Final = 435641193
 _LONGITUDE_E7: Final = 14812804
@@ -42,7 +42,7 @@ _NO_TEMPERATURE: Final = 32767
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """What the autopilot knows of itself; heights in its local frame, up."""
+    """State of the autopilot; heights in its local frame, up."""
 
     boot_s: float
     height_m: float
@@ -61,12 +61,12 @@ class Snapshot:
 
     @property
     def battery_mv(self) -> int:
-        """From steps of 0.1 V."""
+        """Voltage in mV, in steps of 0.1 V."""
         return math.floor(self.battery_v * 10.0) * 100
 
 
 def heartbeat(now: Snapshot) -> Fields:
-    """NAV and HOME look alike where the mode's own number is not told."""
+    """Return HEARTBEAT; NAV and HOME are equal in it unless it contains the mode's number."""
     mode = {_KILL: 0, _FAILSAFE: 0, _GUIDED: 8, _BY_HAND: 64 | 16}.get(now.mode, 4)
     return {
         "type": 2,
@@ -79,7 +79,7 @@ def heartbeat(now: Snapshot) -> Fields:
 
 
 def local_position(now: Snapshot) -> Fields:
-    """z down, in steps of the autopilot's integers."""
+    """Return LOCAL_POSITION_NED in steps of the autopilot's integers."""
     return {
         "time_boot_ms": now.boot_ms,
         "x": _stepped(now.north_m, POSITION_BITS),
@@ -92,7 +92,7 @@ def local_position(now: Snapshot) -> Fields:
 
 
 def global_position(now: Snapshot) -> Fields:
-    """`relative_alt` takes the origin, in metres, from the altitude, in millimetres."""
+    """Return GLOBAL_POSITION_INT; as in the real one, `relative_alt` is altitude in mm minus the origin in m."""
     altitude_mm = _ORIGIN_MM + _GEOID_MM + round(now.height_m * 1000.0)
     return {
         "time_boot_ms": now.boot_ms,
@@ -108,7 +108,7 @@ def global_position(now: Snapshot) -> Fields:
 
 
 def vfr_hud(now: Snapshot) -> Fields:
-    """`climb` is positive downwards."""
+    """Return VFR_HUD, in which `climb` is positive downwards."""
     return {
         "airspeed": 0.0,
         "groundspeed": 0.0,
@@ -200,5 +200,5 @@ def _down_cm_s(now: Snapshot) -> int:
 
 
 def _current(now: Snapshot) -> int:
-    """10 mA: what the motors draw at hover in the recorded flights, while they turn."""
+    """Return the current in 10 mA: that at hover in the recorded flights, proportional to thrust."""
     return round(443 * now.thrust / 0.63)

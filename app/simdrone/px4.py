@@ -1,6 +1,6 @@
-"""PX4 as it answers on the wire.
+"""Simulated PX4.
 
-Its altitude controller is a simplified cascade with PX4's gains, not a replica; see copter/cascade.py.
+Its altitude controller is a simplified cascade with PX4's gains, not a replica; see copter_control.py.
 """
 
 import math
@@ -29,15 +29,15 @@ _MANUAL: Final = 1 | 16 | 64
 _AUTO: Final = 1 | 4 | 8 | 16
 _TAKEOFF: Final = "AUTO.TAKEOFF"
 _NO_POSITION: Final = 1 << 24 | 13835193
-"""The event check_modes_local_pos, of the autopilot."""
+"""Event check_modes_local_pos of the autopilot."""
 _LOCAL_POSITION: Final = 17
-"""Among the components of its checks."""
+"""Component of the check, a bit of health_component_t."""
 _ALL_MODES: Final = 0xFFFFFFFF
 _ARMING_MODES: Final = _ALL_MODES & ~(1 << 18)
-"""All but landing."""
+"""All modes except landing."""
 _PROTOCOL: Final = 0x88
 _ERROR: Final = 0x33
-"""Log levels of an event, inside and outside."""
+"""Internal and external log levels of an event."""
 _ARGUMENTS: Final = 40
 _SEQUENCE_NUMBERS: Final = 1 << 16
 _LINK_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.HOLD}
@@ -45,12 +45,12 @@ _FENCE_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.WARN, 2: Reaction.HOLD}
 
 
 def custom_mode(main: int, sub: int = 0) -> int:
-    """As HEARTBEAT carries it."""
+    """Return the mode as in HEARTBEAT."""
     return main << 16 | sub << 24
 
 
 class Px4(Copter):
-    """Return-to-launch and termination only land here: the vehicle never leaves its place."""
+    """PX4. Return-to-launch and termination only land, because the vehicle does not move horizontally."""
 
     firmware: ClassVar[FirmwareProfile] = FirmwareProfile(
         dialect=COMMON,
@@ -120,8 +120,8 @@ class Px4(Copter):
         self._told_failing: bool | None = None
 
     def tick(self) -> list[OutgoingMessage]:
-        """Once at its height of takeoff it waits there. Once it has landed and stopped its motors it is ready to hold;
-        told to land once more then, it stays in that mode, and does not arm."""
+        """Advance by one tick. At its takeoff height it switches to hold, and also once it has landed and disarmed. If
+        Land is commanded after that, it stays in the landing mode, and does not arm."""
         was_armed = self.armed
         letters = super().tick()
         if self._is_failing != self._told_failing:
@@ -133,7 +133,7 @@ class Px4(Copter):
         return letters
 
     def prearm_failure(self) -> str | None:
-        """Its mode counts, too."""
+        """Return why it cannot be armed, including the mode."""
         return self.arming_refusal()
 
     def tell_checks(self) -> None:
@@ -142,11 +142,11 @@ class Px4(Copter):
 
     @property
     def _is_failing(self) -> bool:
-        """In every mode: it does not know where it is."""
+        """Whether it has no position estimate, which prevents arming in every mode."""
         return Copter.prearm_failure(self) is not None
 
     def _tell_events(self) -> None:
-        """The results of its checks, as the events interface orders them."""
+        """Send the results of its arming checks as events, in the order of the events interface."""
         failing = self._told_failing = self._is_failing
         self._send_event(
             ARMING_CHECK_SUMMARY,
@@ -159,7 +159,7 @@ class Px4(Copter):
         self._send_event(HEALTH_SUMMARY, 0, 0, 0, 0, layout="<BIII")
 
     def _send_event(self, number: int, *arguments: int, layout: str, levels: int = _PROTOCOL) -> None:
-        """To everybody."""
+        """Send an event as a broadcast."""
         packed = struct.pack(layout, *arguments)
         self._out.append(
             OutgoingMessage(
@@ -189,8 +189,8 @@ class Px4(Copter):
         return next((mode for mode in self.firmware.modes if mode.custom_mode == wanted), None)
 
     def take_off(self, param7: float) -> int:
-        """Metres above sea level; what is no number means MIS_TAKEOFF_ALT above the place of takeoff. A disarmed
-        vehicle takes off when it is armed."""
+        """Take off to `param7` metres above sea level, or, if it is not finite, to MIS_TAKEOFF_ALT above the place of
+        takeoff. A disarmed vehicle takes off when it is armed."""
         self.mode = self.find_mode(_TAKEOFF)
         height_m = param7 - HOME_AMSL_M if math.isfinite(param7) else self.parameters["MIS_TAKEOFF_ALT"]
         if height_m <= 0.0:
@@ -206,7 +206,7 @@ class Px4(Copter):
         return self.parameters["COM_DL_LOSS_T"], _LINK_ACTIONS.get(int(self.parameters["NAV_DLL_ACT"]), Reaction.LAND)
 
     def fence(self) -> tuple[float, Reaction]:
-        """A distance of 0 is no fence."""
+        """Return limit and reaction of the altitude fence; a distance of 0 disables it."""
         limit_m = self.parameters["GF_MAX_VER_DIST"]
         if limit_m <= 0.0:
             return math.inf, Reaction.NONE

@@ -1,4 +1,4 @@
-"""The autopilots there are."""
+"""Registry of the simulated autopilots."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from app.simdrone.paparazzi_plan import NEWER_KILL_SETTING
 from app.simdrone.px4 import Px4
 
 _ARDUPILOT_FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0}
-"""Land when the ground station is lost; keep inside the fence."""
+"""Land when the ground station is lost; stay inside the fence."""
 _LAND: Final = 3.0
 _RETURN: Final = 3.0
 
@@ -23,15 +23,15 @@ Make = Callable[[Body, int], Autopilot]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotKind:
-    """An autopilot that a simulated drone can have; `make(body, system)` switches one on as it comes, `set_up` as a
-    person leaves it before a first flight: with the failsafes on that come switched off."""
+    """An autopilot of simulated drones; `make(body, system)` creates one with default parameters, `set_up` with the
+    failsafes enabled that are disabled by default, as before a first flight."""
 
     name: str
     title: str
     system: int
-    """Its system id unless another is asked for."""
+    """Default system id."""
     link: str
-    """Where it speaks unless told otherwise."""
+    """Default address of its link."""
     make: Make
     set_up: Make
 
@@ -49,7 +49,7 @@ def _ardupilot_47(body: Body, system: int) -> Copter:
 
 
 def _with(make: Callable[[Body, int], Copter], **parameters: float) -> Make:
-    """The same copter with these parameters set."""
+    """Return a factory of the same copter with these parameters set."""
 
     def switch_on(body: Body, system: int) -> Autopilot:
         copter = make(body, system)
@@ -86,7 +86,7 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
             ),
             AutopilotKind(
                 name="paparazzi-bare",
-                title="Paparazzi as it is built by default: its position comes at 1.25 Hz",
+                title="Paparazzi as built by default: position at 1.25 Hz",
                 system=31,
                 link="udp:127.0.0.1:4244@4245",
                 make=_bare_paparazzi,
@@ -94,7 +94,7 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
             ),
             AutopilotKind(
                 name="paparazzi-5.10",
-                title="Paparazzi of 2017, whose setting that kills the throttle has another name",
+                title="Paparazzi of 2017, in which the setting that stops the throttle has another name",
                 system=31,
                 link="udp:127.0.0.1:4244@4245",
                 make=_paparazzi_510,
@@ -130,10 +130,10 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
 
 
 def get_autopilot(name: str) -> AutopilotKind:
-    """Raises InputError when there is none of that name."""
+    """Return the autopilot of this name. Raises InputError if it is unknown."""
     if name not in AUTOPILOTS:
         raise InputError(
-            "There is no such autopilot.",
+            "This simulated autopilot is unknown.",
             problems=(Problem("autopilot", f"must be one of {', '.join(AUTOPILOTS)}, got {name!r}"),),
             hint="gainline sim-drone --help lists them.",
         )
