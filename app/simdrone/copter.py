@@ -31,7 +31,7 @@ _SIMULATED: Final = int.from_bytes(b"GAINLIN\0", "big")
 """Hardware id of a simulated drone, except its last byte."""
 _GROUND_STATION: Final = 6
 _LIST_EVERY_TICKS: Final = 2
-_TELL_TICKS: Final = whole_ticks(30.0)
+_REPORT_TICKS: Final = whole_ticks(30.0)
 _TEXT_LENGTH: Final = 50
 _LAST_TEXT: Final = 65535
 _ACTIVE: Final = 4
@@ -72,7 +72,7 @@ class Copter(ABC):
         self._codec = self.dialect.codec(system=system, component=COMPONENT)
         self._ticks = 0
         self._armed_s = 0.0
-        self._ground_heard_s: float | None = None
+        self._heartbeat_s: float | None = None
         self._is_breached = False
         self._breaches = 0
         self._listing: int | None = None
@@ -144,7 +144,7 @@ class Copter(ABC):
         self._watch_link()
         self._watch_fence()
         self._report()
-        self._tell_readiness()
+        self._report_readiness()
         out, self._out = self._out, []
         return out
 
@@ -190,7 +190,7 @@ class Copter(ABC):
     def _arm(self, *, force: bool) -> int:
         reason = None if force and not self.refuses_arming else self.arming_refusal()
         if reason is not None:
-            self.say(reason)
+            self.send_text(reason)
             return self.firmware.refused
         if not self.armed:
             self.armed, self._armed_s = True, self.boot_s
@@ -215,10 +215,10 @@ class Copter(ABC):
     def _watch_link(self) -> None:
         """React to a lost ground station, if there has been one."""
         limit_s, reaction = self.link_loss()
-        if reaction is Reaction.NONE or self._ground_heard_s is None or not self.flyer.flies:
+        if reaction is Reaction.NONE or self._heartbeat_s is None or not self.flyer.flies:
             return
-        if self.boot_s - self._ground_heard_s > limit_s:
-            self._ground_heard_s = None
+        if self.boot_s - self._heartbeat_s > limit_s:
+            self._heartbeat_s = None
             self._react(reaction, self.firmware.link_lost)
 
     def _watch_fence(self) -> None:
@@ -230,17 +230,17 @@ class Copter(ABC):
             self.send("FENCE_STATUS")
             self._react(reaction, self.firmware.fence_breached)
 
-    def _tell_readiness(self) -> None:
-        if not self.armed and self._ticks % _TELL_TICKS == 0:
-            self.tell_checks()
+    def _report_readiness(self) -> None:
+        if not self.armed and self._ticks % _REPORT_TICKS == 0:
+            self.report_checks()
 
-    def tell_checks(self) -> None:
+    def report_checks(self) -> None:
         """Report the failed arming check, if any."""
         if (reason := self.prearm_failure()) is not None:
-            self.say(self.firmware.unready + reason)
+            self.send_text(self.firmware.unready + reason)
 
     def _react(self, reaction: Reaction, reason: str) -> None:
-        self.say(reason)
+        self.send_text(reason)
         if reaction is Reaction.LAND:
             self.enter(self.find_mode(self.firmware.land))
         elif reaction is Reaction.HOLD:
@@ -248,14 +248,14 @@ class Copter(ABC):
 
     # ------------------------------------------------------------ sending
 
-    def say(self, words: str) -> None:
+    def send_text(self, text: str) -> None:
         """Send a critical STATUSTEXT; a long text is sent in several chunks with one number."""
-        self._texts = self._texts % _LAST_TEXT + 1 if len(words) > _TEXT_LENGTH else self._texts
-        for chunk, start in enumerate(range(0, len(words), _TEXT_LENGTH)):
-            number = self._texts if len(words) > _TEXT_LENGTH else 0
-            text = words[start : start + _TEXT_LENGTH]
+        self._texts = self._texts % _LAST_TEXT + 1 if len(text) > _TEXT_LENGTH else self._texts
+        for chunk, start in enumerate(range(0, len(text), _TEXT_LENGTH)):
+            number = self._texts if len(text) > _TEXT_LENGTH else 0
+            part = text[start : start + _TEXT_LENGTH]
             self._out.append(
-                OutgoingMessage("STATUSTEXT", {"severity": 2, "text": text, "id": number, "chunk_seq": chunk})
+                OutgoingMessage("STATUSTEXT", {"severity": 2, "text": part, "id": number, "chunk_seq": chunk})
             )
 
     def send(self, kind: str) -> None:
@@ -272,23 +272,23 @@ class Copter(ABC):
             self._out += [OutgoingMessage(kind, copter_telemetry.REPORTS[kind].fields(now)) for kind in due]
 
     def _snapshot(self) -> copter_telemetry.Snapshot:
-        body, manners = self._body, self.firmware
+        body, firmware = self._body, self.firmware
         return copter_telemetry.Snapshot(
             boot_s=self.boot_s,
             north_m=body.north_m,
             north_m_s=body.north_m_s,
-            local_m=body.altitude_m + manners.ground_m,
+            local_m=body.altitude_m + firmware.ground_m,
             altitude_m=body.altitude_m,
             climb_rate_m_s=body.climb_rate_m_s,
             thrust=body.thrust,
             battery_v=body.battery_v,
             armed=self.armed,
-            autopilot=manners.autopilot,
+            autopilot=firmware.autopilot,
             base_mode=self.mode.base_mode,
             custom_mode=self.mode.custom_mode,
             status=_ACTIVE if self.flyer.flies else _STANDBY,
             landed_state=_LANDED_STATES[self.flyer.phase],
-            version=manners.version,
+            version=firmware.version,
             uid=self.uid,
             breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
             breaches=self._breaches,
@@ -313,21 +313,21 @@ class Copter(ABC):
 
     # ------------------------------------------------------------ receiving
 
-    def _hear_heartbeat(self, message: Message) -> None:
+    def _on_heartbeat(self, message: Message) -> None:
         if number(message, "type") == _GROUND_STATION and self.counts_heartbeat(message):
-            self._ground_heard_s = self.boot_s
+            self._heartbeat_s = self.boot_s
 
-    def _hear_param_list(self, _message: Message) -> None:
+    def _on_param_list(self, _message: Message) -> None:
         self._listing = 0
 
-    def _hear_param_read(self, message: Message) -> None:
+    def _on_param_read(self, message: Message) -> None:
         """Send a parameter; a request for an unknown one has no reply."""
         index = int(number(message, "param_index"))
         place = self.parameters.place(text(message, "param_id")) if index < 0 else index
         if place is not None and place < len(self.parameters):
             self._send_parameter(place)
 
-    def _hear_param_set(self, message: Message) -> None:
+    def _on_param_set(self, message: Message) -> None:
         """Set a parameter without a range check; reply with the value then held."""
         place = self.parameters.place(text(message, "param_id"))
         if place is None or self.ignores_parameters:
@@ -341,23 +341,23 @@ class Copter(ABC):
             self.tune()
         self._send_parameter(place)
 
-    def _hear_set_mode(self, message: Message) -> None:
+    def _on_set_mode(self, message: Message) -> None:
         """Set the mode by the older message, which has no reply."""
         custom = int(number(message, "custom_mode"))
         mode = next((mode for mode in self.firmware.modes if mode.custom_mode == custom), None)
         if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
             self.enter(mode)
 
-    def _hear_data_stream(self, message: Message) -> None:
+    def _on_data_stream(self, message: Message) -> None:
         """Set the rate of all telemetry by the older message."""
         rate_hz = number(message, "req_message_rate") if number(message, "start_stop") else 0.0
         for kind in self.firmware.streams:
             self._timetable.set(kind, 1.0 / rate_hz if rate_hz > 0.0 else 0.0)
 
-    def _hear_command(self, message: Message) -> None:
+    def _on_command(self, message: Message) -> None:
         command = int(number(message, "command"))
-        obey = _COMMANDS.get(command)
-        result = UNSUPPORTED if obey is None else obey(self, message)
+        handler = _COMMANDS.get(command)
+        result = UNSUPPORTED if handler is None else handler(self, message)
         self._acknowledge(message, command, result)
 
     def _handle_arm(self, message: Message) -> int:
@@ -365,12 +365,12 @@ class Copter(ABC):
         if number(message, "param1") > 0.5:
             return self._arm(force=force)
         if not (self.flyer.is_landed or force):
-            self.say(self.firmware.not_landed)
+            self.send_text(self.firmware.not_landed)
             return self.firmware.refused
         self._disarm()
         return ACCEPTED
 
-    def _obey_mode(self, message: Message) -> int:
+    def _handle_mode(self, message: Message) -> int:
         main, sub = number(message, "param2"), number(message, "param3")
         mode = self.requested_mode(_whole(main), _whole(sub))
         if mode is None or not _whole(number(message, "param1")) & _CUSTOM_MODE:
@@ -378,14 +378,14 @@ class Copter(ABC):
         self.enter(mode)
         return ACCEPTED
 
-    def _obey_take_off(self, message: Message) -> int:
+    def _handle_take_off(self, message: Message) -> int:
         return self.take_off(number(message, "param7"))
 
-    def _obey_land(self, _message: Message) -> int:
+    def _handle_land(self, _message: Message) -> int:
         self.enter(self.find_mode(self.firmware.land))
         return ACCEPTED
 
-    def _obey_interval(self, message: Message) -> int:
+    def _handle_interval(self, message: Message) -> int:
         """Set the interval of a message in microseconds; 0 is the default, less than 0 never."""
         kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
         if kind is None:
@@ -395,24 +395,24 @@ class Copter(ABC):
         self._timetable.set(kind, default_s if interval_us == 0.0 else interval_us / 1e6)
         return ACCEPTED
 
-    def _obey_request(self, message: Message) -> int:
+    def _handle_request(self, message: Message) -> int:
         kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
         if kind is None:
             return UNSUPPORTED
         self.send(kind)
         return ACCEPTED
 
-    def _obey_checks(self, _message: Message) -> int:
+    def _handle_checks(self, _message: Message) -> int:
         if self.armed:
             return TEMPORARILY_REJECTED
-        self.tell_checks()
+        self.report_checks()
         return ACCEPTED
 
-    def _obey_capabilities(self, _message: Message) -> int:
+    def _handle_capabilities(self, _message: Message) -> int:
         self.send("AUTOPILOT_VERSION")
         return ACCEPTED
 
-    def _obey_home(self, _message: Message) -> int:
+    def _handle_home(self, _message: Message) -> int:
         self.send("HOME_POSITION")
         return ACCEPTED
 
@@ -430,23 +430,23 @@ _LANDED_STATES: Final = {
 }
 
 _HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
-    "HEARTBEAT": Copter._hear_heartbeat,
-    "PARAM_REQUEST_LIST": Copter._hear_param_list,
-    "PARAM_REQUEST_READ": Copter._hear_param_read,
-    "PARAM_SET": Copter._hear_param_set,
-    "REQUEST_DATA_STREAM": Copter._hear_data_stream,
-    "SET_MODE": Copter._hear_set_mode,
-    "COMMAND_LONG": Copter._hear_command,
+    "HEARTBEAT": Copter._on_heartbeat,
+    "PARAM_REQUEST_LIST": Copter._on_param_list,
+    "PARAM_REQUEST_READ": Copter._on_param_read,
+    "PARAM_SET": Copter._on_param_set,
+    "REQUEST_DATA_STREAM": Copter._on_data_stream,
+    "SET_MODE": Copter._on_set_mode,
+    "COMMAND_LONG": Copter._on_command,
 }
 
 _COMMANDS: Final[Mapping[int, Callable[[Copter, Message], int]]] = {
-    LAND: Copter._obey_land,
-    TAKE_OFF: Copter._obey_take_off,
-    SET_MODE: Copter._obey_mode,
+    LAND: Copter._handle_land,
+    TAKE_OFF: Copter._handle_take_off,
+    SET_MODE: Copter._handle_mode,
     ARM_DISARM: Copter._handle_arm,
-    RUN_PREARM_CHECKS: Copter._obey_checks,
-    GET_HOME: Copter._obey_home,
-    SET_INTERVAL: Copter._obey_interval,
-    REQUEST_MESSAGE: Copter._obey_request,
-    REQUEST_CAPABILITIES: Copter._obey_capabilities,
+    RUN_PREARM_CHECKS: Copter._handle_checks,
+    GET_HOME: Copter._handle_home,
+    SET_INTERVAL: Copter._handle_interval,
+    REQUEST_MESSAGE: Copter._handle_request,
+    REQUEST_CAPABILITIES: Copter._handle_capabilities,
 }

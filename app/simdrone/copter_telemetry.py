@@ -103,7 +103,7 @@ def vfr_hud(now: Snapshot) -> Fields:
 
 
 def sys_status(now: Snapshot) -> Fields:
-    sensors = dict.fromkeys((f"onboard_control_sensors_{word}" for word in ("present", "enabled", "health")), _SENSORS)
+    sensors = dict.fromkeys((f"onboard_control_sensors_{bits}" for bits in ("present", "enabled", "health")), _SENSORS)
     errors = dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
     sensors["onboard_control_sensors_health"] -= 0 if now.ready else _PREARM
     return {

@@ -53,21 +53,21 @@ class Drone:
 
     def receive(self, data: bytes) -> None:
         """Process bytes received over the link."""
-        if not self._faults.is_deaf and self.time_s >= self._silent_until_s:
+        if not self._faults.receives_nothing and self.time_s >= self._silent_until_s:
             self.autopilot.receive(data)
 
     def tick(self) -> list[bytes]:
         """Advance by one tick; return the packets sent. Raises VehicleError if the simulation diverged."""
         self._faults.update(self.time_s, self._takeoff_s, self)
         self._ticks += 1
-        seen = self._outlet.send(self.cameras.look(self.time_s, self.body.altitude_m)) if self._outlet else []
+        seen = self._outlet.send(self.cameras.advance(self.time_s, self.body.altitude_m)) if self._outlet else []
         if self.time_s < self._silent_until_s:
             self.body.advance(TICK_STEPS, MOTORS_OFF)
             return []
-        letters = self._faults.letters([*self.autopilot.tick(), *seen])
+        messages = self._faults.messages([*self.autopilot.tick(), *seen])
         if self._takeoff_s is None and self.autopilot.took_off:
             self._takeoff_s = self.time_s
-        return self._faults.frames([self._packed(letter) for letter in letters])
+        return self._faults.frames([self._packed(message) for message in messages])
 
     def reboot(self) -> None:
         """Restart the autopilot in any state of the body; its faults persist."""
@@ -78,12 +78,12 @@ class Drone:
         self._codecs.clear()
         self._silent_until_s = self.time_s + BOOT_S
 
-    def _packed(self, letter: OutgoingMessage) -> bytes:
-        system = letter.system or self.autopilot.system
-        key = (letter.counter, system)
+    def _packed(self, message: OutgoingMessage) -> bytes:
+        system = message.system or self.autopilot.system
+        key = (message.counter, system)
         if key not in self._codecs:
             self._codecs[key] = self.autopilot.dialect.codec(system=system, component=self.autopilot.component)
-        return self._codecs[key].pack(self.autopilot.dialect.message(letter.kind, letter.fields))
+        return self._codecs[key].pack(self.autopilot.dialect.message(message.kind, message.fields))
 
 
 PEER: Final[Peer] = ("lockstep", 0)
@@ -121,9 +121,9 @@ class Lockstep:
     # ---- the ground side's transport
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:  # noqa: ARG002 - nothing more comes by itself
-        heard = [(frame, PEER) for frame in self._frames]
+        frames = [(frame, PEER) for frame in self._frames]
         self._frames.clear()
-        return heard
+        return frames
 
     def write(self, data: bytes) -> bool:
         self.drone.receive(data)
@@ -179,7 +179,7 @@ class Server:
                 self.lost_s += behind_s - LARGEST_LAG_S
                 start_s += behind_s - LARGEST_LAG_S
                 behind_s = LARGEST_LAG_S
-            self._hear(self._clock.wall_s(TICK_S - behind_s))
+            self._receive(self._clock.wall_s(TICK_S - behind_s))
             for _ in range(min(int(behind_s / TICK_S), TICKS_AT_ONCE)):
                 self._send(self._drone.tick())
 
@@ -188,7 +188,7 @@ class Server:
         self._stopping.set()
         self._transport.wake()
 
-    def _hear(self, wait_s: float) -> None:
+    def _receive(self, wait_s: float) -> None:
         """Receive from the link; very short waits are rounded up."""
         for data, peer in self._transport.read(max(wait_s, _SHORTEST_WAIT_S) if wait_s > 0.0 else 0.0):
             if self._transport.remote is None:

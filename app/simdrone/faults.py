@@ -45,16 +45,16 @@ class Fault:
     def end(self, drone: FaultTarget) -> None:
         """End the fault."""
 
-    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         """Return the changed messages of one tick."""
-        return list(letters)
+        return list(messages)
 
     def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
         """Return the changed packets of one tick."""
         return list(frames)
 
     @property
-    def is_deaf(self) -> bool:
+    def receives_nothing(self) -> bool:
         """Whether nothing is received."""
         return False
 
@@ -64,8 +64,8 @@ class NoHeartbeat(Fault):
 
     name = "no-heartbeat"
 
-    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [letter for letter in letters if letter.kind != "HEARTBEAT"]
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [message for message in messages if message.kind != "HEARTBEAT"]
 
 
 class ParamUnconfirmed(Fault):
@@ -113,7 +113,7 @@ class LinkLost(Fault):
         return []
 
     @property
-    def is_deaf(self) -> bool:
+    def receives_nothing(self) -> bool:
         return True
 
 
@@ -123,7 +123,7 @@ class Deaf(Fault):
     name = "deaf"
 
     @property
-    def is_deaf(self) -> bool:
+    def receives_nothing(self) -> bool:
         return True
 
 
@@ -146,9 +146,10 @@ class FrozenPosition(Fault):
     name: ClassVar[str] = "frozen-position"
     _held: dict[str, OutgoingMessage] = field(default_factory=dict)
 
-    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
         return [
-            self._held.setdefault(letter.kind, letter) if letter.kind in _POSITIONS else letter for letter in letters
+            self._held.setdefault(message.kind, message) if message.kind in _POSITIONS else message
+            for message in messages
         ]
 
 
@@ -159,16 +160,16 @@ class JumpingPosition(Fault):
     name: ClassVar[str] = "jumping-position"
     _count: int = 0
 
-    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [self._jumped(letter) for letter in letters]
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [self._jumped(message) for message in messages]
 
-    def _jumped(self, letter: OutgoingMessage) -> OutgoingMessage:
-        z = letter.fields.get("z")
-        if letter.kind != "LOCAL_POSITION_NED" or not isinstance(z, int | float):
-            return letter
+    def _jumped(self, message: OutgoingMessage) -> OutgoingMessage:
+        z = message.fields.get("z")
+        if message.kind != "LOCAL_POSITION_NED" or not isinstance(z, int | float):
+            return message
         self._count += 1
         jumps = self._count % _JUMP_EVERY == 0
-        return replace(letter, fields={**letter.fields, "z": z - _JUMP_M}) if jumps else letter
+        return replace(message, fields={**message.fields, "z": z - _JUMP_M}) if jumps else message
 
 
 class LowBattery(Fault):
@@ -176,8 +177,8 @@ class LowBattery(Fault):
 
     name = "low-battery"
 
-    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [replace(letter, fields=_drained(letter.fields)) for letter in letters]
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [replace(message, fields=_drained(message.fields)) for message in messages]
 
 
 class Reboot(Fault):
@@ -198,11 +199,11 @@ class DuplicatedPackets(Fault):
     _count: int = 0
 
     def transform_frames(self, frames: Sequence[bytes]) -> list[bytes]:
-        doubled: list[bytes] = []
+        repeated: list[bytes] = []
         for frame in frames:
             self._count += 1
-            doubled += [frame] * (2 if self._count % _TWICE_EVERY == 0 else 1)
-        return doubled
+            repeated += [frame] * (2 if self._count % _TWICE_EVERY == 0 else 1)
+        return repeated
 
 
 @dataclass
@@ -230,8 +231,8 @@ class WrongSystem(Fault):
 
     name = "wrong-system"
 
-    def transform_messages(self, letters: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [replace(letter, system=_WRONG_SYSTEM) for letter in letters]
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [replace(message, system=_WRONG_SYSTEM) for message in messages]
 
 
 class CarriedAway(Fault):
@@ -361,13 +362,13 @@ class Faults:
             entry[1].end(drone)
 
     @property
-    def is_deaf(self) -> bool:
-        return any(fault.is_deaf for _, fault in self._working)
+    def receives_nothing(self) -> bool:
+        return any(fault.receives_nothing for _, fault in self._working)
 
-    def letters(self, letters: list[OutgoingMessage]) -> list[OutgoingMessage]:
+    def messages(self, messages: list[OutgoingMessage]) -> list[OutgoingMessage]:
         for _, fault in self._working:
-            letters = fault.transform_messages(letters)
-        return letters
+            messages = fault.transform_messages(messages)
+        return messages
 
     def frames(self, frames: list[bytes]) -> list[bytes]:
         for _, fault in self._working:

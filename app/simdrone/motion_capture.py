@@ -55,7 +55,7 @@ class MotionCapture:
         """Fault: the altitude drifts from the true one by 0.1 m/s."""
         self._last = MocapFrame(0, 0.0, (0.0, 0.0, 0.0), tracked=False)
 
-    def look(self, time_s: float, altitude_m: float) -> list[MocapFrame]:
+    def advance(self, time_s: float, altitude_m: float) -> list[MocapFrame]:
         """Return the frames sent in the tick that ends at `time_s`; the body's horizontal position is constant."""
         frame = int(time_s * RATE_HZ)
         if frame > self._frame:
@@ -70,15 +70,15 @@ class MotionCapture:
         self._drift_m += DRIFT_M_S / RATE_HZ if self.drifts else 0.0
         x, y, noise = (self._random.gauss(0.0, NOISE_M) for _ in range(3))
         seen = (x, y, altitude_m + self._drift_m + noise)
-        glimpse = MocapFrame(self._frame, time_s, self._last.position_m if self.blind else seen, not self.blind)
-        self._last = self._last if self.stuck else glimpse
-        return glimpse
+        sample = MocapFrame(self._frame, time_s, self._last.position_m if self.blind else seen, not self.blind)
+        self._last = self._last if self.stuck else sample
+        return sample
 
 
 class MocapOutput(Protocol):
     """Output of motion capture frames."""
 
-    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+    def send(self, samples: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         """Send frames; return the messages to send over the drone's own link."""
         ...
 
@@ -89,9 +89,9 @@ class VehicleLinkOutput:
     """Output as VISION_POSITION_ESTIMATE among the drone's own messages, which every version of MAVLink has. It cannot
     report that the body is not tracked, so nothing is sent then."""
 
-    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+    def send(self, samples: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         return [
-            OutgoingMessage("VISION_POSITION_ESTIMATE", _vision(each), "cameras") for each in glimpses if each.tracked
+            OutgoingMessage("VISION_POSITION_ESTIMATE", _vision(each), "cameras") for each in samples if each.tracked
         ]
 
     def close(self) -> None:
@@ -105,9 +105,9 @@ class OdometryOutput:
         self._transport: Transport = open_transport(address.link)
         self._codec = COMMON.codec(system=_SYSTEM, component=_COMPONENT)
 
-    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
-        for glimpse in glimpses:
-            self._transport.write(self._codec.pack(COMMON.message("ODOMETRY", _odometry(glimpse))))
+    def send(self, samples: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+        for sample in samples:
+            self._transport.write(self._codec.pack(COMMON.message("ODOMETRY", _odometry(sample))))
         return []
 
     def close(self) -> None:
@@ -135,10 +135,10 @@ class NatNetServer:
         group = (address.multicast, address.data_port)
         self._listeners: set[tuple[str, int]] = {group} if address.multicast else set()
 
-    def send(self, glimpses: Sequence[MocapFrame]) -> list[OutgoingMessage]:
+    def send(self, samples: Sequence[MocapFrame]) -> list[OutgoingMessage]:
         self._answer()
-        for glimpse in glimpses:
-            packet = frame_packet(glimpse, self._address.body, up=self._address.up)
+        for sample in samples:
+            packet = frame_packet(sample, self._address.body, up=self._address.up)
             for listener in self._listeners:
                 self._send(packet, listener)
         return []
@@ -180,33 +180,33 @@ def server_packet(version: Version) -> bytes:
     return _packet(_SERVER_INFO, struct.pack("<256s4B4BQ", b"Gainline sim-drone", 3, 1, 0, 0, *version, _TICKS_HZ))
 
 
-def frame_packet(glimpse: MocapFrame, body: int, *, up: str) -> bytes:
+def frame_packet(sample: MocapFrame, body: int, *, up: str) -> bytes:
     """Return NAT_FRAMEOFDATA of NatNet 4.1: lists with count and size in bytes, all empty except that of bodies."""
-    north, east, height = glimpse.position_m
+    north, east, height = sample.position_m
     place = (north, height, east) if up == "y" else (north, -east, height)
-    pose = struct.pack("<I3f4ffH", body, *place, 0.0, 0.0, 0.0, 1.0, 0.0002, int(glimpse.tracked))
+    pose = struct.pack("<I3f4ffH", body, *place, 0.0, 0.0, 0.0, 1.0, 0.0002, int(sample.tracked))
     empty = struct.pack("<II", 0, 0)
-    ticks = round(glimpse.time_s * _TICKS_HZ)
-    suffix = struct.pack("<IIdQQQHI", 0, 0, glimpse.time_s, ticks, ticks, ticks, 0, 0)
+    ticks = round(sample.time_s * _TICKS_HZ)
+    suffix = struct.pack("<IIdQQQHI", 0, 0, sample.time_s, ticks, ticks, ticks, 0, 0)
     bodies = struct.pack("<II", 1, len(pose)) + pose
-    return _packet(_FRAME, struct.pack("<I", glimpse.frame) + 2 * empty + bodies + 5 * empty + suffix)
+    return _packet(_FRAME, struct.pack("<I", sample.frame) + 2 * empty + bodies + 5 * empty + suffix)
 
 
 def _packet(kind: int, payload: bytes) -> bytes:
     return struct.pack("<HH", kind, len(payload)) + payload
 
 
-def _vision(glimpse: MocapFrame) -> dict[str, FieldValue]:
-    x, y, z = glimpse.position_m
-    return {"usec": round(glimpse.time_s * 1e6), "x": x, "y": y, "z": -z, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
+def _vision(sample: MocapFrame) -> dict[str, FieldValue]:
+    x, y, z = sample.position_m
+    return {"usec": round(sample.time_s * 1e6), "x": x, "y": y, "z": -z, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
 
 
-def _odometry(glimpse: MocapFrame) -> dict[str, FieldValue]:
-    x, y, z = glimpse.position_m
+def _odometry(sample: MocapFrame) -> dict[str, FieldValue]:
+    x, y, z = sample.position_m
     unknown = [float("nan"), *(0.0 for _ in range(20))]
     still = dict.fromkeys(("vx", "vy", "vz", "rollspeed", "pitchspeed", "yawspeed"), 0.0)
     return {
-        "time_usec": round(glimpse.time_s * 1e6),
+        "time_usec": round(sample.time_s * 1e6),
         "frame_id": 1,
         "child_frame_id": 12,
         "x": x,
@@ -216,5 +216,5 @@ def _odometry(glimpse: MocapFrame) -> dict[str, FieldValue]:
         **still,
         "pose_covariance": unknown,
         "velocity_covariance": unknown,
-        "quality": 100 if glimpse.tracked else -1,
+        "quality": 100 if sample.tracked else -1,
     }

@@ -83,7 +83,7 @@ _REFERENCE_LAG_S: Final = 2 * 0.85 / math.radians(100.0)
 class Paparazzi:
     """One autopilot from power-on; see `Autopilot`. `tuned_telemetry`: it was built with a telemetry file that sends
     the position at 51 Hz; otherwise the rate is 1.25 Hz. `kill_setting`, `landed_after_s` and `max_distance_m` are as
-    in its settings and its flight plan; `tells_mode`: its heartbeat contains the mode's number."""
+    in its settings and its flight plan; `sends_mode`: its heartbeat contains the mode's number."""
 
     def __init__(
         self,
@@ -94,7 +94,7 @@ class Paparazzi:
         kill_setting: str = KILL_SETTING,
         landed_after_s: float = LANDED_AFTER_S,
         max_distance_m: float = MAX_DISTANCE_M,
-        tells_mode: bool = False,
+        sends_mode: bool = False,
     ) -> None:
         self.dialect = PAPARAZZI
         self.system, self.component = system, COMPONENT
@@ -109,7 +109,7 @@ class Paparazzi:
         self._settings = Settings(kill_setting)
         self._plan = FlightPlan(landed_after_s=landed_after_s)
         self._max_distance_m = max_distance_m
-        self._tells_mode = tells_mode
+        self._sends_mode = sends_mode
         self._motors_on = False
         self._reported_seq: int | None = None
         self._listing: int | None = None
@@ -290,7 +290,7 @@ class Paparazzi:
             motors_on=self.armed,
             north_m=body.north_m,
             north_m_s=body.north_m_s,
-            tells_mode=self._tells_mode,
+            sends_mode=self._sends_mode,
         )
 
     def _send(self, kind: str, *, counter: str = "", **fields: FieldValue) -> None:
@@ -318,16 +318,16 @@ class Paparazzi:
             if handler is not None and number(message, "target_system") == self.system:
                 handler(self, message)
 
-    def _hear_param_list(self, _message: Message) -> None:
+    def _on_param_list(self, _message: Message) -> None:
         self._listing = 0
 
-    def _hear_param_read(self, message: Message) -> None:
+    def _on_param_read(self, message: Message) -> None:
         index = int(number(message, "param_index"))
         place = self._settings.find(text(message, "param_id")) if index < 0 else index
         if place is not None:
             self._send_setting(place)
 
-    def _hear_param_set(self, message: Message) -> None:
+    def _on_param_set(self, message: Message) -> None:
         """Set a parameter; wrong types, NaN and unknown names have no reply."""
         name, value = text(message, "param_id"), number(message, "param_value")
         place = self._settings.find(name)
@@ -349,7 +349,7 @@ class Paparazzi:
         if name == "gui_v_ki":
             self._body.forget_error_sum()
 
-    def _hear_command(self, message: Message) -> None:
+    def _on_command(self, message: Message) -> None:
         command, param1 = int(number(message, "command")), number(message, "param1")
         result = UNSUPPORTED
         if command == _ARM_DISARM:
@@ -358,32 +358,32 @@ class Paparazzi:
             result = ACCEPTED if self.armed == wanted else FAILED
         self._send("COMMAND_ACK", command=command, result=result)
 
-    def _hear_set_mode(self, message: Message) -> None:
+    def _on_set_mode(self, message: Message) -> None:
         self._set_motors(on=bool(int(number(message, "base_mode")) & ARMED))
 
-    def _hear_data_stream(self, message: Message) -> None:
+    def _on_data_stream(self, message: Message) -> None:
         self._send("DATA_STREAM", stream_id=int(number(message, "req_stream_id")), message_rate=0, on_off=0)
 
-    def _hear_block_list(self, message: Message) -> None:
+    def _on_block_list(self, message: Message) -> None:
         self._begin_transaction()
         self._send("SCRIPT_COUNT", counter="blocks", count=len(BLOCKS), **_sender(message))
 
-    def _hear_block_request(self, message: Message) -> None:
+    def _on_block_request(self, message: Message) -> None:
         seq = int(number(message, "seq"))
         if not self._is_listing_blocks or seq >= len(BLOCKS):
             return
         self._begin_transaction()
         self._send("SCRIPT_ITEM", counter="blocks", seq=seq, name=BLOCKS[seq].name, **_sender(message))
 
-    def _hear_block(self, message: Message) -> None:
+    def _on_block(self, message: Message) -> None:
         """Enter a block, unless the list is being read or no block is flown; there is no reply in any case."""
         if not self._is_listing_blocks and self.mode not in _KEEP_THEIR_BLOCK:
             self._enter(int(number(message, "seq")))
 
-    def _hear_mission_ack(self, _message: Message) -> None:
+    def _on_mission_ack(self, _message: Message) -> None:
         self._transaction_ends_s = 0.0
 
-    def _hear_waypoint(self, message: Message) -> None:
+    def _on_waypoint(self, message: Message) -> None:
         seq, height_m = int(number(message, "seq")), number(message, "z")
         is_waypoint = number(message, "frame") == _LOCAL_ENU and number(message, "command") == _NAV_WAYPOINT
         if not is_waypoint or seq >= len(WAYPOINTS) or not abs(height_m) <= _HIGHEST_M:
@@ -425,15 +425,15 @@ def _sender(message: Message) -> dict[str, int]:
 
 
 _HANDLERS: Final[Mapping[str, Callable[[Paparazzi, Message], None]]] = {
-    "PARAM_REQUEST_LIST": Paparazzi._hear_param_list,
-    "PARAM_REQUEST_READ": Paparazzi._hear_param_read,
-    "PARAM_SET": Paparazzi._hear_param_set,
-    "COMMAND_LONG": Paparazzi._hear_command,
-    "SET_MODE": Paparazzi._hear_set_mode,
-    "REQUEST_DATA_STREAM": Paparazzi._hear_data_stream,
-    "SCRIPT_REQUEST_LIST": Paparazzi._hear_block_list,
-    "SCRIPT_REQUEST": Paparazzi._hear_block_request,
-    "SCRIPT_ITEM": Paparazzi._hear_block,
-    "MISSION_ACK": Paparazzi._hear_mission_ack,
-    "MISSION_ITEM": Paparazzi._hear_waypoint,
+    "PARAM_REQUEST_LIST": Paparazzi._on_param_list,
+    "PARAM_REQUEST_READ": Paparazzi._on_param_read,
+    "PARAM_SET": Paparazzi._on_param_set,
+    "COMMAND_LONG": Paparazzi._on_command,
+    "SET_MODE": Paparazzi._on_set_mode,
+    "REQUEST_DATA_STREAM": Paparazzi._on_data_stream,
+    "SCRIPT_REQUEST_LIST": Paparazzi._on_block_list,
+    "SCRIPT_REQUEST": Paparazzi._on_block_request,
+    "SCRIPT_ITEM": Paparazzi._on_block,
+    "MISSION_ACK": Paparazzi._on_mission_ack,
+    "MISSION_ITEM": Paparazzi._on_waypoint,
 }

@@ -53,7 +53,7 @@ class Snapshot:
     motors_on: bool
     north_m: float
     north_m_s: float
-    tells_mode: bool
+    sends_mode: bool
 
     @property
     def boot_ms(self) -> int:
@@ -72,7 +72,7 @@ def heartbeat(now: Snapshot) -> Fields:
         "type": 2,
         "autopilot": 9,
         "base_mode": mode | (ARMED if now.motors_on else 0),
-        "custom_mode": now.mode if now.tells_mode else 0,
+        "custom_mode": now.mode if now.sends_mode else 0,
         "system_status": 4 if now.motors_on else 3,
         "mavlink_version": 3,
     }

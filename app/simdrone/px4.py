@@ -117,37 +117,37 @@ class Px4(Copter):
         self._cascade = TwoStage()
         super().__init__(body, self._cascade, system=system)
         self._events = 0
-        self._told_failing: bool | None = None
+        self._reported_failing: bool | None = None
 
     def tick(self) -> list[OutgoingMessage]:
         """Advance by one tick. At its takeoff height it switches to hold, and also once it has landed and disarmed. If
         Land is commanded after that, it stays in the landing mode, and does not arm."""
         was_armed = self.armed
-        letters = super().tick()
-        if self._is_failing != self._told_failing:
-            self._tell_events()
+        messages = super().tick()
+        if self._is_failing != self._reported_failing:
+            self._send_check_events()
         if was_armed and not self.armed and self.mode.behaviour is Behaviour.LAND:
             self.mode = self.find_mode(self.firmware.hold)
         if self.mode.name == _TAKEOFF and self.flyer.phase is Phase.HOLDING:
             self.mode = self.find_mode(self.firmware.hold)
-        return letters
+        return messages
 
     def prearm_failure(self) -> str | None:
         """Return why it cannot be armed, including the mode."""
         return self.arming_refusal()
 
-    def tell_checks(self) -> None:
-        super().tell_checks()
-        self._tell_events()
+    def report_checks(self) -> None:
+        super().report_checks()
+        self._send_check_events()
 
     @property
     def _is_failing(self) -> bool:
         """Whether it has no position estimate, which prevents arming in every mode."""
         return Copter.prearm_failure(self) is not None
 
-    def _tell_events(self) -> None:
+    def _send_check_events(self) -> None:
         """Send the results of its arming checks as events, in the order of the events interface."""
-        failing = self._told_failing = self._is_failing
+        failing = self._reported_failing = self._is_failing
         self._send_event(
             ARMING_CHECK_SUMMARY,
             *(0, 1 << _LOCAL_POSITION if failing else 0, 0),
@@ -194,7 +194,7 @@ class Px4(Copter):
         self.mode = self.find_mode(_TAKEOFF)
         height_m = param7 - HOME_AMSL_M if math.isfinite(param7) else self.parameters["MIS_TAKEOFF_ALT"]
         if height_m <= 0.0:
-            self.say("Already higher than takeoff altitude")
+            self.send_text("Already higher than takeoff altitude")
         elif self.armed and not self.flyer.flies:
             self.climb(height_m, self.parameters["MPC_TKO_SPEED"])
         return ACCEPTED

@@ -1,1 +1,1 @@
-"""Vehicles that speak MAVLink: the ground side."""
+"""Ground side of vehicles with MAVLink autopilots."""

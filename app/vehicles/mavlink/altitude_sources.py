@@ -16,14 +16,14 @@ from app.vehicles.mavlink.link import Received
 class SourceSample:
     """One sample of a source.
 
-    `received_s`: time of receipt by the clock passed to the source, which also stamps the vehicle's messages; `seen_s`:
-    time of the measurement on the same clock, up to a constant latency, without variable delays; `altitude_m`: positive
-    up from the source's own zero; `tracking_valid`: false if the source reports that it does not track the vehicle;
-    `advances`: false if it repeats an old frame.
+    `received_s`: time of receipt by the clock passed to the source, which also stamps the vehicle's messages;
+    `measured_s`: time of the measurement on the same clock, up to a constant latency, without variable delays;
+    `altitude_m`: positive up from the source's own zero; `tracking_valid`: false if the source reports that it does not
+    track the vehicle; `advances`: false if it repeats an old frame.
     """
 
     received_s: float
-    seen_s: float
+    measured_s: float
     altitude_m: float
     tracking_valid: bool
     advances: bool
@@ -56,7 +56,7 @@ class AltitudeSource(Protocol):
 class AlignedAltitudeSource:
     """Source whose altitudes are converted to the vehicle's datum by their values on the ground.
 
-    `seen` are the samples of the flight so far, as `SourceSample.seen_s` and altitude (m) on the vehicle's datum.
+    `seen` are the samples of the flight so far, as `SourceSample.measured_s` and altitude (m) on the vehicle's datum.
     """
 
     def __init__(self, source: AltitudeSource) -> None:
@@ -82,7 +82,7 @@ class AlignedAltitudeSource:
     def take_samples(self) -> list[SecondaryAltitudeReceived]:
         """Return the samples since the last call as events."""
         samples = [(sample, sample.tracking_valid and sample.advances) for sample in self.source.take()]
-        self.seen += [(sample.seen_s, sample.altitude_m + self._rise_m) for sample, is_new in samples if is_new]
+        self.seen += [(sample.measured_s, sample.altitude_m + self._rise_m) for sample, is_new in samples if is_new]
         return [
             SecondaryAltitudeReceived(
                 altitude_m=sample.altitude_m + self._rise_m, is_new=is_new, now_s=sample.received_s

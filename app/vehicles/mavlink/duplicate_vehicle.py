@@ -45,21 +45,21 @@ class DuplicateDetector:
         self._latest = -1
         self._clocks: dict[int, tuple[float, float]] = {}
         self._clock = 0
-        self._doubled_numbers: deque[float] = deque()
-        self._doubled_clocks: deque[float] = deque()
+        self._repeated_numbers: deque[float] = deque()
+        self._clock_changes: deque[float] = deque()
         self._certain_s: float | None = None
         self._why = ""
 
     def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None) -> None:
         """Add a message by its whole frame and sequence number; `boot_s` is its time stamp, if it has one."""
-        if self._hear_number(frame, number, now_s) and boot_s is not None:
-            self._hear_clock(boot_s - now_s, now_s)
+        if self._add_number(frame, number, now_s) and boot_s is not None:
+            self._add_clock(boot_s - now_s, now_s)
 
     def reason(self, now_s: float) -> str:
         """Return the evidence for two vehicles; empty without evidence."""
-        if self._is_certain(self._doubled_numbers, now_s):
+        if self._is_certain(self._repeated_numbers, now_s):
             self._certain_s, self._why = now_s, "Its sequence numbers are repeated with different contents."
-        elif self._is_certain(self._doubled_clocks, now_s):
+        elif self._is_certain(self._clock_changes, now_s):
             self._certain_s, self._why = now_s, "Its messages alternate between two clocks."
         is_recent = self._certain_s is not None and now_s - self._certain_s < REMEMBERED_S
         return self._why if is_recent else ""
@@ -69,7 +69,7 @@ class DuplicateDetector:
             evidence.popleft()
         return len(evidence) >= PIECES and evidence[-1] - evidence[0] >= LASTS_S
 
-    def _hear_number(self, frame: bytes, number: int, now_s: float) -> bool:
+    def _add_number(self, frame: bytes, number: int, now_s: float) -> bool:
         """Process a sequence number; return whether the packet is in order, neither repeated nor late."""
         self._count += 1
         used = self._used.get(number)
@@ -85,7 +85,7 @@ class DuplicateDetector:
         late = behind if is_late else 0
         self._used[number] = _Used(now_s - late / self._rate.number_hz, self._count - late, frame)
         if is_taken:
-            self._doubled_numbers.append(now_s)
+            self._repeated_numbers.append(now_s)
         return not is_late
 
     def _is_of_this_round(self, used: _Used, now_s: float) -> bool:
@@ -93,12 +93,12 @@ class DuplicateDetector:
         round_s = _OF_A_ROUND * NUMBERS / self._rate.number_hz
         return self._count - used.count < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
 
-    def _hear_clock(self, offset_s: float, now_s: float) -> None:
+    def _add_clock(self, offset_s: float, now_s: float) -> None:
         """Process a clock offset; evidence is a return from another clock to a recent one."""
         for clock, (known_s, at_s) in self._clocks.items():
             if abs(offset_s - known_s) < _SAME_CLOCK_S and now_s - at_s < WITHIN_S:
                 if clock != self._clock:
-                    self._doubled_clocks.append(now_s)
+                    self._clock_changes.append(now_s)
                     self._clock = clock
                 self._clocks[clock] = (offset_s, now_s)
                 return

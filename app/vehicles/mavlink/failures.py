@@ -36,7 +36,7 @@ class Failure(StrEnum):
     UNEXPECTED = "F10b"
     INTERRUPTED = "F10c"
     OWN_LANDING = "F11"
-    DOUBLED = "F12"
+    DUPLICATE = "F12"
     FALL = "F13"
 
 
@@ -139,7 +139,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "invalid",
             "The vehicle began to land by itself.",
         ),
-        Failure.DOUBLED: Response(
+        Failure.DUPLICATE: Response(
             "repeated sequence numbers with different contents, or two alternating clocks, under one system id",
             "land",
             "quarantine",
@@ -157,7 +157,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
 
 HELP: Final = "fly it manually, or stop its motors"
 """What the operator can still do if a vehicle does not respond to Land."""
-UNHEEDED: Final = f"It was commanded to land but does not descend: {HELP}."
+NOT_DESCENDING: Final = f"It was commanded to land but does not descend: {HELP}."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,7 +175,7 @@ GAIN_FAILURES: Final = frozenset(
 integrator wound up, is treated in the same way."""
 
 
-MAX_WITNESS_GAP: Final = 1.05
+CONFIRMATION_PERIODS: Final = 1.05
 """Heartbeat periods between two heartbeats that confirm each other: a contradicting one would arrive between them."""
 HEARTBEATS_MISSED: Final = 3.5
 """Heartbeat periods without a heartbeat after which the vehicle counts as lost."""
@@ -185,7 +185,7 @@ REPEAT_S: Final = 1.0
 """Interval at which a command is repeated until the vehicle responds."""
 _LAND_REPEATED_S: Final = 5.0
 """Time for which Land is repeated every `REPEAT_S`."""
-UNHEEDED_S: Final = 5.0
+NOT_DESCENDING_AFTER_S: Final = 5.0
 """Time after the command to land after which a vehicle that does not descend is reported."""
 DESCENDING_M_S: Final = -0.2
 """A vehicle that descends faster than this is landing."""
@@ -228,21 +228,21 @@ class Limits:
     @property
     def confirmation_s(self) -> float:
         """Minimum time between two heartbeats that confirm each other."""
-        return MAX_WITNESS_GAP * self.heartbeat_s
+        return CONFIRMATION_PERIODS * self.heartbeat_s
 
-    def stretched(self, patience: float) -> "Limits":
+    def stretched(self, factor: float) -> "Limits":
         """Return the limits with all timeouts for packets multiplied by this factor."""
         return replace(
             self,
-            heartbeat_s=self.heartbeat_s * patience,
-            silent_s=self.silent_s * patience,
-            stuck_s=self.stuck_s * patience,
-            lost_s=self.lost_s * patience,
-            slow_s=self.slow_s * patience,
+            heartbeat_s=self.heartbeat_s * factor,
+            silent_s=self.silent_s * factor,
+            stuck_s=self.stuck_s * factor,
+            lost_s=self.lost_s * factor,
+            slow_s=self.slow_s * factor,
         )
 
 
-def land_every_s(asked_for_s: float, land_again_s: float) -> float:
-    """Return the interval at which Land is repeated, s, `asked_for_s` after the first command. After some seconds it is
+def land_every_s(elapsed_s: float, land_again_s: float) -> float:
+    """Return the interval at which Land is repeated, s, `elapsed_s` after the first command. After some seconds it is
     `land_again_s`, because on some autopilots every command restarts the landing, which would then never end."""
-    return REPEAT_S if asked_for_s < _LAND_REPEATED_S else land_again_s
+    return REPEAT_S if elapsed_s < _LAND_REPEATED_S else land_again_s

@@ -54,10 +54,10 @@ def find_departure(trial: Trial) -> Finding | None:
 def find_disagreement(trial: Trial, now_s: float) -> Finding | None:
     """Find a disagreement between the vehicle's altitude on the ground and the second source's last one before a
     shift."""
-    seen_m, last = secondary_altitude.current_altitude_m(trial.watch.second, now_s), trial.watch.last
-    if seen_m is None or last is None:
+    secondary_m, last = secondary_altitude.current_altitude_m(trial.watch.second, now_s), trial.watch.last
+    if secondary_m is None or last is None:
         return None
-    apart_m = abs(seen_m + trial.ground_shift_m - last.altitude_m)
+    apart_m = abs(secondary_m + trial.ground_shift_m - last.altitude_m)
     if apart_m <= secondary_altitude.MAX_DIFFERENCE_M:
         return None
     why = f"They were {apart_m:.2f} m apart before the take-off command."

@@ -28,7 +28,7 @@ def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Fin
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
     return (
-        find_doubled(watch)
+        find_duplicate(watch)
         or find_link(watch, limits, now_s)
         or find_frozen(watch, limits, now_s)
         or find_lost_position(watch, limits, now_s)
@@ -100,12 +100,12 @@ def find_own_landing(watch: TrialObservation, limits: Limits, ground_m: float, *
     return Finding(failure=Failure.OWN_LANDING, why=why)
 
 
-def find_doubled(watch: TrialObservation) -> Finding | None:
-    return Finding(failure=Failure.DOUBLED, why=watch.doubled) if watch.doubled else None
+def find_duplicate(watch: TrialObservation) -> Finding | None:
+    return Finding(failure=Failure.DUPLICATE, why=watch.duplicate_reason) if watch.duplicate_reason else None
 
 
 def find_link(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
-    if now_s - watch.heard_s > limits.silent_s:
+    if now_s - watch.received_s > limits.silent_s:
         return Finding(failure=Failure.LINK, why=f"Nothing was received for {limits.silent_s:g} s.")
     if now_s - watch.heartbeat_s > HEARTBEATS_MISSED * limits.heartbeat_s:
         return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
@@ -138,7 +138,7 @@ def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Findin
 def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     """Find a lost position; to be called after `find_link`, because silence is a lost link."""
     why = ""
-    if now_s - watch.accepted_s > limits.lost_s and watch.heard_s - watch.accepted_s > limits.lost_s:
+    if now_s - watch.accepted_s > limits.lost_s and watch.received_s - watch.accepted_s > limits.lost_s:
         why = f"None of its positions was plausible for {limits.lost_s:g} s."
     elif has_unreliable_position(watch):
         why = "Its position jumps back and forth."
@@ -164,7 +164,7 @@ def find_battery(watch: TrialObservation, now_s: float) -> Finding | None:
 def find_fall(watch: TrialObservation, limits: Limits, ground_m: float) -> Finding | None:
     """Find ground contact at a speed above that of any landing."""
     last = watch.last
-    if last is None or watch.doubted is not None or watch.leapt:
+    if last is None or watch.doubted is not None or watch.has_jumped:
         return None
     near = last.altitude_m - ground_m < _IMPACT_BELOW_M
     if not near or last.climb_rate_m_s >= -limits.impact_m_s:

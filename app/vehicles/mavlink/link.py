@@ -47,7 +47,7 @@ MAX_SEQUENCE_LEAD: Final = 128
 """A sequence number further ahead than this is an old one, because packets may overtake each other."""
 GONE_AFTER_S: Final = 1.5
 """A peer that has sent nothing for this long may have moved to another port of the same host."""
-RIVAL_TIMEOUT_S: Final = 3.0
+DUPLICATE_TIMEOUT_S: Final = 3.0
 """Time for which a heartbeat of another peer with the vehicle's system id counts."""
 UNKNOWN_PEER_INTERVAL_S: Final = 0.2
 """Interval at which a datagram of another peer is parsed, so that a flood of them costs nothing."""
@@ -142,8 +142,8 @@ class Link:
         self._opened_s, self._opened_unix_us = clock.now_s(), time.time_ns() // 1000
         self._vehicle_system, self._make = target_system, make
         self._vehicle_component: int | None = None
-        self._speakers = DuplicateDetector()
-        self._looked_s = self._rival_s = float("-inf")
+        self._duplicates = DuplicateDetector()
+        self._checked_s = self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
         self._received = self._bad = self._foreign = self._overrun = self._sent = self._unsent = 0
@@ -152,7 +152,7 @@ class Link:
         self._next_heartbeat_s = self._attended_s = self._opened_s
         self._listeners = 0
         self._inbox: deque[Received] = deque()
-        self._news = threading.Condition()
+        self._inbox_changed = threading.Condition()
         self._sending = threading.Lock()
         self._is_closing = self._is_closed = False
         self._failure: Exception | None = None
@@ -170,13 +170,13 @@ class Link:
         self.close()
 
     @property
-    def doubled(self) -> str:
+    def duplicate_reason(self) -> str:
         """Evidence that two vehicles use the system id; empty without evidence."""
         now_s = self._clock.now_s()
-        with self._news:
-            if now_s - self._rival_s < RIVAL_TIMEOUT_S:
+        with self._inbox_changed:
+            if now_s - self._duplicate_s < DUPLICATE_TIMEOUT_S:
                 return "Another vehicle with its system id sends from another port."
-            return self._speakers.reason(now_s)
+            return self._duplicates.reason(now_s)
 
     @property
     def other_makes(self) -> frozenset[int]:
@@ -190,7 +190,7 @@ class Link:
 
     @property
     def health(self) -> LinkHealth:
-        with self._news:
+        with self._inbox_changed:
             return LinkHealth(
                 received=self._received,
                 lost=self._losses.lost,
@@ -219,18 +219,18 @@ class Link:
 
         Every message is returned once, to any caller. Raises LinkError if the link is closed and no message is left.
         """
-        with self._news:
+        with self._inbox_changed:
             self._listeners += 1
             try:
-                self._wait_for_news(timeout_s)
+                self._wait_for_messages(timeout_s)
             finally:
                 self._listeners -= 1
                 self._attended_s = self._clock.now_s()
             if self._is_closed and not self._inbox:
                 raise self._closed_error()
-            heard = list(self._inbox)
+            messages = list(self._inbox)
             self._inbox.clear()
-        return heard
+        return messages
 
     def log_to(self, path: Path | None) -> None:
         """Record all packets from now on in another telemetry log, or in none; return once the previous log is stored.
@@ -257,9 +257,9 @@ class Link:
         why = f"failed: {self._failure}" if self._failure else "is closed"
         return LinkError(f"The link {self._address} {why}.", hint="Connect to the vehicle again.")
 
-    def _wait_for_news(self, timeout_s: float) -> None:
+    def _wait_for_messages(self, timeout_s: float) -> None:
         if self._thread is not None:
-            self._news.wait_for(lambda: self._inbox or self._is_closed, self._clock.wall_s(timeout_s))
+            self._inbox_changed.wait_for(lambda: self._inbox or self._is_closed, self._clock.wall_s(timeout_s))
             return
         until_s = self._clock.now_s() + timeout_s
         while not self._is_closed:
@@ -284,13 +284,13 @@ class Link:
         """Send a heartbeat if it is due, then receive; `timeout_s` is wall time."""
         self._send_heartbeat()
         for data, peer in self._transport.read(timeout_s):
-            self._take_in(data, peer)
+            self._process_data(data, peer)
 
     def _end(self) -> None:
-        with self._sending, self._news:
+        with self._sending, self._inbox_changed:
             self._is_closed = True
             self._transport.close()
-            self._news.notify_all()
+            self._inbox_changed.notify_all()
 
     def _patience_s(self) -> float:
         """Return the time to wait for packets, s of wall time."""
@@ -315,18 +315,18 @@ class Link:
         else:
             self._unsent += 1
 
-    def _take_in(self, data: bytes, peer: Peer) -> None:
+    def _process_data(self, data: bytes, peer: Peer) -> None:
         remote = self._transport.remote
         if remote == peer:
-            self._hear(self._codec.parse(data))
+            self._queue(self._codec.parse(data))
         elif remote is None:
             self._process_unknown_peer(data, peer)
         else:
             self._foreign += 1
             now_s = self._clock.now_s()
-            if peer[0] == remote[0] and now_s - self._looked_s >= UNKNOWN_PEER_INTERVAL_S:
-                self._looked_s = now_s
-                self._look_at_rival(data, peer, now_s)
+            if peer[0] == remote[0] and now_s - self._checked_s >= UNKNOWN_PEER_INTERVAL_S:
+                self._checked_s = now_s
+                self._check_other_peer(data, peer, now_s)
 
     def _process_unknown_peer(self, data: bytes, peer: Peer) -> None:
         """Process a datagram with a separate codec, because data of an unknown peer must not interfere with the
@@ -334,11 +334,11 @@ class Link:
         messages = self._new_codec().parse(data)
         if any(self._is_vehicle(message) for message in messages):
             self._transport.adopt(peer)
-            self._hear(messages)
+            self._queue(messages)
         else:
             self._foreign += 1
 
-    def _look_at_rival(self, data: bytes, peer: Peer, now_s: float) -> None:
+    def _check_other_peer(self, data: bytes, peer: Peer, now_s: float) -> None:
         """Find out whether the vehicle has moved to another port of its host, or another one uses its system id."""
         if not any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
             return
@@ -346,7 +346,7 @@ class Link:
         if now_s - since_s > GONE_AFTER_S:
             self._transport.adopt(peer)
         elif self._last_packet_s is not None:
-            self._rival_s = now_s
+            self._duplicate_s = now_s
 
     def _is_vehicle(self, message: Message) -> bool:
         """Whether the message identifies its sender as the vehicle of this link."""
@@ -360,18 +360,18 @@ class Link:
         is_it = system is None or source_system(message) == system
         return is_it and (component is None or source_component(message) == component)
 
-    def _hear(self, messages: list[Message]) -> None:
+    def _queue(self, messages: list[Message]) -> None:
         now_s = self._clock.now_s()
         fresh = [Received(message, now_s) for message in messages if self._accepts(message, now_s)]
         if not fresh:
             return
-        with self._news:
+        with self._inbox_changed:
             excess = max(len(self._inbox) + len(fresh) - MAX_QUEUED_MESSAGES, 0)
             self._overrun += excess
             self._inbox.extend(fresh)
             for _ in range(excess):
                 self._inbox.popleft()
-            self._news.notify_all()
+            self._inbox_changed.notify_all()
 
     def _accepts(self, message: Message, now_s: float) -> bool:
         """Count and record the message; return whether `receive` should return it."""
@@ -393,7 +393,7 @@ class Link:
         if self._vehicle_component in (None, source_component(message)):
             self._last_packet_s = now_s
             if not message.get_type().startswith(self._dialect.uncounted):
-                self._speakers.add(frame, sequence(message), now_s, _boot_s(message))
+                self._duplicates.add(frame, sequence(message), now_s, _boot_s(message))
         if is_autopilot:
             self._last_heartbeat_s = now_s
         return True

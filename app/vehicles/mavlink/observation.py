@@ -35,7 +35,7 @@ _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
 _MAX_GLITCHES: Final = 3
 _DOUBTED_LIMIT: Final = 10.0
-_RESTLESS_DRAINS_S: Final = 5.0
+_DOUBT_DECAY_1_S: Final = 5.0
 """Tolerated doubted samples per second; with `_DOUBTED_LIMIT` more than that, the position is unreliable."""
 _AHEAD_S: Final = 2.0
 """Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
@@ -62,12 +62,12 @@ class OtherClock:
 class TrialObservation:
     """State of a vehicle by its messages so far. Times are in s by the ground's clock, except inside a Position.
 
-    Times of the last packet (`heard_s`), of the last position with a new time stamp (`advanced_s`) and of the last one
-    that was not doubted (`accepted_s`). `armed` and `mode` are from the last heartbeat, `armed_since_s` and
-    `mode_since_s` since when all heartbeats agree with it. `leapt`: the altitude has continued from another value.
+    Times of the last packet (`received_s`), of the last position with a new time stamp (`advanced_s`) and of the last
+    one that was not doubted (`accepted_s`). `armed` and `mode` are from the last heartbeat, `armed_since_s` and
+    `mode_since_s` since when all heartbeats agree with it. `has_jumped`: the altitude has continued from another value.
     """
 
-    heard_s: float
+    received_s: float
     heartbeat_s: float
     advanced_s: float
     accepted_s: float
@@ -82,8 +82,8 @@ class TrialObservation:
     doubted: Position | None = None
     other: OtherClock | None = None
     glitches: int = 0
-    restless: float = 0.0
-    leapt: bool = False
+    doubt_level: float = 0.0
+    has_jumped: bool = False
     side: int = -1
     crossings: int = 0
     armed: bool = False
@@ -105,7 +105,7 @@ class TrialObservation:
     rebooted: bool = False
     breached: str = ""
     """Limit of its own fence that it has crossed; empty if none."""
-    doubled: str = ""
+    duplicate_reason: str = ""
     """Evidence that two vehicles use its system id; empty without evidence."""
 
 
@@ -114,7 +114,7 @@ def begin(
 ) -> TrialObservation:
     """Begin an observation with all times now. `last` is the position at which the vehicle has stood for `stood_s`."""
     return TrialObservation(
-        heard_s=now_s,
+        received_s=now_s,
         heartbeat_s=now_s,
         advanced_s=now_s,
         accepted_s=now_s,
@@ -129,20 +129,20 @@ def begin(
 def reset_altitude(watch: TrialObservation) -> TrialObservation:
     """Return the observation of a vehicle on the ground whose altitude was reset, without its earlier altitudes."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
-    return replace(watch, leapt=False, lifted=False, behind_m=0.0, side=-1, crossings=0, second=second)
+    return replace(watch, has_jumped=False, lifted=False, behind_m=0.0, side=-1, crossings=0, second=second)
 
 
 def update(
     watch: TrialObservation, measurement: Measurement | None, now_s: float, limits: Limits
 ) -> tuple[TrialObservation, tuple[Position, ...]]:
     """Return the observation after one packet (None: one without a measurement), and the positions that it confirms."""
-    stuck_s = watch.stuck_s + min(now_s - watch.heard_s, _ATTENDED_S)
-    watch = replace(watch, heard_s=now_s, stuck_s=stuck_s)
+    stuck_s = watch.stuck_s + min(now_s - watch.received_s, _ATTENDED_S)
+    watch = replace(watch, received_s=now_s, stuck_s=stuck_s)
     match measurement:
         case Position():
-            return _hear_position(watch, measurement, now_s, limits)
+            return _add_position(watch, measurement, now_s, limits)
         case Heartbeat():
-            watch = _hear_heartbeat(watch, measurement, now_s)
+            watch = _add_heartbeat(watch, measurement, now_s)
         case Battery(voltage_v=float(volts)):
             low = volts < limits.min_battery_v
             since = (watch.low_since_s if watch.low_since_s is not None else now_s) if low else None
@@ -158,11 +158,11 @@ def update(
     return watch, ()
 
 
-def sight(watch: TrialObservation, sighted: SecondaryAltitudeReceived) -> TrialObservation:
+def update_secondary(watch: TrialObservation, sample: SecondaryAltitudeReceived) -> TrialObservation:
     """Return the observation after a sample of the second source of altitude."""
-    second = watch.second or SecondaryAltitude(heard_s=sighted.now_s)
-    vehicle_m = watch.last.altitude_m if watch.last is not None and is_fresh(watch, sighted.now_s) else None
-    return replace(watch, second=secondary_altitude.update(second, sighted, vehicle_m))
+    second = watch.second or SecondaryAltitude(received_s=sample.now_s)
+    vehicle_m = watch.last.altitude_m if watch.last is not None and is_fresh(watch, sample.now_s) else None
+    return replace(watch, second=secondary_altitude.update(second, sample, vehicle_m))
 
 
 def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObservation:
@@ -184,7 +184,7 @@ def too_many_glitches(watch: TrialObservation) -> bool:
 
 
 def has_unreliable_position(watch: TrialObservation) -> bool:
-    return watch.restless > _DOUBTED_LIMIT
+    return watch.doubt_level > _DOUBTED_LIMIT
 
 
 def is_fresh(watch: TrialObservation, now_s: float) -> bool:
@@ -210,9 +210,9 @@ def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
 
 def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """Whether its own landed state or the second source shows it in the air, independent of its altitude."""
-    says_so = watch.landed is False and now_s - watch.landed_s < AGREED_S
-    seen_m = secondary_altitude.current_altitude_m(watch.second, now_s)
-    return says_so or (seen_m is not None and seen_m - ground_m > GROUND_M)
+    reports_flight = watch.landed is False and now_s - watch.landed_s < AGREED_S
+    secondary_m = secondary_altitude.current_altitude_m(watch.second, now_s)
+    return reports_flight or (secondary_m is not None and secondary_m - ground_m > GROUND_M)
 
 
 def is_behind_climb_rate(watch: TrialObservation) -> bool:
@@ -239,11 +239,11 @@ def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
     """Return why it may not be on the ground; empty once every source has shown it there for a second, if its altitude
     has never jumped."""
     since_s = watch.grounded_since_s
-    if watch.doubled:
+    if watch.duplicate_reason:
         return "two vehicles may be using its system id"
     if watch.rebooted:
         return "it rebooted during the flight"
-    if watch.leapt:
+    if watch.has_jumped:
         return "its altitude jumped during the flight"
     if is_behind_climb_rate(watch):
         return "its altitude did not follow its climb rate"
@@ -255,7 +255,7 @@ def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
 # ---- positions and heartbeats
 
 
-def _hear_heartbeat(watch: TrialObservation, heartbeat: Heartbeat, now_s: float) -> TrialObservation:
+def _add_heartbeat(watch: TrialObservation, heartbeat: Heartbeat, now_s: float) -> TrialObservation:
     return replace(
         watch,
         heartbeat_s=now_s,
@@ -267,7 +267,7 @@ def _hear_heartbeat(watch: TrialObservation, heartbeat: Heartbeat, now_s: float)
     )
 
 
-def _hear_position(
+def _add_position(
     watch: TrialObservation, position: Position, now_s: float, limits: Limits
 ) -> tuple[TrialObservation, tuple[Position, ...]]:
     last, doubted = watch.last, watch.doubted
@@ -275,24 +275,24 @@ def _hear_position(
     if newest is not None:
         gained_s = position.time_boot_s - newest.time_boot_s
         if gained_s <= 0.0 or gained_s > now_s - watch.advanced_s + _AHEAD_S:
-            return _hear_other_clock(watch, position, now_s, newest), ()
+            return _add_other_clock(watch, position, now_s, newest), ()
     quiet_s = now_s - watch.advanced_s
-    restless = max(watch.restless - _RESTLESS_DRAINS_S * quiet_s, 0.0)
-    watch = replace(watch, advanced_s=now_s, stuck_s=0.0, restless=restless)
+    doubt_level = max(watch.doubt_level - _DOUBT_DECAY_1_S * quiet_s, 0.0)
+    watch = replace(watch, advanced_s=now_s, stuck_s=0.0, doubt_level=doubt_level)
     if last is None or _follows(last, position):
-        lone = doubted is not None
-        watch = replace(watch, doubted=None, glitches=watch.glitches + lone)
+        is_single = doubted is not None
+        watch = replace(watch, doubted=None, glitches=watch.glitches + is_single)
         return _accept(watch, position, now_s, limits), (position,)
-    watch = replace(watch, restless=watch.restless + 1.0)
+    watch = replace(watch, doubt_level=watch.doubt_level + 1.0)
     if doubted is None:
         return replace(watch, doubted=position), ()
     if _follows(doubted, position):
-        leapt = replace(watch, doubted=None, leapt=watch.leapt or _leaps(last, doubted))
-        return _accept(leapt, position, now_s, limits), (doubted, position)
+        has_jumped = replace(watch, doubted=None, has_jumped=watch.has_jumped or _jumps(last, doubted))
+        return _accept(has_jumped, position, now_s, limits), (doubted, position)
     return replace(watch, doubted=position, glitches=watch.glitches + 1), ()
 
 
-def _hear_other_clock(watch: TrialObservation, position: Position, now_s: float, newest: Position) -> TrialObservation:
+def _add_other_clock(watch: TrialObservation, position: Position, now_s: float, newest: Position) -> TrialObservation:
     """Process a position whose time is late, repeated or too far ahead. The vehicle has rebooted only if the clock went
     back and continues from there, and no more positions by the previous clock arrive."""
     other = watch.other
@@ -316,10 +316,10 @@ def _is_same_clock(other: OtherClock, position: Position, now_s: float) -> bool:
 def _follows(one: Position, other: Position) -> bool:
     """Whether a vehicle can have moved from one sample to the other."""
     sudden = abs(other.climb_rate_m_s) > _JUMP_M_S >= abs(one.climb_rate_m_s)
-    return not (sudden or _leaps(one, other))
+    return not (sudden or _jumps(one, other))
 
 
-def _leaps(one: Position, other: Position) -> bool:
+def _jumps(one: Position, other: Position) -> bool:
     """Whether the other altitude differs from the first one's extrapolation by more than possible accelerations."""
     elapsed_s = other.time_boot_s - one.time_boot_s
     off_m = other.altitude_m - (one.altitude_m + one.climb_rate_m_s * elapsed_s)

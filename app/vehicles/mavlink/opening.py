@@ -31,13 +31,13 @@ def open_radio(
     options: Options,
     clock: Clock | None,
     *,
-    overhear: Callable[[Received], None] | None,
-    on_wait: Callable[[list[PacketReceived]], None] = lambda _heard: None,
+    on_message: Callable[[Received], None] | None,
+    on_wait: Callable[[list[PacketReceived]], None] = lambda _packets: None,
     transport: Transport | None = None,
 ) -> AutopilotLink:
     """Open the link to a vehicle.
 
-    `clock` is the vehicle's time, by default that of its options; for `overhear` and `on_wait` see AutopilotLink;
+    `clock` is the vehicle's time, by default that of its options; for `on_message` and `on_wait` see AutopilotLink;
     `transport` replaces the address and the thread that reads it. Raises LinkError if the link or its log cannot be
     opened, InputError for a signing key that cannot be read or used.
     """
@@ -54,7 +54,7 @@ def open_radio(
         signing_key=signing.read_key(Path(key_file)) if key_file else None,
         transport=transport,
     )
-    aim = Target(
+    target = Target(
         system=0,
         aircraft=int(options["aircraft_id"]),
         waypoint=int(options["climb_waypoint"]),
@@ -64,9 +64,9 @@ def open_radio(
         link,
         profile,
         clock,
-        aim,
-        patience_s=REPLY_TIMEOUT_S * timeout_factor_of(options),
-        overhear=overhear,
+        target,
+        reply_timeout_s=REPLY_TIMEOUT_S * timeout_factor_of(options),
+        on_message=on_message,
         on_wait=on_wait,
     )
 
@@ -84,7 +84,7 @@ def limits_of(options: Options, radio: AutopilotLink) -> Limits:
         landing_modes=profile.landing_modes,
         manual_modes=profile.manual_modes,
         mode_names={**profile.mode_names, **_described(profile)},
-        blocks={number: name for name, number in radio.aim.blocks.items()},
+        blocks={number: name for name, number in radio.target.blocks.items()},
         arming_blocks=profile.arming_blocks,
         flying_blocks=profile.flying_blocks,
         landing_blocks=profile.landing_blocks,
@@ -93,7 +93,7 @@ def limits_of(options: Options, radio: AutopilotLink) -> Limits:
 
 def _described(profile: Profile) -> dict[str, str]:
     """Return the display names of the modes in which it does not execute Land, with what to do in them."""
-    return {mode: f"{profile.mode_names[mode]}: {what}; {HELP}" for mode, what in profile.deaf_modes.items()}
+    return {mode: f"{profile.mode_names[mode]}: {what}; {HELP}" for mode, what in profile.modes_without_land.items()}
 
 
 def _log_path(folder: str) -> Path | None:

@@ -39,78 +39,80 @@ def write_gains(radio: AutopilotLink, gain_set: GainSet, gains: Gains) -> dict[s
     return read_gains(radio, gain_set, gains)
 
 
-def read_gains(radio: AutopilotLink, gain_set: GainSet, asked: Gains | None = None) -> dict[str, float]:
-    """Return the gains on the vehicle, exactly as in `asked` where they are equal in single precision. Raises
+def read_gains(radio: AutopilotLink, gain_set: GainSet, requested: Gains | None = None) -> dict[str, float]:
+    """Return the gains on the vehicle, exactly as in `requested` where they are equal in single precision. Raises
     VehicleError if the vehicle does not reply."""
     held_now: dict[str, float] = {}
     for gain in gain_set:
         wire = read_parameter(radio, gain.parameter)
         if wire is None:
             raise _unconfirmed(gain)
-        held_now[gain.gain] = gain.read(wire, None if asked is None else asked[gain.gain])
+        held_now[gain.gain] = gain.read(wire, None if requested is None else requested[gain.gain])
     return held_now
 
 
 def read_parameter(radio: AutopilotLink, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
     """Return the value of a parameter, None if the vehicle does not reply."""
-    return _ask(radio, radio.profile.read_parameter(radio.aim, parameter), parameter, attempts=attempts)
+    return _request_parameter(
+        radio, radio.profile.read_parameter(radio.target, parameter), parameter, attempts=attempts
+    )
 
 
 def write_parameter(radio: AutopilotLink, parameter: str, value: float) -> float | None:
     """Write a parameter; return the value in the vehicle's reply, None if it does not reply."""
-    return _ask(radio, radio.profile.set_parameter(radio.aim, parameter, value), parameter)
+    return _request_parameter(radio, radio.profile.set_parameter(radio.target, parameter, value), parameter)
 
 
 def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[str, float]:
     """Read all parameters of the vehicle as a list; those that are lost are requested one by one. Raises VehicleError
     if none arrive, or not all."""
-    heard: dict[int, Parameter] = {}
+    received: dict[int, Parameter] = {}
     radio.listen(0.0)
     for _ in range(LIST_ATTEMPTS):
-        if not heard:
-            radio.send(base.list_parameters(radio.aim))
-            heard = _list(radio, on_progress)
-    for place in [place for place in range(_count(heard)) if place not in heard]:
-        heard |= _fetched(radio, place)
-        on_progress(len(heard), _count(heard))
-    if not heard or not _is_complete(heard):
+        if not received:
+            radio.send(base.list_parameters(radio.target))
+            received = _list(radio, on_progress)
+    for place in [place for place in range(_count(received)) if place not in received]:
+        received |= _fetched(radio, place)
+        on_progress(len(received), _count(received))
+    if not received or not _is_complete(received):
         raise VehicleError(
-            f"Not all of its parameters were received: {len(heard)} of {_count(heard) or 'an unknown number'}.",
+            f"Not all of its parameters were received: {len(received)} of {_count(received) or 'an unknown number'}.",
             hint="Check the link, and that no other program requests them, then try again.",
         )
-    return {heard[place].name: heard[place].value for place in sorted(heard)}
+    return {received[place].name: received[place].value for place in sorted(received)}
 
 
 def _list(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[int, Parameter]:
     """Receive the list until it is complete or no more parameters arrive."""
-    heard: dict[int, Parameter] = {}
+    received: dict[int, Parameter] = {}
     last_s = radio.clock.now_s()
-    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.timeout_factor and not _is_complete(heard):
-        if found := _listed(radio.listen(radio.patience_s)):
-            heard |= found
+    while radio.clock.now_s() - last_s < LIST_ENDS_S * radio.timeout_factor and not _is_complete(received):
+        if found := _listed(radio.listen(radio.reply_timeout_s)):
+            received |= found
             last_s = radio.clock.now_s()
-            on_progress(len(heard), _count(heard))
-    return heard
+            on_progress(len(received), _count(received))
+    return received
 
 
-def _listed(heard: list[PacketReceived]) -> dict[int, Parameter]:
-    found = (each.measurement for each in heard if isinstance(each.measurement, Parameter))
+def _listed(packets: list[PacketReceived]) -> dict[int, Parameter]:
+    found = (each.measurement for each in packets if isinstance(each.measurement, Parameter))
     return {each.place: each for each in found if each.place is not None}
 
 
 def _fetched(radio: AutopilotLink, place: int) -> dict[int, Parameter]:
     answer = radio.request(
-        base.read_place(radio.aim, place), lambda it: isinstance(it, Parameter) and it.place == place
+        base.read_place(radio.target, place), lambda it: isinstance(it, Parameter) and it.place == place
     )
     return {place: answer} if isinstance(answer, Parameter) else {}
 
 
-def _count(heard: Mapping[int, Parameter]) -> int:
-    return max((each.count for each in heard.values()), default=0)
+def _count(received: Mapping[int, Parameter]) -> int:
+    return max((each.count for each in received.values()), default=0)
 
 
-def _is_complete(heard: Mapping[int, Parameter]) -> bool:
-    return bool(heard) and len(heard) >= _count(heard)
+def _is_complete(received: Mapping[int, Parameter]) -> bool:
+    return bool(received) and len(received) >= _count(received)
 
 
 def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:
@@ -119,9 +121,11 @@ def settings(gain_set: GainSet, gains: Gains) -> tuple[Setting, ...]:
     return tuple(Setting(gain.parameter, gain.sent(gains[gain.gain])) for gain in ordered)
 
 
-def _ask(radio: AutopilotLink, request: Outgoing, parameter: str, *, attempts: int = ATTEMPTS) -> float | None:
-    def fits(heard: Measurement) -> bool:
-        return isinstance(heard, Parameter) and heard.name == parameter
+def _request_parameter(
+    radio: AutopilotLink, request: Outgoing, parameter: str, *, attempts: int = ATTEMPTS
+) -> float | None:
+    def fits(reply: Measurement) -> bool:
+        return isinstance(reply, Parameter) and reply.name == parameter
 
     answer = radio.request(request, fits, attempts=attempts)
     return answer.value if isinstance(answer, Parameter) else None

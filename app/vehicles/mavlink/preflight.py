@@ -22,7 +22,7 @@ from app.vehicles.mavlink.radio import AutopilotLink
 HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
 POSITIONS_HZ: Final = 40.0
-SIGHTINGS_HZ: Final = 10.0
+SECONDARY_HZ: Final = 10.0
 ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight of this program was interrupted."
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
@@ -44,7 +44,7 @@ class Ground:
 
     altitude_m: float
     last: Position
-    seen_m: tuple[float, ...] = ()
+    secondary_m: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class GroundObservation:
 
     positions: tuple[Position, ...]
     seconds: float
-    seen_m: tuple[float, ...] = ()
+    secondary_m: tuple[float, ...] = ()
     disarmed: bool = False
     """Whether there were heartbeats and all of them reported disarmed."""
 
@@ -61,7 +61,7 @@ class GroundObservation:
     def ground(self) -> Ground:
         """Position of the ground. Raises ValueError without a position."""
         altitude_m = statistics.median(position.altitude_m for position in self.positions)
-        return Ground(altitude_m, self._last, self.seen_m)
+        return Ground(altitude_m, self._last, self.secondary_m)
 
     @property
     def _last(self) -> Position:
@@ -100,11 +100,11 @@ def _set_target(radio: AutopilotLink, heartbeat: Heartbeat, pinned: Identity | N
             f"Another vehicle answers: system {heartbeat.system} instead of {pinned.system_id}.",
             hint="Connect the registered vehicle, or register this one.",
         )
-    radio.aim = replace(
-        radio.aim,
+    radio.target = replace(
+        radio.target,
         system=heartbeat.system,
         component=heartbeat.component,
-        aircraft=radio.aim.aircraft or heartbeat.system,
+        aircraft=radio.target.aircraft or heartbeat.system,
     )
 
 
@@ -113,24 +113,24 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
     string."""
     problem = ""
     try:
-        radio.aim = replace(radio.aim, blocks=radio.profile.explore(radio.request, radio.aim))
+        radio.target = replace(radio.target, blocks=radio.profile.explore(radio.request, radio.target))
     except VehicleError as error:
         problem = str(error)
-    radio.send(*radio.profile.conclude(radio.aim))
+    radio.send(*radio.profile.conclude(radio.target))
     identify(radio)
     has = tuple(name for name in radio.profile.stop_settings if _has(radio, name))
-    radio.aim = replace(radio.aim, stop_settings=has)
+    radio.target = replace(radio.target, stop_settings=has)
     return problem
 
 
 def identify(radio: AutopilotLink, pinned: Identity | None = None) -> None:
     """Request version and hardware id, if neither has been received since the vehicle was last absent. Some never
     reply, and Paparazzi sends them unrequested; if the pinned vehicle has a hardware id, it is requested for 5 s."""
-    radio.hear_pending()
-    asking, is_needed = radio.profile.ask_version(radio.aim), bool(find_untold_uid(radio, pinned))
-    if asking is not None and (is_needed or not (radio.seen.version or radio.seen.uid)):
+    radio.receive_pending()
+    request, is_needed = radio.profile.version_request(radio.target), bool(find_missing_uid(radio, pinned))
+    if request is not None and (is_needed or not (radio.seen.version or radio.seen.uid)):
         attempts = _UID_ATTEMPTS if is_needed else _VERSION_ATTEMPTS
-        radio.request(asking, lambda reply: isinstance(reply, Version), attempts=attempts)
+        radio.request(request, lambda reply: isinstance(reply, Version), attempts=attempts)
 
 
 def _has(radio: AutopilotLink, parameter: str) -> bool:
@@ -140,13 +140,13 @@ def _has(radio: AutopilotLink, parameter: str) -> bool:
 def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
     """Find out whether a vehicle without a setting that stops its motors accepts the command that does. The command is
     sent only if the vehicle was just observed standing, disarmed by every heartbeat: in the air, it would fall."""
-    if radio.aim.stop_settings or not radio.profile.stop_settings or radio.link.doubled:
+    if radio.target.stop_settings or not radio.profile.stop_settings or radio.link.duplicate_reason:
         return
     stands = watched.disarmed and _moved_m(watched.positions) <= _STANDS_WITHIN_M and bool(watched.positions)
     if stands:
-        obeyed = radio.request(base.disarm(radio.aim), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
-        accepted = isinstance(obeyed, CommandReply) and obeyed.accepted
-        radio.aim = replace(radio.aim, stops_by_command=accepted)
+        reply = radio.request(base.disarm(radio.target), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
+        accepted = isinstance(reply, CommandReply) and reply.accepted
+        radio.target = replace(radio.target, stops_by_command=accepted)
 
 
 def identity_change(radio: AutopilotLink, pinned: Identity | None) -> str:
@@ -170,7 +170,7 @@ def is_another(radio: AutopilotLink, pinned: Identity | None) -> bool:
     return pinned is not None and bool(uid and pinned.uid) and uid != pinned.uid
 
 
-def find_untold_uid(radio: AutopilotLink, pinned: Identity | None) -> str:
+def find_missing_uid(radio: AutopilotLink, pinned: Identity | None) -> str:
     """Return the problem that a vehicle with a pinned hardware id has reported none since it was last absent; empty if
     it has."""
     if pinned is None or not pinned.uid or radio.seen.uid:
@@ -190,14 +190,14 @@ def require_disarmed(radio: AutopilotLink) -> None:
 
 def prepare(radio: AutopilotLink, telemetry_hz: float) -> None:
     """Request telemetry. Raises VehicleError if it is refused."""
-    _set_up(radio, radio.profile.prepare(radio.aim, telemetry_hz))
+    _set_up(radio, radio.profile.prepare(radio.target, telemetry_hz))
 
 
 def make_armable(radio: AutopilotLink) -> None:
     """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm. Raises VehicleError if it
     refuses."""
     heartbeat = radio.seen.heartbeat
-    steps = radio.profile.make_armable(radio.aim, heartbeat.mode) if heartbeat is not None else ()
+    steps = radio.profile.make_armable(radio.target, heartbeat.mode) if heartbeat is not None else ()
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
     while steps and not radio.is_disarmed and not is_armed(radio) and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
@@ -226,11 +226,11 @@ def observe(
     while (now_s := radio.clock.now_s()) < begun_s + watched_s or (
         (radio.seen.battery_v is None or not armed) and now_s < begun_s + _BATTERY_S
     ):
-        heard = radio.listen(_LISTEN_S)
-        armed += [each.measurement.armed for each in heard if isinstance(each.measurement, Heartbeat)]
-    seen_m = () if secondary is None else secondary.ground_altitudes()
+        packets = radio.listen(_LISTEN_S)
+        armed += [each.measurement.armed for each in packets if isinstance(each.measurement, Heartbeat)]
+    secondary_m = () if secondary is None else secondary.ground_altitudes()
     positions = tuple(position for _, position in radio.seen.positions)
-    return GroundObservation(positions, now_s - begun_s, seen_m, disarmed=bool(armed) and not any(armed))
+    return GroundObservation(positions, now_s - begun_s, secondary_m, disarmed=bool(armed) and not any(armed))
 
 
 def evaluate_items(
@@ -254,14 +254,14 @@ def evaluate_items(
 
 
 def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservation) -> CheckItem:
-    rate_hz = len(watched.seen_m) / watched.seconds
+    rate_hz = len(watched.secondary_m) / watched.seconds
     return CheckItem(
         name="second_source",
         title="Second source of altitude",
-        passed=rate_hz >= SIGHTINGS_HZ,
+        passed=rate_hz >= SECONDARY_HZ,
         found=secondary.source.trouble.removesuffix(".")
         or f"{rate_hz:.0f} samples per second of {secondary.source.name}",
-        needed=f"{SIGHTINGS_HZ:g} per second or more",
+        needed=f"{SECONDARY_HZ:g} per second or more",
         hint="Check that it tracks the vehicle and streams, or fly without it.",
     )
 
@@ -318,7 +318,7 @@ def _heartbeat(radio: AutopilotLink) -> CheckItem:
         name="heartbeat",
         title="Heartbeat",
         passed=make and age_s < oldest_s,
-        found=f"{radio.profile.title}{version}, system {radio.aim.system}, {age_s:.1f} s ago"
+        found=f"{radio.profile.title}{version}, system {radio.target.system}, {age_s:.1f} s ago"
         if make
         else "another autopilot",
         needed=f"{radio.profile.title}, within {oldest_s:g} s",
@@ -327,20 +327,20 @@ def _heartbeat(radio: AutopilotLink) -> CheckItem:
 
 
 def _single_vehicle_item(radio: AutopilotLink) -> CheckItem:
-    doubled = radio.link.doubled
+    duplicate_reason = radio.link.duplicate_reason
     return CheckItem(
         name="alone",
         title="System id",
-        passed=not doubled,
-        found=doubled.removesuffix(".") or f"one vehicle uses system id {radio.aim.system}",
+        passed=not duplicate_reason,
+        found=duplicate_reason.removesuffix(".") or f"one vehicle uses system id {radio.target.system}",
         needed="one vehicle per system id",
-        hint="Switch the other vehicle off, or give each its own id." if doubled else "",
+        hint="Switch the other vehicle off, or give each its own id." if duplicate_reason else "",
     )
 
 
 def _stopping(radio: AutopilotLink) -> CheckItem:
-    ways = [f"the setting {name}" for name in radio.aim.stop_settings]
-    ways += ["the command to disarm"] if radio.aim.stops_by_command else []
+    ways = [f"the setting {name}" for name in radio.target.stop_settings]
+    ways += ["the command to disarm"] if radio.target.stops_by_command else []
     return CheckItem(
         name="motors_off",
         title="Motors off",
@@ -354,7 +354,7 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
 def _own_checks(radio: AutopilotLink) -> CheckItem:
     ready = bool(radio.seen.may_arm)
     if not ready and not is_armed(radio):
-        _ask_checks(radio)
+        _request_checks(radio)
     return CheckItem(
         name="own_checks",
         title="Arming checks of the autopilot",
@@ -365,12 +365,12 @@ def _own_checks(radio: AutopilotLink) -> CheckItem:
     )
 
 
-def _ask_checks(radio: AutopilotLink) -> None:
+def _request_checks(radio: AutopilotLink) -> None:
     """Request the results of the arming checks as events, if the vehicle supports them; earlier events were missed."""
-    asking = radio.profile.ask_checks(radio.aim)
-    if asking is not None:
+    request = radio.profile.checks_request(radio.target)
+    if request is not None:
         radio.request(
-            asking,
+            request,
             lambda reply: isinstance(reply, VehicleEvent) and reply.number == HEALTH_SUMMARY,
             attempts=_CHECKS_ATTEMPTS,
         )
@@ -379,7 +379,7 @@ def _ask_checks(radio: AutopilotLink) -> None:
 def _reasons(radio: AutopilotLink) -> str:
     """Return the failing components and the last status texts."""
     failing = radio.seen.arming_checks.failing(_mode(radio))
-    texts = " / ".join(radio.seen.spoken)
+    texts = " / ".join(radio.seen.status_texts)
     components = f"failing: {', '.join(failing)}" if failing else ""
     messages = f"messages: {texts or 'none'}" if texts or not failing else ""
     return "; ".join(part for part in (components, messages) if part)
@@ -390,7 +390,7 @@ def _checks_hint(radio: AutopilotLink) -> str:
     hints = ["Correct what it reports; after power-on, wait until it has settled."]
     if _mode(radio) not in arming_modes and (others := sorted(profile.flying_modes & arming_modes)):
         hints.append(f"It can be armed in mode {' or '.join(profile.mode_names[mode] for mode in others)}.")
-    if profile.ask_checks(radio.aim) is not None:
+    if profile.checks_request(radio.target) is not None:
         hints.append("QGroundControl shows the reasons in full.")
     return " ".join(hints)
 

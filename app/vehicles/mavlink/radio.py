@@ -24,14 +24,14 @@ from app.vehicles.mavlink.events import (
     VehicleEvent,
     Version,
 )
-from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, MAX_WITNESS_GAP
+from app.vehicles.mavlink.failures import CONFIRMATION_PERIODS, HEARTBEATS_MISSED
 from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Step, Target
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
 _POSITIONS: Final = 1000
-_SPOKEN: Final = 5
+_STATUS_TEXTS: Final = 5
 
 
 @dataclass(slots=True)
@@ -51,7 +51,7 @@ class VehicleMemory:
     may_arm: bool | None = None
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
-    spoken: deque[str] = field(default_factory=lambda: deque(maxlen=_SPOKEN))
+    status_texts: deque[str] = field(default_factory=lambda: deque(maxlen=_STATUS_TEXTS))
     _piece_of: int = 0
     _pieces: str = ""
 
@@ -78,26 +78,26 @@ class VehicleMemory:
             case Position():
                 self.positions.append((now_s, measurement))
             case StatusText():
-                self._hear(measurement)
+                self._add_chunk(measurement)
             case _:
                 pass
 
-    def _hear(self, said: StatusText) -> None:
+    def _add_chunk(self, chunk: StatusText) -> None:
         """Assemble the chunks of a status text in order; a lost chunk is not waited for."""
-        if said.number != self._piece_of or said.place == 0:
-            self._piece_of, self._pieces = said.number, ""
-        self._pieces += said.text
-        if said.is_last:
-            self.spoken.append(self._pieces)
+        if chunk.number != self._piece_of or chunk.place == 0:
+            self._piece_of, self._pieces = chunk.number, ""
+        self._pieces += chunk.text
+        if chunk.is_last:
+            self.status_texts.append(self._pieces)
             self._piece_of, self._pieces = 0, ""
 
 
 class AutopilotLink:
     """Link to an autopilot by its profile, for use by one thread.
 
-    Replies are waited for `patience_s`. Only messages of the autopilot's own component are measured; `overhear` is
-    called with every message of any component. Operations that wait for the vehicle call `listen`, which calls
-    `on_wait` with the packets received, at least every `patience_s`; an exception from it ends the operation.
+    Replies are waited for `reply_timeout_s`. Only messages of the autopilot's own component are measured; `on_message`
+    is called with every message of any component. Operations that wait for the vehicle call `listen`, which calls
+    `on_wait` with the packets received, at least every `reply_timeout_s`; an exception from it ends the operation.
     """
 
     def __init__(
@@ -105,25 +105,25 @@ class AutopilotLink:
         link: Link,
         profile: Profile,
         clock: Clock,
-        aim: Target,
+        target: Target,
         *,
-        patience_s: float = REPLY_TIMEOUT_S,
-        overhear: Callable[[Received], None] | None = None,
-        on_wait: Callable[[list[PacketReceived]], None] = lambda _heard: None,
+        reply_timeout_s: float = REPLY_TIMEOUT_S,
+        on_message: Callable[[Received], None] | None = None,
+        on_wait: Callable[[list[PacketReceived]], None] = lambda _packets: None,
     ) -> None:
         self.link: Final = link
         self.profile: Final = profile
         self.clock: Final = clock
-        self.aim = aim
-        self.patience_s: Final = patience_s
+        self.target = target
+        self.reply_timeout_s: Final = reply_timeout_s
         self.seen: Final = VehicleMemory()
-        self._overhear = overhear
+        self._on_message = on_message
         self._on_wait = on_wait
 
     @property
     def timeout_factor(self) -> float:
         """Factor on the timeouts of a real vehicle."""
-        return self.patience_s / REPLY_TIMEOUT_S
+        return self.reply_timeout_s / REPLY_TIMEOUT_S
 
     @property
     def silence_s(self) -> float:
@@ -134,17 +134,17 @@ class AutopilotLink:
     def is_disarmed(self) -> bool:
         """Whether it is disarmed by at least two heartbeats with none between them that contradicts."""
         seen = self.seen
-        return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= self.witness_gap_s
+        return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= self.confirmation_s
 
     @property
-    def witness_gap_s(self) -> float:
+    def confirmation_s(self) -> float:
         """Minimum time between two heartbeats that confirm each other, s."""
-        return MAX_WITNESS_GAP * self.profile.heartbeat_s * self.timeout_factor
+        return CONFIRMATION_PERIODS * self.profile.heartbeat_s * self.timeout_factor
 
     @property
     def block(self) -> str:
         """Name of the current block of its flight plan; empty if not reported."""
-        names = {number: name for name, number in self.aim.blocks.items()}
+        names = {number: name for name, number in self.target.blocks.items()}
         return "" if self.seen.block is None else names.get(self.seen.block, f"block {self.seen.block}")
 
     def send(self, *messages: Outgoing) -> None:
@@ -154,29 +154,29 @@ class AutopilotLink:
 
     def listen(self, timeout_s: float) -> list[PacketReceived]:
         """Receive during an operation that waits; raises as `receive` and `on_wait` do."""
-        heard = self.receive(timeout_s)
-        self._on_wait(heard)
-        return heard
+        packets = self.receive(timeout_s)
+        self._on_wait(packets)
+        return packets
 
     def receive(self, timeout_s: float) -> list[PacketReceived]:
         """Return the packets since the last call, waiting at most `timeout_s` for the first. Raises LinkError as
         `send` does."""
         messages = self.link.receive(timeout_s)
-        if self._overhear is not None:
+        if self._on_message is not None:
             for message in messages:
-                self._overhear(message)
-        heard = [
+                self._on_message(message)
+        packets = [
             PacketReceived(self.profile.measure(received.message), received.received_s)
             for received in messages
             if self._is_autopilots(received.message)
         ]
-        for each in heard:
+        for each in packets:
             if isinstance(each.measurement, Heartbeat):
                 self._forget_absent(each.now_s)
             self.seen.note(each.measurement, each.now_s)
-        return heard
+        return packets
 
-    def hear_pending(self) -> None:
+    def receive_pending(self) -> None:
         """Process the packets that have arrived, and discard the identity of an absent vehicle."""
         self.listen(0.0)
         self._forget_absent(self.clock.now_s())
@@ -188,7 +188,7 @@ class AutopilotLink:
 
     def _is_autopilots(self, message: Message) -> bool:
         """Whether the message is of the autopilot's component, or of any while that is unknown."""
-        return self.aim.component in (0, source_component(message))
+        return self.target.component in (0, source_component(message))
 
     def request(
         self, request: Outgoing, fits: Callable[[Measurement], bool], *, attempts: int = ATTEMPTS
@@ -197,11 +197,11 @@ class AutopilotLink:
         self.listen(0.0)
         for _ in range(attempts):
             self.send(request)
-            until_s = self.clock.now_s() + self.patience_s
+            until_s = self.clock.now_s() + self.reply_timeout_s
             while (left_s := until_s - self.clock.now_s()) > 0.0:
-                for heard in self.listen(left_s):
-                    if heard.measurement is not None and fits(heard.measurement):
-                        return heard.measurement
+                for packet in self.listen(left_s):
+                    if packet.measurement is not None and fits(packet.measurement):
+                        return packet.measurement
         return None
 
     def set_up(self, steps: tuple[Step, ...]) -> str:
@@ -209,7 +209,7 @@ class AutopilotLink:
         LinkError."""
         conversation = CommandSequence(Action.ARM, steps, self, description="be set up")
         while True:
-            ended = conversation.proceed(self.listen(self.patience_s / 10.0))
+            ended = conversation.proceed(self.listen(self.reply_timeout_s / 10.0))
             if ended is not None:
                 return ended.why if isinstance(ended, ActionRefused) else ""
 
@@ -219,15 +219,15 @@ class CommandSequence:
     steps in messages, by default by the action."""
 
     def __init__(self, action: Action, steps: tuple[Step, ...], radio: AutopilotLink, *, description: str = "") -> None:
-        self._action, self._radio, self._told = action, radio, description or action
+        self._action, self._radio, self._description = action, radio, description or action
         self._steps = list(steps)
         self._sent_s = 0.0
         self._attempts = 0
         self._send()
 
-    def proceed(self, heard: list[PacketReceived]) -> ActionDone | ActionRefused | None:
+    def proceed(self, packets: list[PacketReceived]) -> ActionDone | ActionRefused | None:
         """Process packets and send the next messages; return the result once the sequence has ended."""
-        for each in heard:
+        for each in packets:
             if self._steps and (accepted := _verdict(self._steps[0], each.measurement)) is not None:
                 if not accepted and self._steps[0].needed:
                     return self._refused(each.measurement)
@@ -237,7 +237,7 @@ class CommandSequence:
             self._next()
         if not self._steps:
             return ActionDone(self._action, now_s)
-        if self._steps[0].awaits and now_s - self._sent_s >= self._radio.patience_s:
+        if self._steps[0].awaits and now_s - self._sent_s >= self._radio.reply_timeout_s:
             if self._attempts < self._steps[0].attempts:
                 self._send()
             elif not self._steps[0].needed:
@@ -259,13 +259,13 @@ class CommandSequence:
 
     def _refused(self, measurement: Measurement | None) -> ActionRefused:
         why = measurement.why if isinstance(measurement, CommandReply) else ""
-        texts = f" Its messages: {' / '.join(self._radio.seen.spoken)}." if self._radio.seen.spoken else ""
+        texts = f" Its messages: {' / '.join(self._radio.seen.status_texts)}." if self._radio.seen.status_texts else ""
         return ActionRefused(
-            self._action, f"The vehicle refused to {self._told} ({why}).{texts}", self._radio.clock.now_s()
+            self._action, f"The vehicle refused to {self._description} ({why}).{texts}", self._radio.clock.now_s()
         )
 
     def _unanswered(self) -> ActionRefused:
-        why = f"The vehicle did not reply to the command to {self._told}."
+        why = f"The vehicle did not reply to the command to {self._description}."
         return ActionRefused(self._action, why, self._radio.clock.now_s())
 
 

@@ -125,18 +125,18 @@ _SCORED: Final = "altitude_m"
 _OTHER: Final = "altitude_2_m"
 
 
-def channels_of(kept: RecordSample, datum_m: float, scored: Scored) -> dict[str, float]:
+def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[str, float]:
     """Return a sample's channels; altitudes count from `datum_m` on the vehicle's own datum."""
-    own_m = kept.position.altitude_m - datum_m
+    own_m = sample.position.altitude_m - datum_m
     channels = {
         _SCORED: own_m,
-        "climb_rate_m_s": kept.position.climb_rate_m_s,
-        "set_point_m": kept.set_point_m - datum_m,
+        "climb_rate_m_s": sample.position.climb_rate_m_s,
+        "set_point_m": sample.set_point_m - datum_m,
     }
-    if kept.battery_v is not None:
-        channels["battery_v"] = kept.battery_v
-    if kept.second_m is not None:
-        second_m = kept.second_m - datum_m
+    if sample.battery_v is not None:
+        channels["battery_v"] = sample.battery_v
+    if sample.second_m is not None:
+        second_m = sample.second_m - datum_m
         scored_m, other_m = (own_m, second_m) if scored == "vehicle" else (second_m, own_m)
         channels |= {_SCORED: scored_m, _OTHER: other_m}
     return channels

@@ -5,7 +5,7 @@ from typing import Final
 
 from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.events import Action, Heartbeat, PacketReceived, confirms_motors_off
-from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, UNHEEDED, UNHEEDED_S, land_every_s
+from app.vehicles.mavlink.failures import DESCENDING_M_S, NOT_DESCENDING, NOT_DESCENDING_AFTER_S, REPEAT_S, land_every_s
 from app.vehicles.mavlink.radio import AutopilotLink
 
 STOPPING_S: Final = 5.0
@@ -27,7 +27,7 @@ class RepeatedCommand:
         """Send the command; if it is not `by_person`, wait while the newest heartbeat shows a manual mode. Raises
         VehicleError if it needs a block of the flight plan that is unknown."""
         self._radio, self._action = radio, action
-        self._asked_s = radio.clock.now_s()
+        self._requested_s = radio.clock.now_s()
         self._answered = False
         self._by_hand_since_s: float | None = None
         self._landing_since_s: float | None = None
@@ -39,15 +39,15 @@ class RepeatedCommand:
     @property
     def trouble(self) -> str:
         """Message that the vehicle does not land although commanded to; otherwise empty."""
-        waits = self._action is Action.LAND and self._radio.clock.now_s() - self._asked_s > UNHEEDED_S
-        return UNHEEDED if waits and not self.is_over and self._landing_since_s is None else ""
+        waits = self._action is Action.LAND and self._radio.clock.now_s() - self._requested_s > NOT_DESCENDING_AFTER_S
+        return NOT_DESCENDING if waits and not self.is_over and self._landing_since_s is None else ""
 
-    def proceed(self, heard: list[PacketReceived]) -> None:
+    def proceed(self, packets: list[PacketReceived]) -> None:
         """Process packets, and send the command again if it is due."""
-        for each in heard:
+        for each in packets:
             self._note(each)
         now_s = self._radio.clock.now_s()
-        is_late = self._action is Action.KILL and now_s - self._asked_s > STOPPING_S
+        is_late = self._action is Action.KILL and now_s - self._requested_s > STOPPING_S
         self.is_over = self.is_over or is_late or self._has_stopped() or self._has_landed(now_s)
         is_due = now_s - self._sent_s >= self._every_s(now_s)
         held_up = self._landing_since_s is not None or self._may_be_by_hand(now_s)
@@ -60,31 +60,31 @@ class RepeatedCommand:
 
     def _may_be_by_hand(self, now_s: float) -> bool:
         """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
-        is_news = now_s - self._radio.seen.heartbeat_s < self._radio.witness_gap_s
-        return self._action is Action.LAND and is_news and self._is_in_pilots_mode()
+        is_recent = now_s - self._radio.seen.heartbeat_s < self._radio.confirmation_s
+        return self._action is Action.LAND and is_recent and self._is_in_pilots_mode()
 
-    def _note(self, heard: PacketReceived) -> None:
+    def _note(self, packet: PacketReceived) -> None:
         profile = self._radio.profile
         if self._action is Action.KILL:
-            self._answered = self._answered or confirms_motors_off(heard.measurement, profile.stop_settings)
-        elif isinstance(heard.measurement, Heartbeat):
-            if heard.measurement.mode not in profile.manual_modes:
+            self._answered = self._answered or confirms_motors_off(packet.measurement, profile.stop_settings)
+        elif isinstance(packet.measurement, Heartbeat):
+            if packet.measurement.mode not in profile.manual_modes:
                 self._by_hand_since_s = None
             elif self._by_hand_since_s is None:
-                self._by_hand_since_s = heard.now_s
-            elif heard.now_s - self._by_hand_since_s >= self._radio.witness_gap_s:
+                self._by_hand_since_s = packet.now_s
+            elif packet.now_s - self._by_hand_since_s >= self._radio.confirmation_s:
                 self.is_over = True
 
     def _every_s(self, now_s: float) -> float:
         if self._action is Action.LAND:
-            return land_every_s(now_s - self._asked_s, self._radio.profile.land_again_s)
+            return land_every_s(now_s - self._requested_s, self._radio.profile.land_again_s)
         return REPEAT_S
 
     def _send(self) -> None:
         """Send every message once, without waiting for a reply."""
         self._sent_s = self._radio.clock.now_s()
         try:
-            steps = self._radio.profile.steps(self._action, self._radio.aim)
+            steps = self._radio.profile.steps(self._action, self._radio.target)
         except KeyError as error:
             raise VehicleError(
                 f"This program cannot command the vehicle to {self._action}: its flight plan listed no block {error}.",
@@ -96,7 +96,7 @@ class RepeatedCommand:
     def _has_stopped(self) -> bool:
         """Whether the motors have stopped, by two heartbeats since the command, or by one and a reply."""
         seen = self._radio.seen
-        if seen.heartbeat is None or seen.heartbeat_s <= self._asked_s:
+        if seen.heartbeat is None or seen.heartbeat_s <= self._requested_s:
             return False
         return not seen.heartbeat.armed and (self._answered or self._radio.is_disarmed)
 
@@ -112,15 +112,15 @@ class RepeatedCommand:
         if self._action is Action.KILL:
             return False
         seen, profile = self._radio.seen, self._radio.profile
-        if seen.block_s > self._asked_s and self._radio.block in profile.landing_blocks:
+        if seen.block_s > self._requested_s and self._radio.block in profile.landing_blocks:
             return True
-        says_so = profile.landing_modes - profile.flying_modes
-        if seen.heartbeat is not None and seen.heartbeat_s > self._asked_s and seen.heartbeat.mode in says_so:
+        landing_modes = profile.landing_modes - profile.flying_modes
+        if seen.heartbeat is not None and seen.heartbeat_s > self._requested_s and seen.heartbeat.mode in landing_modes:
             return True
-        since_s = max(self._asked_s, now_s - SINKING_S)
-        recent = [each for _, each in takewhile(lambda heard: heard[0] > since_s, reversed(seen.positions))]
+        since_s = max(self._requested_s, now_s - SINKING_S)
+        recent = [each for _, each in takewhile(lambda entry: entry[0] > since_s, reversed(seen.positions))]
         return (
-            now_s - self._asked_s >= SINKING_S
+            now_s - self._requested_s >= SINKING_S
             and len(recent) > 1
             and all(position.climb_rate_m_s < DESCENDING_M_S for position in recent)
         )

@@ -48,7 +48,7 @@ class StatusReader:
             position_hz=len(recent) / RATE_OVER_S,
             lost_share=self._lost_share(now_s, health),
             held=dict(held),
-            said=radio.seen.spoken[-1] if radio.seen.spoken else "",
+            said=radio.seen.status_texts[-1] if radio.seen.status_texts else "",
             trouble=trouble,
         )
 
@@ -56,7 +56,7 @@ class StatusReader:
         """Return the display name of the mode, or of the block if the vehicle flies by a flight plan."""
         profile = self._radio.profile
         name = profile.mode_names.get(number, number)
-        return name if number in profile.deaf_modes else self._radio.block or name
+        return name if number in profile.modes_without_land else self._radio.block or name
 
     def _lost_share(self, now_s: float, health: LinkHealth) -> float | None:
         if now_s - self._counts[-1].at_s >= _EVERY_S:

@@ -109,12 +109,12 @@ class UdpTransport:
         return self._remote
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
-        heard: list[tuple[bytes, Peer]] = []
+        datagrams: list[tuple[bytes, Peer]] = []
         if self._waiter.wait(timeout_s):
             with contextlib.suppress(BlockingIOError):
-                while len(heard) < BATCH:
-                    heard.append(self._socket.recvfrom(LARGEST_READ))
-        return heard
+                while len(datagrams) < BATCH:
+                    datagrams.append(self._socket.recvfrom(LARGEST_READ))
+        return datagrams
 
     def write(self, data: bytes) -> bool:
         if self._remote is None:
@@ -246,10 +246,10 @@ class _Waiter:
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
-        self._bell, self._button = socket.socketpair()
-        self._bell.setblocking(False)
-        self._button.setblocking(False)
-        self._selector.register(self._bell, selectors.EVENT_READ)
+        self._wake_receiver, self._wake_sender = socket.socketpair()
+        self._wake_receiver.setblocking(False)
+        self._wake_sender.setblocking(False)
+        self._selector.register(self._wake_receiver, selectors.EVENT_READ)
         self._watched: int | None = None
         self._events = 0
 
@@ -275,17 +275,17 @@ class _Waiter:
                 found = events
             else:
                 with contextlib.suppress(BlockingIOError):
-                    self._bell.recv(LARGEST_READ)
+                    self._wake_receiver.recv(LARGEST_READ)
         return found
 
     def wake(self) -> None:
         with contextlib.suppress(OSError):  # full of wakes, or closed by the waiting thread
-            self._button.send(b"!")
+            self._wake_sender.send(b"!")
 
     def close(self) -> None:
         self._selector.close()
-        self._bell.close()
-        self._button.close()
+        self._wake_receiver.close()
+        self._wake_sender.close()
 
 
 def _connected(host: str, port: int) -> socket.socket:

@@ -24,7 +24,7 @@ from app.vehicles.mavlink.events import (
     SendGain,
     Tick,
 )
-from app.vehicles.mavlink.failures import UNHEEDED, UNHEEDED_S
+from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
@@ -82,7 +82,7 @@ class TrialRunner:
         self._offset_s = float("inf")
         self._on_sample, self._should_stop = on_sample, should_stop
         self._samples: list[RecordSample] = []
-        self._conversation: CommandSequence | None = None
+        self._sequence: CommandSequence | None = None
         self._error: BaseException | None = None
         self._shown_s = float("-inf")
         self._listened_s = self._sank_s = radio.clock.now_s()
@@ -103,9 +103,9 @@ class TrialRunner:
     def trouble(self) -> str:
         """Message that the vehicle does not land although commanded to; otherwise empty."""
         trial, now_s = self._trial, self._radio.clock.now_s()
-        if trial.state not in LANDING or now_s - self._sank_s < UNHEEDED_S:
+        if trial.state not in LANDING or now_s - self._sank_s < NOT_DESCENDING_AFTER_S:
             return ""
-        return UNHEEDED if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m) else ""
+        return NOT_DESCENDING if watching.is_airborne(trial.watch, now_s, trial.plan.ground_m) else ""
 
     def _note_sinking(self) -> None:
         """Note since when the vehicle has not descended by `SINKS_M`."""
@@ -119,7 +119,7 @@ class TrialRunner:
         self._guarded(lambda: self._carry_out(self._begin_with))
         while not self._trial.is_over:
             self._guarded(self._listen)
-            self._guarded(self._judge)
+            self._guarded(self._evaluate)
         return TrialResult(self._trial, tuple(self._samples), self._offset_s, self._error)
 
     def _guarded(self, work: Callable[[], None]) -> None:
@@ -131,26 +131,26 @@ class TrialRunner:
             self._error = self._error or error
 
     def _listen(self) -> None:
-        heard = self._radio.receive(LISTEN_S)
+        packets = self._radio.receive(LISTEN_S)
         now_s = self._radio.clock.now_s()
         stalled_s = now_s - self._listened_s
         if stalled_s > STALL_S:
-            heard += self._radio.receive(LISTEN_S)
+            packets += self._radio.receive(LISTEN_S)
         self._listened_s = now_s
         if self._trial.state is State.ARM and stalled_s > LONGEST_STALL_S * self._radio.timeout_factor:
             why = f"This program stalled for {stalled_s:.0f} s, so the take-off was not commanded."
             self._advance(ActionRefused(Action.ARM, why, now_s))
-        for each in in_order(heard, self._look()):
+        for each in in_order(packets, self._look()):
             if isinstance(each, PacketReceived) and isinstance(each.measurement, Position):
                 self._offset_s = min(self._offset_s, each.now_s - each.measurement.time_boot_s)
             self._advance(each)
-        if why := self._radio.link.doubled:
+        if why := self._radio.link.duplicate_reason:
             self._advance(DuplicateVehicleDetected(why, self._radio.clock.now_s()))
-        if self._conversation is not None and (ended := self._conversation.proceed(heard)) is not None:
-            self._conversation = None
+        if self._sequence is not None and (ended := self._sequence.proceed(packets)) is not None:
+            self._sequence = None
             self._advance(ended)
 
-    def _judge(self) -> None:
+    def _evaluate(self) -> None:
         if self._trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
             self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
         if (stop := self._wanted()) is not None:
@@ -161,12 +161,12 @@ class TrialRunner:
 
     def _wanted(self) -> StopRequest | None:
         """Return the stop request. An internal error lands the vehicle; a request for motors off takes precedence."""
-        stop = self._asked_stop()
+        stop = self._call_should_stop()
         if self._error is None or (stop is not None and stop.motors_off):
             return stop
         return StopRequest(_describe_error(self._error))
 
-    def _asked_stop(self) -> StopRequest | None:
+    def _call_should_stop(self) -> StopRequest | None:
         try:
             return self._should_stop()
         except BaseException as error:  # noqa: BLE001 - kept for the caller; it is called again
@@ -177,7 +177,7 @@ class TrialRunner:
         before = self._trial.state
         self._trial, commands = advance(self._trial, event)
         if self._trial.state is not before:
-            self._conversation = None  # the commands of the previous state are obsolete
+            self._sequence = None  # the commands of the previous state are obsolete
         self._carry_out(commands)
 
     def _carry_out(self, commands: tuple[Command, ...]) -> None:
@@ -187,14 +187,14 @@ class TrialRunner:
                     self._perform(action)
                 case SendGain(setting):
                     radio = self._radio
-                    radio.send(radio.profile.set_parameter(radio.aim, setting.parameter, setting.value))
+                    radio.send(radio.profile.set_parameter(radio.target, setting.parameter, setting.value))
                 case RestoreGains():
                     self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
                 case RecordSample():
-                    self._keep(command)
+                    self._record_sample(command)
 
     def _perform(self, action: Action) -> None:
-        self._conversation = CommandSequence(action, self._radio.profile.steps(action, self._radio.aim), self._radio)
+        self._sequence = CommandSequence(action, self._radio.profile.steps(action, self._radio.target), self._radio)
 
     def _restored(self) -> str:
         try:
@@ -205,15 +205,15 @@ class TrialRunner:
             self._error = self._error or error
             return self._restore()
 
-    def _keep(self, kept: RecordSample) -> None:
-        self._samples.append(kept)
+    def _record_sample(self, sample: RecordSample) -> None:
+        self._samples.append(sample)
         start_s = self._trial.commanded_boot_s
         if start_s is None or self._error is not None:
             return
-        time_s = kept.position.time_boot_s - start_s
+        time_s = sample.position.time_boot_s - start_s
         if time_s >= 0.0 and time_s - self._shown_s >= _SAMPLE_EVERY_S:
             self._shown_s = time_s
-            self._show(Sample(time_s, self._channels(kept, self.datum_m)))
+            self._show(Sample(time_s, self._channels(sample, self.datum_m)))
 
     def _show(self, sample: Sample) -> None:
         try:
@@ -229,8 +229,8 @@ def _describe_error(error: BaseException) -> str:
 
 
 def in_order(
-    heard: Sequence[PacketReceived], sighted: Sequence[SecondaryAltitudeReceived]
+    packets: Sequence[PacketReceived], samples: Sequence[SecondaryAltitudeReceived]
 ) -> list[PacketReceived | SecondaryAltitudeReceived]:
     """Return all events in the order of receipt, so that after a stall of this program old samples of the second source
     are not compared with newer positions of the vehicle."""
-    return sorted((*heard, *sighted), key=lambda event: event.now_s)
+    return sorted((*packets, *samples), key=lambda event: event.now_s)

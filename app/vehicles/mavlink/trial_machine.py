@@ -57,7 +57,7 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
-_ASKING_S: Final = 15.0
+_ARMING_S: Final = 15.0
 """Longest time that arming may take, with all repetitions."""
 
 
@@ -72,18 +72,18 @@ def advance(trial: Trial, event: Event) -> Step:
         return trial, ()
     kept: tuple[Command, ...] = ()
     if isinstance(event, PacketReceived):
-        trial, kept = _hear(trial, event)
+        trial, kept = _process_packet(trial, event)
     elif isinstance(event, SecondaryAltitudeReceived):
-        sighted = replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
-        trial = replace(trial, watch=watching.sight(trial.watch, sighted))
+        sample = replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
+        trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
     elif isinstance(event, DuplicateVehicleDetected):
-        trial = replace(trial, watch=replace(trial.watch, doubled=event.why))
+        trial = replace(trial, watch=replace(trial.watch, duplicate_reason=event.why))
     trial = replace(trial, watch=watching.settle(trial.watch, event.now_s, trial.plan.ground_m))
     trial, commands = _react(_with_fall(trial), event)
     return trial, (*kept, *commands)
 
 
-def _hear(trial: Trial, event: PacketReceived) -> Step:
+def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan.limits)
     trial = replace(_with_interruption(trial, watch), watch=watch)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
@@ -123,7 +123,7 @@ def _react(trial: Trial, event: Event) -> Step:
 def _arm(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     if isinstance(event, ActionDone) and event.action is Action.ARM:
-        trial = replace(trial, asked_s=now_s)
+        trial = replace(trial, arm_sent_s=now_s)
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
@@ -147,8 +147,8 @@ def _not_armed(trial: Trial, event: Event) -> Finding | None:
     if trial.armed_s is not None and watching.is_disarmed(trial.watch, trial.plan.limits):
         why = "It disarmed itself."
     elif trial.armed_s is None:
-        late = trial.asked_s is not None and event.now_s - trial.asked_s > ARMED_WITHIN_S
-        why = "It did not report that it is armed." if late or event.now_s - trial.since_s > _ASKING_S else ""
+        late = trial.arm_sent_s is not None and event.now_s - trial.arm_sent_s > ARMED_WITHIN_S
+        why = "It did not report that it is armed." if late or event.now_s - trial.since_s > _ARMING_S else ""
     return Finding(failure=Failure.NOT_ARMED, why=why) if why else None
 
 
@@ -233,7 +233,7 @@ def _may_be_by_hand(trial: Trial, now_s: float) -> bool:
 
 def _doubting(trial: Trial) -> Trial:
     """Note a finding that makes the vehicle's state uncertain while it lands for another reason."""
-    finding = _changed(trial) if trial.commanded_s is not None else limit_checks.find_doubled(trial.watch)
+    finding = _changed(trial) if trial.commanded_s is not None else limit_checks.find_duplicate(trial.watch)
     return trial if finding is None else note(trial, finding)
 
 
@@ -274,8 +274,8 @@ def _link_lost(trial: Trial, event: Event) -> Step:
     trial = _doubting(trial)
     if finding := _taken_over(trial):
         return fail(trial, finding, now_s)
-    is_heard = isinstance(event, PacketReceived) and isinstance(event.measurement, Heartbeat)
-    if is_heard and not _may_be_by_hand(trial, now_s):
+    is_received = isinstance(event, PacketReceived) and isinstance(event.measurement, Heartbeat)
+    if is_received and not _may_be_by_hand(trial, now_s):
         return land(trial, State.ABORT_LAND, now_s)
     if now_s - trial.since_s > LINK_LOST_S:
         return quarantine(trial, f"The link stayed lost for {LINK_LOST_S:g} s.", now_s)
@@ -312,8 +312,8 @@ def _why_not_stopped(trial: Trial, now_s: float) -> str:
 
 def _answered(trial: Trial, event: Event) -> Trial:
     """Note a reply to the command to stop its motors, which together with one heartbeat confirms the stop."""
-    heard = event.measurement if isinstance(event, PacketReceived) else None
-    answered = confirms_motors_off(heard, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
+    measurement = event.measurement if isinstance(event, PacketReceived) else None
+    answered = confirms_motors_off(measurement, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
     return replace(trial, answered=trial.answered or answered)
 
 
@@ -355,7 +355,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
         _taken_over(trial)
         or limit_checks.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
         or (limit_checks.find_interrupted_climb(watch, plan.limits) if _modes(trial) else None)
-        or limit_checks.find_doubled(watch)
+        or limit_checks.find_duplicate(watch)
         or limit_checks.find_link(watch, plan.limits, now_s)
         or limit_checks.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
         or limit_checks.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
@@ -378,7 +378,7 @@ def _taken_over(trial: Trial) -> Finding | None:
 def _changed(trial: Trial) -> Finding | None:
     """Return an unexpected change of state during a landing, in which disarming is expected."""
     watch = replace(trial.watch, armed=True)
-    return limit_checks.find_doubled(watch) or limit_checks.find_unexpected(
+    return limit_checks.find_duplicate(watch) or limit_checks.find_unexpected(
         watch, trial.plan.limits, _modes(trial), _blocks(trial)
     )
 

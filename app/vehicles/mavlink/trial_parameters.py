@@ -55,7 +55,7 @@ class TrialParameters:
     def set(self) -> None:
         """Set the parameters for take-off. Raises VehicleError if the vehicle does not report the current values or
         does not accept the new ones, or if the current values cannot be stored."""
-        for setting in self._radio.profile.take_off_settings(self._radio.aim):
+        for setting in self._radio.profile.take_off_settings(self._radio.target):
             held = read_parameter(self._radio, setting.parameter)
             if held is None:
                 raise _unset(setting)
@@ -97,11 +97,11 @@ class TrialParameters:
 
     def _read(self, file: Path) -> dict[str, ChangedParameter]:
         try:
-            kept = json.loads(file.read_text(encoding="utf-8"))
-            if kept["vehicle"] != self._vehicle():
+            stored = json.loads(file.read_text(encoding="utf-8"))
+            if stored["vehicle"] != self._vehicle():
                 return {}
             return {
-                str(name): ChangedParameter(float(one[0]), float(one[1])) for name, one in kept["parameters"].items()
+                str(name): ChangedParameter(float(one[0]), float(one[1])) for name, one in stored["parameters"].items()
             }
         except FileNotFoundError:
             return {}
@@ -134,7 +134,7 @@ class TrialParameters:
         fresh.replace(file)
 
     def _vehicle(self) -> str:
-        return f"{self._radio.profile.name} {self._radio.aim.system}"
+        return f"{self._radio.profile.name} {self._radio.target.system}"
 
 
 def _unusable(file: Path, error: Exception) -> VehicleError:

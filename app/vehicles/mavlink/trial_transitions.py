@@ -134,7 +134,7 @@ class Trial:
     watch: TrialObservation
     failure: Failure | None = None
     why: str = ""
-    asked_s: float | None = None
+    arm_sent_s: float | None = None
     armed_s: float | None = None
     commanded_s: float | None = None
     commanded_boot_s: float | None = None
@@ -173,7 +173,7 @@ def fail(trial: Trial, finding: Finding, now_s: float) -> Step:
     """Make the transition for a failure, from a state in which the vehicle can be commanded."""
     trial = note(trial, finding)
     if trial.state is State.ARM:
-        return disarm(trial, now_s) if finding.failure is not Failure.DOUBLED else _abort_landing(trial, now_s)
+        return disarm(trial, now_s) if finding.failure is not Failure.DUPLICATE else _abort_landing(trial, now_s)
     reaction = RESPONSES[finding.failure].reaction
     if reaction == "cease":
         return quarantine(trial, "" if finding.why == trial.why else finding.why, now_s)

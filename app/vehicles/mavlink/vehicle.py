@@ -44,7 +44,7 @@ _LISTEN_S: Final = 0.1
 _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
 _ANOTHER: Final = "Check which vehicle it is, then try again."
-_KEPT_LANDING: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
+_LAND_REPEATED: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
 _SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
 
 
@@ -89,21 +89,23 @@ class MavlinkVehicle:
         self.is_real: Final = is_real
         self._options = dict(options)
         self._state = State.CONNECT
-        self._why = self._asked = self._plan_problem = ""
+        self._why = self._requested = self._plan_problem = ""
         self._pinned = identity
         self._datum_m = 0.0
         self._flight: TrialRunner | None = None
-        self._order: RepeatedCommand | None = None
-        self._gives_back = False
-        self._lookout = None if source is None else AlignedAltitudeSource(source)
-        overhear = None if source is None else source.on_message
+        self._repeated: RepeatedCommand | None = None
+        self._is_restoring = False
+        self._secondary = None if source is None else AlignedAltitudeSource(source)
+        on_message = None if source is None else source.on_message
         self._on_wait = on_wait
-        self._radio = open_radio(options, clock, overhear=overhear, on_wait=self._while_waiting, transport=transport)
-        self._gauges = StatusReader(self._radio)
+        self._radio = open_radio(
+            options, clock, on_message=on_message, on_wait=self._while_waiting, transport=transport
+        )
+        self._status_reader = StatusReader(self._radio)
         try:
             self._gains = GainStore(self._radio, safe_gains)
             self._decided = decided
-            self._kept_in = trial_parameters
+            self._parameters_folder = trial_parameters
             self._parameters = self._trial_parameters()
             self._connect()
             if not observes:
@@ -130,7 +132,7 @@ class MavlinkVehicle:
         try:
             return self._gains.stage(gains)
         except VehicleError:
-            self._give_back()
+            self._restore_or_quarantine()
             raise
 
     def read_gains(self) -> dict[str, float]:
@@ -160,10 +162,10 @@ class MavlinkVehicle:
         except BaseException as error:
             if isinstance(error, VehicleError):
                 error.not_flown = True
-            self._give_back()
+            self._restore_or_quarantine()
             raise
         if stop is not None:
-            self._give_back()
+            self._restore_or_quarantine()
             return self._not_begun(ground, stop.reason)
         flown = self._fly(ground, on_sample, should_stop)
         if flown.error is not None:
@@ -173,8 +175,8 @@ class MavlinkVehicle:
     def close(self) -> None:
         """Close the link; the vehicle is left unchanged."""
         self._radio.link.close()
-        if self._lookout is not None:
-            self._lookout.source.close()
+        if self._secondary is not None:
+            self._secondary.source.close()
 
     # ---- interface of a vehicle whose link stays open
 
@@ -183,7 +185,7 @@ class MavlinkVehicle:
         """Identity as reported, which may take some time; parts not reported are those of the pinned identity."""
         radio, seen = self._radio, self._radio.seen
         reported = Identity(
-            system_id=radio.aim.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid
+            system_id=radio.target.system, autopilot=radio.profile.name, version=seen.version, uid=seen.uid
         )
         return reported.completed_by(self._pinned)
 
@@ -192,12 +194,12 @@ class MavlinkVehicle:
         """Reason why the vehicle may only be observed; empty if it may fly."""
         if self._state not in QUARANTINE_STATES:
             return ""
-        return " ".join(part for part in (self._why, self._asked) if part)
+        return " ".join(part for part in (self._why, self._requested) if part)
 
     @property
     def has_standing_order(self) -> bool:
         """Whether a command of `land` or `motors_off` is still being repeated."""
-        return self._order is not None and not self._order.is_over
+        return self._repeated is not None and not self._repeated.is_over
 
     def condition(self) -> Condition:
         """Return the state last received, without waiting. Altitude counts as in a record."""
@@ -205,11 +207,11 @@ class MavlinkVehicle:
         problem = self._radio.link.log_problem
         troubles = (
             f"The telemetry log {problem}." if problem else "",
-            self._lookout.source.trouble if self._lookout is not None else "",
+            self._secondary.source.trouble if self._secondary is not None else "",
             self._flight.trouble if self._flight is not None else "",
-            self._order.trouble if self._order is not None else "",
+            self._repeated.trouble if self._repeated is not None else "",
         )
-        return self._gauges.read(
+        return self._status_reader.read(
             step=(State.IDLE if step in _ON_THE_GROUND else step).value,
             datum_m=self._datum_m if self._flight is None else self._flight.datum_m,
             held=self._gains.held,
@@ -221,9 +223,9 @@ class MavlinkVehicle:
         repeated every second until telemetry confirms it. Raises LinkError if the link is closed."""
         until_s = self._radio.clock.now_s() + timeout_s
         while (left_s := until_s - self._radio.clock.now_s()) > 0.0:
-            heard = self._radio.receive(min(left_s, _LISTEN_S))
-            self._judge_heard()
-            self._repeat_order(heard)
+            packets = self._radio.receive(min(left_s, _LISTEN_S))
+            self._check_identity()
+            self._repeat_command(packets)
 
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
@@ -245,7 +247,7 @@ class MavlinkVehicle:
         if preflight.is_another(self._radio, self._pinned):
             raise SafeGainsError(self.concern, hint=_ANOTHER)
         self._require_uid()
-        if problem := self._put_back():
+        if problem := self._restore_all():
             raise SafeGainsError(f"The vehicle does not accept its earlier values: {problem}", hint=_SET_BY_HAND)
         return dict(self._gains.held)
 
@@ -258,23 +260,23 @@ class MavlinkVehicle:
         changed.held, self._gains = self._gains.held, changed
         if self._decided and self._state in QUARANTINE_STATES:
             return
-        if self._took_safe_gains() and self._state in QUARANTINE_STATES:
+        if self._has_set_safe_gains() and self._state in QUARANTINE_STATES:
             self._enter(State.IDLE)
             self._why = ""
 
-    def _put_back(self) -> str:
+    def _restore_all(self) -> str:
         """Restore the safe gains and the other parameters of a trial; return the problem, or an empty string."""
         return self._gains.restore_or_explain() or self._parameters.restore()
 
     def land(self, reason: str) -> None:
         """Command the vehicle to land at once, in any state. Raises VehicleError if it cannot be commanded."""
-        self._asked = f"Land was requested: {reason}."
-        self._order = RepeatedCommand(self._radio, Action.LAND)
+        self._requested = f"Land was requested: {reason}."
+        self._repeated = RepeatedCommand(self._radio, Action.LAND)
 
     def motors_off(self, reason: str) -> None:
         """Stop the motors at once, at any height."""
-        self._asked = f"Motors off was requested: {reason}."
-        self._order = RepeatedCommand(self._radio, Action.KILL)
+        self._requested = f"Motors off was requested: {reason}."
+        self._repeated = RepeatedCommand(self._radio, Action.KILL)
 
     def log_to(self, path: Path | None) -> None:
         """Record all packets from now on, in both directions, in this telemetry log; None ends the log. Raises
@@ -291,10 +293,10 @@ class MavlinkVehicle:
         self._identify()
         if (change := preflight.identity_change(self._radio, self._pinned)) not in seen:
             raise SafeGainsError(change, hint=_ANOTHER)
-        if (untold := preflight.find_untold_uid(self._radio, self._pinned)) not in seen:
-            self._why = f"{seen} {untold}".strip()
-            raise SafeGainsError(untold, hint=_ANOTHER)
-        if untold or preflight.is_another(self._radio, self._pinned):
+        if (missing_uid := preflight.find_missing_uid(self._radio, self._pinned)) not in seen:
+            self._why = f"{seen} {missing_uid}".strip()
+            raise SafeGainsError(missing_uid, hint=_ANOTHER)
+        if missing_uid or preflight.is_another(self._radio, self._pinned):
             self._parameters = self._trial_parameters()
         accepted = replace(self.identity, uid=self._radio.seen.uid)
         pinned, self._pinned, self._decided = self._pinned, accepted, True
@@ -305,8 +307,8 @@ class MavlinkVehicle:
             raise
         if self._state in QUARANTINE_STATES:
             self._enter(State.IDLE)
-        self._why = self._asked = ""
-        self._order = None
+        self._why = self._requested = ""
+        self._repeated = None
 
     # ---- connecting
 
@@ -317,11 +319,11 @@ class MavlinkVehicle:
         self._listen(0.0)
         if self._state in QUARANTINE_STATES:
             return
-        if self._took_safe_gains():
+        if self._has_set_safe_gains():
             self._enter(State.SET_GAINS)
             self._enter(State.IDLE)
 
-    def _took_safe_gains(self) -> bool:
+    def _has_set_safe_gains(self) -> bool:
         """Write or compare the safe gains; return whether the vehicle holds them and nothing else was found. Otherwise
         it is only observed."""
         was_observed = self._state in QUARANTINE_STATES
@@ -354,9 +356,9 @@ class MavlinkVehicle:
 
     def _trial_parameters(self) -> TrialParameters:
         """Return the trial parameters of the vehicle that is connected when they are first needed."""
-        if self._kept_in is None:
+        if self._parameters_folder is None:
             return TrialParameters(self._radio)
-        folder, address = self._kept_in, addresses.parse(str(self._options["address"]))
+        folder, address = self._parameters_folder, addresses.parse(str(self._options["address"]))
         is_simulated = bool(self._options["simulated"])
         return TrialParameters(
             self._radio, lambda: files_for(folder, address, self.identity, is_simulated=is_simulated)
@@ -374,9 +376,9 @@ class MavlinkVehicle:
         self._why, self._gains.staged = why, None
 
     def _await_heartbeat(self) -> None:
-        asked_s = self._radio.clock.now_s()
-        while self._radio.seen.heartbeat_s < asked_s:
-            if self._radio.clock.now_s() - asked_s > _HEARD_WITHIN_S * self._radio.timeout_factor:
+        since_s = self._radio.clock.now_s()
+        while self._radio.seen.heartbeat_s < since_s:
+            if self._radio.clock.now_s() - since_s > _HEARD_WITHIN_S * self._radio.timeout_factor:
                 raise VehicleError(
                     "No heartbeat of the vehicle was received.",
                     hint="Check that it is on and in range, then try again.",
@@ -392,16 +394,18 @@ class MavlinkVehicle:
 
     def _require_uid(self) -> None:
         """Raise VehicleError if the pinned hardware id is known, and this vehicle has not reported its own."""
-        if untold := preflight.find_untold_uid(self._radio, self._pinned):
-            raise VehicleError(untold, hint="Try again. If it no longer reports one, connect it again and release it.")
+        if missing_uid := preflight.find_missing_uid(self._radio, self._pinned):
+            raise VehicleError(
+                missing_uid, hint="Try again. If it no longer reports one, connect it again and release it."
+            )
 
     def _listen(self, timeout_s: float) -> None:
         """Receive between flights. A vehicle that somebody else arms, or that reports another version or hardware id
         than the pinned one, is only observed from then on."""
         self._radio.listen(timeout_s)
-        self._judge_heard()
+        self._check_identity()
 
-    def _judge_heard(self) -> None:
+    def _check_identity(self) -> None:
         armed = preflight.ARMED if preflight.is_armed(self._radio) else ""
         change = preflight.identity_change(self._radio, self._pinned)
         if self._state not in QUARANTINE_STATES:
@@ -410,19 +414,19 @@ class MavlinkVehicle:
         elif change not in self._why:
             self._why = f"{self._why} {change}"
 
-    def _while_waiting(self, heard: list[PacketReceived]) -> None:
+    def _while_waiting(self, packets: list[PacketReceived]) -> None:
         """Repeat a pending Land or motors off and accept new commands during operations that wait. Restoring the safe
         gains is never interrupted."""
-        self._repeat_order(heard)
+        self._repeat_command(packets)
         try:
             self._on_wait()
         except VehicleError:
-            if not self._gives_back:
+            if not self._is_restoring:
                 raise
 
-    def _repeat_order(self, heard: list[PacketReceived]) -> None:
-        if self._order is not None:
-            self._order.proceed(heard)
+    def _repeat_command(self, packets: list[PacketReceived]) -> None:
+        if self._repeated is not None:
+            self._repeated.proceed(packets)
 
     # ---- flying
 
@@ -445,7 +449,7 @@ class MavlinkVehicle:
         if not preflight.is_armed(self._radio) and self._state not in QUARANTINE_STATES:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
             preflight.make_armable(self._radio)
-        watched = preflight.observe(self._radio, self._lookout, watched_s=watched_s)
+        watched = preflight.observe(self._radio, self._secondary, watched_s=watched_s)
         self._identify()
         if self._state not in QUARANTINE_STATES:
             preflight.confirm_stop(self._radio, watched)
@@ -453,8 +457,8 @@ class MavlinkVehicle:
         items = preflight.evaluate_items(self._radio, watched, min_battery_v=minimum_v, plan_problem=self._plan_problem)
         if self._pinned is not None and self._pinned.uid:
             items = (*items, preflight.evaluate_uid(self._radio, self._pinned))
-        if self._lookout is not None:
-            items = (*items, preflight.evaluate_secondary(self._lookout, watched))
+        if self._secondary is not None:
+            items = (*items, preflight.evaluate_secondary(self._secondary, watched))
         if self._radio.profile.flying_blocks:
             radius_m, plan_radius_m = float(self._options["radius_m"]), float(self._options["plan_radius_m"])
             items = (*items, preflight.evaluate_distance(watched, radius_m=radius_m, plan_radius_m=plan_radius_m))
@@ -462,24 +466,24 @@ class MavlinkVehicle:
 
     def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> TrialResult:
         last = ground.last
-        self._radio.aim = replace(self._radio.aim, east_m=last.east_m, north_m=last.north_m)
+        self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
         plan = self._plan(ground)
-        self._gains.staged = self._order = None
+        self._gains.staged = self._repeated = None
         watch = watching.begin(
             self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S
         )
-        if self._lookout is not None:
-            self._lookout.align(ground.seen_m, ground.altitude_m)
+        if self._secondary is not None:
+            self._secondary.align(ground.secondary_m, ground.altitude_m)
         self._flight = TrialRunner(
             self._radio,
             plan,
             watch,
-            restore=self._put_back,
+            restore=self._restore_all,
             on_sample=on_sample,
             should_stop=should_stop,
-            channels=lambda kept, datum_m: records.channels_of(kept, datum_m, self._scored),
-            look=list if self._lookout is None else self._lookout.take_samples,
+            channels=lambda sample, datum_m: records.channels_of(sample, datum_m, self._scored),
+            look=list if self._secondary is None else self._secondary.take_samples,
         )
         try:
             flown = self._flight.fly()
@@ -494,10 +498,10 @@ class MavlinkVehicle:
         """Keep commanding Land to a vehicle that did not land within its trial, while it is armed and no pilot flies
         it."""
         by_hand = limit_checks.find_taken_over(trial.watch, trial.plan.limits) is not None
-        if not by_hand and not self._radio.is_disarmed and self._order is None:
+        if not by_hand and not self._radio.is_disarmed and self._repeated is None:
             with suppress(LinkError):
-                self._order = RepeatedCommand(self._radio, Action.LAND, by_person=False)
-                self._asked = _KEPT_LANDING
+                self._repeated = RepeatedCommand(self._radio, Action.LAND, by_person=False)
+                self._requested = _LAND_REPEATED
 
     def _plan(self, ground: Ground) -> Plan:
         profile = self._radio.profile
@@ -512,12 +516,12 @@ class MavlinkVehicle:
         )
         return plan.on_ground_at(ground.altitude_m)
 
-    def _give_back(self) -> None:
+    def _restore_or_quarantine(self) -> None:
         """Restore the safe gains, because the staged gains are not flown; quarantine the vehicle if they cannot be
         verified. A vehicle that is armed keeps its gains, and is observed."""
         if self._state in QUARANTINE_STATES:
             return
-        self._gives_back = True
+        self._is_restoring = True
         try:
             self.restore()
         except VehicleError as error:
@@ -525,7 +529,7 @@ class MavlinkVehicle:
                 self._enter(State.QUARANTINE)
                 self._why = f"Its safe gains could not be verified: {error}"
         finally:
-            self._gives_back = False
+            self._is_restoring = False
 
     # ---- records
 
@@ -545,16 +549,18 @@ class MavlinkVehicle:
             refusal.not_flown = True
             raise refusal
         both = AlignedRecord(trajectory=records.trajectory_of(flown.samples, start_s, trial.plan.datum_m))
-        if self._lookout is not None:
-            zero_s, name = start_s + flown.offset_s, self._lookout.source.name
+        if self._secondary is not None:
+            zero_s, name = start_s + flown.offset_s, self._secondary.source.name
             both = add_secondary_altitude(
-                both.trajectory, self._lookout.seen, name=name, zero_s=zero_s, scored=self._scored
+                both.trajectory, self._secondary.seen, name=name, zero_s=zero_s, scored=self._scored
             )
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
             reason=" ".join(
-                part for part in (reason, _KEPT_LANDING if self._asked == _KEPT_LANDING else "", both.remark) if part
+                part
+                for part in (reason, _LAND_REPEATED if self._requested == _LAND_REPEATED else "", both.remark)
+                if part
             ),
             settings={**self._options, **both.settings},
         )

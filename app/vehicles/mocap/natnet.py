@@ -73,7 +73,7 @@ class NatNetSource:
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=str(address), daemon=True)
         try:
-            self._meet()
+            self._await_body()
         except BaseException:
             self._client.shutdown()
             raise
@@ -114,7 +114,7 @@ class NatNetSource:
             data_port=self._address.data_port,
             use_multicast=bool(self._address.multicast),
         )
-        client.on_data_frame_received_event.handlers.append(self._hear)
+        client.on_data_frame_received_event.handlers.append(self._on_frame)
         for _ in range(ATTEMPTS):
             try:
                 client.connect(timeout=ANSWERED_WITHIN_S)
@@ -126,7 +126,7 @@ class NatNetSource:
             return client
         raise _unreachable(self._address, f"it did not answer within {ATTEMPTS * ANSWERED_WITHIN_S:g} s")
 
-    def _meet(self) -> None:
+    def _await_body(self) -> None:
         version = self._client.protocol_version
         if version < _FIRST_WITH_TRACKING:
             raise VehicleError(
@@ -136,7 +136,7 @@ class NatNetSource:
             )
         until_s = time.monotonic() + SEEN_WITHIN_S
         while self._stream.newest is None and time.monotonic() < until_s:
-            self._take_in()
+            self._process_data()
             time.sleep(POLL_S)
         if self._stream.newest is None:
             raise self._absent()
@@ -157,14 +157,14 @@ class NatNetSource:
 
     def _run(self) -> None:
         while not self._closing.wait(POLL_S):
-            self._take_in()
+            self._process_data()
 
-    def _take_in(self) -> None:
+    def _process_data(self) -> None:
         """Process the packets that have arrived. Malformed packets and network failures are treated as silence."""
         with contextlib.suppress(OSError, *_GARBLED):
             self._client.update_sync()
 
-    def _hear(self, frame: _Frame) -> None:
+    def _on_frame(self, frame: _Frame) -> None:
         self._frame_s = time.monotonic()
         for body in frame.rigid_bodies:
             self._streamed_bodies.add(body.id_num)

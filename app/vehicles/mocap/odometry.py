@@ -115,7 +115,7 @@ class StreamSource:
         self._thread = threading.Thread(target=self._run, name=str(address), daemon=True)
         self._thread.start()
         try:
-            self._meet(address)
+            self._await_odometry(address)
         except BaseException:
             self.close()
             raise
@@ -141,7 +141,7 @@ class StreamSource:
             self._transport.wake()
         self._thread.join()
 
-    def _meet(self, address: StreamAddress) -> None:
+    def _await_odometry(self, address: StreamAddress) -> None:
         until_s = time.monotonic() + RECEIVED_WITHIN_S
         while not self._inner.has_received:
             if time.monotonic() > until_s:
@@ -155,11 +155,11 @@ class StreamSource:
         try:
             while not self._closing.is_set():
                 for data, peer in self._transport.read(_READ_S):
-                    self._take_in(data, peer)
+                    self._process_data(data, peer)
         finally:
             self._transport.close()
 
-    def _take_in(self, data: bytes, peer: Peer) -> None:
+    def _process_data(self, data: bytes, peer: Peer) -> None:
         is_unknown = self._transport.remote is None
         if self._transport.remote not in (None, peer):
             return

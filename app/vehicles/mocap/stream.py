@@ -24,7 +24,7 @@ class ClockOffset:
         self._fastest: deque[tuple[float, float]] = deque()
         """Time stamps, each with its arrival minus its time stamp, both increasing: a monotonic queue of minima."""
 
-    def seen_s(self, time_s: float, arrived_s: float) -> float:
+    def measured_s(self, time_s: float, arrived_s: float) -> float:
         """Return when a message stamped `time_s` that arrived at `arrived_s` would have arrived with least latency."""
         offset_s = arrived_s - time_s
         if self._fastest and time_s < self._fastest[-1][0] - _RESTART_S:
@@ -60,7 +60,7 @@ class PoseStream:
         later = math.isfinite(time_s) and (time_s > self._time_s or time_s < self._time_s - _RESTART_S)
         sample = SourceSample(
             received_s=arrived_s,
-            seen_s=self._arrivals.seen_s(time_s, arrived_s) if later else arrived_s,
+            measured_s=self._arrivals.measured_s(time_s, arrived_s) if later else arrived_s,
             altitude_m=altitude_m,
             tracking_valid=tracking_valid and math.isfinite(altitude_m),
             advances=later and not _is_same(pose, self._pose),

@@ -312,7 +312,7 @@ def test_a_vehicle_that_is_armed_while_it_is_staged_is_given_nothing_more() -> N
         while vehicle.condition().armed is not True:
             vehicle._radio.listen(0.1)  # while it writes
         written = list(rig.writes)
-        vehicle._give_back()
+        vehicle._restore_or_quarantine()
         assert (vehicle.condition().step, rig.writes) == ("observing", written)
 
 

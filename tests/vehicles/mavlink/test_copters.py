@@ -318,7 +318,7 @@ def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events:
     """It told at its start, when nobody listened yet, and tells again when something changes or somebody asks."""
     with LockstepRig("px4", faults=["arm-refused@connect"]) as rig:
         if not tells_events:
-            rig.drone.autopilot._tell_events = lambda: None  # type: ignore[attr-defined]  # as before release 1.14
+            rig.drone.autopilot._send_check_events = lambda: None  # type: ignore[attr-defined]  # as before release 1.14
         with connected(rig) as vehicle:
             vehicle.attend(4.0)
             vehicle._radio.seen.forget_vehicle()
@@ -371,6 +371,6 @@ def test_a_vehicle_that_does_not_know_yet_where_it_is_is_waited_for_not_restarte
 def test_a_text_that_comes_in_pieces_is_put_together() -> None:
     with ready("px4") as rig, connected(rig) as vehicle:
         words = "Preflight Fail: the heading estimate is not stable and the vehicle has moved since it was switched on"
-        rig.drone.autopilot.say(words)  # type: ignore[attr-defined]
+        rig.drone.autopilot.send_text(words)  # type: ignore[attr-defined]
         vehicle.attend(0.5)
         assert vehicle.condition().said == words

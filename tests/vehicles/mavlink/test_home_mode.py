@@ -19,11 +19,11 @@ ADVICE = "fly it manually, or stop its motors"
 LAND_HERE = 13
 
 
-def old_plan(*, max_distance_m: float = 5.5, tells_mode: bool = False) -> Make:
+def old_plan(*, max_distance_m: float = 5.5, sends_mode: bool = False) -> Make:
     """Its HOME mode begins right behind the radius of a trial, while it lands."""
 
     def make(body: Body, system: int) -> Autopilot:
-        return Paparazzi(body, system=system, max_distance_m=max_distance_m, tells_mode=tells_mode)
+        return Paparazzi(body, system=system, max_distance_m=max_distance_m, sends_mode=sends_mode)
 
     return make
 
@@ -145,7 +145,7 @@ def test_a_landing_that_is_obeyed_is_no_trouble() -> None:
 
 
 def test_a_heartbeat_that_tells_home_is_a_finding_of_its_own() -> None:
-    make = old_plan(max_distance_m=4.0, tells_mode=True)
+    make = old_plan(max_distance_m=4.0, sends_mode=True)
     with LockstepRig(make=make, faults=["carried-away:3@8"]) as rig, connected(rig) as vehicle:
         record = fly(vehicle)
         assert record.ending == "invalid"

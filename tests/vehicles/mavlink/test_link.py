@@ -147,10 +147,10 @@ def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(
         other.ground = paparazzi.ground
         paparazzi.send(heartbeat(paparazzi, autopilot=9))
         collect(link, 1)
-        assert link.doubled == ""
+        assert link.duplicate_reason == ""
         other.send(heartbeat(other, autopilot=9))
-        assert becomes(lambda: bool(link.doubled))
-    assert link.doubled == "Another vehicle with its system id sends from another port."
+        assert becomes(lambda: bool(link.duplicate_reason))
+    assert link.duplicate_reason == "Another vehicle with its system id sends from another port."
 
 
 def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(paparazzi: FakeVehicleEndpoint) -> None:
@@ -169,7 +169,7 @@ def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(pap
         assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [60]
         link.send("PARAM_SET", **GAIN)
         assert [message.get_type() for message in again.hear()] == ["PARAM_SET"]
-        assert link.doubled == ""
+        assert link.duplicate_reason == ""
 
 
 def test_another_component_is_handed_on_but_is_no_sign_of_the_autopilots_life(

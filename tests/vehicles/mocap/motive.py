@@ -38,7 +38,7 @@ class FakeMotive:
     def _run(self) -> None:
         begun_s = time.monotonic() - self._clock_s
         while not self._stopping.wait(0.002):
-            self._outlet.send(self.cameras.look(time.monotonic() - begun_s, self.altitude_m))
+            self._outlet.send(self.cameras.advance(time.monotonic() - begun_s, self.altitude_m))
 
 
 def comes_true(condition: Callable[[], bool], within_s: float = 10.0) -> bool:

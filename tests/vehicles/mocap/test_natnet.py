@@ -48,7 +48,7 @@ def test_the_body_s_altitude_is_heard_and_dated(address: NatNetAddress) -> None:
         heard = news(source, 50)
         assert [sample.altitude_m for sample in heard] == pytest.approx([1.5] * len(heard), abs=0.01)
         assert all(sample.tracking_valid and sample.advances for sample in heard)
-        dates_s = [sample.seen_s for sample in heard]
+        dates_s = [sample.measured_s for sample in heard]
         assert dates_s == sorted(dates_s)
         assert begun_s - 0.2 < dates_s[0] < dates_s[-1] < CLOCK.now_s()
         assert source.trouble == ""

@@ -13,28 +13,28 @@ def test_a_frame_that_was_held_up_is_dated_as_if_it_had_not_been() -> None:
     arrivals = ClockOffset()
     held_up_s = (0.003, 0.001, 0.004, 0.050, 0.041, 0.002)
     sent_s = [100.0 + 0.01 * place for place in range(len(held_up_s))]
-    dated_s = [arrivals.seen_s(at, at - 60.0 + late) for at, late in zip(sent_s, held_up_s, strict=True)]
+    dated_s = [arrivals.measured_s(at, at - 60.0 + late) for at, late in zip(sent_s, held_up_s, strict=True)]
     assert dated_s[1:] == pytest.approx([at - 60.0 + 0.001 for at in sent_s[1:]])
 
 
 def test_a_source_whose_messages_wait_for_seconds_is_dated_by_its_own_clock_all_the_while() -> None:
     arrivals = ClockOffset()
     waited_s = np.interp(np.arange(2000), (0, 500, 1000, 2000), (0.0, 0.0, 3.0, 3.0))
-    dated_s = [arrivals.seen_s(0.01 * place, 70.0 + 0.01 * place + late) for place, late in enumerate(waited_s)]
+    dated_s = [arrivals.measured_s(0.01 * place, 70.0 + 0.01 * place + late) for place, late in enumerate(waited_s)]
     np.testing.assert_allclose(dated_s, 70.0 + 0.01 * np.arange(2000))
 
 
 def test_the_clocks_of_a_long_day_may_drift_apart() -> None:
     arrivals = ClockOffset()
-    dated_s = [arrivals.seen_s(at_s, at_s * (1.0 + 5e-5)) for at_s in np.arange(0.0, 7200.0, 0.5)]
+    dated_s = [arrivals.measured_s(at_s, at_s * (1.0 + 5e-5)) for at_s in np.arange(0.0, 7200.0, 0.5)]
     assert 7199.5 * (1.0 + 5e-5) - dated_s[-1] < 0.01
 
 
 def test_a_source_that_starts_anew_is_dated_by_its_new_clock() -> None:
     arrivals = ClockOffset()
-    arrivals.seen_s(5000.0, 10.0)
-    assert arrivals.seen_s(0.5, 12.0) == 12.0
-    assert arrivals.seen_s(0.6, 12.3) == pytest.approx(12.1)
+    arrivals.measured_s(5000.0, 10.0)
+    assert arrivals.measured_s(0.5, 12.0) == 12.0
+    assert arrivals.measured_s(0.6, 12.3) == pytest.approx(12.1)
 
 
 def test_late_packets_and_repeated_frames_say_nothing_new() -> None:
@@ -56,7 +56,7 @@ def test_a_source_that_was_switched_off_and_on_advances_again() -> None:
     stream = PoseStream()
     put(stream, 900.0, 0.1, arrived_s=5.0)
     put(stream, 0.01, 0.2, arrived_s=25.0)
-    assert [(sample.seen_s, sample.advances) for sample in stream.take()] == [(5.0, True), (25.0, True)]
+    assert [(sample.measured_s, sample.advances) for sample in stream.take()] == [(5.0, True), (25.0, True)]
 
 
 NAN, INF = float("nan"), float("inf")
@@ -83,4 +83,8 @@ def test_a_time_that_is_no_number_says_nothing_new_and_spoils_nothing(time_s: fl
     put(stream, 1.00, 0.10)
     put(stream, time_s, 0.11, arrived_s=1.01)
     put(stream, 1.02, 0.12)
-    assert [(sample.seen_s, sample.advances) for sample in stream.take()] == [(1.0, True), (1.01, False), (1.02, True)]
+    assert [(sample.measured_s, sample.advances) for sample in stream.take()] == [
+        (1.0, True),
+        (1.01, False),
+        (1.02, True),
+    ]

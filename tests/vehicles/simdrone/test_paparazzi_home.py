@@ -81,7 +81,7 @@ def test_its_motors_can_be_stopped_all_the_same(how: str, lost: Pilot) -> None:
 @pytest.mark.parametrize(("tells", "number"), [(False, 0), (True, HOME)])
 def test_its_heartbeat_looks_like_nav_unless_its_release_tells_the_modes_number(tells: bool, number: int) -> None:
     def make(body: Body, system: int) -> Paparazzi:
-        return Paparazzi(body, system=system, max_distance_m=NEAR_M, tells_mode=tells)
+        return Paparazzi(body, system=system, max_distance_m=NEAR_M, sends_mode=tells)
 
     pilot = Pilot(flying("paparazzi", make=make, faults=["carried-away:4@6"]))
     pilot.take_off()

@@ -48,7 +48,7 @@ class ArduPilot:
         }
     )  # fmt: skip
     manual_modes: Final = frozenset({"0", "1", "2", "5", "7", "11", "13", "14", "16", "18"})
-    deaf_modes: Final[Mapping[str, str]] = MappingProxyType({})
+    modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
@@ -77,70 +77,70 @@ class ArduPilot:
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
+    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
         return {}
 
-    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
         return ()
 
-    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
+    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
         """Request telemetry: without requests, only heartbeats are sent on a direct link."""
-        return request_telemetry(aim, telemetry_hz)
+        return request_telemetry(target, telemetry_hz)
 
-    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
 
-    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
+    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
         return ()
 
-    def ask_version(self, aim: Target) -> Outgoing:
-        return request_version(aim)
+    def version_request(self, target: Target) -> Outgoing:
+        return request_version(target)
 
-    def ask_checks(self, aim: Target) -> None:
+    def checks_request(self, target: Target) -> None:
         """Return None: failed checks are reported as status texts."""
 
-    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
+    def steps(self, action: Action, target: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
                 return (
-                    Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, GUIDED),), awaits="command 176"),
-                    Step((base.command(aim, base.ARM_DISARM, 1.0),), awaits=DISARMING),
+                    Step((base.command(target, _SET_MODE, _CUSTOM_MODE, GUIDED),), awaits="command 176"),
+                    Step((base.command(target, base.ARM_DISARM, 1.0),), awaits=DISARMING),
                 )
             case Action.TAKE_OFF:
-                above = base.command(aim, _TAKE_OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, aim.altitude_m)
+                above = base.command(target, _TAKE_OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, target.altitude_m)
                 return (Step((above,), awaits="command 22", attempts=1),)
             case Action.LAND:
-                return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, LAND),)),)
+                return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, LAND),)),)
             case Action.MOTORS_OFF:
-                return (Step((base.disarm(aim),)),)
+                return (Step((base.disarm(target),)),)
             case Action.KILL:
-                return (Step((base.disarm(aim, forced=True),)),)
+                return (Step((base.disarm(target, forced=True),)),)
 
-    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing:
-        return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
+        return base.set_parameter(target, parameter, value, component=base.AUTOPILOT)
 
-    def read_parameter(self, aim: Target, parameter: str) -> Outgoing:
-        return base.read_parameter(aim, parameter)
+    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
+        return base.read_parameter(target, parameter)
 
 
-def request_telemetry(aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
+def request_telemetry(target: Target, telemetry_hz: float) -> tuple[Step, ...]:
     """Request all messages that a trial needs, positions at this rate. Not every autopilot has the last two."""
     return (
-        _request(aim, _LOCAL_POSITION_NED, telemetry_hz),
-        _request(aim, _SYS_STATUS, _STATUS_HZ),
-        _request(aim, _EXTENDED_SYS_STATE, _STATUS_HZ, needed=False),
-        _request(aim, _FENCE_STATUS, _STATUS_HZ, needed=False),
+        _request(target, _LOCAL_POSITION_NED, telemetry_hz),
+        _request(target, _SYS_STATUS, _STATUS_HZ),
+        _request(target, _EXTENDED_SYS_STATE, _STATUS_HZ, needed=False),
+        _request(target, _FENCE_STATUS, _STATUS_HZ, needed=False),
     )
 
 
-def _request(aim: Target, message: int, rate_hz: float, *, needed: bool = True) -> Step:
-    asked = base.command(aim, _SET_MESSAGE_INTERVAL, message, round(1e6 / rate_hz))
-    return Step((asked,), awaits="command 511", attempts=5 if needed else 2, needed=needed)
+def _request(target: Target, message: int, rate_hz: float, *, needed: bool = True) -> Step:
+    request = base.command(target, _SET_MESSAGE_INTERVAL, message, round(1e6 / rate_hz))
+    return Step((request,), awaits="command 511", attempts=5 if needed else 2, needed=needed)
 
 
-def request_version(aim: Target) -> Outgoing:
+def request_version(target: Target) -> Outgoing:
     """Return a request for one AUTOPILOT_VERSION."""
-    return base.command(aim, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
+    return base.command(target, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
 
 
 def _heartbeat(message: Message) -> Measurement | None:

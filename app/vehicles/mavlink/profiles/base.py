@@ -74,12 +74,14 @@ class GainParameter:
         """Return the value to send, in single precision."""
         return _single(value * self.factor)
 
-    def read(self, wire: float, asked: float | None = None) -> float:
-        """Return the gain for a value of the vehicle, to the seven digits of single precision; exactly `asked` if the
-        value is the one sent for it."""
+    def read(self, wire: float, requested: float | None = None) -> float:
+        """Return the gain for a value of the vehicle, to the seven digits of single precision; exactly `requested` if
+        the value is the one sent for it."""
         if self.whole:
             return int(wire)
-        return asked if asked is not None and wire == self.sent(asked) else float(f"{wire / self.factor:.7g}")
+        return (
+            requested if requested is not None and wire == self.sent(requested) else float(f"{wire / self.factor:.7g}")
+        )
 
     def refusal(self, value: float) -> str | None:
         """Return why this value may not be written, or None if it may."""
@@ -221,7 +223,7 @@ class Profile(Protocol):
         ...
 
     @property
-    def deaf_modes(self) -> Mapping[str, str]:
+    def modes_without_land(self) -> Mapping[str, str]:
         """Modes in which it does not execute Land, with a description of its behaviour in them."""
         ...
 
@@ -247,49 +249,49 @@ class Profile(Protocol):
     @property
     def requirements(self) -> tuple[Requirement, ...]: ...
     def measure(self, message: Message) -> Measurement | None: ...
-    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:
+    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:
         """Return the blocks of the flight plan, if there is one. Raises VehicleError if a required one is missing."""
         ...
 
-    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:
+    def conclude(self, target: Target) -> tuple[Outgoing, ...]:
         """Return the messages that end an exploration, successful or not."""
         ...
 
-    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
+    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
         """Return the steps that request telemetry, without lasting changes."""
         ...
 
-    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:
+    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
         """Return the steps out of a mode in which it does not arm; none for other modes."""
         ...
 
-    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:
-        """Return the parameters required for a take-off to the altitude of `aim`."""
+    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
+        """Return the parameters required for a take-off to the altitude of `target`."""
         ...
 
-    def ask_version(self, aim: Target) -> Outgoing | None:
+    def version_request(self, target: Target) -> Outgoing | None:
         """Return the request for its version; None if it sends that unrequested, or never."""
         ...
 
-    def ask_checks(self, aim: Target) -> Outgoing | None:
+    def checks_request(self, target: Target) -> Outgoing | None:
         """Return the request to run its arming checks and send the results as events; None if unsupported."""
         ...
 
-    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
-        """Return the steps of an action. Raises KeyError if it needs a block of the flight plan that `aim` lacks."""
+    def steps(self, action: Action, target: Target) -> tuple[Step, ...]:
+        """Return the steps of an action. Raises KeyError if it needs a block of the flight plan that `target` lacks."""
         ...
 
-    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing: ...
-    def read_parameter(self, aim: Target, parameter: str) -> Outgoing: ...
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing: ...
+    def read_parameter(self, target: Target, parameter: str) -> Outgoing: ...
 
 
-def set_parameter(aim: Target, parameter: str, value: float, *, component: int = 0) -> Outgoing:
+def set_parameter(target: Target, parameter: str, value: float, *, component: int = 0) -> Outgoing:
     """Return the message that sets a floating-point parameter, the type of all gains. Some vehicles, such as MAVSDK's,
     ignore a PARAM_SET to all components (0)."""
     return Outgoing(
         "PARAM_SET",
         {
-            "target_system": aim.aircraft,
+            "target_system": target.aircraft,
             "target_component": component,
             "param_id": parameter,
             "param_value": value,
@@ -298,33 +300,33 @@ def set_parameter(aim: Target, parameter: str, value: float, *, component: int =
     )
 
 
-def read_parameter(aim: Target, parameter: str) -> Outgoing:
+def read_parameter(target: Target, parameter: str) -> Outgoing:
     return Outgoing(
         "PARAM_REQUEST_READ",
-        {"target_system": aim.aircraft, "target_component": 0, "param_id": parameter, "param_index": -1},
+        {"target_system": target.aircraft, "target_component": 0, "param_id": parameter, "param_index": -1},
     )
 
 
-def list_parameters(aim: Target) -> Outgoing:
-    return Outgoing("PARAM_REQUEST_LIST", {"target_system": aim.aircraft, "target_component": 0})
+def list_parameters(target: Target) -> Outgoing:
+    return Outgoing("PARAM_REQUEST_LIST", {"target_system": target.aircraft, "target_component": 0})
 
 
-def read_place(aim: Target, place: int) -> Outgoing:
+def read_place(target: Target, place: int) -> Outgoing:
     """Return a request for the parameter at a place in the vehicle's list, which must not be past its end, because
     Paparazzi reads beyond its table."""
     return Outgoing(
         "PARAM_REQUEST_READ",
-        {"target_system": aim.aircraft, "target_component": 0, "param_id": "", "param_index": place},
+        {"target_system": target.aircraft, "target_component": 0, "param_id": "", "param_index": place},
     )
 
 
-def command(aim: Target, code: int, *parameters: float) -> Outgoing:
+def command(target: Target, code: int, *parameters: float) -> Outgoing:
     """Return a COMMAND_LONG; missing parameters are 0."""
     filled = (*parameters, *(0.0 for _ in range(7 - len(parameters))))
     return Outgoing(
         "COMMAND_LONG",
         {
-            "target_system": aim.aircraft,
+            "target_system": target.aircraft,
             "target_component": 0,
             "command": code,
             "confirmation": 0,
@@ -382,9 +384,9 @@ def answer(message: Message) -> CommandReply | None:
     return CommandReply(f"command {number(message, 'command'):.0f}", result == _ACCEPTED, f"result {result}, {known}")
 
 
-def disarm(aim: Target, *, forced: bool = False) -> Outgoing:
+def disarm(target: Target, *, forced: bool = False) -> Outgoing:
     """Return the command to disarm; `forced` also in flight, where an autopilot would refuse it."""
-    return command(aim, ARM_DISARM, 0.0, FORCED if forced else 0.0)
+    return command(target, ARM_DISARM, 0.0, FORCED if forced else 0.0)
 
 
 def parse_status_text(message: Message) -> StatusText:

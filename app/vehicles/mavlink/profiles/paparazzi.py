@@ -56,7 +56,7 @@ class Paparazzi:
         {_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "Manual", "80": "Manual"}
     )
     manual_modes: Final = frozenset({"64", "80"})
-    deaf_modes: Final = MappingProxyType({_HOME: "it flies back by itself and ignores Land"})
+    modes_without_land: Final = MappingProxyType({_HOME: "it flies back by itself and ignores Land"})
     arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
     flying_blocks: Final = frozenset({TAKE_OFF})
     landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
@@ -74,16 +74,16 @@ class Paparazzi:
         """Read a message; altitude only from LOCAL_POSITION_NED, because other messages mix their units."""
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:
+    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:
         """Request the list of blocks once; the acknowledgement that ends it is sent before every change of block."""
-        request = Outgoing("SCRIPT_REQUEST_LIST", _to(aim))
-        counted = ask(request, lambda heard: isinstance(heard, BlockCount))
+        request = Outgoing("SCRIPT_REQUEST_LIST", _to(target))
+        counted = ask(request, lambda reply: isinstance(reply, BlockCount))
         if not isinstance(counted, BlockCount):
             raise _without_blocks("It did not list the blocks of its flight plan.")
         blocks: dict[str, int] = {}
         for seq in range(counted.count):
-            request = Outgoing("SCRIPT_REQUEST", _to(aim) | {"seq": seq})
-            found = ask(request, lambda heard, seq=seq: isinstance(heard, Block) and heard.number == seq)  # type: ignore[misc]
+            request = Outgoing("SCRIPT_REQUEST", _to(target) | {"seq": seq})
+            found = ask(request, lambda reply, seq=seq: isinstance(reply, Block) and reply.number == seq)  # type: ignore[misc]
             if not isinstance(found, Block):
                 raise _without_blocks(f"It did not name block {seq} of {counted.count}.")
             blocks.setdefault(found.name, found.number)
@@ -91,76 +91,76 @@ class Paparazzi:
             raise _without_blocks(f"Its flight plan has no block {', '.join(missing)}.")
         return blocks
 
-    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:
+    def conclude(self, target: Target) -> tuple[Outgoing, ...]:
         """Return the end of the listing of blocks, which otherwise prevents every change of block for 15 s."""
-        return (_acknowledge(aim),)
+        return (_acknowledge(target),)
 
-    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
+    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
         return ()
 
-    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
 
-    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - its take-off is told the altitude
+    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
         return ()
 
-    def ask_version(self, aim: Target) -> None:
+    def version_request(self, target: Target) -> None:
         """Return None: it sends its version every few seconds."""
 
-    def ask_checks(self, aim: Target) -> None:
+    def checks_request(self, target: Target) -> None:
         """Return None: failed checks are reported as status texts."""
 
-    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
+    def steps(self, action: Action, target: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
                 return (
-                    Step((_climb_here(aim),), awaits="waypoint"),
-                    Step(_block(aim, HOLDING), pause_s=_SETTLE_S),
-                    Step(_block(aim, START_ENGINE)),
+                    Step((_climb_here(target),), awaits="waypoint"),
+                    Step(_block(target, HOLDING), pause_s=_SETTLE_S),
+                    Step(_block(target, START_ENGINE)),
                 )
             case Action.TAKE_OFF:
-                return (Step(_block(aim, TAKE_OFF)),)
+                return (Step(_block(target, TAKE_OFF)),)
             case Action.LAND:
-                return (Step(_block(aim, LAND)),)
+                return (Step(_block(target, LAND)),)
             case Action.MOTORS_OFF | Action.KILL:
-                settings = aim.stop_settings or self.stop_settings
-                return (Step((base.disarm(aim), *(self.set_parameter(aim, name, 1.0) for name in settings))),)
+                settings = target.stop_settings or self.stop_settings
+                return (Step((base.disarm(target), *(self.set_parameter(target, name, 1.0) for name in settings))),)
 
-    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing:
-        return base.set_parameter(aim, parameter, value)
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
+        return base.set_parameter(target, parameter, value)
 
-    def read_parameter(self, aim: Target, parameter: str) -> Outgoing:
-        return base.read_parameter(aim, parameter)
+    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
+        return base.read_parameter(target, parameter)
 
 
-def _to(aim: Target) -> dict[str, float]:
+def _to(target: Target) -> dict[str, float]:
     """Return the recipient of messages on blocks and waypoints: the MAVLink system id. Others have the aircraft id."""
-    return {"target_system": aim.system, "target_component": 0}
+    return {"target_system": target.system, "target_component": 0}
 
 
-def _acknowledge(aim: Target) -> Outgoing:
-    return Outgoing("MISSION_ACK", _to(aim) | {"type": 0})
+def _acknowledge(target: Target) -> Outgoing:
+    return Outgoing("MISSION_ACK", _to(target) | {"type": 0})
 
 
-def _block(aim: Target, name: str) -> tuple[Outgoing, ...]:
-    activate = Outgoing("SCRIPT_ITEM", {**_to(aim), "seq": aim.blocks[name], "name": ""})
-    return (_acknowledge(aim), activate)
+def _block(target: Target, name: str) -> tuple[Outgoing, ...]:
+    activate = Outgoing("SCRIPT_ITEM", {**_to(target), "seq": target.blocks[name], "name": ""})
+    return (_acknowledge(target), activate)
 
 
-def _climb_here(aim: Target) -> Outgoing:
+def _climb_here(target: Target) -> Outgoing:
     """Return the message that sets the waypoint of the take-off straight above the vehicle."""
     fields = {
-        "seq": aim.waypoint,
+        "seq": target.waypoint,
         "frame": _LOCAL_ENU,
         "command": _WAYPOINT,
         "current": 0,
         "autocontinue": 0,
         **{f"param{place}": 0.0 for place in range(1, 5)},
-        "x": aim.east_m,
-        "y": aim.north_m,
-        "z": aim.altitude_m,
+        "x": target.east_m,
+        "y": target.north_m,
+        "z": target.altitude_m,
     }
-    return Outgoing("MISSION_ITEM", _to(aim) | fields)
+    return Outgoing("MISSION_ITEM", _to(target) | fields)
 
 
 def _without_blocks(what: str) -> VehicleError:

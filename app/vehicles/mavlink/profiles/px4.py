@@ -45,7 +45,7 @@ class Px4:
         }
     )  # fmt: skip
     manual_modes: Final = frozenset({"1.0", "2.0", "3.0", "5.0", "7.0"})
-    deaf_modes: Final[Mapping[str, str]] = MappingProxyType({})
+    modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
@@ -69,56 +69,56 @@ class Px4:
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, aim: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
+    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
         return {}
 
-    def conclude(self, aim: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
         return ()
 
-    def prepare(self, aim: Target, telemetry_hz: float) -> tuple[Step, ...]:
-        return request_telemetry(aim, telemetry_hz)
+    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
+        return request_telemetry(target, telemetry_hz)
 
-    def make_armable(self, aim: Target, mode: str) -> tuple[Step, ...]:
+    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
         """Leave the landing mode, in which it does not arm, and in which it stays if Land arrives after the landing."""
         if mode not in self.landing_modes:
             return ()
-        return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),)
+        return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),)
 
-    def take_off_settings(self, aim: Target) -> tuple[Setting, ...]:
-        return (Setting(TAKE_OFF_ALTITUDE, aim.altitude_m),)
+    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
+        return (Setting(TAKE_OFF_ALTITUDE, target.altitude_m),)
 
-    def ask_version(self, aim: Target) -> Outgoing:
-        return request_version(aim)
+    def version_request(self, target: Target) -> Outgoing:
+        return request_version(target)
 
-    def ask_checks(self, aim: Target) -> Outgoing:
-        return base.command(aim, _RUN_PREARM_CHECKS)
+    def checks_request(self, target: Target) -> Outgoing:
+        return base.command(target, _RUN_PREARM_CHECKS)
 
-    def steps(self, action: Action, aim: Target) -> tuple[Step, ...]:
+    def steps(self, action: Action, target: Target) -> tuple[Step, ...]:
         match action:
             case Action.ARM:
-                return (Step((base.command(aim, base.ARM_DISARM, 1.0),), awaits=DISARMING),)
+                return (Step((base.command(target, base.ARM_DISARM, 1.0),), awaits=DISARMING),)
             case Action.TAKE_OFF:
-                mode = base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
+                mode = base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
                 return (Step((mode,), awaits="command 176", attempts=1),)
             case Action.LAND:
-                return (Step((base.command(aim, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
+                return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
             case Action.MOTORS_OFF:
-                return (Step((base.disarm(aim),)),)
+                return (Step((base.disarm(target),)),)
             case Action.KILL:
-                return (Step((base.disarm(aim, forced=True),)),)
+                return (Step((base.disarm(target, forced=True),)),)
 
-    def set_parameter(self, aim: Target, parameter: str, value: float) -> Outgoing:
-        return base.set_parameter(aim, parameter, value, component=base.AUTOPILOT)
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
+        return base.set_parameter(target, parameter, value, component=base.AUTOPILOT)
 
-    def read_parameter(self, aim: Target, parameter: str) -> Outgoing:
-        return base.read_parameter(aim, parameter)
+    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
+        return base.read_parameter(target, parameter)
 
 
 def _parameter(message: Message) -> Parameter:
-    heard = base.parameter(message)
+    parameter = base.parameter(message)
     if number(message, "param_type") != _INT32:
-        return heard
-    return replace(heard, value=base.bytewise_integer(heard.value))
+        return parameter
+    return replace(parameter, value=base.bytewise_integer(parameter.value))
 
 
 def _heartbeat(message: Message) -> Measurement | None:
