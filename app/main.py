@@ -118,7 +118,7 @@ def _no_dashboard() -> None:
     raise NotFoundError(
         "built dashboard in",
         "this installation",
-        hint="In a checkout, ./dev up builds and serves it. The API under /api works without it.",
+        hint="In a checkout, `./dev up` builds and serves it. The API under /api works without it.",
     )
 
 

@@ -50,9 +50,9 @@ class Keyring:
             return cls(folder, _secret(folder / "secret"), now_s=now_s)
         except OSError as error:
             raise StorageError(
-                f"The folder {folder}, which keeps the secret of this server, cannot be used: {error.strerror}.",
-                hint="Give this user the right to read and write it, or stop Gainline and delete it: browsers are then "
-                "unlocked anew.",
+                f"The folder {folder}, which holds this server's secret, cannot be used: {error.strerror}.",
+                hint="Give this user read and write permission for it; or stop Gainline and delete it, after "
+                "which every browser must be unlocked again.",
             ) from error
 
     def value(self, key: Key) -> str:
@@ -108,5 +108,5 @@ def _secret(file: Path) -> bytes:
         draft.rename(file)
     found = file.read_bytes()
     if len(found) != _SECRET_BYTES:
-        raise OSError(errno.EINVAL, f"{file.name} does not hold {_SECRET_BYTES} bytes")
+        raise OSError(errno.EINVAL, f"{file.name} does not contain {_SECRET_BYTES} bytes")
     return found

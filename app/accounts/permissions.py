@@ -87,8 +87,8 @@ COMMAND_LINE: Final = Caller(key=Key.BROWSER)
 """A command that runs on the data folder itself."""
 
 UNLOCK_HINT: Final = (
-    "Open the link that the terminal printed at the start, or run `gainline unlock` on the computer that Gainline runs "
-    "on and open the link that it prints."
+    "Open the link that the terminal printed at startup, or run `gainline unlock` on the computer that runs "
+    "Gainline and open the link that it prints."
 )
 
 
@@ -114,29 +114,28 @@ def require(act: Permission, caller: Caller, vehicle: str = "") -> None:
 
 
 def _describe_permission(act: Permission, vehicle: str) -> str:
-    return f"{vehicle} is flown over a link" if act is Permission.LINK else f"{vehicle} is a real vehicle"
+    return f"{vehicle} is connected over a link" if act is Permission.LINK else f"{vehicle} is a real vehicle"
 
 
 def _exposed(act: Permission, vehicle: str) -> NotAllowedError:
     return NotAllowedError(
-        f"{_describe_permission(act, vehicle)}, and this server can be reached over the network, where it has no "
-        "accounts yet.",
-        hint="Start the server with --host 127.0.0.1 on the computer that is linked to the vehicle.",
+        f"{_describe_permission(act, vehicle)}, and this server is reachable over the network, without user accounts.",
+        hint="Start the server with --host 127.0.0.1 on the computer that has the link to the vehicle.",
     )
 
 
 def _elsewhere(act: Permission, caller: Caller, vehicle: str) -> NotAllowedError:
     return NotAllowedError(
-        f"{_describe_permission(act, vehicle)}: it is commanded from this computer alone, and the request came "
+        f"{_describe_permission(act, vehicle)}: it accepts commands from this computer only, and the request came "
         f"{caller.because}.",
-        hint="Use a browser on the computer that Gainline runs on, at the address that the terminal printed, without a "
-        "proxy or tunnel between them.",
+        hint="Use a browser on the computer that runs Gainline, at the address that the terminal printed, "
+        "without a proxy or tunnel.",
     )
 
 
 def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
     return NotAllowedError(
-        f"The request came {caller.because}: from there one may look, and needs this server's token for all else.",
+        f"The request came {caller.because}. Reading is allowed from there; everything else needs this server's token.",
         hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`.",
     )
 
@@ -144,13 +143,13 @@ def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
 def _locked(act: Permission, vehicle: str) -> NotAllowedError:
     if act is Permission.TAKE_OFF:
         return NotAllowedError(
-            f"{vehicle} is a real vehicle: it takes off only on its operator's own act in an unlocked browser.",
+            f"{vehicle} is a real vehicle: only its operator can start the take-off, in an unlocked browser.",
             hint=f"{UNLOCK_HINT} A script can propose gains and stage the flight.",
         )
     return NotAllowedError(
-        f"{vehicle} is a real vehicle, and whoever asks has not shown that they may command it.",
-        hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`. "
-        "Abort and land need neither.",
+        f"{vehicle} is a real vehicle, and the request has no key that permits commanding it.",
+        hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer "
+        "TOKEN`. Abort and land need no key.",
     )
 
 

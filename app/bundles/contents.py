@@ -130,7 +130,7 @@ class Trial(_Strict):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if self.state in {TrialState.STAGED, TrialState.FLYING}:
-            raise ValueError(f"is {self.state}: a flight that is under way belongs to the vehicle that flies it")
+            raise ValueError(f"is {self.state}: a bundle holds no flight that is under way")
         if self.state == TrialState.VALID and self.error is None:
             raise ValueError("is valid without an error")
         return self
@@ -183,12 +183,14 @@ class Campaign(_Strict):
     def _consistent(self) -> Self:
         numbers = [trial.number for trial in self.trials]
         if len(set(numbers)) < len(numbers):
-            raise ValueError("has two trials of the same number")
+            raise ValueError("has two trials with the same number")
         if self.state == CampaignState.FLYING:
-            raise ValueError("is flying: a flight that is under way belongs to the vehicle that flies it")
+            raise ValueError("is flying: a bundle holds no flight that is under way")
         for trial in self.trials:
             if trial.proposal is not None and trial.proposal >= len(self.proposals):
-                raise ValueError(f"trial {trial.number} names proposal {trial.proposal}, which is not there")
+                raise ValueError(
+                    f"trial {trial.number} refers to proposal {trial.proposal}, which is not in the bundle"
+                )
         return self
 
     def records(self) -> list[tuple[str, Record]]:

@@ -101,7 +101,7 @@ class Packer:
         except (zipfile.BadZipFile, KeyError, OSError) as error:
             raise _not_written(str(error)) from error
         if spoilt:
-            raise _not_written(f"{spoilt[0]} is not what was written")
+            raise _not_written(f"{spoilt[0]} differs from what was written")
 
     def _write(self, name: str, data: bytes, *, squeeze: bool = False) -> str:
         """Write a part; `squeeze` compresses what is not compressed already."""
@@ -156,15 +156,15 @@ class Packer:
         kept = {name: getattr(row, name) for name in Proposal.model_fields.keys() & row.__mapper__.columns.keys()}
         if row.predicted is not None and not is_intact(row.predicted):
             raise StorageError(
-                f"The bundle was not made: the predicted flight of proposal {row.id} of campaign {row.campaign_id} is "
-                "damaged.",
-                hint="Take the database from an earlier backup; every flight's own record is checked by itself.",
+                f"The bundle was not created: the predicted flight of proposal {row.id} of campaign "
+                f"{row.campaign_id} is damaged.",
+                hint="Restore the database from an earlier backup. Flight records are checked separately.",
             )
         return Proposal(**kept, predicted=self._record(row.predicted))
 
     def _flown(self, row: TrialRow) -> Record | None:
         if row.trajectory is not None and not is_intact(row.trajectory):
-            raise refused_for((row,), "The bundle was not made")
+            raise refused_for((row,), "The bundle was not created")
         return self._record(row.trajectory)
 
     def _record(self, row: TrajectoryRow | None) -> Record | None:
@@ -181,8 +181,9 @@ class Packer:
     def _photo(self, trial: TrialRow, row: TrialPhotoRow) -> Photo:
         if media_type_of(row.data) != row.media_type:
             raise StorageError(
-                f"The bundle was not made: a photo of trial {trial.number} of campaign {trial.campaign_id} is damaged.",
-                hint="Delete that photo, or take it from an earlier backup; everything else is intact.",
+                f"The bundle was not created: a photo of trial {trial.number} of campaign {trial.campaign_id} is "
+                "damaged.",
+                hint="Delete that photo, or restore it from an earlier backup. Everything else is intact.",
             )
         part = self._write(f"photos/{row.id}.{ENDINGS[row.media_type]}", row.data)
         self._session.expire(row, ["data"])
@@ -202,8 +203,8 @@ def _too_much(error: ValidationError) -> ConflictError:
     first = error.errors(include_url=False, include_input=False)[0]
     where = ".".join(map(str, first["loc"]))
     return ConflictError(
-        f"This campaign, or one that it starts from, does not fit into a bundle: {where}: {first['msg']}.",
-        hint="Nothing is lost: its report and the records of its trials can be taken one by one.",
+        f"This campaign, or one that it starts from, cannot be exported as a bundle: {where}: {first['msg']}.",
+        hint="No data is lost. Export its report and the records of its trials one by one.",
     )
 
 
@@ -222,8 +223,8 @@ def _digest(data: bytes) -> str:
 
 def _not_written(why: str) -> StorageError:
     return StorageError(
-        f"The bundle was not made: the file does not hold what was written to it ({why}).",
-        hint="Check the disk that it was written to, then take the bundle again.",
+        f"The bundle was not created: the file does not contain what was written to it ({why}).",
+        hint="Check the disk that it was written to, then export the bundle again.",
     )
 
 
@@ -242,7 +243,7 @@ def write_bundle(session: Session, campaign_id: int, data_dir: Path, out: IO[byt
     for each in chain:
         if history.flight_under_way(session, each.id) is not None:
             raise BusyError(
-                f"Campaign {each.id} has a flight under way.", hint="Wait until it is over, then take the bundle."
+                f"Campaign {each.id} has a flight under way.", hint="Wait until it has ended, then export the bundle."
             )
     Packer(session, data_dir, out).pack(chain)
     return f"campaign-{row.id}.gainline.zip"
@@ -261,9 +262,9 @@ def _chain(session: Session, row: CampaignRow) -> list[CampaignRow]:
         chain.insert(0, found)
     if len(chain) > MAX_CAMPAIGNS:
         raise ConflictError(
-            f"Campaign {row.id} goes back over {len(chain) - 1} warm starts, and a bundle holds {MAX_CAMPAIGNS} "
-            "campaigns: without the first of them its gains could not be computed again.",
-            hint=f"Take the bundle of an earlier one of them (campaign {chain[MAX_CAMPAIGNS - 1].id} is the last that "
-            "fits), or the report and the records of this one.",
+            f"Campaign {row.id} has a chain of {len(chain) - 1} warm starts, and a bundle can hold {MAX_CAMPAIGNS} "
+            "campaigns. Without the first campaigns of the chain its gains could not be computed again.",
+            hint=f"Export the bundle of an earlier campaign of the chain (campaign {chain[MAX_CAMPAIGNS - 1].id} "
+            "is the last that fits), or the report and the records of this one.",
         )
     return chain

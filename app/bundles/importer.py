@@ -28,7 +28,7 @@ from app.vehicles.registry import VEHICLE_KINDS, check_options
 
 JsonObject = dict[str, Any]
 _AT_ONCE_BYTES: Final = 16 * 2**20
-_HINT: Final = "Bring it in with the version of Gainline that wrote it, or update this one."
+_HINT: Final = "Import it with the version of Gainline that wrote it, or update this installation."
 
 
 @dataclass(slots=True)
@@ -112,7 +112,7 @@ def _vehicle(session: Session, where: str, said: Campaign) -> tuple[VehicleRow, 
         )
         return row, {}
     if vehicle.kind not in VEHICLE_KINDS:
-        raise _refused(f"{where}.vehicle.kind", f"{vehicle.kind!r} is none that this version knows")
+        raise _refused(f"{where}.vehicle.kind", f"{vehicle.kind!r} is not supported by this version")
     options = check_options(vehicle.kind, said.vehicle_options, field=f"{where}.vehicle")
     choice = VehicleChoice(kind=vehicle.kind, options=options)
     return fleet.chosen_vehicle(session, choice, default_gains=vehicle.safe_gains), options
@@ -190,7 +190,7 @@ def _fields(said: BaseModel, without: set[str]) -> JsonObject:
 
 def _refused(field: str, reason: str) -> InputError:
     return InputError(
-        "This bundle cannot be brought in; nothing was stored.", problems=(Problem(field, reason),), hint=_HINT
+        "This bundle cannot be imported; nothing was stored.", problems=(Problem(field, reason),), hint=_HINT
     )
 
 
@@ -202,9 +202,9 @@ def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> CampaignVi
     """
     if (flight := history.any_flight_under_way(session)) is not None:
         raise ConflictError(
-            f"Campaign {flight.campaign_id} has a flight asked for, staged or under way, and storing a bundle would "
-            "keep its commands and its record waiting.",
-            hint="Bring the bundle in once it has landed, or unstage it.",
+            f"Campaign {flight.campaign_id} has a flight requested, staged or under way. Storing a bundle now would "
+            "delay its commands and its record.",
+            hint="Import the bundle after it has landed, or unstage it.",
         )
     arrived = store(session, bundle)
     keep_telemetry(bundle, arrived, data_dir)

@@ -78,7 +78,7 @@ class _Opening:
 
     def read(self, size: int = -1) -> bytes:
         if not self.is_open and size > MAX_DIRECTORY_BYTES:
-            raise ValueError(f"its directory takes more than {MAX_DIRECTORY_BYTES / 2**20:g} MiB")
+            raise ValueError(f"its directory is larger than {MAX_DIRECTORY_BYTES / 2**20:g} MiB")
         return self._file.read(size)
 
 
@@ -92,12 +92,12 @@ class Bundle:
             self._zip = zipfile.ZipFile(opening)
             opening.is_open = True
         except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
-            _refuse("file", f"is no zip file: {error}")
+            _refuse("file", f"is not a zip file: {error}")
         self._look_at_directory()
         self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_MANIFEST_BYTES), Manifest, look=_version)
         listed = self.manifest.parts.keys() | {MANIFEST}
         if odd := sorted(listed ^ set(self._zip.namelist())):
-            _refuse(f"{MANIFEST}: parts", f"and the files in the zip are not the same: {odd[0][:80]!r}")
+            _refuse(f"{MANIFEST}: parts", f"and the files in the zip differ: {odd[0][:80]!r}")
         self.contents = _parsed(CONTENTS, self._listed(CONTENTS, MAX_JSON_BYTES), Contents)
         self._unpacked = _Unpacked()  # last, because a refused bundle must have nothing to close
 
@@ -135,30 +135,32 @@ class Bundle:
                     used.add(_once(used, f"{field}.trials.{number}.telemetry", trial.telemetry))
                     self.part(trial.telemetry)
         if idle := sorted(self.manifest.parts.keys() - used):
-            _refuse(idle[0], "belongs to nothing in the contents")
+            _refuse(idle[0], "is not referred to in the contents")
 
     def _listed(self, name: str, limit: int) -> bytes:
         if name not in self.manifest.parts:
-            _refuse(name, "is named in the contents, and is not in the bundle")
+            _refuse(name, "is listed in the contents, but is not in the bundle")
         data = self._read(name, limit)
         if hashlib.sha256(data).hexdigest() != self.manifest.parts[name]:
-            _refuse(name, "does not have the SHA-256 that the manifest says: the file was damaged or changed")
+            _refuse(name, "does not have the SHA-256 in the manifest: the file was damaged or changed")
         return data
 
     def _look_at_directory(self) -> None:
         infos = self._zip.infolist()
         names = [info.filename for info in infos]
         if len(infos) > MAX_PARTS:
-            _refuse("file", f"holds {len(infos)} parts; {MAX_PARTS} are the most")
+            _refuse("file", f"has {len(infos)} parts; at most {MAX_PARTS} are allowed")
         if len(set(names)) < len(names):
-            _refuse("file", "holds two parts of the same name")
+            _refuse("file", "has two parts with the same name")
         if MANIFEST not in names:
             _refuse(MANIFEST, "is missing: this zip was not written by Gainline")
         for info in infos:
             if info.flag_bits & _ENCRYPTED or info.compress_type not in _METHODS:
-                _refuse(info.filename[:80], "is encrypted, or compressed in a way that is not read here")
+                _refuse(info.filename[:80], "is encrypted, or compressed with an unsupported method")
         if (total := sum(info.file_size for info in infos)) > MAX_TOTAL_BYTES:
-            _refuse("file", f"would unpack to {total / 2**30:.1f} GiB; {MAX_TOTAL_BYTES / 2**30:g} GiB is the most")
+            _refuse(
+                "file", f"would unpack to {total / 2**30:.1f} GiB; at most {MAX_TOTAL_BYTES / 2**30:g} GiB is allowed"
+            )
 
     def _read(self, name: str, limit: int) -> bytes:
         """Read a part; never unpacks more than `limit` + 1 bytes, whatever the directory states."""
@@ -174,10 +176,10 @@ class Bundle:
     def _check_record(self, field: str, record: Record, output: str) -> None:
         columns = record.columns
         if columns[0] != "time_s" or len(set(columns)) < len(columns) or output not in columns:
-            _refuse(f"{field}.columns", f"must begin with time_s, hold {output}, and each once")
+            _refuse(f"{field}.columns", f"must start with time_s and contain {output}, each once")
         size = len(columns) * record.samples
         if size > MAX_NUMBERS:
-            _refuse(f"{field}.samples", f"make {size} numbers; {MAX_NUMBERS} are the most")
+            _refuse(f"{field}.samples", f"make {size} numbers; at most {MAX_NUMBERS} are allowed")
         data = self.part(record.part)
         try:
             plain = zstandard.get_frame_parameters(data).content_size
@@ -188,14 +190,14 @@ class Bundle:
         try:
             trajectory = unpack(packed(record, data))
         except GainlineError:
-            _refuse(f"{field}.checksum", "does not belong to the samples")
+            _refuse(f"{field}.checksum", "does not match the samples")
         values = (trajectory.time_s, *trajectory.channels.values())
         if not all(np.isfinite(each).all() for each in values) or (np.diff(trajectory.time_s) <= 0).any():
-            _refuse(f"{field}.part", "holds a number that is not finite, or time that does not rise")
+            _refuse(f"{field}.part", "contains a number that is not finite, or time that does not increase")
 
     def _check_photo(self, field: str, photo: Photo) -> None:
         if media_type_of(self.part(photo.part, PHOTO_BYTES)) != photo.media_type:
-            _refuse(f"{field}.media_type", f"is not what {photo.part} holds")
+            _refuse(f"{field}.media_type", f"differs from the content of {photo.part}")
 
 
 def packed(record: Record, data: bytes) -> Packed:
@@ -216,7 +218,7 @@ def _output_of(field: str, campaign: Campaign) -> str:
     """Scored channel of the campaign's experiment. Raises InputError when the gains are not the experiment's."""
     experiment = EXPERIMENTS.get(str(campaign.definition.get("experiment")))
     if experiment is None:
-        _refuse(f"{field}.definition.experiment", "is none that this version knows")
+        _refuse(f"{field}.definition.experiment", "is not supported by this version")
     names = set(experiment.space.names)
     for where, given in (
         *((f"trials.{place}", trial.gains) for place, trial in enumerate(campaign.trials)),
@@ -229,18 +231,20 @@ def _output_of(field: str, campaign: Campaign) -> str:
 
 def _once(used: set[str], field: str, part: str) -> str:
     if part in used:
-        _refuse(field, f"{part} stands for something else already")
+        _refuse(field, f"{part} is used for something else already")
     return part
 
 
 def _version(document: object) -> None:
     if isinstance(document, dict) and isinstance(found := document.get("version"), int) and found > VERSION:
-        _refuse(f"{MANIFEST}: version", f"is {found}, written by a newer Gainline; this one reads up to {VERSION}")
+        _refuse(f"{MANIFEST}: version", f"is {found}, written by a newer Gainline; this version reads up to {VERSION}")
 
 
 def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], None] | None = None) -> M:
     if (values := sum(map(data.count, (b",", b"[", b"{")))) > MAX_VALUES:
-        _refuse(name, f"holds some {values / 1e6:.0f} million values; {MAX_VALUES / 1e6:g} million are the most")
+        _refuse(
+            name, f"contains about {values / 1e6:.0f} million values; at most {MAX_VALUES / 1e6:g} million are allowed"
+        )
     try:
         document: Any = json.loads(data, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
@@ -256,7 +260,7 @@ def _parsed(name: str, data: bytes, kind: type[M], *, look: Callable[[object], N
 
 
 def _no_number(text: str) -> NoReturn:
-    raise ValueError(f"{text} is no number")
+    raise ValueError(f"{text} is not a number")
 
 
 def _refuse(field: str, reason: str) -> NoReturn:
@@ -265,7 +269,7 @@ def _refuse(field: str, reason: str) -> NoReturn:
 
 def _refusal(problems: tuple[Problem, ...]) -> InputError:
     return InputError(
-        "This bundle cannot be brought in; nothing was stored.",
+        "This bundle cannot be imported; nothing was stored.",
         problems=problems,
-        hint="Download the bundle again where the campaign is, and bring in that file as it is.",
+        hint="Export the bundle again from the installation that has the campaign, and import that file unchanged.",
     )

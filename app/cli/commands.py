@@ -20,7 +20,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Tune a drone's controller gains in a handful of flights.",
+    help="Tune a drone's controller gains in a few flights.",
 )
 controller = typer.Typer(no_args_is_help=True, help="Check the replica of the autopilot's vertical loop.")
 app.add_typer(controller, name="controller")
@@ -30,15 +30,13 @@ DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [de
 CampaignSource = Annotated[
     str,
     typer.Argument(
-        metavar="PRESET|FILE.yaml", show_default=False, help="A preset, as ardrone-takeoff, or a campaign file."
+        metavar="PRESET|FILE.yaml", show_default=False, help="A preset, such as ardrone-takeoff, or a campaign file."
     ),
 ]
 GivenCampaign = Annotated[str, typer.Argument(metavar="ID|NAME", show_default=False, help="The campaign.")]
 StartGains = Annotated[
     str | None,
-    typer.Option(
-        metavar="default|simplex|KP,KI,KD", show_default=False, help="Where the first flight's gains come from."
-    ),
+    typer.Option(metavar="default|simplex|KP,KI,KD", show_default=False, help="Source of the first flight's gains."),
 ]
 GivenSettings = Annotated[
     list[str] | None,
@@ -58,17 +56,19 @@ GivenGains = Annotated[
         "--gains",
         metavar="NAME=NUMBER,…",
         show_default=False,
-        help="A gain set to be flown under the strategy manual. Repeatable: they are flown in this order.",
+        help="A gain set to fly with the strategy manual. Repeatable; the sets are flown in this order.",
     ),
 ]
 Overrule = Annotated[
     str,
-    typer.Option(metavar="REASON", show_default=False, help="Fly gains that the gate refuses all the same; say why."),
+    typer.Option(
+        metavar="REASON", show_default=False, help="Reason to fly gains that the gate refuses (simulations only)."
+    ),
 ]
 
 
 class Reproducible(StrEnum):
-    """What `gainline reproduce` knows."""
+    """Reproductions of `gainline reproduce`."""
 
     F16 = "f16"
     TABLE1 = "table1"
@@ -79,7 +79,7 @@ class Reproducible(StrEnum):
 
 
 def report_errors(command: Callable[P, None]) -> Callable[P, None]:
-    """The command, with the program's own errors said in words and exit code 1."""
+    """The command, with the program's own errors printed and exit code 1."""
 
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
@@ -100,19 +100,20 @@ def serve(
     host: Annotated[
         str | None,
         typer.Option(
-            help="Address to listen on. 0.0.0.0 lets other devices in, a tablet for instance: whoever reaches this "
-            "machine over the network can then see every campaign, and change them and fly simulations with a link of "
-            "`gainline unlock`; vehicles with a link do not fly.  [default: GAINLINE_HOST, else 127.0.0.1]"
+            help="Address to listen on. 0.0.0.0 admits other devices, such as a tablet: anyone who can reach "
+            "this computer over the network can then view every campaign, and browsers unlocked with "
+            "`gainline unlock` can change campaigns and fly simulations; vehicles with a link do not fly.  "
+            "[default: GAINLINE_HOST, else 127.0.0.1]"
         ),
     ] = None,
     port: Annotated[
         int | None,
-        typer.Option(min=0, max=65535, help="Port; 0 takes a free one.  [default: GAINLINE_PORT, else 8000]"),
+        typer.Option(min=0, max=65535, help="Port; 0 selects a free one.  [default: GAINLINE_PORT, else 8000]"),
     ] = None,
     data_dir: DataDir = None,
-    worker: Annotated[bool, typer.Option(help="Start the worker that flies and computes beside the server.")] = True,
+    worker: Annotated[bool, typer.Option(help="Also start the worker, which flies and computes.")] = True,
 ) -> None:
-    """Serve the dashboard and its API until it is stopped."""
+    """Serve the dashboard and its API until stopped."""
     from app.runtime.serve import serve as run
 
     run(_settings(host=host, port=port, data_dir=data_dir), with_worker=worker)
@@ -122,7 +123,8 @@ def serve(
 @report_errors
 def unlock(
     script: Annotated[
-        bool, typer.Option("--script", help="Print what a script sends instead, as `Authorization: Bearer TOKEN`.")
+        bool,
+        typer.Option("--script", help="Print the token of a script instead, to send as `Authorization: Bearer TOKEN`."),
     ] = False,
     data_dir: DataDir = None,
 ) -> None:
@@ -135,7 +137,7 @@ def unlock(
 @app.command()
 @report_errors
 def worker(data_dir: DataDir = None) -> None:
-    """Fly and compute for a server that was started with --no-worker."""
+    """Run the worker for a server that was started with --no-worker."""
     from app.runtime.worker import run_worker
 
     run_worker(_settings(data_dir=data_dir))
@@ -149,13 +151,15 @@ def run(
         str | None,
         typer.Option(help="jsbsim, twin, lti, or mavlink:ADDRESS with --set simulated=true.", show_default=False),
     ] = None,
-    strategy: Annotated[str | None, typer.Option(help="How the next gains are found.", show_default=False)] = None,
+    strategy: Annotated[
+        str | None, typer.Option(help="Strategy that computes the next gains.", show_default=False)
+    ] = None,
     start: StartGains = None,
     gains: GivenGains = None,
     settings: GivenSettings = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random.", show_default=False)] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers.", show_default=False)] = None,
     max_flights: Annotated[
-        int | None, typer.Option(min=1, max=200, help="Flights at most.", show_default=False)
+        int | None, typer.Option(min=1, max=200, help="Maximum number of flights.", show_default=False)
     ] = None,
     overrule: Overrule = "",
     json_out: JsonOut = None,
@@ -182,9 +186,9 @@ def run(
 @app.command()
 @report_errors
 def reproduce(
-    what: Annotated[Reproducible, typer.Argument(help="Which experiment or table of the paper.")],
+    what: Annotated[Reproducible, typer.Argument(help="Experiment or table of the paper.")],
     full: Annotated[
-        bool, typer.Option("--full", help="The long form, where there is one: it takes several minutes.")
+        bool, typer.Option("--full", help="The long version, if there is one; takes several minutes.")
     ] = False,
     trace: Annotated[
         Path | None,
@@ -192,7 +196,7 @@ def reproduce(
     ] = None,
     json_out: JsonOut = None,
 ) -> None:
-    """Run the paper's experiments here and print measured, published and their ratio."""
+    """Run the paper's experiments and print measured values, published values and their ratios."""
     from app.cli.reproduce import reproduce as run
 
     run(what.value, full=full, trace=trace, json_out=json_out)
@@ -201,44 +205,51 @@ def reproduce(
 @app.command("sim-drone")
 @report_errors
 def sim_drone(
-    autopilot: Annotated[str, typer.Option(help="Whose manners it has: paparazzi, ardupilot or px4.")] = "paparazzi",
+    autopilot: Annotated[str, typer.Option(help="Autopilot to simulate: paparazzi, ardupilot or px4.")] = "paparazzi",
     link: Annotated[
         str | None,
         typer.Option(
             metavar="ADDRESS",
             show_default=False,
-            help="Where the ground station listens and, after @, where the drone does: udp:HOST:PORT[@LOCALPORT]. "
-            "[default: udp:127.0.0.1:4244@4245 for Paparazzi, else udp:127.0.0.1:14550]",
+            help="Address of the ground station and, after @, local port of the drone: "
+            "udp:HOST:PORT[@LOCALPORT]. [default: udp:127.0.0.1:4244@4245 for Paparazzi, else "
+            "udp:127.0.0.1:14550]",
         ),
     ] = None,
-    vehicle: Annotated[str, typer.Option(help="Its body: jsbsim or twin.")] = "jsbsim",
+    vehicle: Annotated[str, typer.Option(help="Flight model: jsbsim or twin.")] = "jsbsim",
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=NUMBER", show_default=False, help="A setting of the body. Repeatable."),
+        typer.Option(
+            "--set", metavar="NAME=NUMBER", show_default=False, help="Setting of the flight model. Repeatable."
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of its first flight; each later one has the next.")] = 1,
-    speed: Annotated[float, typer.Option(help="Its time over the clock's.")] = 1.0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of the first flight; each later flight uses the next seed.")
+    ] = 1,
+    speed: Annotated[float, typer.Option(help="Speed of simulated time relative to real time.")] = 1.0,
     fault: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME[:DURATION]@T",
             show_default=False,
-            help="What goes wrong, T s after the takeoff command or @connect; docs/sim-drone.md lists it. Repeatable.",
+            help="Fault to inject T s after the takeoff command, or @connect; docs/sim-drone.md lists the "
+            "faults. Repeatable.",
         ),
     ] = None,
-    system: Annotated[
-        int | None, typer.Option(min=1, max=255, show_default=False, help="Its MAVLink system id.")
-    ] = None,
+    system: Annotated[int | None, typer.Option(min=1, max=255, show_default=False, help="MAVLink system id.")] = None,
     failsafes: Annotated[
         bool,
-        typer.Option(help="ArduPilot and PX4: with the failsafes on that a flight needs, or all off, as they come."),
+        typer.Option(
+            help="ArduPilot and PX4: enable the failsafes that a flight needs, or leave all off, as in the default "
+            "parameters."
+        ),
     ] = True,
     mocap: Annotated[
         str | None,
         typer.Option(
             metavar="SOURCE",
             show_default=False,
-            help="Motion capture sees it and says so: natnet:HOST?body=ID, odometry (on its own link), or "
+            help="Simulate motion capture of the drone: natnet:HOST?body=ID, odometry (on its own link), or "
             "mavlink:ADDRESS.",
         ),
     ] = None,
@@ -246,7 +257,7 @@ def sim_drone(
         bool, typer.Option("--any-network", help="Allow links that lead beyond this computer.")
     ] = False,
 ) -> None:
-    """Serve a simulated drone that speaks MAVLink, until it is stopped."""
+    """Run a simulated MAVLink drone until stopped."""
     from app.cli.sim_drone import run_sim_drone
 
     run_sim_drone(
@@ -272,24 +283,24 @@ def import_log(
         typer.Argument(
             metavar="FILE",
             show_default=False,
-            help="MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data (its .log beside it is read too), or CSV.",
+            help="MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data (a .log next to it is read too), or CSV.",
         ),
     ],
-    campaign: Annotated[str, typer.Option(metavar="ID|NAME", show_default=False, help="The campaign it belongs to.")],
+    campaign: Annotated[str, typer.Option(metavar="ID|NAME", show_default=False, help="Campaign of the flight.")],
     trial: Annotated[
         int | None,
-        typer.Option(min=1, show_default=False, help="The trial's number, where more than one waits for its record."),
+        typer.Option(min=1, show_default=False, help="Number of the trial, if more than one waits for its record."),
     ] = None,
     takeoff: Annotated[
-        int | None, typer.Option(min=1, show_default=False, help="Which takeoff of a log with several.")
+        int | None, typer.Option(min=1, show_default=False, help="Number of the takeoff, if the log contains several.")
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Take the log's gains where they are not the planned ones.")
+        bool, typer.Option("--yes", help="Accept the gains in the log if they differ from the planned ones.")
     ] = False,
     data_dir: DataDir = None,
     json_out: JsonOut = None,
 ) -> None:
-    """Hand in the log of a flight made elsewhere: takeoff and gains are found in it."""
+    """Import the log of a flight made elsewhere; takeoff and gains are read from it."""
     from app.cli.files import import_log as run
 
     settings = _settings(data_dir=data_dir)
@@ -302,15 +313,17 @@ def report(
     campaign: GivenCampaign,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", show_default=False, help="Where to.  [default: campaign-ID-report.html]"),
+        typer.Option(metavar="FILE", show_default=False, help="Output file.  [default: campaign-ID-report.html]"),
     ] = None,
     kind: Annotated[
         Literal["html", "pdf"] | None,
-        typer.Option("--format", show_default=False, help="html or pdf.  [default: what FILE ends in, else html]"),
+        typer.Option(
+            "--format", show_default=False, help="html or pdf.  [default: from the extension of FILE, else html]"
+        ),
     ] = None,
     data_dir: DataDir = None,
 ) -> None:
-    """Write a campaign's report as one file that needs neither this program nor a network; PDF needs a Chromium."""
+    """Write a campaign's report as one self-contained file. PDF needs Chromium."""
     from app.cli.files import report as run
 
     run(campaign, _settings(data_dir=data_dir), out=out, kind=kind)
@@ -322,11 +335,11 @@ def bundle(
     campaign: GivenCampaign,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", show_default=False, help="Where to.  [default: campaign-ID.gainline.zip]"),
+        typer.Option(metavar="FILE", show_default=False, help="Output file.  [default: campaign-ID.gainline.zip]"),
     ] = None,
     data_dir: DataDir = None,
 ) -> None:
-    """Write a whole campaign, records, photos and logs included, as one file for another installation."""
+    """Export a campaign with its records, photos and logs as one file, to import into another installation."""
     from app.cli.files import bundle as run
 
     run(campaign, _settings(data_dir=data_dir), out=out)
@@ -335,10 +348,12 @@ def bundle(
 @app.command()
 @report_errors
 def unbundle(
-    file: Annotated[Path, typer.Argument(metavar="FILE", show_default=False, help="What `gainline bundle` wrote.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", show_default=False, help="Bundle written by `gainline bundle`.")
+    ],
     data_dir: DataDir = None,
 ) -> None:
-    """Bring in a campaign from another installation, every number as it was."""
+    """Import a campaign from another installation, with identical numbers."""
     from app.cli.files import unbundle as run
 
     run(file, _settings(data_dir=data_dir))
@@ -361,14 +376,15 @@ def replay(
 @report_errors
 def check(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE…", help="Paparazzi's .data files with VERT_LOOP; .log beside them.")
+        list[Path],
+        typer.Argument(metavar="FILE…", help="Paparazzi .data files with VERT_LOOP, each with its .log next to it."),
     ],
     gains: Annotated[
-        str | None, typer.Option(metavar="KP,KI,KD", show_default=False, help="Gains flown, where no log says so.")
+        str | None, typer.Option(metavar="KP,KI,KD", show_default=False, help="Gains flown, if no log contains them.")
     ] = None,
     json_out: JsonOut = None,
 ) -> None:
-    """Hold the loop's own flight logs against the replica; exit code 1 where they differ or cannot be read."""
+    """Compare flight logs of the vertical loop with the replica; exit code 1 if they differ or cannot be read."""
     from app.cli.reproduce import check_files
 
     if not check_files(files, gains, json_out):

@@ -58,5 +58,5 @@ def write_json(target: Path | None, document: Mapping[str, object]) -> None:
         raise InputError(
             f"{target} could not be written: {error.strerror or error}.",
             problems=(Problem("--json", "cannot be written"),),
-            hint="Name a file in a folder that exists and has room.",
+            hint="Choose a file in an existing folder with enough free space.",
         ) from error

@@ -75,7 +75,7 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
         raise InputError(
             f"{file} could not be read: {error.strerror or error}.",
             problems=(Problem("FILE", "cannot be read"),),
-            hint="Give a log that this user may read.",
+            hint="Give a log that this user can read.",
         ) from error
 
 
@@ -90,7 +90,7 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
         if not can_ask():
             raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
         Console(stderr=True, highlight=False).print(f"{escape(needed.message)} {escape(needed.hint)}")
-        if not typer.confirm("Take it?"):
+        if not typer.confirm("Import it?"):
             raise
         return attempt(True)
 
@@ -122,13 +122,15 @@ def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
                 raise InputError(
                     f"{target} could not be written: {error.strerror or error}.",
                     problems=(Problem("--out", "cannot be written"),),
-                    hint="Name a file in a folder that exists and has room.",
+                    hint="Choose a file in an existing folder with enough free space.",
                 ) from error
             finally:
                 arriving.unlink(missing_ok=True)
     finally:
         database.close()
-    console().print(f"Campaign {campaign_id} is in {escape(str(target))}, {target.stat().st_size / 1e6:.1f} MB.")
+    console().print(
+        f"Campaign {campaign_id} was written to {escape(str(target))} ({target.stat().st_size / 1e6:.1f} MB)."
+    )
 
 
 def unbundle(file: Path, settings: Settings) -> None:
@@ -144,7 +146,7 @@ def unbundle(file: Path, settings: Settings) -> None:
         raise InputError(
             f"{file} could not be read: {error.strerror or error}.",
             problems=(Problem("FILE", "cannot be read"),),
-            hint="Give a bundle that this user may read.",
+            hint="Give a bundle that this user can read.",
         ) from error
     finally:
         database.close()
@@ -153,7 +155,7 @@ def unbundle(file: Path, settings: Settings) -> None:
         f"Campaign {made.id}, {escape(made.name)}: {count(made.trials.flown, 'flight')} on {escape(made.vehicle.name)}."
     )
     if not made.vehicle.can_fly:
-        out.print("It is history here: it can be read, compared and cloned to a vehicle that flies.")
+        out.print("It is read-only here: view it, compare it, or clone it to a vehicle that can be flown from here.")
 
 
 Format = Literal["html", "pdf"]
@@ -182,6 +184,6 @@ def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format 
         raise InputError(
             f"{target} could not be written: {error.strerror or error}.",
             problems=(Problem("--out", "cannot be written"),),
-            hint="Name a file in a folder that exists and has room.",
+            hint="Choose a file in an existing folder with enough free space.",
         ) from error
-    console().print(f"The report of campaign {found.campaign.id} is in {escape(str(target))}.")
+    console().print(f"The report of campaign {found.campaign.id} was written to {escape(str(target))}.")

@@ -149,7 +149,7 @@ def _check(file: Path, given: Mapping[str, float] | None) -> LogCheck:
             return check_log(data, name=file.name, companion=companion, given=given)
     except OSError as error:
         raise InputError(
-            f"{file} could not be read: {error.strerror or error}.", hint="Give a readable .data file of Paparazzi."
+            f"{file} could not be read: {error.strerror or error}.", hint="Give a readable Paparazzi .data file."
         ) from error
 
 
@@ -158,12 +158,12 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
     spoken = ", ".join(f"{name} {value:g}" for name, value in checked.gains.items())
     tilted = f" ({commands.tilted} of them tilted by up to {commands.largest_tilt_deg:.1f}°)" if commands.tilted else ""
     rows = [
-        ("commands that follow to the last bit", f"{commands.exact} of {commands.rows}{tilted}"),
-        *((f"only with the {name} a step apart", str(count)) for name, count in commands.stale.items()),
-        ("that do not follow", _different(commands)),
+        ("bit-exact commands", f"{commands.exact} of {commands.rows}{tilted}"),
+        *((f"exact with the {name} one step apart", str(count)) for name, count in commands.stale.items()),
+        ("different commands", _different(commands)),
     ]
     if simulation is None:
-        rows.append(("reference and integrator", "not simulated: no command in the log, or another one within 2 s"))
+        rows.append(("reference and integrator", "not simulated: no command in the log, or another command within 2 s"))
     else:
         rows.append(
             ("simulated from the command at", f"{simulation.command_s:.3f} s for {simulation.duration_s:.1f} s")
@@ -178,7 +178,7 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
     out.print(table(("", ""), rows, title=f"{file.name}, {spoken} ({checked.gains_from})"))
     if checked.better_gains is not None:
         better = ", ".join(f"{name} {value:g}" for name, value in checked.better_gains.items())
-        out.print(f"More commands follow from {better}: were other gains flown?")
+        out.print(f"More commands match with {better}: were other gains flown?")
     out.print("The replica agrees." if checked.passed else "[bold]The replica differs.[/]")
 
 

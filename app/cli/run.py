@@ -102,7 +102,7 @@ def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue])
     if vehicle.id is not None:
         raise InputError(
             "A registered vehicle cannot be flown from the command line.",
-            problems=(Problem("vehicle.id", "names a vehicle that only the dashboard's database knows"),),
+            problems=(Problem("vehicle.id", "names a vehicle of the dashboard's database"),),
             hint="Fly it in the dashboard, or give the address of a simulated one.",
         )
     kind, described = vehicle.kind, get_kind(vehicle.kind)
@@ -110,8 +110,8 @@ def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue])
         raise InputError(
             f"{described.title} cannot be flown from the command line.",
             problems=(Problem("vehicle.kind", f"{kind} is not a simulation"),),
-            hint="Choose a simulation: --vehicle jsbsim, twin or lti, or mavlink:ADDRESS --set simulated=true with an "
-            "address on this computer. Real vehicles fly on a person's act in the dashboard only.",
+            hint="Choose a simulation: --vehicle jsbsim, twin or lti, or mavlink:ADDRESS --set simulated=true "
+            "with an address on this computer. Real vehicles fly only from the dashboard.",
         )
 
 
@@ -144,7 +144,7 @@ class _Display:
     def broken_off(self, error: BaseException) -> HeadlessCampaign:
         """The campaign with the flights until the error."""
         said = str(error) or type(error).__name__
-        return HeadlessCampaign(trials=tuple(self._trials), stopped_because=f"An error ended it: {said}")
+        return HeadlessCampaign(trials=tuple(self._trials), stopped_because=f"After an error: {said}")
 
     def _holding(self, gains: Mapping[str, float] | None) -> None:
         self.touched, self.held = True, gains
@@ -202,7 +202,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: H
     ]
     out.print(table(("run #", f"error ({unit})", f"predicted ({unit})", *names, "step", ""), rows, title=file.name))
     if overruled := [str(trial.number) for trial in campaign.trials if trial.overrule_reason]:
-        out.print(f"Refused by the gate, and flown all the same: flight {', '.join(overruled)}.")
+        out.print(f"Refused by the gate and flown with a reason: flight {', '.join(overruled)}.")
     out.print(f"Stopped: {campaign.stopped_because}")
     if best is not None:
         out.print(f"Best: {_error(best.error, unit)} with {_gains(best.gains)}, flight {best.number}.")
@@ -213,9 +213,9 @@ def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
     if not get_kind(file.vehicle.kind).is_real:
         return
     if display.held is not None:
-        out.print(f"The vehicle holds its safe gains again, read back: {_gains(display.held)}.")
+        out.print(f"The safe gains are restored and read back: {_gains(display.held)}.")
     elif display.touched:
-        out.print("Nobody knows which gains the vehicle holds: read them back by hand before it flies again.")
+        out.print("The gains on the vehicle are unknown. Read them back manually before it flies again.")
 
 
 def _document(

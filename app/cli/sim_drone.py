@@ -54,14 +54,14 @@ def run_sim_drone(
         transport = opened.enter_context(closing(open_transport(address)))
         server = Server(drone, transport, clock)
         out = console()
-        out.print(f"{kind.title}, system {number}, in the body of {vehicle}, on {address}.")
+        out.print(f"{kind.title}, system {number}, flight model {vehicle}, on {address}.")
         if seen_at is not None:
-            out.print(f"Motion capture sees it: {seen_at}.")
-        out.print(f"Its time runs {speed:g} times as fast as the clock's. Ctrl-C switches it off.")
+            out.print(f"Motion capture: {seen_at}.")
+        out.print(f"Simulated time runs at {speed:g} times real time. Press Ctrl-C to stop.")
         with _stopped_by_signals(server):
             server.run()
         if server.lost_s > 0.0:
-            out.print(f"This computer was too slow: the drone's clock is {server.lost_s:.1f} s late.")
+            out.print(f"This computer was too slow: the drone's clock is {server.lost_s:.1f} s behind.")
 
 
 def _mocap_address(source: SourceAddress | None) -> Address | None:
@@ -78,9 +78,9 @@ def _mocap_address(source: SourceAddress | None) -> Address | None:
 def _require_loopback(option: str, address: Address | None) -> None:
     if address is not None and not is_loopback(address):
         raise InputError(
-            "A simulated drone keeps to this computer.",
-            problems=(Problem(option, f"{address} leads elsewhere"),),
-            hint="Anybody who reaches it can fly it; if that is meant, add --any-network.",
+            "A simulated drone accepts links on this computer only.",
+            problems=(Problem(option, f"{address} is not an address of this computer"),),
+            hint="Anyone who can reach the address can fly the drone. To allow that, add --any-network.",
         )
 
 
@@ -93,7 +93,7 @@ def _options(settings: Sequence[str]) -> dict[str, float]:
             options[name] = float(number)
         except ValueError as error:
             raise InputError(
-                "This setting cannot be used.",
+                "Invalid setting.",
                 problems=(Problem(f"--set {name}", f"must be NAME=NUMBER, got {setting!r}"),),
                 hint="For example --set wind_m_s=3; docs/vehicles.md lists the settings of jsbsim and twin.",
             ) from error

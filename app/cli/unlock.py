@@ -42,7 +42,7 @@ def unlock(settings: Settings, *, script: bool) -> None:
     _say("Open this in a browser on this computer:", [unlock_link(address, keyring.new_link())])
     if system.addresses:
         links = [unlock_link(each.url, keyring.new_link()) for each in system.addresses]
-        _say("Or one of these on another device, for simulated campaigns:", links)
+        _say("Or open one of these on another device, for simulated campaigns:", links)
     _say(f"Each link works once, within {LINK_VALID_S // 60} minutes.", [])
 
 
@@ -60,8 +60,8 @@ def _running(settings: Settings) -> tuple[str, _System]:
 
 def _not_running(settings: Settings) -> UnavailableError:
     return UnavailableError(
-        f"No Gainline server runs on {settings.data_dir}.",
-        hint="Start it with `gainline serve`, which prints such a link itself, or name its folder with --data-dir.",
+        f"No Gainline server is running on {settings.data_dir}.",
+        hint="Start it with `gainline serve`, which prints such a link, or give its folder with --data-dir.",
     )
 
 

@@ -183,7 +183,7 @@ class Client:
             ready,
             timeout_s,
             f"There is no proposal for campaign {campaign_id} after {timeout_s:g} s.",
-            "Look whether a worker runs (GET /api/health), then ask again.",
+            "Check that a worker is running (GET /api/health), then ask again.",
         )
 
     def tell(self, campaign_id: int, flown: Proposal | Mapping[str, float], record: Record, *, note: str = "") -> Trial:
@@ -226,7 +226,7 @@ class Client:
             if trial.state not in _LANDED and flight is not None and flight.state in _NOT_FLOWN:
                 raise RefusedError(
                     f"Trial {trial.number} was not flown: {flight.problem}",
-                    hint="It is planned as before; fly it again or cancel it.",
+                    hint="It is planned again: fly it or cancel it.",
                 )
             return trial if trial.state in _LANDED else None
 
@@ -234,7 +234,7 @@ class Client:
             landed,
             timeout_s,
             f"Trial {trial_id} has not landed after {timeout_s:g} s.",
-            "Look whether a worker runs (GET /api/health), then wait again.",
+            "Check that a worker is running (GET /api/health), then wait again.",
         )
 
     def abort(self, trial_id: int) -> AbortAnswer:
@@ -328,7 +328,7 @@ def _refusal(answer: httpx2.Response) -> RefusedError:
         return kind(
             f"The server answered {answer.status_code} {answer.reason_phrase}.",
             status=answer.status_code,
-            hint="Check that the address is that of a Gainline server of this version.",
+            hint="Check that the address belongs to a Gainline server of this version.",
         )
     problems = tuple(Problem(problem.field, problem.reason, problem.offer) for problem in said.problems)
     return kind(said.detail, hint=said.hint, problems=problems, status=said.status, title=said.title)

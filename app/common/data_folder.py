@@ -21,12 +21,12 @@ def prepare_data_dir(folder: Path) -> None:
     try:
         folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
         if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, "this user may not write there")
+            raise PermissionError(errno.EACCES, "this user cannot write there")
     except OSError as error:
         raise StorageError(
             f"The folder {folder} cannot be used for Gainline's data.",
             problems=(Problem("--data-dir", f"{error.strerror or error}"),),
-            hint="Choose a folder that this user may write, with --data-dir or GAINLINE_DATA_DIR.",
+            hint="Choose a folder that this user can write to, with --data-dir or GAINLINE_DATA_DIR.",
         ) from error
 
 
@@ -50,12 +50,12 @@ def make_private(folder: Path) -> str:
     status = folder.stat()
     if stat.S_IMODE(status.st_mode) & OTHERS:
         raise StorageError(
-            f"Other users of this computer may open {folder}, and this cannot be changed.",
+            f"Other users of this computer can open {folder}, and its mode cannot be changed.",
             problems=(Problem("--data-dir", f"has the mode {stat.S_IMODE(status.st_mode):o}"),),
-            hint="Gainline keeps there what lets a browser command real vehicles. Choose a folder of your own, on a "
-            "disk that knows file permissions, with --data-dir or GAINLINE_DATA_DIR.",
+            hint="Gainline stores the secret there that lets a browser command real vehicles. Choose a private "
+            "folder, on a disk with file permissions, with --data-dir or GAINLINE_DATA_DIR.",
         )
-    return f"{folder} was open to other users of this computer (mode {before:o}); now it is yours alone."
+    return f"{folder} was open to other users of this computer (mode {before:o}); now only you can open it."
 
 
 def folder_bytes(folder: Path) -> int:

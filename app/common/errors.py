@@ -69,7 +69,7 @@ class NotFoundError(GainlineError):
     def __init__(self, what: str, identity: object, *, hint: str = "") -> None:
         super().__init__(
             f"There is no {what} {identity}.",
-            hint=hint or "It may have been deleted, or the number is mistyped; look it up in its list.",
+            hint=hint or "It may have been deleted, or the number is wrong. Check the list.",
         )
 
 

@@ -1,6 +1,6 @@
 """What the schemas and pages of several slices share: checked names and numbers, pages and their cursors, figures.
 
-A name must not hold control characters: they can rewrite a terminal's lines, or reverse text so that one name looks
+A name must not contain control characters: they can rewrite a terminal's lines, or reverse text so that one name looks
 like another. A cursor is the position where a page ended, so that the next page begins there whatever was added or
 changed meanwhile.
 """
@@ -55,7 +55,7 @@ def _shown_as_it_is(name: str) -> str:
     """Return the name unless it holds control characters, which move a terminal's cursor or reverse text."""
     if found := find_control_characters(name):
         raise PydanticCustomError(
-            "control_character", "must not hold control characters ({found})", {"found": ", ".join(found)}
+            "control_character", "must not contain control characters ({found})", {"found": ", ".join(found)}
         )
     return name
 
@@ -63,7 +63,7 @@ def _shown_as_it_is(name: str) -> str:
 Shown = AfterValidator(_shown_as_it_is)
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120), Shown]
 Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
-Version = Annotated[int, Field(ge=1, strict=True, description="the version that was edited, as last read")]
+Version = Annotated[int, Field(ge=1, strict=True, description="the version on which the edit is based, as last read")]
 
 
 class Request(BaseModel):
@@ -157,7 +157,7 @@ def decode_cursor(order: str, text: str, kind: type[str] | type[float]) -> Posit
     except (ValueError, TypeError, OverflowError, binascii.Error, RecursionError):
         raise _refused("is not a cursor of this list") from None
     if said != order:
-        raise _refused("belongs to another order of the list")
+        raise _refused("belongs to a different sort order of the list")
     if value is None or type(identity) is not int or not 0 < identity <= _LARGEST_ID:
         raise _refused("is not a cursor of this list")
     return value, identity
@@ -176,9 +176,9 @@ def instant(text: str | float) -> datetime:
 
 def _refused(reason: str) -> InputError:
     return InputError(
-        "This page cannot be found.",
+        "There is no such page of the list.",
         problems=(FieldProblem("cursor", reason),),
-        hint="Begin without a cursor, and pass on `next_cursor` unchanged.",
+        hint="Start without a cursor, and send `next_cursor` unchanged.",
     )
 
 

@@ -57,12 +57,14 @@ class Settings(BaseSettings):
     host: str = Field(default="127.0.0.1", description="address of the dashboard")
     port: int = Field(default=8000, ge=0, le=65535, description="port of the dashboard; 0 takes a free one")
     ui_dir: Path = Field(default_factory=default_ui_dir, description="folder of the built dashboard")
-    max_upload_bytes: int = Field(default=48 * 2**20, ge=2**16, description="largest flight record that is taken")
-    lease_s: float = Field(default=30.0, gt=0, description="silence after which a worker's job is given to another")
-    simulation_hosts: Hosts = Field(
-        default=frozenset(), description="hosts on which simulated vehicles run, beside this computer; with commas"
+    max_upload_bytes: int = Field(default=48 * 2**20, ge=2**16, description="largest flight record accepted")
+    lease_s: float = Field(
+        default=30.0, gt=0, description="silence of a worker after which its job is given to another"
     )
-    log_level: str = Field(default="info", description="least level of a message that is written to the log")
+    simulation_hosts: Hosts = Field(
+        default=frozenset(), description="further hosts on which simulated vehicles run, separated by commas"
+    )
+    log_level: str = Field(default="info", description="minimum level of log messages")
 
     @property
     def database_file(self) -> Path:
@@ -76,7 +78,7 @@ def read_settings(given: Mapping[str, str | int | Path]) -> Settings:
     except ValidationError as error:
         problems = tuple(Problem(_setting_name(str(entry["loc"][0]), given), entry["msg"]) for entry in error.errors())
         raise InputError(
-            "These settings cannot be used.",
+            "Invalid settings.",
             problems=problems,
             hint="Correct the named option or variable; docs/operations.md lists them all.",
         ) from error

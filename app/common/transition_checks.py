@@ -21,7 +21,7 @@ def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, wha
     if state not in actions[action]:
         raise ConflictError(
             f"{what} is {state}; “{action}” is possible only while it is {_or(actions[action])}.",
-            hint="Load it again: it has changed since, or something else has to be done first.",
+            hint="Load it again: its state has changed, or another step must come first.",
         )
 
 
@@ -43,8 +43,8 @@ def check_version(sent: int, held: int, what: str, differences: Mapping[str, tup
         if now != wanted
     )
     raise ConflictError(
-        f"{what} was changed by somebody else (version {held}, you edited version {sent}).",
-        hint="Load it again, look at what changed, and make your edit on that.",
+        f"{what} was changed by another client (current version {held}, you edited version {sent}).",
+        hint="Load it again, review the changes, and repeat your edit.",
         problems=(Problem("version", f"is {held}, got {sent}"), *problems),
     )
 

@@ -226,7 +226,7 @@ class LimitedProtocol(HttpToolsProtocol):
         if self._own is not None and self._own.for_stopping and not self.url.partition(b"?")[0].endswith(_STOPPING):
             self._refuse(
                 HTTPStatus.SERVICE_UNAVAILABLE,
-                "This server has more connections open than it can serve; only abort, land and motors off are taken.",
+                "This server has too many open connections; it accepts only abort, land and motors off.",
                 "Try again in a few seconds.",
             )
             return
@@ -255,8 +255,8 @@ class LimitedProtocol(HttpToolsProtocol):
         if self._head_bytes > MAX_HEAD_BYTES:
             self._refuse(
                 HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE,
-                f"The headers are larger than {MAX_HEAD_BYTES // 1024} KiB; nothing was done.",
-                "Send smaller headers; what is large belongs into the body.",
+                f"The headers are larger than {MAX_HEAD_BYTES // 1024} KiB; the request was rejected.",
+                "Send smaller headers; put large data into the body.",
             )
 
     def _refuse(self, status: HTTPStatus, detail: str, hint: str) -> None:

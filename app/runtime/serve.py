@@ -94,7 +94,10 @@ def _already_served(settings: Settings, error: LockedError) -> AlreadyRunningErr
     return AlreadyRunningError(
         f"Another Gainline server ({error.holder or 'its process is unknown'}) already uses {settings.database_file}.",
         hint=(f"Open {where}, " if where else "Use that one, ")
-        + "stop it first, or give this server a folder of its own with --data-dir. The running server is not affected.",
+        + (
+            "stop it first, or choose another folder for this server with --data-dir. The running server is "
+            "not affected."
+        ),
     )
 
 
@@ -104,9 +107,9 @@ def _no_address(host: str, port: int, error: OSError) -> AddressError:
             problem = Problem("port", f"{port} is in use by another program")
             hint = f"Stop that program, or choose another port: --port {port % 65535 + 1} (0 takes a free one)."
         case errno.EACCES:
-            problem = Problem("port", f"{port} may not be opened by this user")
+            problem = Problem("port", f"this user has no permission to open port {port}")
             hint = "Choose a port above 1023, for instance --port 8000."
         case _:
-            problem = Problem("host", f"{host} is no address of this machine ({error.strerror or error})")
-            hint = "Use --host 127.0.0.1 (this machine only) or an address that this machine has."
+            problem = Problem("host", f"{host} is not an address of this computer ({error.strerror or error})")
+            hint = "Use --host 127.0.0.1 (this computer only) or one of this computer's addresses."
     return AddressError(f"Gainline cannot listen on {host}, port {port}.", hint=hint, problems=(problem,))

@@ -165,7 +165,7 @@ def _announce_links(settings: Settings, port: int, keyring: Keyring, announce: C
         announce(f"Open {link} to command real vehicles from that browser.")
     elif addresses:
         link = unlock_link(addresses[0].url, keyring.new_link())
-        announce(f"Open {link} on a tablet to create and fly simulated campaigns from it.")
+        announce(f"Open {link} on a tablet to create and fly simulated campaigns.")
         if sys.stdout.isatty():
             announce(qr_text(link))
     announce("The link works once, within 15 minutes; `gainline unlock` prints another.")

@@ -84,10 +84,10 @@ def run_worker(settings: Settings) -> None:
         _run(settings, ending, abort_registry, keep_waiting=lambda: False)
     except LockedError as error:
         raise AlreadyRunningError(
-            f"Another Gainline worker ({error.holder or 'its process is unknown'}) already works for "
+            f"Another Gainline worker ({error.holder or 'its process is unknown'}) already uses "
             f"{settings.database_file}.",
-            hint="One is enough: `gainline serve` brings its own. Stop that one first, or start this one with another "
-            "data folder (GAINLINE_DATA_DIR).",
+            hint="One is enough: `gainline serve` starts its own. Stop that worker first, or start this one "
+            "with another data folder (GAINLINE_DATA_DIR).",
         ) from error
 
 
@@ -175,7 +175,7 @@ class Worker:
             )
             job_runners = self._build_job_runners(database, pool, landscape_pool)
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
-            stack.callback(self._ending.set, "the worker failed; its log says why")
+            stack.callback(self._ending.set, "the worker failed; see its log")
             self._until_stored(lambda: recover(database))
             computing.submit(pool.run, os.getpid)
             _log.info("worker ready", worker=self._name)

@@ -12,9 +12,9 @@ from typing import Final
 from app.common.settings import is_loopback
 
 EXPOSES: Final = (
-    "anybody who can reach this machine over the network can see every campaign, and who has opened a link of "
-    "`gainline unlock` can change and delete them and start simulated flights: Gainline has no accounts yet. Real "
-    "vehicles fly only from a server on loopback (--host 127.0.0.1), and so do simulated ones with a link."
+    "anyone who can reach this computer over the network can view every campaign. Browsers unlocked with `gainline "
+    "unlock` can change and delete campaigns and start simulated flights. Gainline has no user accounts. Real "
+    "vehicles, and simulated ones with a link, fly only from a server on loopback (--host 127.0.0.1)."
 )
 """Consequence of listening beyond loopback, as the second half of a sentence."""
 

@@ -27,15 +27,16 @@ from app.web.origin import caller_of
 M = TypeVar("M", bound=BaseModel)
 
 Id = Annotated[int, Path(ge=1, le=2**63 - 1)]
-Limit = Annotated[int, Query(ge=1, le=200, description="how many items the page may hold")]
-CursorText = Annotated[str | None, Query(max_length=500, description="`next_cursor` of the page before")]
+Limit = Annotated[int, Query(ge=1, le=200, description="maximum number of items on the page")]
+CursorText = Annotated[str | None, Query(max_length=500, description="`next_cursor` of the previous page")]
 IdempotencyKey = Annotated[
     str | None,
     Header(
         alias="Idempotency-Key",
         min_length=1,
         max_length=200,
-        description="a text of the caller's own, new for each act: the same request sent again with it is harmless",
+        description="a text chosen by the client, new for each operation: repeating a request with the same key has no "
+        "further effect",
     ),
 ]
 
@@ -44,7 +45,7 @@ ControlToken = Annotated[
     Header(
         alias="X-Gainline-Control",
         max_length=100,
-        description="token of the lease by which one is in control of the vehicle",
+        description="token of the lease that gives control of the vehicle",
     ),
 ]
 
@@ -145,7 +146,7 @@ async def json_only(request: Request) -> None:
     has_body = request.headers.get("content-length", "0") != "0" or "transfer-encoding" in request.headers
     if has_body and kind != "application/json":
         raise MediaTypeError(
-            f"The body is {kind or 'of no stated type'}, and JSON is expected here.",
+            f"The body is {kind or 'of unknown type'}; JSON is expected here.",
             hint="Send JSON with the header `Content-Type: application/json`.",
         )
 
@@ -172,7 +173,7 @@ REQUEST_BODY: Final = {
                         "companion": {
                             "type": "string",
                             "format": "binary",
-                            "description": "the .log file that Paparazzi writes beside a .data file",
+                            "description": "the .log file that Paparazzi writes next to a .data file",
                         },
                     },
                 }
@@ -234,7 +235,7 @@ async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyK
     arriving = _ARRIVING.get(kind)
     if arriving is None:
         raise MediaTypeError(
-            f"A record of type {kind or 'that is not stated'} is not read here.",
+            f"A record of type {kind or 'unknown'} is not accepted here.",
             hint=f"Send the file as `Content-Type: {_ANY}`, or as the form field `file`.",
         )
     async with arriving(request) as arrived:
@@ -259,7 +260,7 @@ async def _form(request: Request) -> AsyncIterator[_ReceivedUpload]:
         part, companion = _part(form, "file"), _part(form, "companion")
         if part is None:
             raise InputError(
-                "The form holds no file.",
+                "The form contains no file.",
                 hint="Send the record in the form field `file`.",
                 problems=(Problem("file", "is missing"),),
             )

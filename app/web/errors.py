@@ -60,14 +60,14 @@ _HTTP: Final[Mapping[int, tuple[str, str]]] = {
         "The body cannot be read; nothing was changed.",
         "Send JSON in UTF-8 without deep nesting, or a flight record as `text/csv`.",
     ),
-    404: ("There is nothing at {path}.", "Check the address; the paths of the API are listed in /api/openapi.json."),
-    405: ("{path} does not know the method {method}.", "The methods of each path are listed in /api/openapi.json."),
+    404: ("No resource at {path}.", "Check the address; the paths of the API are listed in /api/openapi.json."),
+    405: ("{path} does not support the method {method}.", "The methods of each path are listed in /api/openapi.json."),
 }
 """Errors raised by the framework itself."""
 
 RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
     "default": {
-        "description": "An error: what happened, what to do about it, and the fields that are to blame.",
+        "description": "An error: what happened, what to do about it, and the invalid fields.",
         "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
     },
 }
@@ -138,7 +138,7 @@ async def _invalid_request(_request: Request, error: Exception) -> Response:
     problems = [_refused(found) for found in error.errors()]
     return _problem(
         HTTPStatus.UNPROCESSABLE_ENTITY,
-        "The request has fields that cannot be used; nothing was changed.",
+        "The request has invalid fields; nothing was changed.",
         "Correct the named fields and send the request again.",
         problems,
         title="Unusable input",
@@ -175,8 +175,8 @@ async def _system_error(request: Request, error: Exception) -> Response:
         return await _own_error(
             request,
             StorageError(
-                "The disk is full; nothing of this request was stored.",
-                hint="Free some space, then do the same again; everything stored before is intact.",
+                "The disk is full; nothing from this request was stored.",
+                hint="Free some disk space, then try again. Everything stored before is intact.",
             ),
         )
     return await _unforeseen(request, error)
@@ -187,8 +187,8 @@ async def _unforeseen(request: Request, error: Exception) -> Response:
     _log.error("unforeseen error", error_id=number, method=request.method, path=request.url.path, exc_info=error)
     return _problem(
         HTTPStatus.INTERNAL_SERVER_ERROR,
-        f"The program made a mistake (number {number}); nothing of this request was stored.",
-        f"Try again. If it happens again, report it with the number {number} and the log.",
+        f"Internal error {number}; nothing from this request was stored.",
+        f"Try again. If it happens again, report it with its number, {number}, and the log.",
     )
 
 

@@ -30,7 +30,8 @@ async def events(
     database: CurrentDatabase,
     last_event_id: Annotated[str | None, Header()] = None,
     since_s: Annotated[
-        float, Query(ge=0.0, le=MAX_SINCE_S, description="seconds before now whose changes come first")
+        float,
+        Query(ge=0.0, le=MAX_SINCE_S, description="length in seconds of the recent past whose changes are sent first"),
     ] = 0.0,
 ) -> AsyncIterator[ServerSentEvent]:
     """Stream all events.

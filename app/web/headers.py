@@ -109,7 +109,7 @@ class _Limit:
     otherwise: str
 
 
-_JSON: Final = _Limit("body", JSON_BYTES, "no act of the API needs more")
+_JSON: Final = _Limit("body", JSON_BYTES, "no operation of the API needs more")
 
 
 class BodyLimitMiddleware:
@@ -123,7 +123,7 @@ class BodyLimitMiddleware:
             "/trajectory": _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs"),
             "/controller-checks": _Limit("file", upload_bytes, "`gainline controller check` reads larger logs"),
             "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),
-            "/api/bundles": _Limit("file", BUNDLE_BYTES, "`gainline unbundle` brings in larger ones"),
+            "/api/bundles": _Limit("file", BUNDLE_BYTES, "`gainline unbundle` imports larger ones"),
         }
         self._refuse = refuse
 

@@ -67,15 +67,15 @@ class AccessMiddleware:
         name = _name_of(address)
         if name not in {"localhost", self._host} and not _is_ip_address(name):  # DNS rebinding needs a name
             return self._refuse_foreign(
-                f"This server does not answer to the name “{address}”.",
-                "Use localhost or the machine's address, or start it with that name as --host (GAINLINE_HOST).",
+                f"This server does not accept requests for the host name “{address}”.",
+                "Use localhost or the computer's address, or start it with that name as --host (GAINLINE_HOST).",
             )
         path: str = scope["path"]
         changes = scope["method"] not in _READS
         if (changes or path.startswith("/api/")) and _is_foreign(headers, address):
             return self._refuse_foreign(
-                "This was asked for by a page of another site; nothing was done.",
-                "Do it in the dashboard itself, or send it from a program, without the header Origin.",
+                "The request came from a page of another site and was rejected.",
+                "Use the dashboard, or send the request from a program without the header Origin.",
             )
         if changes or path.endswith(_COSTLY):
             try:

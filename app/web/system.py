@@ -82,8 +82,8 @@ def get_address_code(
     """One of the server's addresses as a QR code, for the camera of a tablet."""
     if address not in {each.url for each in _addresses(request, settings)}:
         raise InputError(
-            "Other devices do not reach this server there.",
-            problems=(Problem("address", "is none of the server's addresses"),),
+            "Other devices cannot reach this server at that address.",
+            problems=(Problem("address", "is not one of the server's addresses"),),
             hint="GET /api/system lists them; on loopback there are none.",
         )
     return Response(qr_svg(address), media_type="image/svg+xml")

@@ -21,25 +21,25 @@ _SPENT: Final = f"""<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width">
-<title>Gainline: this link is spent</title>
+<title>Gainline: this link has been used</title>
 <style>
 :root {{ color-scheme: light dark; font: 18px/1.5 system-ui, sans-serif }}
 main {{ max-width: 34rem; margin: 15vh auto; padding: 0 1.5rem }}
 </style>
 <main>
-<h1>This link is spent</h1>
+<h1>This link has been used or has expired</h1>
 <p>A link unlocks one browser, within {LINK_VALID_S // 60} minutes. Run <code>gainline unlock</code> on the computer
-that Gainline runs on, and open the link that it prints.</p>
-<p><a href="/">To the dashboard</a>, where this browser may watch.</p>
+that runs Gainline, and open the link that it prints.</p>
+<p><a href="/">To the dashboard</a>, which is read-only in this browser.</p>
 </main>
 </html>
 """
 
 
 class Access(BaseModel):
-    """What the client may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
-    link, `may_command` real ones. `elsewhere`: the client is not on this computer. `hint` says how to unlock a browser;
-    empty where a link would change nothing."""
+    """What the client may do: `may_change` campaigns and simulated flights, `may_link` vehicles with a link,
+    `may_command` real ones. `elsewhere`: the client is not on this computer. `hint` describes how to unlock a browser;
+    empty if a link would change nothing."""
 
     elsewhere: bool
     may_change: bool

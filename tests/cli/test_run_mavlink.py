@@ -82,8 +82,8 @@ def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains
     assert result.exit_code == 1
     printed = " ".join(result.output.split())
     assert "run 1" in printed
-    assert "Stopped: An error ended it: The battery is below 10.2 V." in printed
-    assert "The vehicle holds its safe gains again, read back: kp 283, ki 13, kd 82." in printed
+    assert "Stopped: After an error: The battery is below 10.2 V." in printed
+    assert "The safe gains are restored and read back: kp 283, ki 13, kd 82." in printed
     document = json.loads(out.read_text())
     assert [trial["outcome"] for trial in document["trials"]] == ["valid"]
     assert document["stopped_because"].startswith("An error ended it")

@@ -71,7 +71,7 @@ def test_a_folder_that_others_may_open_is_narrowed_and_says_so(tmp_path: Path, w
     folder.chmod(wide)
     assert (
         make_private(folder)
-        == f"{folder} was open to other users of this computer (mode {wide:o}); now it is yours alone."
+        == f"{folder} was open to other users of this computer (mode {wide:o}); now only you can open it."
     )
     assert mode_of(folder) == 0o700
 

@@ -74,7 +74,7 @@ def test_opening_the_link_in_another_tab_unlocks_the_page_that_one_comes_back_to
 def test_a_spent_link_says_so_and_how_to_get_another(open_dashboard: Opener, shared_server: Server) -> None:
     dashboard = open_dashboard(shared_server.url, unlocked=False)
     dashboard.page.goto("/unlock?token=spent")
-    expect(dashboard.page.get_by_role("heading", name="This link is spent")).to_be_visible()
+    expect(dashboard.page.get_by_role("heading", name="This link has been used or has expired")).to_be_visible()
     expect(dashboard.page.get_by_text("gainline unlock")).to_be_visible()
     picture(dashboard.page, "spent")
     dashboard.page.get_by_role("link", name="To the dashboard").click()

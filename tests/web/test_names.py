@@ -28,7 +28,7 @@ def test_a_name_with_a_control_character_is_refused_wherever_one_is_given(client
     for what, answer in refusals.items():
         assert answer.status_code == 422, what
         (reason,) = problems_of(answer).values()
-        assert reason == f"must not hold control characters (U+{ord(control[0]):04X})", what
+        assert reason == f"must not contain control characters (U+{ord(control[0]):04X})", what
 
 
 @pytest.mark.parametrize("name", ["Größe 3", "無人機", "طائرة", "Bee 🐝", "Ada – no. 3"])

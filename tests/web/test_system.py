@@ -52,7 +52,7 @@ def test_a_server_on_loopback_has_no_address_for_a_tablet_and_says_what_another_
     assert "Real vehicles fly only from a server on loopback" in system["exposes"]
     refused = client.get("/api/system/qr.svg", params={"address": TABLET})
     assert refused.status_code == 422
-    assert problems_of(refused) == {"address": "is none of the server's addresses"}
+    assert problems_of(refused) == {"address": "is not one of the server's addresses"}
 
 
 def test_a_server_that_others_reach_says_where_and_draws_that_for_a_camera(exposed: TestClient) -> None:
@@ -196,7 +196,7 @@ def test_a_backup_never_takes_the_room_that_flights_need(
         ("/api/bundles", "1024 MiB", "gainline unbundle"),
         ("/api/controller-checks", "48 MiB", "gainline controller check"),
         ("/api/trials/1/photos", "10 MiB", "a lower resolution"),
-        ("/api/campaigns", "1 MiB", "no act of the API needs more"),
+        ("/api/campaigns", "1 MiB", "no operation of the API needs more"),
     ],
 )
 def test_what_is_too_large_is_told_its_own_way_out(client: TestClient, path: str, size: str, otherwise: str) -> None:
