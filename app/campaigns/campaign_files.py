@@ -59,7 +59,9 @@ def read_campaign_file(path: Path) -> CampaignFile:
         problems = tuple(_located(document, entry["loc"], entry["msg"]) for entry in error.errors())
         raise _no_campaign(path, problems) from error
     if file.definition.start.kind == "campaign":
-        reason = "'campaign' needs the database that holds the other one: create it over the API or in the dashboard"
+        reason = (
+            "'campaign' needs the database that contains the other campaign: create it over the API or in the dashboard"
+        )
         raise _no_campaign(path, (_located(document, ("definition", "start", "kind"), reason),))
     try:
         definition, _ = check_campaign(file.definition, file.vehicle)
@@ -79,8 +81,8 @@ def gains_by_hand(
     """
     if file.gains and definition.strategy != MANUAL.name:
         raise InputError(
-            "These gains would not be flown.",
-            problems=(Problem("gains", f"are chosen by the strategy {definition.strategy!r} itself"),),
+            "These gains cannot be used with this strategy.",
+            problems=(Problem("gains", f"are computed by the strategy {definition.strategy!r}"),),
             hint=f"Leave them out, or choose the strategy {MANUAL.name!r}.",
         )
     space = experiment_of(definition).space.narrowed(definition.bounds)
@@ -90,9 +92,9 @@ def gains_by_hand(
 
 def _no_campaign(path: Path, problems: tuple[Problem, ...]) -> InputError:
     return InputError(
-        f"{path.name} does not describe a campaign.",
+        f"{path.name} is not a valid campaign file.",
         problems=problems,
-        hint="Mend the named lines; docs/campaign-files.md lists the fields.",
+        hint="Correct the named lines; docs/campaign-files.md lists the fields.",
     )
 
 
@@ -115,15 +117,15 @@ def _load(path: Path) -> "CommentedMap":
         raise InputError(
             f"{path.name} is not YAML.",
             problems=(Problem(f"line {line}", str(error.problem)),),
-            hint="Mend the named line.",
+            hint="Correct the named line.",
         ) from error
     except (YAMLError, UnicodeDecodeError) as error:
         raise InputError(f"{path.name} is not YAML: {error}.", hint="Give a UTF-8 YAML file.") from error
     if not isinstance(document, CommentedMap):
         raise InputError(
-            f"{path.name} does not describe a campaign.",
+            f"{path.name} is not a valid campaign file.",
             hint="Start it with `name: …` on line 1.",
-            problems=(Problem("line 1", "must hold fields, `name: …` and so on"),),
+            problems=(Problem("line 1", "must contain fields: `name: …` and so on"),),
         )
     return document
 
@@ -171,7 +173,7 @@ def with_settings(file: CampaignFile, settings: Mapping[tuple[str, ...], object]
             for entry in error.errors()
         )
         raise InputError(
-            "These settings do not make a campaign.", problems=problems, hint="Correct the named settings."
+            "These settings do not define a valid campaign.", problems=problems, hint="Correct the named settings."
         ) from error
 
 
@@ -235,9 +237,9 @@ def _gains(text: str, experiment: str, option: str, others: str = "") -> dict[st
     if len(values) != len(names) or len(set(names)) != len(names):
         example = ",".join(f"{name}={value:g}" for name, value in space.mapping(space.default).items())
         raise InputError(
-            "These gains cannot be used.",
-            problems=(Problem(option, f"cannot be {text!r}"),),
-            hint=f"Give {others}every gain by its name, {example}, or the numbers alone in this order.",
+            "Invalid gains.",
+            problems=(Problem(option, f"is not a gain set: {text!r}"),),
+            hint=f"Give {others}every gain by name, {example}, or only the numbers in this order.",
         )
     return dict(zip(names, values, strict=True))
 
@@ -249,14 +251,16 @@ def _assignments(file: CampaignFile, settings: Sequence[str]) -> dict[SettingPat
     for setting in settings:
         name, separator, text = setting.partition("=")
         if name not in known:
-            problems.append(Problem(f"--set {name}", f"is not a setting here; there are {', '.join(sorted(known))}"))
+            problems.append(
+                Problem(f"--set {name}", f"is not a setting of this campaign; available: {', '.join(sorted(known))}")
+            )
         elif not separator or not text:
             problems.append(Problem(f"--set {name}", "needs a value, as in name=value"))
         else:
             chosen[known[name]] = _value(text)
     if problems:
         raise InputError(
-            "These settings cannot be used.",
+            "Invalid settings.",
             problems=tuple(problems),
             hint="Settings belong to the chosen vehicle, strategy and stop rule.",
         )

@@ -88,7 +88,7 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
     ]
     if problems:
         raise InputError(
-            "This campaign cannot be used.",
+            "Invalid campaign.",
             problems=tuple(problems),
             hint="Correct the named fields and send it again; nothing was changed.",
         )
@@ -99,9 +99,9 @@ def _require_whole(asked: DefinitionIn) -> None:
     donor = asked.start.donor
     if donor is not None and donor.trial_number is None:
         raise InputError(
-            "This campaign cannot be used.",
-            problems=(Problem("definition.start.donor", "goes with start.kind 'campaign' only"),),
-            hint="Leave the donor out, or start from its campaign.",
+            "Invalid campaign.",
+            problems=(Problem("definition.start.donor", "is allowed with start.kind 'campaign' only"),),
+            hint="Remove the donor, or set start.kind to 'campaign'.",
         )
 
 
@@ -115,7 +115,7 @@ def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionVal
         yield Problem("definition.experiment", f"{definition.experiment!r} cannot be flown by {kind}")
         yield Problem("vehicle.kind", f"{kind!r} flies {', '.join(described.experiments)} only")
     elif options and definition.experiment not in (flies := described.experiments_with(options)):
-        reason = f"{definition.experiment!r} has other gains than this vehicle, which flies {', '.join(flies)}"
+        reason = f"{definition.experiment!r} tunes other gains than this vehicle's, which flies {', '.join(flies)}"
         yield Problem("definition.experiment", reason)
 
 
@@ -141,7 +141,7 @@ def fill_in_donor(session: Session, asked: DefinitionIn) -> DefinitionIn:
     assert trial.trajectory is not None
     checksum = trial.trajectory.checksum
     if named.checksum and named.checksum != checksum:
-        raise _refused("checksum", f"does not belong to the record of flight {trial.number}: leave it out")
+        raise _refused("checksum", f"does not match the record of flight {trial.number}; leave it out")
     donor = Donor(campaign_id=named.campaign_id, trial_number=trial.number, checksum=checksum)
     return asked.model_copy(update={"start": Start(kind="campaign", gains=dict(trial.gains), donor=donor)})
 
@@ -167,7 +167,7 @@ def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
 
 def _refused(field: str, reason: str) -> InputError:
     return InputError(
-        "This campaign cannot start from the other one.",
+        "This campaign cannot start from the given campaign.",
         problems=(Problem(f"definition.start.donor.{field}", reason),),
-        hint="Name a campaign of the same experiment with a valid flight, or choose another start.",
+        hint="Choose a campaign of the same experiment with a valid flight, or another start.",
     )

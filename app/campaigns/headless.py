@@ -100,7 +100,7 @@ def fly_campaign(
         if gains:
             if number > len(gains):
                 return HeadlessCampaign(
-                    trials=tuple(trials), stopped_because=f"All {len(gains)} gain sets that were given are flown."
+                    trials=tuple(trials), stopped_because=f"All {len(gains)} given gain sets have been flown."
                 )
             proposal = _manual_proposal(gains[number - 1], history)
         overruled = _require_flyable(definition, experiment, proposal, history, overrule, is_real)
@@ -122,7 +122,7 @@ def _manual_proposal(gains: Gains, history: Sequence[Flight]) -> Proposal:
         gains=dict(gains),
         predicted=None,
         predicted_error=None,
-        explanation=Explanation(summary="Given on the command line or in the campaign's file."),
+        explanation=Explanation(summary="Given on the command line or in the campaign file."),
     )
 
 
@@ -139,7 +139,7 @@ def _stop_reason(
         return judged.why
     if len(trials) < definition.stop.max_flights:
         return ""
-    return f"All {len(trials)} flights are flown; {len(trials) - len(history)} of them could not be scored."
+    return f"All {len(trials)} flights have been flown; {len(trials) - len(history)} of them could not be scored."
 
 
 def _flight_of(trial: HeadlessTrial, proposal: Proposal, record: FlightRecord) -> tuple[Flight, ...]:
@@ -161,9 +161,9 @@ def _flight_of(trial: HeadlessTrial, proposal: Proposal, record: FlightRecord) -
 def _require_no_donor(definition: Definition) -> None:
     if definition.start.donor is not None or definition.start.kind == "campaign":
         raise InputError(
-            "A campaign that starts from another one cannot be flown without the database that holds the other.",
+            "A campaign that starts from another campaign needs the database that contains that campaign.",
             problems=(Problem("definition.start.kind", "'campaign' needs the dashboard or the API"),),
-            hint="Create it in the dashboard, or start from the other's best gains as `given`.",
+            hint="Create it in the dashboard, or start from the other campaign's best gains as `given`.",
         )
 
 
@@ -212,8 +212,8 @@ def _flown(
     held = controlled.stage(proposal.gains)
     if held != proposal.gains:
         raise VehicleError(
-            f"The vehicle holds {held} instead of {proposal.gains}; nothing was flown.",
-            hint="Read its gains back by hand before flying it again.",
+            f"The vehicle has the gains {held} instead of {proposal.gains}; nothing was flown.",
+            hint="Read its gains back manually before it flies again.",
         )
     order = FlightOptions(seed=flight_seed(definition.seed, number))
     return controlled.fly(order, on_sample=watcher.sampled, should_stop=lambda: None)

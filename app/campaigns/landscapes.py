@@ -74,11 +74,11 @@ def read_plan(session: Session, campaign_id: int, order: JsonObject) -> Landscap
     named = order.get("proposal_id")
     proposal = repository.get_proposal_or_none(session, named) if isinstance(named, int) else None
     if proposal is None:
-        raise GainlineError("The order names no proposal.", hint="Open the campaign to have it computed anew.")
+        raise GainlineError("The job names no proposal.", hint="Open the campaign to compute it again.")
     if proposal.history_digest != past.digest:
         raise jobs.SupersededError(
             "The campaign's flights have changed since these gains were proposed.",
-            hint="Nothing is to be done: the landscape of the next proposal takes its place.",
+            hint="No action is needed: the landscape of the next proposal replaces it.",
         )
     return LandscapePlan(
         definition=past.definition,
@@ -97,24 +97,24 @@ def as_json(landscape: Landscape, order: JsonObject) -> JsonObject:
 def _impossible(campaign: CampaignRow) -> str | None:
     definition = definition_of(campaign)
     if experiment_of(definition).modelled is None:
-        return "There is no model of this vehicle's controller, so there is no landscape to draw: only flights tell."
+        return "There is no model of this vehicle's controller, so no landscape can be computed."
     if free_gains(space_of(definition)) < 2:
-        return "The campaign's bounds leave fewer than two gains free: a landscape takes two."
+        return "The campaign's bounds leave fewer than two gains free; a landscape needs two."
     return None
 
 
 def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> LandscapeAnswer:
     if is_stale(session, campaign, proposal, history.trials_of(session, campaign.id)):
-        return _waiting("The next gains are being computed; the landscape that they lie in follows.")
+        return _waiting("The next gains are being computed. Their landscape follows.")
     job = _job(session, campaign.id, proposal.id)
     wanted = _is_wanted(job)
     if job is not None and not wanted and job.state in {JobState.FAILED, JobState.CANCELLED}:
         said = jobs.job_problem(job)
         why = "It was cancelled." if said is None else f"{said.title} {said.hint}"
-        return _waiting(f"The landscape could not be computed. {why} The page Jobs can start it again.")
+        return _waiting(f"The landscape could not be computed. {why} Retry it on the page Jobs.")
     reason = (
-        "The model is being flown with several hundred gain sets around the flown and the proposed ones. That takes "
-        "seconds, or half a minute with the calibrated model; the landscape appears here by itself."
+        "The model is being evaluated at several hundred gain sets around the flown and the proposed ones. This "
+        "takes seconds, or half a minute with the calibrated model. The landscape appears here automatically."
     )
     return LandscapeAnswer(_card(reason), wanted=wanted)
 

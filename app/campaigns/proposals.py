@@ -36,7 +36,9 @@ _OUTCOMES: Final[dict[Reason, Outcome]] = {
     "told from noise": Outcome.CONVERGED,
     "battery low": Outcome.BUDGET,
 }
-_UNSUPPORTED: Final = "It is over, but its flights, as they are classed now, no longer say so:"
+_UNSUPPORTED: Final = (
+    "The campaign is finished, but with the present classification of its flights the stop rule is no longer met:"
+)
 
 
 def read_history(session: Session, campaign_id: int) -> CampaignHistory:
@@ -60,9 +62,9 @@ def _donor(session: Session, definition: Definition) -> Flight | None:
     found = history.donor_of(session, experiment_of(definition), named)
     if found is None:
         raise ConflictError(
-            f"The flight that this campaign starts from, {named.trial_number} of campaign {named.campaign_id}, is no "
-            "longer there as it was.",
-            hint="Choose another start, or name the campaign as the donor again.",
+            f"The flight that this campaign starts from, {named.trial_number} of campaign {named.campaign_id}, has "
+            "been deleted or changed.",
+            hint="Choose another start, or select the campaign as the donor again.",
         )
     return found
 
@@ -120,11 +122,11 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
     """A proposal of this campaign that is not stale. Raises NotFoundError, or ConflictError when it is stale."""
     row = repository.get_proposal_or_none(session, proposal_id)
     if row is None or row.campaign_id != campaign.id:
-        raise NotFoundError("proposal", proposal_id, hint="Ask for the campaign's proposal and use its id.")
+        raise NotFoundError("proposal", proposal_id, hint="Request the campaign's proposal and use its id.")
     if is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
             f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
-            hint="Ask for the campaign's proposal again and decide on the new one.",
+            hint="Request the campaign's proposal again and decide on the new one.",
         )
     return row
 
@@ -135,7 +137,7 @@ def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalR
     if row is None or is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
             f"The next gains of campaign {campaign.id} are not computed yet.",
-            hint="Try again in a moment; ask for the campaign's proposal to see when they are there.",
+            hint="Try again in a moment; request the campaign's proposal to see when they are ready.",
         )
     return row
 
@@ -153,7 +155,7 @@ def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
     outdated = [
         row for row in waiting if row.proposal_id and is_stale(session, campaign, proposals[row.proposal_id], trials)
     ]
-    reason = "its proposal is outdated: the campaign's flights have changed since"
+    reason = "its proposal is outdated: the campaign's flights have changed"
     cancel_unflown(outdated, history.flight_under_way(session, campaign.id), reason)
 
 
@@ -169,8 +171,9 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
         or is_stale(session, campaign, latest, history.trials_of(session, campaign.id))
     ):
         raise ConflictError(
-            f"The start gains of campaign {campaign.id} are not computed yet, and gains of your own are held to them.",
-            hint="Try again in a moment; ask for the campaign's proposal to see when they are there.",
+            f"The start gains of campaign {campaign.id} are not computed yet; the step limits of your own gains are "
+            "measured from them.",
+            hint="Try again in a moment; request the campaign's proposal to see when they are ready.",
         )
     return latest.gains
 

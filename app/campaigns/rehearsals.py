@@ -39,13 +39,13 @@ def rehearsal_result(trials: Sequence[RehearsalTrial], outcome: Outcome | None) 
     if (spoilt := next((trial for trial in flown if trial.state in _FAILED_STATES), None)) is not None:
         return "failed", f"flight {spoilt.number} is {spoilt.state}"
     if (refused := next((trial for trial in flown if not trial.gate_passed), None)) is not None:
-        return "failed", f"the gate refused the gains of flight {refused.number}, and was overruled"
+        return "failed", f"the gate refused the gains of flight {refused.number} and was overruled"
     valid = sum(trial.state == TrialState.VALID for trial in flown)
     ended_by_rule = outcome is not None and outcome != Outcome.STOPPED
     if valid >= FLIGHTS or (valid and ended_by_rule):
         return "passed", f"{valid} valid {'flight' if valid == 1 else 'flights'}, nothing aborted, invalid or refused"
     if outcome is not None:
-        return "failed", f"it was ended after {valid} valid flights; {FLIGHTS} are needed"
+        return "failed", f"it was stopped after {valid} valid flights; {FLIGHTS} are required"
     return "under way", f"{valid} of {FLIGHTS} valid flights"
 
 
@@ -63,9 +63,11 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
         )
         return Rehearsal(state=state, campaign_id=row.id, reason=reason)
     if campaign.definition_digest is not None:
-        return Rehearsal(state="not needed", campaign_id=None, reason="it flew before rehearsals were asked for")
+        return Rehearsal(state="not needed", campaign_id=None, reason="it flew before rehearsals were required")
     changed = "its definition, or its vehicle's safe gains, have changed since the last rehearsal"
-    return Rehearsal(state="missing", campaign_id=None, reason=changed if held else "it was not flown on a simulation")
+    return Rehearsal(
+        state="missing", campaign_id=None, reason=changed if held else "it has not been flown on a simulation"
+    )
 
 
 def is_rehearsal_satisfied(said: Rehearsal) -> bool:
@@ -80,6 +82,6 @@ def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
         raise ConflictError(
             f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal: "
             f"{said.reason}.",
-            hint=f"Rehearse it {where} first: {FLIGHTS} valid flights, or the campaign to its stop, none of them "
-            "aborted or invalid.",
+            hint=f"Rehearse it {where} first: fly {FLIGHTS} valid flights, or the campaign until its stop rule "
+            "ends it, with no flight aborted or invalid.",
         )

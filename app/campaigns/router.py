@@ -77,7 +77,7 @@ def edit_campaign(session: Writer, campaign_id: Id, body: CampaignEdit) -> Campa
 
 @router.delete("/{campaign_id}", status_code=status.HTTP_204_NO_CONTENT)
 def delete_campaign(
-    session: Writer, campaign_id: Id, version: Annotated[int, Query(ge=1, description="the version, as last read")]
+    session: Writer, campaign_id: Id, version: Annotated[int, Query(ge=1, description="version as last read")]
 ) -> None:
     """Delete a campaign in which no flight was begun."""
     service.delete_campaign(session, campaign_id, version)
@@ -145,10 +145,10 @@ def get_campaign_figure(
     campaign_id: Id,
     name: FigureName,
     theme: Theme = "light",
-    from_s: Annotated[float | None, Query(description="first second of the curves that is looked at")] = None,
-    to_s: Annotated[float | None, Query(description="last second of the curves that is looked at")] = None,
+    from_s: Annotated[float | None, Query(description="start of the displayed time range in seconds")] = None,
+    to_s: Annotated[float | None, Query(description="end of the displayed time range in seconds")] = None,
     flight: Annotated[
-        int | None, Query(ge=1, le=2**31, description="number of a flight that is to have a curve of its own")
+        int | None, Query(ge=1, le=2**31, description="number of a flight to draw as a separate curve")
     ] = None,
 ) -> FigureCard:
     """All takeoffs over the set point, the error of each flight, or the gains of each flight.
@@ -166,9 +166,9 @@ def _window(from_s: float | None, to_s: float | None) -> Range | None:
         return None
     if from_s is None or to_s is None or not from_s < to_s:
         raise InputError(
-            "These seconds cannot be drawn.",
+            "Invalid time range.",
             problems=(Problem("to_s", "must be given together with from_s, and be later"),),
-            hint="Give both ends in seconds since the command, or none for the whole flight.",
+            hint="Give both limits in seconds since the command, or neither for the whole flight.",
         )
     return Range(from_s, to_s)
 
@@ -188,7 +188,7 @@ def get_landscape(
     asking: RequestContextDep,
     campaign_id: Id,
     theme: Theme = "light",
-    stacked: Annotated[bool, Query(description="slices one below the other, for a narrow page")] = False,
+    stacked: Annotated[bool, Query(description="one column of slices, for a narrow page")] = False,
 ) -> FigureCard:
     """The gains as a path over the error that the strategy's model predicts, two gains at a time.
 

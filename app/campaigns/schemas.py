@@ -15,7 +15,9 @@ from app.fleet.schemas import CampaignVehicle, VehicleChoice
 
 Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
 Key = Annotated[str, Field(max_length=40)]
-VERDICT: Final = "the best gains against the first flight's; null while they are the same, or nothing has flown"
+VERDICT: Final = (
+    "verdict of the best gains against the first flight's; null while they are the same or no flight is valid"
+)
 
 
 class Sort(StrEnum):
@@ -179,13 +181,13 @@ class Campaign(BaseModel):
     vehicle: CampaignVehicle
     parent_id: int | None
     rehearsal: Rehearsal
-    rehearses: Annotated[int | None, Field(description="the campaign that this one is the rehearsal of")]
+    rehearses: Annotated[int | None, Field(description="the campaign that this one rehearses")]
     best: BestTrial | None
     verdict: Annotated[Verdict | None, Field(description=VERDICT)]
     trials: TrialCounts
     flying: FlyingTrial | None
     next_action: str
-    actions: Annotated[list[str], Field(description="what may be done with it now: plan, define, finish, archive, …")]
+    actions: Annotated[list[str], Field(description="allowed actions: plan, define, finish, archive, …")]
     created_at: datetime
     updated_at: datetime
 
@@ -233,7 +235,7 @@ class StopVerdict(BaseModel):
     stop: bool
     reason: str
     sentence: str
-    threshold: Annotated[float | None, Field(description="error that the next flight has to beat to count as better")]
+    threshold: Annotated[float | None, Field(description="error below which the next flight counts as better")]
 
 
 class Advice(BaseModel):
@@ -281,7 +283,7 @@ class RepeatGroup(BaseModel):
     trial_numbers: list[int]
     errors: list[float]
     mean: float
-    standard_error: Annotated[float | None, Field(description="from the pooled scatter; null while that is not known")]
+    standard_error: Annotated[float | None, Field(description="from the pooled scatter; null while that is unknown")]
     is_baseline: bool
     is_best: bool
 

@@ -81,12 +81,12 @@ def find_by_id_or_name(session: Session, wanted: str) -> int:
         return get_row(session, int(wanted)).id
     found = repository.ids_of_name(session, wanted)
     if not found:
-        raise NotFoundError("campaign", repr(wanted), hint="Give its whole name, or the number in its address.")
+        raise NotFoundError("campaign", repr(wanted), hint="Give its complete name, or the number in its URL.")
     if len(found) > 1:
         raise InputError(
-            f"{len(found)} campaigns are called {wanted!r}.",
-            hint="Say which one is meant, by its number.",
-            problems=(Problem("campaign", f"may be {', '.join(map(str, found))}"),),
+            f"{len(found)} campaigns have the name {wanted!r}.",
+            hint="Give the number of the campaign.",
+            problems=(Problem("campaign", f"matches {', '.join(map(str, found))}"),),
         )
     return found[0]
 
@@ -187,8 +187,8 @@ def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
     _require_no_flight(session, row)
     if history.has_begun_flight(session, row.id):
         raise ConflictError(
-            f"Campaign {row.id} stands in the ledger of {row.vehicle.title}: a flight was begun in it.",
-            hint="Keep it; the ledger lists every gain set that a vehicle was given, for ever.",
+            f"Campaign {row.id} is in the ledger of {row.vehicle.title}, because one of its flights was started.",
+            hint="It cannot be deleted: the ledger keeps every gain set that was written to a vehicle.",
         )
     history.drop_unbegun_flights(session, row.id)
     predicted = [proposal.predicted for proposal in repository.proposals(session, row.id) if proposal.predicted]
@@ -262,7 +262,7 @@ def _require_no_flight(session: Session, row: CampaignRow) -> None:
     if (flight := history.flight_under_way(session, row.id)) is not None:
         raise BusyError(
             f"Campaign {row.id} has a flight under way (trial {flight.trial_id}).",
-            hint="Wait until it is over, or abort it.",
+            hint="Wait until it has ended, or abort it.",
         )
 
 
@@ -275,11 +275,11 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     row = repository.get_campaign(session, campaign_id)
     now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))
     if now is None or now.comparison is None:
-        raise _not_shown(row, "it has no gains that are better than its first ones")
+        raise _not_shown(row, "no gains are better than its first gains")
     said = now.comparison
     if said.verdict != "better":
         raise _not_shown(
-            row, f"whether {format_gains(now.winner.gains)} is better than its first gains is {said.verdict}"
+            row, f"the comparison of {format_gains(now.winner.gains)} with its first gains is {said.verdict}"
         )
     gains = dict(now.winner.gains)
     promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), context=context)
@@ -299,7 +299,7 @@ def _because(row: CampaignRow, now: ComparisonState, asked: Promotion) -> str:
 def _not_shown(row: CampaignRow, why: str) -> ConflictError:
     return ConflictError(
         f"No gains of campaign {row.id} can be promoted: {why}.",
-        hint="Fly the best gains and the first ones again until the statistics say “better”.",
+        hint="Fly the best gains and the first gains again until the verdict is “better”.",
     )
 
 
@@ -336,8 +336,8 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
 def _simulation_of(session: Session, row: CampaignRow) -> VehicleChoice:
     if (found := fleet.simulation_for(session, row.experiment, row.vehicle.safe_gains)) is None:
         raise ConflictError(
-            f"No simulation flies the experiment {row.experiment} of campaign {row.id}.",
-            hint="Start `gainline sim-drone` with the same autopilot, register it as a simulated vehicle and connect "
-            "it; then rehearse on it.",
+            f"No simulation supports the experiment {row.experiment} of campaign {row.id}.",
+            hint="Start `gainline sim-drone` with the same autopilot, register it as a simulated vehicle, "
+            "connect it, and start the rehearsal again.",
         )
     return found

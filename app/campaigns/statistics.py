@@ -123,7 +123,7 @@ def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
     if found is None:
         return None
     amount = plus_minus(found.difference, found.standard_error, experiment.error_unit, sign="+")
-    word = "has drifted" if found.confidence >= _SURE else "has not drifted noticeably"
+    word = "has drifted" if found.confidence >= _SURE else "shows no resolvable drift"
     return Drift(
         first_trial=found.first_number,
         last_trial=found.last_number,
@@ -193,8 +193,8 @@ def _notes(
     notes = [verdict_sentence(experiment, now)]
     if expected > _NO_OPTIMISM * now.winner.standard_error(now.scatter):
         notes.append(
-            f"The best of {len(now.groups)} gain sets ({format_gains(now.winner.gains)}) looks better than it is, for "
-            f"having been chosen: by {short(expected)} {unit} on average, so that its error is nearer to "
+            f"The best of {len(now.groups)} gain sets ({format_gains(now.winner.gains)}) looks better than it is, "
+            f"because it was selected as the lowest: by {short(expected)} {unit} on average. Its expected error is closer to "
             f"{short(now.winner.mean + expected)} {unit}."
         )
     if drift is not None:

@@ -34,7 +34,7 @@ class ProposalJob:
         Raises GainlineError, and CancelledError when the pool is closed meanwhile.
         """
         if job.campaign_id is None:
-            raise GainlineError("It names no campaign.", hint="")
+            raise GainlineError("The job names no campaign.", hint="")
         started_s = monotonic()
         with self._database.read() as session:
             past = proposals.read_history(session, job.campaign_id)
@@ -59,7 +59,7 @@ class LandscapeJob:
         Raises GainlineError, and CancelledError when the pool is closed meanwhile.
         """
         if job.campaign_id is None:
-            raise GainlineError("It names no campaign.", hint="")
+            raise GainlineError("The job names no campaign.", hint="")
         started_s = monotonic()
         with self._database.read() as session:
             plan = landscapes.read_plan(session, job.campaign_id, job.order)

@@ -42,7 +42,7 @@ _EXPLANATION: Final = TypeAdapter(Explanation)
 _NEXT_ACTIONS: Final[Mapping[CampaignState, str]] = {
     CampaignState.DRAFT: "Wait for the first gains",
     CampaignState.FLYING: "Watch the flight",
-    CampaignState.FINISHED: "Look at the result",
+    CampaignState.FINISHED: "View result",
     CampaignState.ARCHIVED: "",
 }
 
@@ -121,9 +121,9 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
             state="none",
             proposal=shown,
             problem=Trouble(
-                title=f"Flight {waiting.number} waits for its class.",
+                title=f"Flight {waiting.number} needs a review.",
                 detail="The next gains depend on whether it counts.",
-                hint="Say whether it is valid, aborted or invalid.",
+                hint="Mark it valid, aborted or invalid.",
             ),
         )
     job = jobs.latest_job(session, row.id, PROPOSAL_JOB)
@@ -138,9 +138,9 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
         state="none",
         proposal=shown,
         problem=Trouble(
-            title="There is no proposal for the present flights.",
+            title="There is no proposal for the current flights.",
             detail="Its computation was cancelled." if cancelled else f"The campaign is {row.state}.",
-            hint="Compute it again." if row.state in CAMPAIGN_ACTIONS["propose"] else "Clone the campaign to fly on.",
+            hint="Compute it again." if row.state in CAMPAIGN_ACTIONS["propose"] else "Clone the campaign to fly more.",
         ),
     )
 
@@ -218,9 +218,9 @@ def _next_action(row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehear
     if row.state in _NEXT_ACTIONS:
         return _NEXT_ACTIONS[row.state]
     if (waiting := history.find_unreviewed(trials)) is not None:
-        return f"Say whether flight {waiting.number} counts"
+        return f"Review flight {waiting.number}"
     if not is_rehearsal_satisfied(rehearsal):
-        return "Go on with the rehearsal" if rehearsal.state == "under way" else "Rehearse on the simulation"
+        return "Continue the rehearsal" if rehearsal.state == "under way" else "Rehearse on a simulation"
     which = "first" if row.state == CampaignState.READY else "next"
     return f"Fly the {which} trial" if fleet.can_fly(row.vehicle) else f"Upload the record of the {which} flight"
 

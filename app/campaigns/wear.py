@@ -149,10 +149,10 @@ def _estimate(row: ProposalRow, flight: int, number: int) -> Estimate:
 
 def _retune(estimates: Sequence[Estimate], ends: Sequence[int]) -> Retune:
     if not estimates:
-        said = "Nothing is known yet: no campaign with the calibrated model has flown on this vehicle."
+        said = "No data yet: no campaign with the calibrated model has flown on this vehicle."
         return Retune(due=False, since=None, drifted=[], sentence=said)
     if not ends:
-        said = "Not judged yet: no campaign with the calibrated model is finished on this vehicle."
+        said = "No verdict yet: no campaign with the calibrated model is finished on this vehicle."
         return Retune(due=False, since=None, drifted=[], sentence=said)
     since = max(ends)
     tuned = next(one for one in reversed(estimates) if one.flight == since)

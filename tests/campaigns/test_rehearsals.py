@@ -52,7 +52,7 @@ def test_it_is_passed_by_three_valid_flights_or_its_own_stop_and_nothing_spoilt(
 
 def test_gains_that_the_gate_refused_spoil_it() -> None:
     flown = [RehearsalTrial(number, VALID, gate_passed=number != 2) for number in (1, 2, 3)]
-    assert rehearsal_result(flown, None) == ("failed", "the gate refused the gains of flight 2, and was overruled")
+    assert rehearsal_result(flown, None) == ("failed", "the gate refused the gains of flight 2 and was overruled")
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_a_real_vehicle_is_staged_only_after_three_flights_on_its_simulation(
     assert "stage" not in planned["actions"]
     refused = client.post(f"/api/trials/{planned['id']}/stage")
     assert refused.status_code == 409
-    assert "has not passed its rehearsal: it was not flown on a simulation" in refused.json()["detail"]
+    assert "has not passed its rehearsal: it has not been flown on a simulation" in refused.json()["detail"]
     assert "Rehearse it on its simulation first: 3 valid flights" in refused.json()["hint"]
 
     rehearsal = rehearse(client, campaign)

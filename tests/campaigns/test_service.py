@@ -111,7 +111,8 @@ def test_a_finished_campaign_says_why_it_is_over_in_the_light_of_its_flights(
     after = get(client, path)
     assert (after["state"], after["outcome"]) == ("finished", None)
     assert after["stop_reason"] == (
-        "It is over, but its flights, as they are classed now, no longer say so: 1 of 2 flights are left."
+        "The campaign is finished, but with the present classification of its flights the stop rule is no longer "
+        "met: 1 of 2 flights are left."
     )
     assert classify(client, last["id"], "valid") == 200
     run_jobs(database)

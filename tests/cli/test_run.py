@@ -88,7 +88,7 @@ def test_gains_by_hand_are_flown_in_their_order_until_all_are_flown(tmp_path: Pa
     assert [trial["predicted_error"] for trial in campaign["trials"]] == [None, None, None]
     assert errors(campaign)[1] == pytest.approx(0.2341, rel=0.01)
     assert errors(campaign)[2] == errors(campaign)[0]
-    assert campaign["stopped_because"] == "All 3 gain sets that were given are flown."
+    assert campaign["stopped_because"] == "All 3 given gain sets have been flown."
 
 
 def test_the_table_has_a_row_for_each_run(tmp_path: Path) -> None:

@@ -198,7 +198,7 @@ def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> No
         (("px4-takeoff", "--strategy", "gradient"), "there is no model of what the gains of 'takeoff-px4' do"),
         (
             ("ardrone-takeoff", "--vehicle", "mavlink:udpin:127.0.0.1:14550", "--set", "autopilot=px4"),
-            "definition.experiment: 'takeoff' has other gains than this vehicle, which flies takeoff-px4",
+            "definition.experiment: 'takeoff' tunes other gains than this vehicle's, which flies takeoff-px4",
         ),
     ],
 )

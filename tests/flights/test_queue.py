@@ -191,10 +191,10 @@ def test_a_flight_of_a_real_vehicle_waits_for_a_person_and_blocks_the_next(
     assert trial["error"] == pytest.approx(climb_error(1.0), rel=1e-4)
     proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")
     assert proposal["state"] == "none"
-    assert proposal["problem"]["title"] == "Flight 1 waits for its class."
-    assert get(client, f"/api/campaigns/{campaign['id']}")["next_action"] == "Say whether flight 1 counts"
+    assert proposal["problem"]["title"] == "Flight 1 needs a review."
+    assert get(client, f"/api/campaigns/{campaign['id']}")["next_action"] == "Review flight 1"
     answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": DEFAULT_GAINS})
-    assert (answer.status_code, answer.json()["detail"]) == (409, "Flight 1 waits for its class.")
+    assert (answer.status_code, answer.json()["detail"]) == (409, "Flight 1 needs a review.")
     said = client.post(
         f"/api/trials/{trial['id']}/classify", json={"version": 1, "outcome": "valid", "reason": "a clean flight"}
     )

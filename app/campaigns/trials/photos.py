@@ -50,7 +50,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
         size = f"{MAX_BYTES / 2**20:g} MiB"
         raise TooLargeError(
             "The photo is too large; nothing was stored.",
-            hint=f"Send at most {size}: a lower resolution in the camera's settings is enough.",
+            hint=f"Send at most {size}; reduce the resolution in the camera's settings.",
             problems=(Problem("file", f"is larger than {size}"),),
         )
     if not content:
@@ -59,12 +59,12 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
         raise MediaTypeError(
             "This is not a JPEG, PNG or WebP picture; nothing was stored.",
             hint="Set the camera to JPEG (iPhone: Settings, Camera, Formats, Most Compatible), or send a screenshot.",
-            problems=(Problem("file", "is no JPEG, PNG or WebP picture"),),
+            problems=(Problem("file", "is not a JPEG, PNG or WebP picture"),),
         )
     if len(repository.photos_of_trial(session, trial_id)) >= MAX_PER_TRIAL:
         raise ConflictError(
-            f"Flight {trial.number} has {MAX_PER_TRIAL} photos, which is as many as are kept.",
-            hint="Delete one that says little, then add this one.",
+            f"Flight {trial.number} has {MAX_PER_TRIAL} photos, the maximum.",
+            hint="Delete one of them, then add this one.",
         )
     row = TrialPhotoRow(trial=trial, media_type=media_type, data=content)
     session.add(row)

@@ -62,7 +62,9 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
             f"The log was flown with {_format_gains(flown.gains)}; trial {row.number} was planned with "
             f"{_format_gains(row.gains)}.",
             hint=f"Choose the log of this trial, or confirm that {_consequence(row.gains, flown.gains)}.",
-            problems=(Problem("confirm", f"the gains in the log, {_format_gains(flown.gains)}, are not the trial's"),),
+            problems=(
+                Problem("confirm", f"the gains in the log, {_format_gains(flown.gains)}, differ from the trial's"),
+            ),
         )
     row.read_back = dict(flown.gains)
     if _alike(row.gains, flown.gains):
@@ -85,8 +87,8 @@ def _same(planned: Gains, flown: Gains) -> bool:
 
 def _consequence(planned: Gains, flown: Gains) -> str:
     if _alike(planned, flown):
-        return "the trial shall stand for the gains in the log"
-    return "the flight shall count for the planned gains, which this log does not name"
+        return "the trial takes the gains in the log"
+    return "the flight counts for the planned gains, which are not in this log"
 
 
 def _format_gains(gains: Mapping[str, float]) -> str:
@@ -175,7 +177,7 @@ def capture(
         return
     row.error = judged.error  # shown before a person classifies the flight, which scores it again
     if fleet.is_classed_automatically(campaign.vehicle):
-        _classify(row, reason or "the measurement is no good" if ending == "invalid" else judged.refusal)
+        _classify(row, reason or "the measurement is invalid" if ending == "invalid" else judged.refusal)
 
 
 def _classify(row: TrialRow, refusal: str) -> None:
@@ -227,7 +229,7 @@ def import_record(
     if fleet.can_fly(campaign.vehicle):
         raise ConflictError(
             f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
-            hint="Fly it; records are uploaded to campaigns whose vehicle is `import`.",
+            hint="Fly it. Records can be uploaded only to campaigns with the vehicle `import`.",
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)
     settle_gains(session, campaign, row, flown, confirmed=confirmed)
@@ -259,7 +261,7 @@ def import_into_campaign(
     if len(chosen) > 1:
         raise InputError(
             f"{len(chosen)} trials of campaign {campaign_id} wait for a record.",
-            hint="Say which one is meant, by its number: --trial.",
+            hint="Give the number of the trial: --trial.",
             problems=tuple(Problem("trial", f"{trial.number}: {trial.state}") for trial in chosen),
         )
     if chosen:
@@ -314,6 +316,4 @@ def find_telemetry_log(session: Session, trial_id: int, data_dir: Path) -> Telem
     for file in (*flown, log_of_trial(data_dir, trial_id)):
         if file.is_file():
             return TelemetryLog(file, f"campaign-{row.campaign_id}-trial-{row.number}.tlog")
-    raise NotFoundError(
-        "telemetry log of trial", trial_id, hint="Only flights of vehicles that are flown over a link leave one."
-    )
+    raise NotFoundError("telemetry log of trial", trial_id, hint="Only flights of vehicles with a link have one.")

@@ -57,8 +57,8 @@ def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: 
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     if row.abort_cause == "limit":
         raise ConflictError(
-            f"Trial {row.number} was broken off by the program, for a limit: it counts against its gains.",
-            hint="If the measurement is no good, mark it invalid.",
+            f"Trial {row.number} was aborted automatically because a limit was exceeded: it counts against its gains.",
+            hint="If the measurement is wrong, mark it invalid.",
         )
     row.abort_cause = said.cause
     row.version += 1
@@ -71,9 +71,9 @@ def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> fl
     flight."""
     if row.ending == "aborted":
         raise InputError(
-            f"Trial {row.number} cannot count: its record ends where the flight was broken off.",
-            hint="Class it as aborted or leave it invalid, and fly the gains again.",
-            problems=(Problem("outcome", "cannot be valid: the flight was broken off"),),
+            f"Trial {row.number} cannot be valid: its record ends at the abort.",
+            hint="Mark it aborted or leave it invalid, and fly the gains again.",
+            problems=(Problem("outcome", "cannot be valid: the flight was aborted"),),
         )
     judged = (
         None
@@ -81,9 +81,9 @@ def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> fl
         else score(get_experiment(campaign.experiment), history.record_of(session, row), accept_gaps=True)
     )
     if judged is None or judged.error is None:
-        reason = judged.refusal if judged is not None else "it left no record"
+        reason = judged.refusal if judged is not None else "it has no record"
         raise InputError(
-            f"Trial {row.number} cannot count: it cannot be scored.",
+            f"Trial {row.number} cannot be valid: it cannot be scored.",
             hint="Leave it invalid and fly the gains again.",
             problems=(Problem("outcome", reason),),
         )

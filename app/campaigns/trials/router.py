@@ -144,9 +144,11 @@ def upload_trajectory(
     record: Record,
     asking: RequestContextDep,
     trial_id: Id,
-    takeoff: Annotated[int | None, Query(ge=1, le=10_000, description="which one of a log with several")] = None,
+    takeoff: Annotated[
+        int | None, Query(ge=1, le=10_000, description="number of the takeoff in a log with several")
+    ] = None,
     confirm: Annotated[
-        bool, Query(description="take a log that was flown with other gains; the trial then has those")
+        bool, Query(description="accept a log that was flown with other gains; the trial takes the gains in the log")
     ] = False,
 ) -> Trial:
     """Upload the record of a flight made elsewhere, or the recovered record of a lost flight.

@@ -31,7 +31,7 @@ class NewTrial(Request):
     variant: Variant | None = None
     overrule: Annotated[
         Reason | None,
-        Field(description="why gains that the gate refuses shall fly all the same; simulated vehicles only"),
+        Field(description="reason to fly gains that the gate refuses; simulated vehicles only"),
     ] = None
     note: Text = ""
     fly: FlightOrder | None = None
@@ -94,7 +94,7 @@ class RecordBrief(BaseModel):
     clock: str
     channels: list[str]
     units: dict[str, str]
-    checksum: Annotated[str, Field(description="SHA-256 of the stored samples; docs/api.md says how to verify it")]
+    checksum: Annotated[str, Field(description="SHA-256 of the stored samples; see docs/api.md for its verification")]
 
 
 class FlightBrief(BaseModel):
@@ -104,10 +104,10 @@ class FlightBrief(BaseModel):
     id: int
     state: FlightState
     mode: FlightMode
-    take_off_at: Annotated[datetime | None, Field(description="when the take-off was asked for")]
-    standing_down: Annotated[str, Field(description="why a staged flight does not take place; empty while it may")]
+    take_off_at: Annotated[datetime | None, Field(description="time of the take-off request")]
+    standing_down: Annotated[str, Field(description="why a staged flight was cancelled; empty otherwise")]
     problem: str
-    battery: Annotated[str, Field(description="label of the battery that was in; empty when nobody said")]
+    battery: Annotated[str, Field(description="label of the battery used; empty if not given")]
     battery_v_before: float | None
     battery_v_after: float | None
 
@@ -159,35 +159,40 @@ class Trial(BaseModel):
     predicted_error: float | None
     predicted_interval: Interval | None
     inside_interval: Annotated[
-        bool | None, Field(description="whether a valid flight's error lay where it was expected")
+        bool | None, Field(description="whether a valid flight's error was inside the predicted interval")
     ]
     group: Annotated[GroupBrief | None, Field(description="all valid flights of the same gains; null before the first")]
     comparisons: list[TrialComparison]
     overshoot_m: float | None
-    verdict: Annotated[str, Field(description="the flight against the best before it and against its prediction")]
-    reason: Annotated[str, Field(description="why it has the state that it has, where somebody or something said so")]
+    verdict: Annotated[
+        str, Field(description="comparison of the flight with the best before it and with its prediction")
+    ]
+    reason: Annotated[str, Field(description="reason for the state; empty if none was given")]
     abort_cause: Annotated[
         AbortCause | None,
         Field(
-            description="why it was broken off: `limit` and `behaved badly` count against its gains, `operator` (who "
-            "has not said why) and `something else` do not; null where it was not, and where nobody recorded it"
+            description="abort cause: `limit` and `behaved badly` count against the gains, `operator` (no reason "
+            "given) and `something else` do not; null if the flight was not aborted or the cause was not "
+            "recorded"
         ),
     ]
     note: str
     gate: Gate
-    overrule_reason: Annotated[str, Field(description="why the gate's refusal was overruled; empty when it was not")]
-    glitches: Annotated[list[Glitch], Field(description="what the record cannot have seen; the record itself stays")]
+    overrule_reason: Annotated[str, Field(description="why the gate's refusal was overruled; empty if it was not")]
+    glitches: Annotated[list[Glitch], Field(description="implausible parts of the record; the record is not changed")]
     repaired_error: Annotated[
-        float | None, Field(description="the error with straight lines over the glitches; null without any")
+        float | None, Field(description="error with the glitches replaced by straight lines; null without glitches")
     ]
     record: RecordBrief | None
     flight: FlightBrief | None
     seed: int
     speed: float | None
-    settings: Annotated[dict[str, OptionValue], Field(description="what the vehicle said of itself after the flight")]
+    settings: Annotated[
+        dict[str, OptionValue], Field(description="settings that the vehicle reported after the flight")
+    ]
     created_at: datetime
     flown_at: datetime | None
-    actions: Annotated[list[str], Field(description="what may be done with it now: fly, cancel, abort, upload, …")]
+    actions: Annotated[list[str], Field(description="allowed actions: fly, cancel, abort, upload, …")]
 
 
 class Trajectory(BaseModel):

@@ -112,7 +112,7 @@ def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[
     now = standing_within_bounds_of(campaign, history.trials_of(session, campaign.id))
     if now is None:
         raise ConflictError(
-            f"Campaign {campaign.id} has no valid flight inside its bounds yet for a {variant} to be measured from.",
+            f"Campaign {campaign.id} has no valid flight inside its bounds yet, which a {variant} needs.",
             hint="Fly the first proposal.",
         )
     if variant == "baseline":
@@ -125,7 +125,7 @@ def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[
     half = space.mapping(space.nearest((space.vector(best) + proposed) / 2.0))
     if half == best or np.array_equal(space.vector(half), proposed):
         raise ConflictError(
-            "The proposed step cannot be made smaller: half of it is no whole count.",
+            "The proposed step cannot be made smaller: half of it is less than one count.",
             hint="Fly the proposal, or repeat the best gains.",
         )
     return half
@@ -149,13 +149,13 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
     budget = definition_of(campaign).stop.max_flights
     if sum(row.state in spent_by for row in trials) >= budget:
         raise ConflictError(
-            f"The budget of campaign {campaign.id}, {budget} flights, is flown or planned for.",
-            hint="Cancel a trial that is only planned, or clone the campaign to fly on.",
+            f"All {budget} flights in the budget of campaign {campaign.id} are flown or planned.",
+            hint="Cancel a planned trial, or clone the campaign to fly more.",
         )
     if (waiting := history.find_unreviewed(trials)) is not None:
         raise ConflictError(
-            f"Flight {waiting.number} waits for its class.",
-            hint="Say first whether it is valid, aborted or invalid: the next gains depend on it.",
+            f"Flight {waiting.number} needs a review.",
+            hint="Mark it valid, aborted or invalid first; the next gains depend on it.",
         )
 
 
@@ -231,9 +231,9 @@ def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[Gat
     """The gains that may fly, and the proposal that they come from, if any."""
     if sum(given is not None for given in (new.proposal_id, new.gains, new.variant)) != 1:
         raise InputError(
-            "A trial flies a proposal, gains of one's own, or a variant.",
-            hint="Send exactly one of the three.",
-            problems=(Problem("proposal_id", "or gains or variant, exactly one of the three, must be given"),),
+            "A trial flies a proposal, gains of your own, or a variant.",
+            hint="Send exactly one of them.",
+            problems=(Problem("proposal_id", "or gains or variant: exactly one of them is required"),),
         )
     if new.proposal_id is None:
         asked = new.gains if new.variant is None else gains_of(session, campaign, new.variant)

@@ -217,14 +217,14 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
         case TrialState.LOST:
             return f"Lost: {row.reason}"
         case TrialState.CAPTURED:
-            doubt = f"; the measurement is in doubt: {row.reason}" if row.reason else ""
-            return f"Landed and recorded{_glitches(row)}{doubt}; somebody has to say whether it counts."
+            doubt = f"; the measurement is doubtful: {row.reason}" if row.reason else ""
+            return f"Landed and recorded{_glitches(row)}{doubt}. Review it: does it count?"
         case _:
             return ""
 
 
 def _once_more(again: Sequence[int]) -> str:
-    return f"with the gains of flight{'s' if len(again) > 1 else ''} {', '.join(map(str, again))} once more"
+    return f"with the gains of flight{'s' if len(again) > 1 else ''} {', '.join(map(str, again))} again"
 
 
 def _glitches(row: TrialRow) -> str:

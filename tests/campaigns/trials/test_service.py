@@ -43,7 +43,7 @@ def test_a_landing_outdates_what_was_planned_from_the_same_proposal(client: Test
     land(database, lift_off(database), create_record())
     outdated = get(client, f"/api/trials/{second['id']}")
     assert (outdated["state"], outdated["actions"]) == ("cancelled", ["note"])
-    assert outdated["reason"] == "its proposal is outdated: the campaign's flights have changed since"
+    assert outdated["reason"] == "its proposal is outdated: the campaign's flights have changed"
     assert client.post(f"/api/trials/{second['id']}/fly", json={"speed": None}).status_code == 409
     assert get(client, f"/api/trials/{own['id']}")["state"] == "planned"
 
@@ -92,7 +92,7 @@ def test_a_flight_that_was_broken_off_never_counts_as_complete(client: TestClien
         f"/api/trials/{trial['id']}/classify", json={"version": version, "outcome": "valid", "reason": "looks good"}
     )
     assert answer.status_code == 422
-    assert problems_of(answer) == {"outcome": "cannot be valid: the flight was broken off"}
+    assert problems_of(answer) == {"outcome": "cannot be valid: the flight was aborted"}
     assert get(client, f"/api/trials/{trial['id']}")["record"]["ending"] == "aborted"
     assert classify(client, trial["id"], "aborted") == 200
 
