@@ -127,7 +127,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
     if problems:
         raise InputError(
             "These flights cannot be compared.",
-            hint="Leave the named flights out, or choose others.",
+            hint="Remove the named flights, or choose others.",
             problems=tuple(problems),
         )
     rows = [found[trial_id] for trial_id in trial_ids]
@@ -191,7 +191,7 @@ def _refusal(
     if row is None:
         return f"there is no trial {trial_id}; its campaign may have been deleted"
     if trial_id in trial_ids[:index]:
-        return f"flight {row.number} of campaign {row.campaign_id} is named twice"
+        return f"flight {row.number} of campaign {row.campaign_id} is listed twice"
     if row.state not in history.FLOWN:
         return f"flight {row.number} of campaign {row.campaign_id} has not flown: it is {row.state}"
     first = next(found[other] for other in trial_ids if other in found)
@@ -199,8 +199,8 @@ def _refusal(
     if unit == wanted:
         return None
     return (
-        f"the error of flight {row.number} of campaign {row.campaign_id} is in {unit}, "
-        f"that of flight {first.number} of campaign {first.campaign_id} in {wanted}: they measure different things"
+        f"the error of flight {row.number} of campaign {row.campaign_id} is in {unit}, that of flight {first.number} "
+        f"of campaign {first.campaign_id} in {wanted}: the errors are different quantities"
     )
 
 

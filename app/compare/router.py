@@ -13,7 +13,7 @@ router = APIRouter(prefix="/api/compare", tags=["compare"])
 
 TrialIds = Annotated[
     list[Annotated[int, Query(ge=1, le=2**63 - 1)]],
-    Query(alias="trial", min_length=2, max_length=20, description="2 to 20 flights; the first is what others change"),
+    Query(alias="trial", min_length=2, max_length=20, description="2 to 20 flights; the first is the reference"),
 ]
 
 

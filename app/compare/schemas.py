@@ -12,8 +12,8 @@ from app.core.statistics.comparisons import Verdict
 
 Basis = Literal["gains", "repeats", "apart", "no error"]
 _BASIS = (
-    "what the difference is of: other `gains` on one vehicle; `repeats` of the same gains; flights that are `apart`, "
-    "for their vehicles or experiments differ; or there is none, because one of them has `no error`"
+    "kind of comparison: different `gains` on one vehicle; `repeats` of the same gains; flights that are `apart`, "
+    "because their vehicles or experiments differ; or none, because one of them has `no error`"
 )
 
 
@@ -103,4 +103,4 @@ class FlightComparison(BaseModel):
     gains: list[FlightDifference]
     settings: list[FlightDifference]
     pairs: list[FlightPair]
-    file_stem: Annotated[str, Field(description="for the names of files made of this comparison")]
+    file_stem: Annotated[str, Field(description="stem of the names of files exported from this comparison")]

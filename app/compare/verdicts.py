@@ -71,8 +71,8 @@ def list_notes(sides: Sequence[ComparisonFlight]) -> list[str]:
         campaigns.setdefault(side.population, set()).add(side.campaign.id)
     scatters = {side.population: side.scatter for side in sides}
     shared = [
-        f"One flight scatters by {scatters[population].sigma:.4f} {first.experiment.error_unit}, as repeats in "
-        f"{len(members)} campaigns of the same vehicle and experiment say together."
+        f"Scatter of one flight: {scatters[population].sigma:.4f} {first.experiment.error_unit}, pooled over repeats "
+        f"in {len(members)} campaigns of the same vehicle and experiment."
         for population, members in campaigns.items()
         if len(members) > 1 and scatters[population].known
     ]
@@ -128,12 +128,12 @@ def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, 
         how, what = "flown by another vehicle", f"Different vehicles ({other.title}, {one.title})"
     elif not fleet.can_fly(one):
         how = "perhaps flown by another vehicle"
-        what = "Flights made elsewhere: nothing says that one vehicle flew both campaigns"
+        what = "Flights made elsewhere: it is unknown whether one vehicle flew both campaigns"
     else:
-        how, what = "flown with other settings of the vehicle", "One vehicle, but with other settings"
+        how, what = "flown with different settings of the vehicle", "One vehicle with different settings"
     return (
         how,
-        f"{what}. The errors differ for that as well as for the gains; to compare gains, fly both in one campaign.",
+        f"{what}. The errors depend on this as well as on the gains. To compare gains, fly both in one campaign.",
     )
 
 
@@ -144,7 +144,9 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
     found = drift_of(Group(group.gains, numbers, (errors[numbers[0]], errors[numbers[1]])), side.scatter)
     assert found is not None
     amount = measured(abs(found.difference), found.standard_error, side.experiment.error_unit)
-    word = "more than flights scatter" if found.confidence >= CONFIDENCE else "no more than flights scatter"
+    word = (
+        "more than the scatter of flights" if found.confidence >= CONFIDENCE else "no more than the scatter of flights"
+    )
     sentence = (
         f"The same gains ({format_gains(group.gains)}): {side.name} and {against.name} are {amount} apart, {word} "
         f"({percent(found.confidence)} confidence that something has changed)."
@@ -168,9 +170,9 @@ def _changed(side: ComparisonFlight, against: ComparisonFlight, said: Comparison
             f"{against.name}. {SCATTER_NOT_KNOWN}"
         )
     word = (
-        "which scatter explains"
+        "within the scatter"
         if said.verdict == "unresolved"
-        else "more than scatter explains: the vehicle or its surroundings have changed"
+        else "more than the scatter: the vehicle or its environment has changed"
     )
     return (
         f"The same gains in two campaigns: {side.name} is {amount} {_direction(said)} than {against.name}, {word} "
@@ -195,11 +197,11 @@ def _direction(said: Comparison) -> str:
 
 def _deciding(side: ComparisonFlight, against: ComparisonFlight, said: Comparison) -> str:
     if said.further is None:
-        return "Not even 100 further flights would decide it."
+        return "Even 100 more flights would not resolve it."
     parts = [
         f"{count} with the gains of {name}"
         for count, name in ((said.further.first, side.name), (said.further.second, against.name))
         if count
     ]
     flights = "flight" if said.further.total == 1 else "flights"
-    return f"If the difference stays, {said.further.total} more {flights} would decide it: {' and '.join(parts)}."
+    return f"If the difference persists, {said.further.total} more {flights} would resolve it: {' and '.join(parts)}."

@@ -76,11 +76,11 @@ def check_recording(
         return check_log(stream, name=name, companion=companion, given=given)
     if may_be_loop_trace(head):
         return check_trace(read_loop_trace_stream(stream, name=name))
-    reason = "is empty" if not head else "is neither a .data file of Paparazzi nor a trace"
+    reason = "is empty" if not head else "is neither a Paparazzi .data file nor a trace"
     raise InputError(
-        f"{name} is no recording of the vertical loop.",
-        hint="Give the .data file of Paparazzi's ground log with VERT_LOOP in it (its .log goes along), or a trace of "
-        "the loop, .csv or .csv.gz, with a row for every step.",
+        f"{name} is not a recording of the vertical loop.",
+        hint="Give the .data file of Paparazzi's ground log with VERT_LOOP messages, together with its .log, or "
+        "a trace of the loop, .csv or .csv.gz, with one row per step.",
         problems=(Problem("file", reason),),
     )
 
@@ -101,7 +101,7 @@ def check_log(
     """
     log, logged = read_loop_log(stream, companion)
     inferred = infer_gains(log)
-    for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "worked out from the commands")):
+    for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "computed from the commands")):
         if gains is not None:
             commands, drawn = compare_commands(log, gains)
             simulated = compare_simulation(log)
@@ -109,9 +109,9 @@ def check_log(
                 return LogCheck(gains, source, inferred, commands, None, (drawn,))
             return LogCheck(gains, source, inferred, commands, simulated[0], (simulated[1], drawn))
     raise InputError(
-        f"{name} does not say which gains were flown, and its flight is too calm to tell.",
+        f"{name} does not contain the gains flown, and its motion is too small to compute them.",
         problems=(Problem("gains", "are needed"),),
-        hint="Give the .log file that was written beside it too, or the gains; to the command with --gains KP,KI,KD.",
+        hint="Add the .log file that was written with it, or give the gains (on the command line: --gains KP,KI,KD).",
     )
 
 
@@ -120,7 +120,7 @@ def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
     parts = given.split(",")
     if len(parts) != len(GAINS) or not all(_is_whole(part.strip()) for part in parts):
         raise InputError(
-            f"{given[:60]!r} is no gain set.",
+            f"{given[:60]!r} is not a gain set.",
             problems=(Problem(field, "must be three whole numbers, KP,KI,KD"),),
             hint="For example 283,13,82.",
         )

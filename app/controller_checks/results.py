@@ -47,9 +47,9 @@ _SHOWN: Final[Mapping[str, _Shown]] = MappingProxyType(
     }
 )
 _TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
-_BEYOND: Final = f"beyond what {1000 * TIME_TOLERANCE_S:g} ms of uncertain time explain"
-_TO_THE_BIT: Final = "compared to the last bit"
-_COUNTED: Final = f"only what {1000 * TIME_TOLERANCE_S:g} ms of uncertain time do not explain counts"
+_BEYOND: Final = f"beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty"
+_TO_THE_BIT: Final = "compared bit for bit"
+_COUNTED: Final = f"only differences beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty count"
 _DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 m."
 
 FIGURES: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
@@ -119,7 +119,7 @@ def _result_of_trace(checked: TraceCheck) -> Result:
         sentence=_said_of_trace(checked, differs),
         rows=replay.rows,
         gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
-        gains_from="of the recording" if is_constant else "not the same throughout",
+        gains_from="of the recording" if is_constant else "not constant",
         better_gains=None,
         notes=(_DOWN,),
         signals=tuple(
@@ -135,7 +135,7 @@ def _result_of_log(checked: LogCheck) -> Result:
     *simulated, drawn = checked.overlays
     apart = {name: float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0)) for name in COMMANDS}
     signals = [
-        _signal(name, difference, "counts", 0.0, f"{_TO_THE_BIT}, fields one step of 1/512 s apart allowed", drawn)
+        _signal(name, difference, "counts", 0.0, f"{_TO_THE_BIT}; fields may be one step of 1/512 s apart", drawn)
         for name, difference in apart.items()
     ]
     if simulation is not None:
@@ -191,31 +191,31 @@ def _said_of_trace(checked: TraceCheck, differs: Mapping[str, NDArray[np.bool_]]
 def _said_of_log(checked: LogCheck) -> str:
     commands, simulation = checked.commands, checked.simulation
     if not commands.rows:
-        return "Nothing could be compared: the loop commands nothing of its own in this log."
+        return "Nothing could be compared: the loop was not in control in this log."
     if not commands.passed:
         return (
-            f"The replica differs: {_grouped(commands.different)} of {_grouped(commands.rows)} commands do not follow, "
-            f"the first at {commands.first_different_s:.3f} s."
+            f"The replica differs: {_grouped(commands.different)} of {_grouped(commands.rows)} commands are not "
+            f"reproduced, the first at {commands.first_different_s:.3f} s."
         )
     if simulation is not None and not simulation.passed:
         name, value = max(simulation.largest_difference.items(), key=lambda pair: pair[1] / TOLERANCES[pair[0]])
         return (
-            f"The replica differs: {name} lies {value:.3g} {_TOLERANCE_UNITS[name]} {_BEYOND}, and "
-            f"{TOLERANCES[name]:g} are allowed."
+            f"The replica differs: {name} is {value:.3g} {_TOLERANCE_UNITS[name]} {_BEYOND}; {TOLERANCES[name]:g} is "
+            "allowed."
         )
     apart = sum(commands.stale.values())
     more = "" if not apart else f", the other {_grouped(apart)} with fields one step of 1/512 s apart"
     exact = f"{_grouped(commands.exact)} of {_grouped(commands.rows)}"
-    return f"The replica agrees: {exact} commands follow to the last bit{more}."
+    return f"The replica agrees: {exact} commands are bit-exact{more}."
 
 
 def _notes(checked: LogCheck) -> Iterable[str]:
     if checked.better_gains is not None:
         better = ", ".join(f"{name} {value:g}" for name, value in checked.better_gains.items())
-        yield f"More commands follow from {better}: were other gains flown?"
+        yield f"More commands match with {better}: were other gains flown?"
     yield from _notes_on(checked.commands)
     if checked.simulation is None:
-        yield "Reference and integrator were not simulated: no command in the log, or another one within 2 s."
+        yield "Reference and integrator were not simulated: no command in the log, or another command within 2 s."
     else:
         yield (
             f"Reference and integrator were simulated again from the command at {checked.simulation.command_s:.3f} s "
@@ -226,10 +226,10 @@ def _notes(checked: LogCheck) -> Iterable[str]:
 def _notes_on(commands: CommandCheck) -> Iterable[str]:
     if commands.tilted:
         tilt = f"{commands.largest_tilt_deg:.1f}°"
-        yield f"Commands that follow under a tilt, of up to {tilt}: {_grouped(commands.tilted)}."
+        yield f"Commands reproduced under a tilt of up to {tilt}: {_grouped(commands.tilted)}."
     for fields, count in commands.stale.items():
         if count:
-            yield f"Commands that follow only with the {fields} a step apart: {_grouped(count)}."
+            yield f"Commands reproduced only with the {fields} one step apart: {_grouped(count)}."
 
 
 def _curves(overlays: Iterable[Overlay]) -> dict[str, Overlaid]:

@@ -39,7 +39,7 @@ def list_controller_checks(
 def check_controller(
     record: Record,
     gains: Annotated[
-        str | None, Query(max_length=40, description="KP,KI,KD that were flown, where the log does not say so")
+        str | None, Query(max_length=40, description="KP,KI,KD flown, if the log does not contain them")
     ] = None,
 ) -> ControllerCheck:
     """Compare a recording of the vertical loop with the replica: Paparazzi's .data file with VERT_LOOP (its .log as the

@@ -58,9 +58,9 @@ class CheckedSignal(BaseModel):
     largest_difference: float
     difference_unit: str
     tolerance: Annotated[float, Field(description="the largest difference allowed, in the same unit")]
-    allowance: Annotated[str, Field(description="what the tolerance means, in words")]
+    allowance: Annotated[str, Field(description="description of the tolerance")]
     verdict: Literal["exact", "agrees", "differs"]
-    different: Annotated[int, Field(description="how many samples differ by more than is allowed")]
+    different: Annotated[int, Field(description="number of samples that differ by more than the tolerance")]
     first_different_s: float | None
 
 
@@ -75,10 +75,10 @@ class ControllerCheck(ControllerCheckSummary):
     """The result as a sentence, the gains and notes behind it, and one line for each signal."""
 
     sentence: str
-    rows: Annotated[int, Field(description="how many samples or steps were compared")]
-    gains: Annotated[Gains | None, Field(description="null where they change within the recording")]
+    rows: Annotated[int, Field(description="number of samples or steps compared")]
+    gains: Annotated[Gains | None, Field(description="null if they change within the recording")]
     gains_from: str
-    better_gains: Annotated[Gains | None, Field(description="other gains that more of the commands follow from")]
+    better_gains: Annotated[Gains | None, Field(description="other gains that reproduce more of the commands")]
     notes: list[str]
     signals: list[CheckedSignal]
     figures: list[CheckFigure]
@@ -134,7 +134,7 @@ def figure(session: Session, check_id: int, name: str, theme: ThemeName) -> Card
     """Figure of one group of signals, recording and replica overlaid. Raises NotFoundError."""
     result = _result(get_one(session, check_id))
     if name not in FIGURES:
-        raise NotFoundError("figure", name, hint=f"There are: {', '.join(FIGURES)}.")
+        raise NotFoundError("figure", name, hint=f"Available: {', '.join(FIGURES)}.")
     title, signals = FIGURES[name]
     said = "; ".join(
         f"{signal.name} {signal.verdict}, largest difference {signal.largest_difference:.4g} {signal.difference_unit}"

@@ -30,9 +30,9 @@ class ScaledClock:
         """Raises InputError unless `speed` is positive and finite."""
         if not (math.isfinite(speed) and speed > 0.0):
             raise InputError(
-                "This clock cannot run.",
+                "Invalid clock speed.",
                 problems=(Problem("clock_speed", f"must be above 0 and finite, got {speed:g}"),),
-                hint="1 is a real vehicle's; give a simulation the speed that it runs at, such as 10.",
+                hint="Use 1 for a real vehicle; for a simulation, the speed at which it runs, such as 10.",
             )
         self._speed = speed
 

@@ -162,7 +162,7 @@ def problems_of_options(
     known = {option.name: option for option in offered}
     for name, value in chosen.items():
         if name not in known:
-            yield Problem(f"{field}.{name}", f"is not an option of {owner} (it has: {', '.join(known) or 'none'})")
+            yield Problem(f"{field}.{name}", f"is not an option of {owner} (options: {', '.join(known) or 'none'})")
         elif (reason := known[name].refusal(value)) is not None:
             yield Problem(f"{field}.{name}", reason)
 

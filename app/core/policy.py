@@ -58,7 +58,7 @@ class Gain:
         if self.integer and value != int(value):
             return f"must be a whole number of counts, got {value:g}"
         if self.integer and not -(2**31) <= value < 2**31:
-            return f"must be a number that 32 bits hold, got {shortened(value)}"
+            return f"must fit into 32 bits, got {shortened(value)}"
         return None
 
     def refusal_by_bounds(self, value: float) -> str | None:
@@ -106,7 +106,7 @@ class PolicySpace:
             if (reason := gain.refusal_by_bounds(complete[gain.name])) is not None
         ]
         if refused:
-            raise GainsError("These gains cannot be flown.", hint=_HINT, problems=tuple(refused))
+            raise GainsError("Invalid gains.", hint=_HINT, problems=tuple(refused))
         return complete
 
     def complete(self, gains: Mapping[str, object], *, field: str = "gains") -> dict[str, float]:
@@ -126,7 +126,7 @@ class PolicySpace:
             if gain.name in gains and (reason := gain.refusal_by_controller(gains[gain.name])) is not None
         ]
         if problems := (*unknown, *missing, *refused):
-            raise GainsError("These gains cannot be flown.", hint=_HINT, problems=problems)
+            raise GainsError("Invalid gains.", hint=_HINT, problems=problems)
         return self.mapping(np.array([gains[name] for name in self.names], dtype=np.float64))
 
     def vector(self, gains: Gains) -> Vector:
@@ -188,8 +188,8 @@ class PolicySpace:
                 )
         if problems:
             raise InputError(
-                "These bounds cannot be used.",
-                hint="Choose bounds inside the experiment's own.",
+                "Invalid bounds.",
+                hint="Choose bounds inside those of the experiment.",
                 problems=tuple(problems),
             )
         return PolicySpace(

@@ -176,7 +176,7 @@ def test_the_budget_ends_a_campaign_and_nothing_more_is_flown(client: TestClient
     path = f"/api/campaigns/{campaign['id']}"
     done = get(client, path)
     assert (done["state"], done["outcome"]) == ("finished", "budget")
-    assert done["stop_reason"] == "All 2 flights of the budget are flown."
+    assert done["stop_reason"] == "All 2 flights of the budget have been flown."
     assert get(client, f"{path}/proposal")["proposal"]["recommended"] == "stop"
     assert client.post(f"{path}/trials", json={"gains": first["gains"]}).status_code == 409
     assert done["actions"] == ["rename", "archive", "clone", "judge"]

@@ -109,7 +109,7 @@ def test_a_strategy_that_needs_a_model_is_refused_with_the_reason(client: TestCl
     wanted = {"name": "Test", "vehicle": {"kind": "import"}, "definition": {**PX4, "strategy": "gradient"}}
     answer = client.post("/api/campaigns", json=wanted)
     assert answer.status_code == 422
-    assert "there is no model of what the gains of 'takeoff-px4' do" in problems_of(answer)["definition.strategy"]
+    assert "there is no model for the gains of 'takeoff-px4'" in problems_of(answer)["definition.strategy"]
 
 
 def test_flights_made_elsewhere_with_different_gains_do_not_get_in_each_others_way(

@@ -22,4 +22,4 @@ def test_a_low_battery_ends_a_campaign_whose_flights_do_not_count(monkeypatch: p
     definition = Definition(stop=StopRule(kind="budget", max_flights=3, min_battery_v=11.5))
     flown = fly_campaign(definition, "twin", {}, CampaignListener())
     assert [trial.outcome for trial in flown.trials] == ["invalid"]
-    assert flown.stopped_because.startswith("The last flight ended at 11.10 V; 11.5 V is the least.")
+    assert flown.stopped_because.startswith("The last flight ended at 11.10 V; the minimum is 11.5 V.")

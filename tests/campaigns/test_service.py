@@ -193,7 +193,7 @@ def test_a_low_battery_ends_a_campaign_whatever_its_last_flight_is_worth(
     run_jobs(database)
     done = get(client, path)
     assert (done["state"], done["outcome"]) == ("finished", "budget")
-    assert done["stop_reason"].startswith("The last flight ended at 10.40 V; 10.5 V is the least.")
+    assert done["stop_reason"].startswith("The last flight ended at 10.40 V; the minimum is 10.5 V.")
     after = get(client, f"{path}/proposal")["proposal"]
     assert (after["stale"], after["gains"]) == (False, before["gains"])
     assert after["history_digest"] != before["history_digest"]

@@ -215,7 +215,7 @@ def test_a_clone_on_another_vehicle_starts_from_the_best_flight(
 @pytest.mark.parametrize(
     ("settling_s", "decided", "agreement"),
     [
-        (1.0, "The model fitted to the other vehicle's flight takes the data sheet's place: ", "agreement 100\u00a0%"),
+        (1.0, "The model fitted to the other vehicle's flight replaces the data sheet: ", "agreement 100\u00a0%"),
         (6.0, "Nothing is taken over from the other vehicle: ", "less than 50\u00a0%"),
     ],
 )

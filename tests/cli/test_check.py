@@ -38,7 +38,7 @@ def test_other_gains_are_noticed_and_the_flown_ones_suggested(tmp_path: Path) ->
 def test_without_companion_the_gains_are_worked_out(tmp_path: Path) -> None:
     result = check(write(tmp_path, Flight(DEFAULT), companion=False))
     assert result.exit_code == 0
-    assert "worked out from the commands" in result.stdout
+    assert "computed from the commands" in result.stdout
 
 
 def test_a_calm_flight_without_gains_asks_for_them(tmp_path: Path) -> None:

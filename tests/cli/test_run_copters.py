@@ -195,7 +195,7 @@ def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> No
     ("arguments", "said_of_it"),
     [
         (("px4-takeoff", "--set", "autopilot=ardupilot"), "definition.experiment: 'takeoff-px4' has other gains than"),
-        (("px4-takeoff", "--strategy", "gradient"), "there is no model of what the gains of 'takeoff-px4' do"),
+        (("px4-takeoff", "--strategy", "gradient"), "there is no model for the gains of 'takeoff-px4'"),
         (
             ("ardrone-takeoff", "--vehicle", "mavlink:udpin:127.0.0.1:14550", "--set", "autopilot=px4"),
             "definition.experiment: 'takeoff' tunes other gains than this vehicle's, which flies takeoff-px4",

@@ -121,7 +121,7 @@ def test_only_what_differs_is_listed_with_its_change_against_the_first(client: T
     assert (hover["title"], hover["unit"], hover["values"]) == ("Hover throttle", "of full", [0.61, 0.65])
     assert hover["changes"] == [0, pytest.approx(0.04)]
     assert found["verdict"] is None
-    assert found["notes"][0].startswith("One vehicle, but with other settings.")
+    assert found["notes"][0].startswith("One vehicle with different settings.")
 
 
 def test_campaigns_of_one_vehicle_share_their_scatter(client: TestClient, database: Database) -> None:
@@ -168,7 +168,7 @@ def test_repeats_are_told_apart_only_when_something_has_changed(client: TestClie
     pairs = {one["trial_id"]: one for one in get(client, address([first, near, far]))["pairs"][:2]}
     assert [pairs[one]["basis"] for one in (near, far)] == ["repeats", "repeats"]
     assert pairs[near]["difference"] == pytest.approx(climb_error(1.05) - climb_error(1.0), abs=1e-4)
-    assert "no more than flights scatter" in pairs[near]["sentence"]
+    assert "no more than the scatter of flights" in pairs[near]["sentence"]
 
 
 def test_the_best_of_several_gets_no_credit_for_having_been_chosen(client: TestClient, database: Database) -> None:

@@ -121,7 +121,7 @@ def test_a_file_may_be_dropped_on_the_page(page_of_checks: Dashboard) -> None:
     )
     page.get_by_role("heading", name="Controller check").dispatch_event("drop", {"dataTransfer": dropped})
     expect(page.get_by_role("article", name="Check of dropped.data")).to_be_visible()
-    assert newest(dashboard)["gains_from"] == "worked out from the commands"
+    assert newest(dashboard)["gains_from"] == "computed from the commands"
 
 
 def test_on_a_phone_nothing_is_cut_off(open_dashboard: Opener, empty_server: Server) -> None:

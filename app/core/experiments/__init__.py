@@ -19,7 +19,7 @@ def get_experiment(name: str, options: Mapping[str, OptionValue] | None = None) 
     """Return an experiment with its settings, which must be free of problems. Raises InputError for an unknown name."""
     if name not in EXPERIMENTS:
         raise InputError(
-            "There is no such experiment.",
+            "Unknown experiment.",
             hint=f"Choose one of: {', '.join(EXPERIMENTS)}.",
             problems=(Problem("experiment", f"unknown name {name!r}"),),
         )

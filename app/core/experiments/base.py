@@ -105,7 +105,7 @@ class ParameterDistribution:
 _PROBABILITY_WITHIN: Final = 0.9544997361036416
 
 
-NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="nothing: there is no model")
+NO_PARAMETERS: Final = ParameterDistribution(mean=(), covariance=(), origin="none: there is no model")
 
 
 def prior_distribution(experiment: "Experiment") -> ParameterDistribution:

@@ -110,14 +110,14 @@ class PitchTracking:
     options: Final = (
         Option(
             name="perturbation",
-            title="How far every element of the model may be off, as a share of it",
+            title="Largest relative error of each element of the model",
             default=0.45,
             lower=0.0,
             upper=0.8,
         ),
         Option(
             name="model_seed",
-            title="Which of the inaccurate models is used (seed of the draw)",
+            title="Seed that selects the inaccurate model",
             default=0,
             lower=0,
             upper=2**32 - 1,

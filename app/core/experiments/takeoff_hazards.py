@@ -155,7 +155,7 @@ def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: flo
         if not passed
         else f"{ceiling_m:g} m is allowed."
         if highest_m <= ceiling_m
-        else f"beyond {ceiling_m:g} m; these are the gains that every flight is compared with, and they may fly."
+        else f"beyond {ceiling_m:g} m; these are the gains with which every flight is compared, so they are allowed."
     )
     return Check("altitude", passed, sentence, worst=highest_m, limit=ceiling_m, case=case)
 
@@ -165,12 +165,12 @@ def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m:
     worst = int(np.argmax(distances))
     distance_m, fallen_step = float(distances[worst]), float(runs.reports[worst, FALLEN_STEP])
     if distance_m == 0.0:
-        sentence = "No simulated takeoff falls back to the ground or moves away from the set point at its end."
+        sentence = "No simulated takeoff falls back to the ground or diverges from the set point."
         return Check("divergence", True, sentence, worst=0.0, limit=0.0)
     fallen = fallen_step >= 0.0
     case = _case(parameters, runs.models[worst], fallen_step, "on the ground again") if fallen else ""
     case = case or _case(parameters, runs.models[worst])
-    did = "falls back to the ground" if fallen else f"is {distance_m:.2f} m from the set point and moves away"
+    did = "falls back to the ground" if fallen else f"ends {distance_m:.2f} m from the set point and diverges"
     return Check("divergence", False, f"A simulated takeoff {did}, with {case}.", distance_m, 0.0, case=case)
 
 
@@ -179,13 +179,13 @@ def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
     worst = int(np.argmax(swings))
     swing_m_s = float(swings[worst])
     if swing_m_s <= SMALLEST_SWING_M_S:
-        sentence = "Every simulated takeoff comes to rest, or swings less and less."
+        sentence = "Every simulated takeoff settles, or its oscillation decays."
         return Check("oscillation", True, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S)
     case = _case(parameters, runs.models[worst])
     before_m_s = float(runs.reports[worst, SWING_MIDDLE_M_S])
     sentence = (
-        f"The climb rate swings by {swing_m_s:.2f} m/s in the last third of a simulated takeoff, after "
-        f"{before_m_s:.2f} m/s in the third before: it does not decay, with {case}."
+        f"The climb rate oscillates by {swing_m_s:.2f} m/s in the last third of a simulated takeoff, after "
+        f"{before_m_s:.2f} m/s in the middle third: it does not decay, with {case}."
     )
     return Check("oscillation", False, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S, case=case)
 
@@ -204,8 +204,8 @@ def _abort(
     value, allowed = float(values[run, instant]), float(limits[run, 0])
     passed = bool(value <= allowed)
     case = _case(parameters, runs.models[run], float(runs.abort_steps[run, instant]), "aborted")
-    what = "rises to" if place == HIGHEST_M else "meets the ground at"
-    why = "" if allowed == limit else ", which is what the safe gains themselves come to"
+    what = "rises to" if place == HIGHEST_M else "hits the ground at"
+    why = "" if allowed == limit else ", as with the safe gains"
     sentence = f"After an abort the vehicle {what} {value:.2f} {unit} in the worst case; {allowed:.2f} {unit} is "
     sentence += f"allowed{why}." if passed else f"allowed{why}: {case}."
     return Check(name, passed, sentence, worst=value, limit=allowed, case=case)
@@ -268,8 +268,8 @@ def check_wrapping(counts: Counts, model: Vector, target: int) -> tuple[Check, .
     worst, place = max((abs(gains[place]) * product.largest_error, place) for place, product in enumerate(PRODUCTS))
     product = PRODUCTS[place]
     sentence = (
-        f"No product can wrap: the largest, {product.gain}·({product.error}) with its limiter at {product.limiter}, "
-        f"is {percent(worst / INT32_MAX)} of what 32 bits hold."
+        f"No product can overflow: the largest, {product.gain}·({product.error}) with its limiter at "
+        f"{product.limiter}, is {percent(worst / INT32_MAX)} of the 32-bit maximum."
     )
     return (Check("wrapping", True, sentence, worst=float(worst), limit=float(INT32_MAX)),)
 
@@ -291,9 +291,9 @@ def _refusals(refused: list[int], gains: list[int], wraps: Counts) -> Iterator[C
         worst = abs(gains[place]) * product.largest_error
         case, told = _wrap_case(product, wraps[:, place])
         sentence = (
-            f"{product.gain}·({product.error}) can reach {_grouped(worst)} and wrap: 32 bits hold "
-            f"{_grouped(INT32_MAX)}, and full up turns into full down. {told} "
-            f"The largest {product.gain} that cannot wrap is {offered}."
+            f"{product.gain}·({product.error}) can reach {_grouped(worst)} and overflow 32 bits "
+            f"({_grouped(INT32_MAX)}): full up becomes full down. {told} The largest {product.gain} that cannot "
+            f"overflow is {offered}."
         )
         offer = {product.gain: offered if gains[place] > 0 else -offered}
         yield Check(
@@ -308,10 +308,10 @@ def _wrap_case(product: Product, wraps: Counts) -> tuple[str, str]:
     ]
     if not wrapped:
         case = f"{product.error} at its limiter, {product.limiter}"
-        return case, f"It wraps with the {case}."
+        return case, f"It overflows with the {case}."
     name, step, value = wrapped[0]
     case = f"{name}, {step * STEP_S:.2f} s after the start: {product.gain}·({product.error}) = {_grouped(value)}"
-    return case, f"Simulated {case}; so it does in {len(wrapped) - 1} of {len(_STARTS) - 1} other starts."
+    return case, f"Simulated {case}. It also overflows in {len(wrapped) - 1} of {len(_STARTS) - 1} other starts."
 
 
 def _grouped(value: int) -> str:

@@ -53,7 +53,7 @@ def find_delay(time_s: Samples, altitude_m: Samples, other_time_s: Samples, othe
     start_s = max(time_s[0], other_time_s[0] + RANGE_S) if len(time_s) and len(other_time_s) else 0.0
     end_s = min(time_s[-1], other_time_s[-1] - RANGE_S) if len(time_s) and len(other_time_s) else 0.0
     if end_s - start_s < _SHORTEST_S:
-        raise _unalignable(f"have less than {_SHORTEST_S:g} s in common with {RANGE_S:g} s to spare on either side")
+        raise _unalignable(f"overlap by less than {_SHORTEST_S:g} s with a margin of {RANGE_S:g} s on either side")
     grid_s = np.arange(start_s, end_s, STEP_S)
     lags = round(RANGE_S / STEP_S)
     wide_s = grid_s[0] + STEP_S * np.arange(-lags, len(grid_s) + lags)
@@ -63,7 +63,9 @@ def find_delay(time_s: Samples, altitude_m: Samples, other_time_s: Samples, othe
     likeness = _correlations(_changes(altitude), _changes(other))
     best = int(np.argmax(likeness))
     if likeness[best] < _LEAST_CORRELATION:
-        raise _unalignable(f"do not move alike (correlation {likeness[best]:.2f}, it takes {_LEAST_CORRELATION:g})")
+        raise _unalignable(
+            f"are not correlated enough ({likeness[best]:.2f}, at least {_LEAST_CORRELATION:g} is required)"
+        )
     if best in {0, len(likeness) - 1}:
         raise _unalignable(f"are more than {RANGE_S:g} s apart")
     return float(best - lags + _vertex(*likeness[best - 1 : best + 2])) * STEP_S
@@ -80,7 +82,7 @@ def align(
     apart_m = np.interp(time_s + delay_s, other_time_s, other_m) - altitude_m
     rested = time_s < rest_until_s
     if not rested.any():
-        raise _unalignable("have no time at rest in common")
+        raise _unalignable("have no common time at rest")
     return Alignment(delay_s=delay_s, datum_m=float(np.median(apart_m[rested])))
 
 
@@ -128,5 +130,5 @@ def _unalignable(reason: str) -> TrajectoryError:
     return TrajectoryError(
         "The two sources of altitude cannot be aligned in time.",
         problems=(Problem("altitude_2_m", f"the two {reason}"),),
-        hint="See that both follow the same vehicle, and that both run from before the take-off until after it.",
+        hint="Check that both measure the same vehicle, from before the take-off until after it.",
     )

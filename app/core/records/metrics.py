@@ -54,7 +54,7 @@ def require_scorable(
         raise TrajectoryError(
             "This flight cannot be scored.",
             problems=(problem,),
-            hint="Record it again, or class the flight as invalid; the raw record is kept.",
+            hint="Record it again, or mark the flight invalid; the raw record is kept.",
         )
 
 
@@ -64,13 +64,15 @@ def _problem(trajectory: Trajectory, channel: str) -> Problem | None:
         return Problem(channel, f"is not among the recorded channels ({', '.join(trajectory.channels)})")
     values = trajectory[channel]
     if len(values) != len(time_s):
-        return Problem(channel, f"has {len(values)} samples, the time stamps are {len(time_s)}")
+        return Problem(channel, f"has {len(values)} samples, but there are {len(time_s)} time stamps")
     for name, column in (("time_s", time_s), (channel, values)):
         if not np.isfinite(column).all():
             return Problem(name, f"is not a finite number at sample {int(np.argmin(np.isfinite(column)))}")
     if (np.diff(time_s) <= 0.0).any():
         late = int(np.argmax(np.diff(time_s) <= 0.0)) + 1
-        return Problem("time_s", f"must rise, but is {time_s[late]:g} s after {time_s[late - 1]:g} s at sample {late}")
+        return Problem(
+            "time_s", f"must increase, but is {time_s[late]:g} s after {time_s[late - 1]:g} s at sample {late}"
+        )
     return None
 
 

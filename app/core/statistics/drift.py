@@ -55,19 +55,19 @@ def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
     allowed = {name: reach * hypot(before[name].standard_error, now[name].standard_error) for name in names}
     drifted = tuple(name for name in names if abs(moved[name]) > allowed[name])
     if not names:
-        sentence = "The newest calibration and the one it was tuned with have no parameter in common to compare."
+        sentence = "The newest calibration and the one from the last tuning have no common parameter to compare."
         return Drift(due=False, drifted=(), sentence=sentence)
     if not drifted:
         titles = [now[name].title.lower() for name in names]
         compared = " or ".join(filter(None, (", ".join(titles[:-1]), titles[-1])))
-        sentence = f"Since it was last tuned the vehicle shows no change beyond chance in {compared}."
+        sentence = f"No significant change of {compared} since the vehicle was last tuned."
         return Drift(due=False, drifted=(), sentence=sentence)
     told = "; ".join(
         f"{now[name].title.lower()} from {_measured(before[name])} to {_measured(now[name])} {now[name].unit}"
         for name in drifted
     )
     sentence = (
-        f"Since it was last tuned the vehicle has changed by more than chance explains: {told}. Look for the cause "
+        f"The vehicle has changed significantly since it was last tuned: {told}. Find the cause "
         f"({', '.join(MONITORED_PARAMETERS[name] for name in drifted)}), then tune it again."
     )
     return Drift(due=True, drifted=drifted, sentence=sentence)

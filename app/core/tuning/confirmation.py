@@ -27,8 +27,8 @@ from app.core.statistics.comparisons import (
 from app.core.tuning.strategy import Proposal
 
 SCATTER_NOT_KNOWN: Final = (
-    "How much flights scatter was never measured under this autopilot, so nobody can say whether that is more than "
-    "chance: fly one of the gain sets again."
+    "The flight-to-flight scatter under this autopilot is unknown, so the difference cannot be tested. Fly one of "
+    "the gain sets again."
 )
 
 _CONFIRMATION_FLIGHTS: Final = 2
@@ -165,7 +165,7 @@ def _confirm_baseline(
     if left > 0 and _is_worth_a_step(definition, now, left, proposal):
         return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
     tried = len(now.groups) - 1
-    found = f"None of the other sets flown, {tried}, is better." if tried else "No other set was flown."
+    found = f"None of the other sets flown ({tried}) is better." if tried else "No other set was flown."
     promise = _describe_improvement(definition, experiment, now, left, proposal)
     return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {promise}".strip())
 
@@ -177,7 +177,7 @@ def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
     if now.looks and said.verdict != "unresolved":
         return Confirmation(phase="decided", why=sentence)
     if now.winner.size <= now.baseline.size:
-        why = f"The winner, {format_gains(now.winner.gains)}, is flown again, to see whether it is better or was lucky."
+        why = f"The winner, {format_gains(now.winner.gains)}, is flown again, to confirm that it is better."
         return Confirmation(phase="repeat", why=f"{why} {sentence}")
     why = (
         f"The first flight's gains, {format_gains(now.baseline.gains)}, are flown again under the winner's conditions."
@@ -206,13 +206,13 @@ def _describe_improvement(
 ) -> str:
     unit = experiment.error_unit
     if proposal.kind in {"none", "manual"} or left <= 0:
-        return "The strategy offers nothing more." if proposal.kind == "none" else ""
+        return "The strategy proposes no further step." if proposal.kind == "none" else ""
     told = _detectable_difference(definition, now, left)
     promised = _predicted_improvement(now, proposal)
     relation = "at least" if promised >= told else "below"
     return (
-        f"The next step promises {short(promised)} {unit} less, {relation} the {short(told)} {unit} that "
-        f"{_flights(left)} could tell from noise with {percent(definition.stop.confidence)} confidence."
+        f"The next step is predicted to reduce the error by {short(promised)} {unit}, {relation} the {short(told)} "
+        f"{unit} that {_flights(left)} can resolve at {percent(definition.stop.confidence)} confidence."
     )
 
 
@@ -226,10 +226,10 @@ def _percent(confidence: float) -> str:
 
 def _deciding(said: Comparison) -> str:
     if said.further is None:
-        return "Not even 100 further flights would decide it."
+        return "Even 100 more flights would not resolve it."
     return (
-        f"If the difference stays, {_flights(said.further.total)} more would decide it: {said.further.first} of the "
-        f"winner, {said.further.second} of the first gains."
+        f"If the difference persists, {_flights(said.further.total)} more would resolve it: {said.further.first} of "
+        f"the winner, {said.further.second} of the first gains."
     )
 
 

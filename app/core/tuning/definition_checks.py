@@ -21,7 +21,7 @@ def check_definition(definition: Definition) -> None:
     """Raise InputError naming every field that cannot be used."""
     if problems := problems_of(definition):
         raise InputError(
-            "This campaign definition cannot be used.",
+            "Invalid campaign definition.",
             problems=problems,
             hint="Correct the named fields and try again; nothing was changed.",
         )
@@ -69,12 +69,12 @@ def _fit(definition: Definition) -> Iterator[Problem]:
 
 
 def _without_model(definition: Definition) -> Iterator[Problem]:
-    lacks = f"there is no model of what the gains of {definition.experiment!r} do"
+    lacks = f"there is no model for the gains of {definition.experiment!r}"
     if STRATEGIES[definition.strategy].needs_model:
         by_hand = ", ".join(repr(name) for name, strategy in STRATEGIES.items() if not strategy.needs_model)
-        yield Problem("strategy", f"{definition.strategy!r} finds gains on a model, and {lacks}: choose {by_hand}")
+        yield Problem("strategy", f"{definition.strategy!r} needs a model, and {lacks}: choose {by_hand}")
     if definition.start.kind == "simplex":
-        yield Problem("start.kind", f"'simplex' searches on a model, and {lacks}: choose 'default' or 'given'")
+        yield Problem("start.kind", f"'simplex' needs a model, and {lacks}: choose 'default' or 'given'")
 
 
 def _policy(definition: Definition) -> tuple[Problem, ...]:
@@ -92,12 +92,12 @@ def _check_start(definition: Definition, space: PolicySpace) -> None:
     start = definition.start
     brings_gains = start.kind in {"given", "campaign"}
     if brings_gains != (start.gains is not None):
-        needed = f"are needed with start.kind {start.kind!r}"
-        reason = needed if start.gains is None else f"do not go with start.kind {start.kind!r}"
-        raise InputError("The start cannot be used.", hint="", problems=(Problem("start.gains", reason),))
+        needed = f"are required with start.kind {start.kind!r}"
+        reason = needed if start.gains is None else f"are not allowed with start.kind {start.kind!r}"
+        raise InputError("Invalid start.", hint="", problems=(Problem("start.gains", reason),))
     if (start.kind == "campaign") != (start.donor is not None):
-        reason = "is needed with start.kind 'campaign', and goes with no other"
-        raise InputError("The start cannot be used.", hint="", problems=(Problem("start.donor", reason),))
+        reason = "is required with start.kind 'campaign', and not allowed with any other"
+        raise InputError("Invalid start.", hint="", problems=(Problem("start.donor", reason),))
     if start.kind != "simplex":
         space.check(start.gains or space.mapping(space.default), field="start.gains")
 

@@ -162,7 +162,7 @@ def _flown_before(check: Check) -> Check:
     """The check's result for gains that a valid flight of the campaign has flown."""
     if check.passed or check.name not in WAIVED_AFTER_VALID_FLIGHT:
         return check
-    sentence = f"{check.sentence} But a flight of this campaign flew these gains to its end, so they may fly again."
+    sentence = f"{check.sentence} But a flight of this campaign completed with these gains, so they are allowed again."
     return replace(check, passed=True, sentence=sentence)
 
 
@@ -179,7 +179,7 @@ def _step(
         return check_step(space, gains, flown, definition.step_fraction, "a flown set")
     origin = start_gains(definition, experiment, space) if start is None else start
     fraction = definition.first_step_fraction
-    return check_step(space, gains, [origin], fraction, "the start gains until a flight has shown more")
+    return check_step(space, gains, [origin], fraction, "the start gains until a flight is valid")
 
 
 def space_of(definition: Definition) -> PolicySpace:
@@ -196,8 +196,8 @@ def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = Fal
     """
     if overrule and is_real:
         raise GainsError(
-            "Nobody can overrule the gate on a real vehicle.",
-            hint="Fly these gains on its simulation, or choose gains that the gate lets pass.",
+            "The gate cannot be overruled on a real vehicle.",
+            hint="Fly these gains on its simulation, or choose gains that pass the gate.",
             problems=(Problem("overrule", "is only for simulated vehicles"),),
         )
     if gate.passed or (overrule and gate.overrulable):
@@ -216,8 +216,8 @@ def problems_of_gate(gate: GateResult) -> tuple[Problem, ...]:
 def _hint(gate: GateResult, is_real: bool) -> str:
     offers = {name: value for check in gate.refusals for name, value in check.offer.items()}
     offered = ", ".join(f"{name} = {value:g}" for name, value in offers.items())
-    nearest = f"The nearest that these checks let pass: {offered}. " if offered else ""
-    choose = "Choose milder gains, or clone the campaign with wider limits."
+    nearest = f"The nearest gains that pass these checks: {offered}. " if offered else ""
+    choose = "Choose less aggressive gains, or clone the campaign with wider limits."
     may_overrule = "" if is_real or not gate.overrulable else " On a simulated vehicle you may overrule with a reason."
     return f"{nearest}{choose}{may_overrule}"
 

@@ -217,11 +217,15 @@ def offset_sensitivity(experiment: Experiment) -> float:
 
 def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy: bool) -> str:
     if not of and not agreeing + disagreeing:
-        return "No flight has put a prediction to the test yet."
-    parts = [f"{inside} of {of} flights lay in their predicted interval"] if of else []
+        return "No prediction has been tested by a flight yet."
+    parts = [f"{inside} of {of} flights ended inside their predicted interval"] if of else []
     if agreeing + disagreeing:
         parts.append(f"{agreeing} of {agreeing + disagreeing} changed the error in the predicted direction")
-    ending = "" if trustworthy else "; the gradient is not trustworthy: flights keep going the other way"
+    ending = (
+        ""
+        if trustworthy
+        else "; the gradient is not trustworthy: most flights changed the error in the other direction"
+    )
     return f"{', '.join(parts)}{ending}."
 
 

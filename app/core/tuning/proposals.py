@@ -76,9 +76,9 @@ def _manual_proposal(
     gains = start_gains(definition, experiment, space)
     summary = (
         f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); there is no model of this "
-        "vehicle's controller to predict it with."
+        "vehicle's controller, so there is no prediction."
     )
-    lesson = "What these gains do, for the others to be measured against."
+    lesson = "The result of these gains, as a reference for the others."
     explanation = Explanation(summary=summary, lesson=lesson)
     return Proposal(kind="start", gains=gains, predicted=None, predicted_error=None, explanation=explanation)
 
@@ -98,7 +98,9 @@ def _start(
         f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {teller} "
         f"predicts {short(error)} {experiment.error_unit}."
     )
-    lesson = "How far this vehicle is from the model." if donor is None else "Whether the two vehicles are alike."
+    lesson = (
+        "How much this vehicle deviates from the model." if donor is None else "Whether the two vehicles are similar."
+    )
     start = Proposal(
         kind="start",
         gains=gains,
@@ -141,7 +143,7 @@ def _confirmed(
 
 def _refused(group: Group, gate: GateResult) -> str:
     reasons = " ".join(check.sentence for check in gate.refusals)
-    return f"But {format_gains(group.gains)} cannot be flown again, the gate refuses them: {reasons}"
+    return f"But {format_gains(group.gains)} cannot be flown again, because the gate refuses them: {reasons}"
 
 
 def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | None) -> Proposal:

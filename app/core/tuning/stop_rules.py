@@ -119,14 +119,14 @@ def _sentence(
 ) -> str:
     by = f"more than {percent(rule.improvement)}"
     if reason is None and rule.kind == "paper" and failures:
-        return f"The last flight did not improve by {by} on the best before it; one more such flight ends it."
+        return f"The last flight did not improve on the best before it by {by}; one more such flight ends the campaign."
     if reason is None:
         return f"{rule.max_flights - flights} of {rule.max_flights} flights are left."
     sentences: dict[Reason, str] = {
-        "flight budget": f"All {rule.max_flights} flights of the budget are flown.",
-        "not improving": f"The last {failures} flights in a row did not improve by {by} on the best before them.",
-        "nothing better": "The model finds nothing better than the best flight.",
+        "flight budget": f"All {rule.max_flights} flights of the budget have been flown.",
+        "not improving": f"The last {failures} consecutive flights did not improve on the best before them by {by}.",
+        "nothing better": "The model predicts no improvement over the best flight.",
         "told from noise": "",
-        "battery low": f"The last flight ended at {battery_v or 0.0:.2f} V; {rule.min_battery_v} V is the least.",
+        "battery low": f"The last flight ended at {battery_v or 0.0:.2f} V; the minimum is {rule.min_battery_v} V.",
     }
     return f"{sentences[reason]} {because if rule.kind == 'noise' else ''}".strip()

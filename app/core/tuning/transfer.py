@@ -27,8 +27,8 @@ from app.core.tuning.predictions import offset_sensitivity
 
 LEAST_AGREEMENT: Final = 0.5
 _TAKEN: Final = {
-    True: "The model fitted to the other vehicle's flight takes the data sheet's place",
-    False: "The other vehicle's best gains are taken over",
+    True: "The model fitted to the other vehicle's flight replaces the data sheet",
+    False: "The other vehicle's best gains are used",
 }
 
 
@@ -61,10 +61,12 @@ def transfer(
         f"{apart:.3f} {unit}: agreement {percent(agreed)}"
     )
     if agreed < LEAST_AGREEMENT:
-        sentence = f"Nothing is taken over from the other vehicle: {numbers}, less than {percent(LEAST_AGREEMENT)}."
+        sentence = f"Nothing is used from the other vehicle: {numbers}, less than {percent(LEAST_AGREEMENT)}."
         return replace(plain, agreement=agreed, sentence=sentence)
     is_first_step = len(valid) == 1
-    shortened = f" The first step goes {percent(agreed)} as far as it might." if is_first_step and agreed < 1.0 else ""
+    shortened = (
+        f" The first step is limited to {percent(agreed)} of its maximum." if is_first_step and agreed < 1.0 else ""
+    )
     return Transfer(
         experiment=_informed(experiment, donor, agreed),
         step_fraction=definition.step_fraction * (agreed if is_first_step else 1.0),

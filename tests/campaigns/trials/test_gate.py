@@ -106,7 +106,7 @@ def test_a_reason_that_nothing_needs_is_not_kept(client: TestClient, database: D
     ("gains", "field", "reason"),
     [
         (PAPERS | {"kd": 82.5}, "gains.kd", "must be a whole number of counts, got 82.5"),
-        (PAPERS | {"kp": 2**31}, "gains.kp", "must be a number that 32 bits hold, got 2147483648"),
+        (PAPERS | {"kp": 2**31}, "gains.kp", "must fit into 32 bits, got 2147483648"),
     ],
 )
 def test_numbers_that_the_controller_cannot_hold_are_never_overruled(
@@ -124,7 +124,7 @@ def test_nobody_overrules_the_gate_on_a_real_vehicle(client: TestClient, databas
         session.get_one(VehicleRow, campaign["vehicle"]["id"]).is_real = True
     answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": PAPERS, "overrule": REASON})
     assert answer.status_code == 422
-    assert answer.json()["detail"].startswith("Nobody can overrule the gate on a real vehicle.")
+    assert answer.json()["detail"].startswith("The gate cannot be overruled on a real vehicle.")
     assert problems_of(answer) == {"overrule": "is only for simulated vehicles"}
 
 

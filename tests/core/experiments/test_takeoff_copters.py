@@ -75,8 +75,8 @@ def test_only_gains_by_hand_can_be_flown_without_a_model(strategy: str) -> None:
     if strategy == "manual":
         assert problems == ()
         return
-    lacks = "there is no model of what the gains of 'takeoff-px4' do"
-    reason = f"{strategy!r} finds gains on a model, and {lacks}: choose 'manual'"
+    lacks = "there is no model for the gains of 'takeoff-px4'"
+    reason = f"{strategy!r} needs a model, and {lacks}: choose 'manual'"
     assert [(problem.field, problem.reason) for problem in problems] == [("strategy", reason)]
 
 
@@ -99,7 +99,7 @@ def test_a_start_that_is_searched_on_a_model_is_refused_where_there_is_none() ->
     check_definition(replace(BY_HAND, start=Start(kind="given", gains=dict(FIRMER))))
     (problem,) = problems_of(replace(BY_HAND, start=Start(kind="simplex")))
     assert problem.field == "start.kind"
-    assert "there is no model of what the gains of 'takeoff-px4' do: choose 'default' or 'given'" in problem.reason
+    assert "there is no model for the gains of 'takeoff-px4': choose 'default' or 'given'" in problem.reason
 
 
 def said(proposal: Proposal) -> tuple[str, Gains]:

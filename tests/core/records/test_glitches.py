@@ -120,7 +120,7 @@ def test_a_datum_that_moves_is_named_and_cannot_be_repaired() -> None:
 
     bad = altered(model_run(), move)
     (found,) = find_glitches(TAKEOFF, bad)
-    assert found.sentence == "A jump by +0.30 m at 12.00 s: no thrust accelerates a vehicle so."
+    assert found.sentence == "A jump by +0.30 m at 12.00 s: no thrust can accelerate a vehicle so much."
     np.testing.assert_array_equal(repaired(TAKEOFF, bad, (found,))["altitude_m"], bad["altitude_m"])
 
 

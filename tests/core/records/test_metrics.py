@@ -75,10 +75,13 @@ def test_gaps_of_a_quarter_second_are_allowed_even_in_single_precision() -> None
         (lambda t, z: (t[3:], z[3:]), r"time_s: must cover 0 … 10 s .* got 0\.3 … 10"),
         (lambda t, z: (t[:-4], z[:-4]), r"time_s: must cover 0 … 10 s"),
         (lambda t, z: (t[:0], z[:0]), r"time_s: must cover .* got nothing"),
-        (lambda t, z: (t, z[:-1]), r"altitude_m: has 100 samples, the time stamps are 101"),
+        (lambda t, z: (t, z[:-1]), r"altitude_m: has 100 samples, but there are 101 time stamps"),
         (lambda t, z: (t, np.where(t > 5.0, np.nan, z)), r"altitude_m: is not a finite number at sample 51"),
         (lambda t, z: (np.where(t == t[7], np.inf, t), z), r"time_s: is not a finite number at sample 7"),
-        (lambda t, z: (np.where(t == t[7], t[6], t), z), r"time_s: must rise, but is 0\.6 s after 0\.6 s at sample 7"),
+        (
+            lambda t, z: (np.where(t == t[7], t[6], t), z),
+            r"time_s: must increase, but is 0\.6 s after 0\.6 s at sample 7",
+        ),
     ],
 )
 def test_flights_that_cannot_be_scored_are_refused_with_field_and_reason(change, reason: str) -> None:  # type: ignore[no-untyped-def]

@@ -22,8 +22,8 @@ def test_a_change_beyond_the_interval_makes_a_re_tune_due_and_is_told() -> None:
     found = drift(hover(0.6, 0.003), hover(0.6099, 0.004))
     assert (found.due, found.drifted) == (True, ("hover_throttle",))
     assert found.sentence == (
-        "Since it was last tuned the vehicle has changed by more than chance explains: hover throttle from "
-        "0.6000 ± 0.0030 to 0.6099 ± 0.0040 of full. Look for the cause (propellers, weight), then tune it again."
+        "The vehicle has changed significantly since it was last tuned: hover throttle from 0.6000 ± 0.0030 to "
+        "0.6099 ± 0.0040 of full. Find the cause (propellers, weight), then tune it again."
     )
 
 

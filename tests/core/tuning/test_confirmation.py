@@ -58,7 +58,7 @@ def test_a_step_that_promises_less_than_noise_ends_a_campaign_without_a_winner()
     assert "No other set was flown." in found.why
     tried = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
     assert tried.phase == "decided"
-    assert "None of the other sets flown, 1, is better. The strategy offers nothing more." in tried.why
+    assert "None of the other sets flown (1) is better. The strategy proposes no further step." in tried.why
 
 
 def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided() -> None:

@@ -41,7 +41,7 @@ def test_gains_out_of_their_bounds_are_refused_by_name(gains: dict[str, float], 
     [
         (DEFAULT | {"kd": 82.5}, "kd must be a whole number of counts, got 82.5.", 0.0),
         (DEFAULT | {"kd": math.nan}, "kd must be a finite number, got nan.", math.inf),
-        (DEFAULT | {"kp": 2**31}, "kp must be a number that 32 bits hold, got 2147483648.", (2**31 - 4000) / 4000),
+        (DEFAULT | {"kp": 2**31}, "kp must fit into 32 bits, got 2147483648.", (2**31 - 4000) / 4000),
     ],
 )
 def test_numbers_that_no_controller_holds_are_refused_alone_and_for_good(
@@ -63,8 +63,8 @@ def test_before_the_first_flight_a_quarter_of_each_range_around_the_start_is_all
     assert refused.worst == pytest.approx(103 / 409)
     assert refused.limit == 0.25
     assert refused.sentence == (
-        "The largest change, of kd, is 25.2\u00a0% of its range; only 25\u00a0% is allowed from the start "
-        "gains until a flight has shown more."
+        "The largest change, of kd, is 25.2\u00a0% of its range; only 25\u00a0% is allowed from the start gains "
+        "until a flight is valid."
     )
 
 

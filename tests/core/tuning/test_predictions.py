@@ -131,7 +131,7 @@ def test_the_record_counts_flights_inside_their_interval_and_predicted_direction
     assert (record.inside, record.of, record.share) == (1, 2, 0.5)
     assert (record.agreeing, record.disagreeing, record.trustworthy) == (1, 1, True)
     assert record.sentence == (
-        "1 of 2 flights lay in their predicted interval, 1 of 2 changed the error in the predicted direction."
+        "1 of 2 flights ended inside their predicted interval, 1 of 2 changed the error in the predicted direction."
     )
 
 
@@ -150,4 +150,4 @@ def test_flights_flown_again_and_flights_that_do_not_count_predict_no_direction(
     record = track_record([first, again, aborted])
     assert (record.of, record.inside, record.agreeing + record.disagreeing) == (1, 0, 0)
     empty = track_record([first])
-    assert (empty.share, empty.sentence) == (None, "No flight has put a prediction to the test yet.")
+    assert (empty.share, empty.sentence) == (None, "No prediction has been tested by a flight yet.")

@@ -79,7 +79,7 @@ def test_the_noise_rule_never_stops_on_errors_but_when_nothing_is_left_to_tell()
     judged = decide_stop(rule, same, "none", because="Better.")
     assert (judged.reason, judged.why) == ("told from noise", "Better.")
     spent = decide_stop(rule, [*same, 0.5], "none", because="Unresolved.")
-    assert (spent.reason, spent.why) == ("flight budget", "All 4 flights of the budget are flown. Unresolved.")
+    assert (spent.reason, spent.why) == ("flight budget", "All 4 flights of the budget have been flown. Unresolved.")
 
 
 @pytest.mark.parametrize("kind", ["paper", "noise", "budget"])
@@ -89,7 +89,7 @@ def test_a_low_battery_ends_a_campaign_under_every_rule(kind: Literal["paper", "
     assert decide_stop(rule, [0.5], "step").reason is None
     low = decide_stop(rule, [0.5], "step", battery_v=10.42, because="A step.")
     assert low.reason == "battery low"
-    assert low.why.startswith("The last flight ended at 10.42 V; 10.5 V is the least.")
+    assert low.why.startswith("The last flight ended at 10.42 V; the minimum is 10.5 V.")
 
 
 def test_the_battery_is_read_at_both_ends_of_a_record() -> None:

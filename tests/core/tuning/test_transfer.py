@@ -89,7 +89,7 @@ def test_the_agreement_is_the_share_of_the_deviation_that_the_other_vehicle_expl
     """Offsets 0.4 (A) and 0.5 (B), scatter 0.01: 1 − (0.1² − 2·0.01²)/0.5²."""
     found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, 0.5)], bowl.fly(3, 50, 50, 0.4))
     assert found.agreement == pytest.approx(1.0 - (0.01 - 0.0002) / 0.25, abs=1e-5)
-    assert "The other vehicle's best gains are taken over" in found.sentence
+    assert "The other vehicle's best gains are used" in found.sentence
 
 
 @pytest.mark.parametrize(("theirs", "ours", "agreement"), [(0.4, 0.41, 1.0), (0.0, 0.005, 1.0), (0.4, -0.1, 0.0)])

@@ -115,7 +115,8 @@ def _choose(
             if halvings == 0:
                 return _ChosenGains("step", gains, optimum)
             note = (
-                f"The whole step, to {format_gains(space.mapping(optimum))}, was aborted before or the gate refuses it."
+                f"The full step, to {format_gains(space.mapping(optimum))}, was aborted before or is refused by the "
+                "gate."
             )
             return _ChosenGains("shorter step", gains, optimum, (note,))
     note = f"Every step towards {format_gains(space.mapping(optimum))} was flown before or is refused by the gate."
@@ -148,21 +149,21 @@ def _summary(
     told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
     best = f"flight {base.number} ({format_gains(base.gains)}, error {short(base.error)} {unit})"
     if choice.kind == "none":
-        return f"{told} finds nothing that is better than {best} by {percent(MIN_IMPROVEMENT, 1)} and may be flown."
+        return f"{told} predicts no allowed gains that are better than {best} by {percent(MIN_IMPROVEMENT, 1)}."
     low, high = prediction.interval.lower, prediction.interval.upper
     assert base.error is not None
     share = 1.0 - prediction.error / base.error
     return (
-        f"{told} promises {percent(abs(share))} {'less' if share >= 0.0 else 'more'} error than with {best}: "
-        f"{short(prediction.error)} {unit}, with {percent(prediction.interval.confidence)} confidence within "
-        f"{short(low)} … {short(high)} {unit}."
+        f"{told} predicts {short(prediction.error)} {unit} ({percent(prediction.interval.confidence)} interval "
+        f"{short(low)} … {short(high)} {unit}), {percent(abs(share))} {'less' if share >= 0.0 else 'more'} error than "
+        f"{best}."
     )
 
 
 def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
-    kept = "What the best flight did beyond the model is kept inside the control loop."
-    limits = f"A bound or the trust region stopped {', '.join(clipped)}." if clipped else ""
-    trust = f"Steps of at most {percent(fraction)} of each range are trusted." if fraction < 1.0 else ""
+    kept = "The deviation of the best flight from the model is added inside the control loop."
+    limits = f"Clipped by a bound or the trust region: {', '.join(clipped)}." if clipped else ""
+    trust = f"Steps are limited to {percent(fraction)} of each gain's range." if fraction < 1.0 else ""
     return tuple(filter(None, (kept, limits, trust)))
 
 
@@ -174,15 +175,15 @@ def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> 
     shares = np.divide(np.abs(errors @ values), spread, out=np.zeros_like(spread), where=spread > 0.0)
     most = calibration.fitted[int(np.argmax(np.round(shares, 9)))]
     return (
-        f"Mostly {most.title.lower()}, now {most.value:.3g} ± {most.standard_error:.1g} {most.unit}: what is open in "
-        "the foretold error hangs on it more than on any other number."
+        f"Mostly {most.title.lower()}, now {most.value:.3g} ± {most.standard_error:.1g} {most.unit}: it contributes "
+        "most to the uncertainty of the predicted error."
     )
 
 
 CALIBRATED: Final = Strategy(
     name="calibrated",
     title="Calibrated model",
-    line="Fits the model to all flights and flies its optimum, hedged over what is left open: about two flights.",
+    line="Fits the model to all flights and flies its robust optimum. Typically two flights.",
     options=(),
     propose=propose,
     predict_errors=foresee,

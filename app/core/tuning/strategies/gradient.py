@@ -192,17 +192,19 @@ def _summary(
     unit = experiment.error_unit
     origin = f"The best flight so far is {base.number} ({format_gains(base.gains)}), error {short(base.error)} {unit}."
     if chosen is None:
-        may = " and may be flown" if refused else ""
-        return f"{origin} Along its gradient the corrected model finds nothing better that was not flown yet{may}."
+        may = " and pass the gate" if refused else ""
+        return (
+            f"{origin} Along its gradient the corrected model predicts no better gains that have not been flown{may}."
+        )
     if chosen is best:
         return (
             f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
-            f"{chosen.length:.4g} promises most: {short(chosen.predicted_error)} {unit}."
+            f"{chosen.length:.4g} has the lowest predicted error: {short(chosen.predicted_error)} {unit}."
         )
     why = "is refused by the gate" if refused else "did not improve on it"
     return (
-        f"{origin} The longer step along the same line {why}, so the next one goes less far, "
-        f"{chosen.length:.4g} instead of {best.length:.4g}; predicted {short(chosen.predicted_error)} {unit}."
+        f"{origin} The longer step in the same direction {why}, so the next one is shorter, {chosen.length:.4g} "
+        f"instead of {best.length:.4g}; predicted error {short(chosen.predicted_error)} {unit}."
     )
 
 
@@ -217,7 +219,7 @@ def _corrected(definition: Definition, experiment: ModelledExperiment, base: Fli
 
 
 def _notes(chosen: LadderStep | None, refused: Sequence[LadderStep]) -> tuple[str, ...]:
-    stopped = f"A bound or the step limit stopped {', '.join(chosen.clipped)}." if chosen and chosen.clipped else ""
+    stopped = f"Clipped by a bound or the step limit: {', '.join(chosen.clipped)}." if chosen and chosen.clipped else ""
     shortened = f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}." if refused else ""
     return tuple(filter(None, (stopped, shortened)))
 
@@ -229,13 +231,13 @@ GRADIENT: Final = Strategy(
     options=(
         Option(
             name="scaled",
-            title="Measure each gain in its own scale (off: raw counts, as the paper)",
+            title="Scale each gain (off: raw counts, as in the paper)",
             default=True,
             choices=(True, False),
         ),
         Option(
             name="bias",
-            title="Where the flight corrects the model: outside the control loop, or inside where its command is known",
+            title="Place of the correction: outside the control loop, or inside if the command was recorded",
             default="outside",
             choices=("outside", "inside"),
         ),

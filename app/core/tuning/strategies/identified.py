@@ -187,8 +187,8 @@ def _explanation(
     fitted = f"A and B were identified again from flight{plural} {numbers}."
     gains = format_gains(space.mapping(optimum.gains))
     offer = (
-        f"The identified model offers nothing worth a flight beyond flight {base.number}, "
-        f"error {short(base.error)} {experiment.error_unit}."
+        f"The identified model predicts no sufficient improvement over flight {base.number}, error "
+        f"{short(base.error)} {experiment.error_unit}."
         if stays
         else f"The identified model's optimum is at {gains}; predicted {short(error)} {experiment.error_unit}."
     )
@@ -196,14 +196,14 @@ def _explanation(
         summary=f"{fitted} {offer}",
         base_flight=base.number,
         notes=(_FITS[fit],),
-        lesson="How the aircraft moves under gains far from those flown so far; every flight enters the next fit.",
+        lesson="The dynamics under gains far from those flown so far; the next fit uses every flight.",
         fitted=fitted_parameters(experiment.model_parameters, found.model, found.covariance),
     )
 
 
 _FITS: Final[dict[Fit, str]] = {
     "least-squares": "Least squares over single steps: exact for clean records, biased by noise on the states.",
-    "map": "Maximum a posteriori over windows of a second: noise on the recorded states does no harm.",
+    "map": "Maximum a posteriori over windows of a second: not biased by noise on the recorded states.",
 }
 
 IDENTIFIED: Final = Strategy(
@@ -213,7 +213,7 @@ IDENTIFIED: Final = Strategy(
     options=(
         Option(
             name="fit",
-            title="How the model is identified: single steps (clean records), or windows of a second (noisy records)",
+            title="Identification: single steps (clean records), or windows of one second (noisy records)",
             default="map",
             choices=("least-squares", "map"),
         ),

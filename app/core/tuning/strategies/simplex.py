@@ -33,7 +33,7 @@ def propose(
         f"{optimum.evaluations} runs of the nominal model end at {format_gains(space.mapping(optimum.gains))}, "
         f"model error {short(optimum.error)} {experiment.error_unit}."
     )
-    summary = f"{found} That was flown; the model alone offers nothing more." if is_flown else found
+    summary = f"{found} These gains have been flown; the model alone proposes nothing else." if is_flown else found
     return Proposal(
         kind="none" if is_flown else "step",
         gains=space.mapping(gains),
