@@ -44,7 +44,7 @@ def _require_sound(copy: sqlite3.Connection) -> None:
     (found,) = copy.execute("PRAGMA quick_check(1)").fetchone()
     if found != "ok":
         raise StorageError(
-            f"The backup was not made: the database is damaged ({found}).",
+            f"The backup was not created: the database is damaged ({found}).",
             hint="Stop Gainline, keep a copy of gainline.sqlite3, most of which can be recovered, and restore the last "
             "backup.",
         )
@@ -54,8 +54,8 @@ def _require_room(database_file: Path) -> None:
     needed, free = database_bytes(database_file) + SPARE_BYTES, shutil.disk_usage(database_file.parent).free
     if free < needed:
         raise StorageError(
-            f"There is too little room for a copy: {free / 1e9:.1f} GB are free, and {needed / 1e9:.1f} GB are needed "
-            "so that flights can still be stored.",
+            f"There is too little disk space for a copy: {free / 1e9:.1f} GB are free, and {needed / 1e9:.1f} GB are "
+            "needed so that flights can still be stored.",
             hint="Free some disk space; or stop Gainline, and copy gainline.sqlite3 to another disk.",
         )
 

@@ -25,9 +25,9 @@ def carry_out_once(session: Session, key: str, fingerprint: str, answer: type[M]
     if (known := session.get(IdempotencyRow, key)) is not None:
         if known.fingerprint != fingerprint:
             raise KeyReusedError(
-                f"The idempotency key {key!r} was used before, for another request.",
-                hint="Use a new key for every act, and the same key only to send the very same request again.",
-                problems=(Problem("Idempotency-Key", "stands for another request"),),
+                f"The idempotency key {key!r} has already been used for another request.",
+                hint="Use a new key for every operation, and the same key only to repeat an identical request.",
+                problems=(Problem("Idempotency-Key", "belongs to another request"),),
             )
         return answer.model_validate_json(known.answer)
     session.execute(delete(IdempotencyRow).where(IdempotencyRow.created_at < utc_now() - KEPT))

@@ -42,7 +42,7 @@ def migrate(database_file: Path) -> None:
             broken = connection.execute(text("PRAGMA foreign_key_check")).first()
             if broken is not None:
                 raise SchemaError(
-                    f"After its migration {database_file} refers to rows that are gone ({broken}).",
+                    f"After the migration, {database_file} refers to missing rows ({broken}).",
                     hint="Restore the last backup and report this.",
                 )
             connection.commit()
@@ -59,7 +59,7 @@ def require_current(database_file: Path) -> None:
         raise _newer(database_file, held)
     raise SchemaError(
         f"The database {database_file} is at revision {held or 'none'}, not {REVISION}.",
-        hint=f"Run `{_COMMAND}`, which brings it up to date, or `alembic upgrade head` in a checkout.",
+        hint=f"Run `{_COMMAND}` to migrate it, or `alembic upgrade head` in a checkout.",
     )
 
 

@@ -122,28 +122,28 @@ def _storage_error(error: DBAPIError | sqlite3.Error, database_file: Path) -> St
 
 _DAMAGED: Final = (
     "The database {file} is damaged.",
-    "Stop Gainline and restore the last backup; keep the damaged file, most of it can be recovered.",
+    "Stop Gainline and restore the last backup; keep the damaged file, because most of it can be recovered.",
 )
 _TROUBLES: Final = {
     "is full": (
-        "The disk that holds {file} is full; nothing of this request was stored.",
-        "Free some space there, then do the same again; everything stored before is intact.",
+        "The disk that holds {file} is full; nothing from this request was stored.",
+        "Free some disk space there, then try again. Everything stored before is intact.",
     ),
     "disk i/o error": (
-        "The disk that holds {file} could not be written or read; nothing of this request was stored.",
-        "Check its free space and its health, then do the same again.",
+        "The disk that holds {file} could not be written or read; nothing from this request was stored.",
+        "Check its free space and its health, then try again.",
     ),
     "is locked": (
-        "The database was busy for longer than five seconds; nothing of this request was stored.",
-        "Do the same again. If it happens often, look for another program that holds {file} open.",
+        "The database was busy for longer than five seconds; nothing from this request was stored.",
+        "Try again. If it happens often, check for another program that has {file} open.",
     ),
     "readonly database": (
-        "The database {file} may not be written by this user; nothing of this request was stored.",
-        "Give this user the right to write the file and its folder, then do the same again.",
+        "This user has no permission to write the database {file}; nothing from this request was stored.",
+        "Give this user write permission for the file and its folder, then try again.",
     ),
     "unable to open": (
         "The database {file} cannot be opened.",
-        "Check that its folder exists and that this user may write there.",
+        "Check that its folder exists and that this user can write there.",
     ),
     "malformed": _DAMAGED,
     "no such table": _DAMAGED,

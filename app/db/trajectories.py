@@ -75,7 +75,7 @@ def unpack(packed: Packed) -> Trajectory:
     if packed.codec != VERSION:
         raise StorageError(
             f"A flight record has the unknown version {packed.codec}.",
-            hint="It was written by a newer Gainline; open it with that one.",
+            hint="It was written by a newer Gainline; open it with that version.",
         )
     size = len(packed.columns) * packed.samples * _WIDTH
     try:
@@ -101,16 +101,16 @@ def _require_storable(columns: list[str], table: Table) -> None:
     if not finite.all():
         column, sample = (int(index) for index in np.argwhere(~finite)[0])
         raise TrajectoryError(
-            "This record holds a number that cannot be stored.",
+            "This record contains a number that cannot be stored.",
             hint="Correct the record and send it again.",
             problems=(Problem(columns[column], f"is not finite, or larger than 3.4e38, at sample {sample}"),),
         )
     if (np.diff(table[0]) <= 0).any():
         sample = int(np.argmax(np.diff(table[0]) <= 0)) + 1
         raise TrajectoryError(
-            "The time stamps of this record do not rise once they are stored (single precision).",
-            hint="Let time start near zero at the command, and sample no faster than 100 kHz.",
-            problems=(Problem(_TIME, f"does not rise at sample {sample}"),),
+            "The time stamps of this record do not increase once stored (single precision).",
+            hint="Count time from the command, and sample no faster than 100 kHz.",
+            problems=(Problem(_TIME, f"does not increase at sample {sample}"),),
         )
 
 
@@ -120,8 +120,8 @@ def _checksum(columns: list[str], plain: bytes) -> str:
 
 def _damaged() -> StorageError:
     return StorageError(
-        "A stored flight record is damaged: its checksum does not fit.",
-        hint="Restore it from a backup; the trial's other figures are intact.",
+        "A stored flight record is damaged: its checksum does not match.",
+        hint="Restore it from a backup; the trial's other data is intact.",
     )
 
 
@@ -223,7 +223,7 @@ def require_intact(database_file: Path) -> None:
     with closing(Database(database_file)) as database, database.read() as session:
         damaged = damaged_trials(session)
         if damaged:
-            raise refused_for(damaged, "The backup was not made")
+            raise refused_for(damaged, "The backup was not created")
 
 
 def refused_for(damaged: Sequence[TrialRow], what: str) -> StorageError:
@@ -231,12 +231,12 @@ def refused_for(damaged: Sequence[TrialRow], what: str) -> StorageError:
     names = [f"trial {row.number} of campaign {row.campaign_id}" for row in damaged]
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     records = "the record of" if len(names) == 1 else f"{len(names)} records are damaged, those of"
-    ending = " is damaged: its checksum does not fit." if len(names) == 1 else "."
+    ending = " is damaged: its checksum does not match." if len(names) == 1 else "."
     return StorageError(
         f"{what}: {records} {', '.join(names[:_NAMED])}{more}{ending}",
-        hint="Everything else is intact. Take the damaged records from an earlier backup or bundle; to keep the "
-        "database as it is, stop Gainline and copy gainline.sqlite3.",
-        problems=tuple(Problem(name, "its record does not fit its checksum") for name in names),
+        hint="Everything else is intact. Restore the damaged records from an earlier backup or bundle. To keep "
+        "the database unchanged, stop Gainline and copy gainline.sqlite3.",
+        problems=tuple(Problem(name, "its record does not match its checksum") for name in names),
     )
 
 

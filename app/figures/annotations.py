@@ -131,7 +131,7 @@ def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit:
     return {
         "type": "scatter",
         "mode": "markers",
-        "name": "Off the scale",
+        "name": "Off scale",
         "x": [flight.number for flight in flights],
         "y": [top] * len(flights),
         "text": [f"{flight.error:.2f} {unit}" for flight in flights],

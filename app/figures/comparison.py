@@ -57,7 +57,7 @@ class ComparisonFigure:
     title: ClassVar[str] = "Curves compared"
 
     def not_ready(self) -> str | None:
-        return None if self._recorded() else "None of these flights left a record."
+        return None if self._recorded() else "None of these flights has a record."
 
     def compute(self) -> Card:
         palette, recorded = PALETTES[self.theme], self._recorded()
@@ -175,9 +175,9 @@ class ComparisonFigure:
             + ("no error" if flight.error is None else f"error {flight.error:.3f} {data.error_unit}")
             for flight in data.flights
         )
-        off = f" {outside} off the scale, marked at the edge." if outside else ""
+        off = f" {outside} off scale, marked at the edge." if outside else ""
         return (
-            f"{data.output_title} of {len(data.flights)} flights over time, and below how each differs from "
+            f"{data.output_title} of {len(data.flights)} flights over time, and below the difference of each from "
             f"{data.flights[0].label}: {told}.{off}"
         )
 

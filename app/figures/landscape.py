@@ -73,7 +73,7 @@ class LandscapeFigure:
     title: ClassVar[str] = "Error landscape of the model"
 
     def not_ready(self) -> str | None:
-        return None if self.landscape.slices else "There is nothing to draw: no gain is free."
+        return None if self.landscape.slices else "Nothing to draw: no gain is free."
 
     def compute(self) -> Card:
         palette, slices = PALETTES[self.theme], self.landscape.slices
@@ -254,12 +254,12 @@ class LandscapeFigure:
         held = ", ".join(f"{name} {value:g}" for name, value in self.landscape.centre.items())
         parts = [
             f"The error that the model predicts, {pairs}.",
-            f"What a slice does not vary is held at {held}; flights with other values there are drawn all the same.",
-            f"Contours every {scale.step:g} {self.history.error_unit}; shaded is what lies above {scale.high:g}.",
+            f"The other gains are fixed at {held}; flights with other values of them are drawn too.",
+            f"Contours every {scale.step:g} {self.history.error_unit}; values above {scale.high:g} are shaded.",
         ]
         if self.landscape.still:
             parts.append(
-                f"Varied are the gains that hold most of the gradient; {', '.join(self.landscape.still)} stand still."
+                f"The gains with most of the gradient are varied; {', '.join(self.landscape.still)} are fixed."
             )
         return " ".join(parts)
 

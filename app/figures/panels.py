@@ -71,7 +71,7 @@ class PanelsFigure:
     title: ClassVar[str] = "Panels"
 
     def not_ready(self) -> str | None:
-        return None if any(panel.lines for panel in self.plot.panels) else "There is nothing to draw."
+        return None if any(panel.lines for panel in self.plot.panels) else "Nothing to draw."
 
     def compute(self) -> Card:
         palette, plot = PALETTES[self.theme], self.plot
@@ -236,7 +236,7 @@ class ControllerFigure:
         return self.heading
 
     def not_ready(self) -> str | None:
-        return None if self.signals else "The log holds no command that could be simulated again."
+        return None if self.signals else "The log contains no command that could be simulated again."
 
     def compute(self) -> Card:
         plot = Plot(

@@ -214,7 +214,7 @@ class TrajectoriesFigure:
             if history.best is None
             else (f" Best: flight {history.best.number}, error {history.best.error:.3f} {history.error_unit}.")
         )
-        off = f" {outside} off the scale, marked at the top." if outside else ""
+        off = f" {outside} off scale, marked at the top." if outside else ""
         noun = "flight" if len(history.flights) == 1 else "flights"
         return f"{history.output_title} over time: {len(history.flights)} {noun}.{best}{off}"
 

@@ -38,7 +38,7 @@ class CalibrationFigure:
     verdict: str
     theme: ThemeName = "light"
     name: ClassVar[str] = "calibration"
-    title: ClassVar[str] = "Calibration over the flights"
+    title: ClassVar[str] = "Calibration history"
 
     def not_ready(self) -> str | None:
         if self.points:
@@ -203,7 +203,7 @@ class BatteriesFigure:
     def not_ready(self) -> str | None:
         if any(flight.before_v is not None or flight.after_v is not None for flight in self.flights):
             return None
-        return "Voltages before and after each flight appear here once a flight has told them."
+        return "Voltages before and after each flight appear here once a flight has reported them."
 
     def compute(self) -> Card:
         palette = PALETTES[self.theme]
@@ -263,4 +263,4 @@ class BatteriesFigure:
     def _summary(self, labels: list[str]) -> str:
         counted = [(label, sum(flight.battery == label for flight in self.flights)) for label in labels]
         told = ", ".join(f"{label or 'no label'}: {count} flight{'s' if count > 1 else ''}" for label, count in counted)
-        return f"Open marks are before a flight, the smaller full ones after it. {told}."
+        return f"Open marks: before a flight; smaller filled marks: after it. {told}."

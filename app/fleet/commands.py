@@ -35,8 +35,8 @@ REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 BY_WORKER: Final = "the worker"
 
 _WITHDRAWN: Final = {
-    ActState.REQUESTED: "It was not begun: the worker was away when it was asked for.",
-    ActState.RUNNING: "It was not finished: the worker ended.",
+    ActState.REQUESTED: "It was not started: no worker was running when it was requested.",
+    ActState.RUNNING: "It was not finished: the worker stopped.",
 }
 _READ_ONLY_ACTS: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
 """Acts that change nothing on the vehicle, so that every operator may request them."""
@@ -75,7 +75,7 @@ def request_act(session: Session, vehicle_id: int, kind: ActKind, context: Reque
     row = repository.get_one(session, vehicle_id)
     if not row.registered:
         raise ConflictError(
-            f"{row.name} is shared by all campaigns and needs no link.", hint="Fly it from a campaign, in one go."
+            f"{row.name} is shared by all campaigns and needs no link.", hint="Fly it from a campaign, without staging."
         )
     return act_view(_requested(session, row, kind, context))
 
@@ -111,7 +111,7 @@ def _requested(
     if kind == ActKind.DISCONNECT:
         require_may(Permission.STOP, row, context)
         if not is_linked_or_wanted(row):
-            raise ConflictError(f"{row.name} is neither connected nor looked for.", hint="Connect it, if it is wanted.")
+            raise ConflictError(f"{row.name} is neither connected nor reconnecting.", hint="Connect it.")
     else:
         require_may_command(row, context)
     by = "" if kind in _READ_ONLY_ACTS else require_not_controlled_by_other(row, context)
@@ -145,7 +145,7 @@ def claim_act(session: Session, worker: str) -> ActTask | None:
             _move(act, ActState.RUNNING)
             act.worker, act.claimed_at = worker, utc_now()
             return ActTask(act_id=act.id, kind=act.kind, reason=act.reason, vehicle=_linked(act.vehicle))
-        _end(act, problem=f"It could not be begun within {REQUEST_TIMEOUT.total_seconds():g} s. Ask again.")
+        _end(act, problem=f"It could not be started within {REQUEST_TIMEOUT.total_seconds():g} s. Request it again.")
     return None
 
 
@@ -178,7 +178,7 @@ def withdraw_acts(session: Session) -> list[int]:
     """End all requested and running acts at a worker's start; they are not carried out later. Returns their ids."""
     found = repository.acts_under_way(session)
     for act in found:
-        _end(act, problem=f"{_WITHDRAWN[act.state]} Ask again if it is still wanted.")
+        _end(act, problem=f"{_WITHDRAWN[act.state]} Request it again if it is still needed.")
     return [act.id for act in found]
 
 
@@ -219,7 +219,7 @@ def record_reconnected(
     read_back = dict(held) or None
     record_connected(session, vehicle_id, identity, concern=concern, held=read_back)
     given = dict(row.safe_gains) if _was_given(row, read_back) else None
-    act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is there again", asked=given)
+    act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is reachable again", asked=given)
     act.read_back = read_back
     return True
 

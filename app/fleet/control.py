@@ -45,10 +45,10 @@ def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, context
     if held is not None and not asked.take_over:
         raise ConflictError(
             f"{held.operator} is in control of {row.name}.",
-            hint="Ask them to hand it over, or take over: everybody sees that.",
+            hint="Ask them to release control, or take over; every operator sees a takeover.",
         )
     if asked.token is not None and not asked.take_over:
-        raise ConflictError(f"Your control of {row.name} has ended.", hint="Take control again if you still want it.")
+        raise ConflictError(f"Your control of {row.name} has ended.", hint="Take control again.")
     if held is not None:
         record_act(session, row, ActKind.CONTROL, by=asked.operator, reason=f"took over from {held.operator}")
     return _granted(session, row, asked.operator, secrets.token_urlsafe(24))
@@ -62,7 +62,8 @@ def give_up_control(session: Session, vehicle_id: int, token: str | None) -> Non
         return
     if token is None or not holds(row, token):
         raise ConflictError(
-            f"{held.operator} is in control of {row.name}, not you.", hint="Only who has control can give it up."
+            f"{held.operator} is in control of {row.name}, not you.",
+            hint="Only the operator in control can release it.",
         )
     row.operator = row.operator_token_hash = row.operator_until = None
 
@@ -80,7 +81,7 @@ def require_not_controlled_by_other(row: VehicleRow, context: RequestContext) ->
     if context.token is None or not holds(row, context.token):
         raise ConflictError(
             f"{held.operator} is in control of {row.name}.",
-            hint="Ask them to do it or to hand over control; abort, land and motors off are open to everybody.",
+            hint="Ask them to do it or to release control. Abort, land and motors off need no control.",
         )
     return held.operator
 
@@ -91,12 +92,12 @@ def require_control(row: VehicleRow, context: RequestContext) -> str:
     require(Permission.TAKE_OFF, context.caller, row.name)
     if not context.from_our_page:
         raise NotAllowedError(
-            f"{row.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
+            f"{row.name} is a real vehicle: only its operator can start the take-off, in the browser.",
             hint="A script can propose gains and stage the flight; the operator then holds the button on the fly page.",
         )
     operator = require_not_controlled_by_other(row, context)
     if not operator:
-        raise ConflictError(f"Nobody is in control of {row.name}.", hint="Take control on the fly page first.")
+        raise ConflictError(f"No operator is in control of {row.name}.", hint="Take control on the fly page first.")
     return operator
 
 

@@ -34,9 +34,9 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
     kind = get_kind(new.kind, field="kind")
     if not is_registered_one_by_one(kind):
         raise InputError(
-            f"Vehicles of kind {kind.name} are not registered: they are there for every campaign.",
+            f"Vehicles of kind {kind.name} need no registration: every campaign can use them.",
             hint=f"Create a campaign with the vehicle {kind.name}.",
-            problems=(Problem("kind", "has no vehicles of its own"),),
+            problems=(Problem("kind", "cannot be registered"),),
         )
     require(Permission.LINK, context.caller, new.name)
     options = kind.check(new.options, field="options", simulation_hosts=context.simulation_hosts)
@@ -108,7 +108,7 @@ def promote_gains(
 def _require_own(row: VehicleRow) -> None:
     if not row.registered:
         raise ConflictError(
-            f"{row.name} is shared by all campaigns; its settings stand in each of them.", hint="Edit the campaign."
+            f"{row.name} is shared by all campaigns; its settings belong to each campaign.", hint="Edit the campaign."
         )
 
 
@@ -124,14 +124,15 @@ def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], context: Req
         return
     if row.state != VehicleState.DISCONNECTED:
         raise ConflictError(
-            f"{row.name} is connected; its link's settings cannot change under it.",
+            f"{row.name} is connected; its link settings cannot be changed.",
             hint="Disconnect it, change them, and connect it again.",
         )
     if kind.is_real_with(options, context.simulation_hosts) != row.is_real:
         raise InputError(
-            f"{row.name} is {'REAL' if row.is_real else 'simulated'} and stays so: that tells its flights apart.",
-            hint="Register the other one as a vehicle of its own.",
-            problems=(Problem("options", "would make another vehicle of it"),),
+            f"{row.name} is {'REAL' if row.is_real else 'simulated'}. This cannot be changed, because its flights "
+            "are classified by it.",
+            hint="Register the other vehicle separately.",
+            problems=(Problem("options", "would change whether the vehicle is real"),),
         )
     _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has other gains
     row.options, row.identity, row.checks, row.checked_at = options, None, None, None
@@ -145,8 +146,8 @@ def _set_safe_gains(
         return
     if statement is None:
         raise InputError(
-            f"The safe gains of {row.name} are what every flight ends with; who changes them says why.",
-            hint="Say in a sentence who decided that, and from which flights.",
+            f"Changing the safe gains of {row.name} needs a statement: every flight ends with them.",
+            hint="State who decided the change, and from which flights.",
             problems=(Problem("statement", "is missing"),),
         )
     row.safe_gains = gains
@@ -163,8 +164,8 @@ def _require_free(session: Session, name: str, *, unless: int | None = None) -> 
     taken = repository.of_name_or_none(session, name)
     if (taken is not None and taken.id != unless) or any(kind.title == name for kind in VEHICLE_KINDS.values()):
         raise ConflictError(
-            f"Another vehicle is called {name}.",
-            hint="Give this one a name of its own: it stands on every page that shows the vehicle.",
+            f"Another vehicle has the name {name}.",
+            hint="Choose another name: every page identifies the vehicle by it.",
             problems=(Problem("name", "is taken"),),
         )
 
@@ -172,15 +173,15 @@ def _require_free(session: Session, name: str, *, unless: int | None = None) -> 
 def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
     problems = []
     if not new.safe_gains_confirmed:
-        problems.append(Problem("safe_gains_confirmed", "must be true once a person has looked at the safe gains"))
+        problems.append(Problem("safe_gains_confirmed", "must be true once a person has reviewed the safe gains"))
     if not new.statement.strip():
-        problems.append(Problem("statement", "must say who has looked"))
+        problems.append(Problem("statement", "must name the reviewer"))
     if problems:
         spoken = ", ".join(f"{name} {value:g}" for name, value in gains.items())
         raise UnconfirmedError(
-            f"{new.name} is a real vehicle, and every flight of it would end with {spoken}: a person has to look at "
-            "these gains first.",
-            hint="Compare them with what flies well on this vehicle, then confirm them and say who did.",
+            f"{new.name} is a real vehicle, and every flight of it ends with {spoken}. A person must review these "
+            "gains first.",
+            hint="Compare them with gains that fly well on this vehicle, then confirm them and give your name.",
             problems=tuple(problems),
         )
 
@@ -205,7 +206,7 @@ def get_or_create_imported_vehicle(
             return _made(session, called, is_real=is_real, options=origin, safe_gains=safe_gains)
         if (known.kind, known.registered, known.is_real, known.options) == (IMPORT.name, False, is_real, origin):
             return known
-    raise AssertionError("numbers do not end")
+    raise AssertionError("unreachable")
 
 
 def origin_of(row: VehicleRow) -> tuple[str, str] | None:

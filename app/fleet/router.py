@@ -100,7 +100,7 @@ def list_given_gains(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor:
 @router.post("/{vehicle_id}/land", status_code=status.HTTP_202_ACCEPTED)
 async def land_vehicle(live: Live, vehicle_id: Id, body: VehicleOrder | None = None) -> OrderAnswer:
     """Land the vehicle now, whatever it is doing. Goes straight to the worker without waiting for storage."""
-    return await _order(live, vehicle_id, "land", body, "The vehicle is told to land until it agrees.")
+    return await _order(live, vehicle_id, "land", body, "The land command is repeated until the vehicle accepts it.")
 
 
 @router.post("/{vehicle_id}/motors-off", status_code=status.HTTP_202_ACCEPTED)
@@ -111,7 +111,7 @@ async def stop_motors(
     Only for a client that may not command real vehicles is the database read first, to see whether this is one."""
     if not is_allowed(permissions.Permission.STOP, asking.caller):
         await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
-    return await _order(live, vehicle_id, "motors off", body, "The vehicle is told to stop its motors.")
+    return await _order(live, vehicle_id, "motors off", body, "The command to stop the motors has been sent.")
 
 
 def _require_simulated(database: CurrentDatabase, vehicle_id: int, asking: RequestContextDep) -> None:

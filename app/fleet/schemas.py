@@ -31,7 +31,9 @@ class CampaignVehicle(BaseModel):
     is_real: bool
     registered: bool
     can_fly: Annotated[bool, Field(description="false when flights are made elsewhere and uploaded")]
-    needs_staging: Annotated[bool, Field(description="true when a flight is staged first, and taken off by a person")]
+    needs_staging: Annotated[
+        bool, Field(description="true if a flight is staged first and its operator starts the take-off")
+    ]
     state: VehicleState
     options: dict[str, OptionValue]
 
@@ -66,8 +68,8 @@ class Identity(BaseModel):
 
     system_id: int
     autopilot: str
-    version: Annotated[str, Field(description="empty where the autopilot does not tell")]
-    uid: Annotated[str, Field(description="hardware id in hexadecimal digits; empty where it is not told")] = ""
+    version: Annotated[str, Field(description="empty if the autopilot does not report it")]
+    uid: Annotated[str, Field(description="hardware id in hexadecimal digits; empty if it is not reported")] = ""
 
 
 class VehicleCheck(BaseModel):
@@ -119,7 +121,7 @@ class Vehicle(BaseModel):
     registered: bool
     state: VehicleState
     concern: str
-    experiments: Annotated[list[str], Field(description="those that it can fly: whose gains it has")]
+    experiments: Annotated[list[str], Field(description="experiments that it can fly: those whose gains it has")]
     options: dict[str, OptionValue]
     identity: Identity | None
     safe_gains: Gains
@@ -127,9 +129,9 @@ class Vehicle(BaseModel):
     held_at: datetime | None
     checks: list[VehicleCheck] | None
     checked_at: datetime | None
-    battery: Annotated[str, Field(description="label of the battery that is in; empty when nobody said")]
-    control: Annotated[Control | None, Field(description="null while nobody is in control")]
-    actions: Annotated[list[str], Field(description="what may be done with it now: fly, stage, connect, release, …")]
+    battery: Annotated[str, Field(description="label of the installed battery; empty if not given")]
+    control: Annotated[Control | None, Field(description="null while no operator is in control")]
+    actions: Annotated[list[str], Field(description="allowed actions: fly, stage, connect, release, …")]
 
 
 class VehicleAct(BaseModel):
@@ -140,12 +142,12 @@ class VehicleAct(BaseModel):
     vehicle_id: int
     kind: ActKind
     state: ActState
-    by: Annotated[str, Field(description="the operator in control; empty when nobody was")]
+    by: Annotated[str, Field(description="the operator in control; empty if there was none")]
     reason: str
     asked: Gains | None
     read_back: Gains | None
     result: dict[str, object] | None
-    problem: Annotated[str, Field(description="why it failed; empty when it did not")]
+    problem: Annotated[str, Field(description="why it failed; empty if it did not")]
     requested_at: datetime
     finished_at: datetime | None
 

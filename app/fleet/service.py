@@ -59,7 +59,7 @@ def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Ga
         return _registered(session, choice, choice.id, default_gains)
     described = get_kind(choice.kind)
     if is_registered_one_by_one(described):
-        raise _no_choice("id", "is missing: vehicles of this kind are registered one by one")
+        raise _no_choice("id", "is missing: each vehicle of this kind is registered")
     if (known := repository.shared_of_kind_or_none(session, choice.kind)) is not None:
         return known
     row = VehicleRow(
@@ -82,7 +82,7 @@ def _registered(session: Session, choice: VehicleChoice, vehicle_id: int, defaul
     if row.kind != choice.kind:
         raise _no_choice("kind", f"{row.name} is of kind {row.kind}")
     if choice.options and choice.options != row.options:
-        raise _no_choice("options", f"are those that {row.name} is registered with; change them there")
+        raise _no_choice("options", f"are those with which {row.name} is registered; change them there")
     if row.safe_gains.keys() != default_gains.keys():
         ours, its = ", ".join(default_gains), ", ".join(row.safe_gains)
         raise _no_choice("id", f"{row.name} has the gains {its}; this experiment tunes {ours}")
@@ -109,9 +109,9 @@ def simulation_for(session: Session, experiment: str, gains: Gains) -> VehicleCh
 
 def _no_choice(field: str, reason: str) -> InputError:
     return InputError(
-        "This vehicle cannot be used.",
+        "Invalid vehicle.",
         problems=(Problem(f"vehicle.{field}", reason),),
-        hint="Register the vehicle on the fleet page (POST /api/vehicles), and give its id.",
+        hint="Register the vehicle on the fleet page (POST /api/vehicles) and give its id.",
     )
 
 
@@ -120,14 +120,14 @@ def require_ready(session: Session, row: VehicleRow, action: str) -> None:
     if not can_fly(row):
         raise ConflictError(
             f"{row.name} cannot be flown from here.",
-            hint="Fly it elsewhere, then upload the record of the flight to the planned trial.",
+            hint="Fly it elsewhere, then upload the flight record to the planned trial.",
         )
     if row.state == VehicleState.QUARANTINED:
         raise ConflictError(
-            f"{row.name} is quarantined: {row.concern}", hint="Look at the vehicle, verify its gains, then release it."
+            f"{row.name} is quarantined: {row.concern}", hint="Inspect the vehicle, verify its gains, then release it."
         )
     if row.state == VehicleState.DISCONNECTED:
-        raise ConflictError(f"{row.name} is not connected.", hint="Connect it on its page, then ask again.")
+        raise ConflictError(f"{row.name} is not connected.", hint="Connect it on its page, then try again.")
     check_action(VEHICLE_ACTIONS, action, row.state, row.name)
     require_idle(session, row)
 
@@ -136,11 +136,11 @@ def require_idle(session: Session, row: VehicleRow) -> None:
     """Raise BusyError while the vehicle has a flight or an act under way, because requests do not queue."""
     if (flight := repository.flight_under_way(session, row.id)) is not None:
         raise BusyError(
-            f"{row.name} has a flight already: trial {flight.trial.number} of campaign {flight.campaign_id}.",
+            f"{row.name} already has a flight: trial {flight.trial.number} of campaign {flight.campaign_id}.",
             hint="Wait until it has landed, or abort it; flights do not queue.",
         )
     if (act := repository.act_under_way(session, row.id)) is not None:
-        raise BusyError(f"{row.name} is busy: “{act.kind}” is under way.", hint="Wait until that is done.")
+        raise BusyError(f"{row.name} is busy: “{act.kind}” is in progress.", hint="Wait until that has finished.")
 
 
 def set_vehicle_state(row: VehicleRow, to: VehicleState) -> None:

@@ -141,8 +141,8 @@ class VehicleConnectionManager:
             try:
                 {ActKind.CONNECT: self._connect, ActKind.DISCONNECT: self._disconnect}.get(task.kind, self._ask)(task)
             except Exception as error:  # noqa: BLE001 - outermost frame; the vehicle must not stay busy for ever
-                _log.exception("act failed by a mistake of the program")
-                self._fail(task, f"The program made a mistake ({type(error).__name__}); see the worker's log.")
+                _log.exception("act failed with an internal error")
+                self._fail(task, f"Internal error ({type(error).__name__}); see the worker's log.")
 
     def _connect(self, task: ActTask) -> None:
         slot = self._slot(task.vehicle.vehicle_id)
@@ -228,7 +228,7 @@ class VehicleConnectionManager:
                 commands.record_disconnected(transaction, vehicle_id)
         except ConflictError:
             return  # the database still has its flight: try again later
-        _log.warning("the session of a vehicle ended by itself", vehicle_id=vehicle_id)
+        _log.warning("vehicle connection ended unexpectedly", vehicle_id=vehicle_id)
         if slot.session is gone:  # not one that was opened meanwhile
             slot.session = None
         self._publish_state(vehicle_id, "gone")
@@ -331,11 +331,11 @@ class VehicleConnectionManager:
                 with self._database.write() as transaction:
                     return work(transaction)
             except StorageError as error:
-                _log.error("what became of a vehicle is not stored yet", why=str(error))
+                _log.error("vehicle state not stored yet", why=str(error))
                 if self._closing.wait(self._clock.wall_s(RETRY_S)):
                     return None
             except GainlineError as error:
-                _log.error("what became of a vehicle does not fit the books", why=str(error))
+                _log.error("vehicle state conflicts with the database", why=str(error))
                 return None
 
 
@@ -377,5 +377,5 @@ def _refused(problem: str) -> Future[str]:
 
 def _no_link_error() -> VehicleError:
     return VehicleError(
-        "There is no link to the vehicle.", hint="It is looked for; wait until it is connected, then ask again."
+        "There is no link to the vehicle.", hint="Gainline is reconnecting; wait until it is connected, then try again."
     )

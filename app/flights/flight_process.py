@@ -205,7 +205,7 @@ def _listener(pipe: Connection, trial_id: int, standing_down: str | None, asked:
                 if isinstance(message, CancelFlight) and message.trial_id == trial_id:
                     return StopRequest(message.reason)
         except (EOFError, OSError):
-            return StopRequest("the worker is gone")
+            return StopRequest("the worker has exited")
         return None
 
     return should_stop

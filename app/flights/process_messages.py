@@ -155,8 +155,8 @@ def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightR
 
 def process_died_error(exit_code: int | None) -> VehicleError:
     return VehicleError(
-        f"The process that flew died (exit code {exit_code}).",
-        hint="Look at the vehicle. The worker's log may say more; then fly again.",
+        f"The flight process died (exit code {exit_code}).",
+        hint="Inspect the vehicle and the worker's log, then fly again.",
     )
 
 
@@ -179,7 +179,7 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 def internal_error(error: Exception) -> FlightFailure:
     """Failure message of an internal error, so that the trial gets a definite end."""
-    return FlightFailure(f"The program made a mistake ({type(error).__name__}: {error}).", unsafe=False)
+    return FlightFailure(f"Internal error ({type(error).__name__}: {error}).", unsafe=False)
 
 
 @contextmanager

@@ -56,8 +56,8 @@ def running(session: Session) -> Sequence[FlightRow]:
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 
-_WORKER_ENDED: Final = {True: "the worker ended while it flew", False: "the worker ended before lift-off"}
-_NOT_VERIFIED: Final = "whoever had it ended before its safe gains were read back, so nobody knows which gains it holds"
+_WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "the worker stopped before lift-off"}
+_NOT_VERIFIED: Final = "its process ended before the safe gains were read back; the gains on the vehicle are unknown"
 
 
 def claim_flight(session: Session, worker: str) -> FlightRequest | None:
@@ -68,7 +68,7 @@ def claim_flight(session: Session, worker: str) -> FlightRequest | None:
     while (flight := first_requested(session)) is not None:
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
             return _claimed(session, flight, worker)
-        _withdraw(flight, f"it could not be begun within {REQUEST_TIMEOUT.total_seconds():g} s")
+        _withdraw(flight, f"it could not be started within {REQUEST_TIMEOUT.total_seconds():g} s")
     return None
 
 
@@ -84,7 +84,7 @@ def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
 
 def _withdraw(flight: FlightRow, reason: str) -> None:
     set_flight_state(
-        flight, FlightState.CANCELLED, problem=f"It was not flown: {reason}. Ask again if it is still wanted."
+        flight, FlightState.CANCELLED, problem=f"It was not flown: {reason}. Request it again if it is still needed."
     )
 
 
@@ -141,7 +141,7 @@ def stand_down_wanted(session: Session, flight_id: int) -> str | None:
     if flight.trial.state not in {TrialState.PLANNED, TrialState.STAGED}:
         return f"the trial is {flight.trial.state}"
     if flight.mode == "stage" and flight.take_off_at is not None and not _may_take_off(flight):
-        return f"it could not take off within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's word"
+        return f"the take-off did not start within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's request"
     return None
 
 
@@ -161,12 +161,12 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     flight = _running(session, flight_id)
     trial = flight.trial
     if not take_off_wanted(session, flight_id):
-        why = stand_down_wanted(session, flight_id) or "nobody has asked for its take-off"
-        raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still wanted.")
+        why = stand_down_wanted(session, flight_id) or "its take-off has not been requested"
+        raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
     if trial.read_back != trial.gains:
         raise ConflictError(
             f"Trial {trial.number} must not fly: the vehicle holds {trial.read_back}.",
-            hint="Stage it again; if it happens again, look at the vehicle's link.",
+            hint="Stage it again. If this happens again, check the vehicle's link.",
         )
     set_trial_state(trial, TrialState.FLYING, reason="")
     trial.flown_at = utc_now()
@@ -292,7 +292,7 @@ def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record:
 def _running(session: Session, flight_id: int) -> FlightRow:
     flight = get_flight(session, flight_id)
     if flight.state != FlightState.RUNNING:
-        raise ConflictError(f"Flight {flight_id} is {flight.state}, not running.", hint="It must not go on.")
+        raise ConflictError(f"Flight {flight_id} is {flight.state}, not running.", hint="It must not continue.")
     return flight
 
 

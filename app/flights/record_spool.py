@@ -49,8 +49,9 @@ class Spool:
             with suppress(OSError):
                 path.unlink(missing_ok=True)
             raise StorageError(
-                f"There is no room for the flight's record in {self._folder}: {error.strerror}.",
-                hint=f"Free at least {2 * RESERVED_BYTES // 2**20} MB there, then fly again; nothing has moved.",
+                f"There is no space for the flight record in {self._folder}: {error.strerror}.",
+                hint=f"Free at least {2 * RESERVED_BYTES // 2**20} MB there, then fly again. The vehicle has not "
+                "moved.",
             ) from error
 
     def write(self, flight_id: int, record: FlightRecord) -> None:
@@ -82,7 +83,7 @@ class Spool:
         except (OSError, ValueError, KeyError) as error:
             raise StorageError(
                 f"The record {path} cannot be read: {error}.",
-                hint="Keep the file for inspection; the trial stays lost until somebody decides.",
+                hint="Keep the file for inspection; the trial stays lost until it is reviewed.",
             ) from error
 
     def delete(self, flight_id: int) -> None:

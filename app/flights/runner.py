@@ -62,7 +62,7 @@ class FlightOutcome:
 
 
 def _refuse_session(_vehicle_id: int) -> FlightBackend:
-    raise VehicleError("There is no link to the vehicle.", hint="Connect it, then ask again.")
+    raise VehicleError("There is no link to the vehicle.", hint="Connect it, then try again.")
 
 
 class FlightRunner:
@@ -106,10 +106,10 @@ class FlightRunner:
         are withdrawn. Raises StorageError.
         """
         with self._database.write() as session:
-            for flight_id in queue.withdraw_requested_flights(session, "the worker was away when it was asked for"):
-                _log.warning("flight withdrawn: it was asked for before this worker began", flight_id=flight_id)
+            for flight_id in queue.withdraw_requested_flights(session, "no worker was running when it was requested"):
+                _log.warning("flight withdrawn: it was requested before this worker started", flight_id=flight_id)
             for trial_id in queue.lose_running_flights(session):
-                _log.warning("flight lost: the worker ended while it was under way", trial_id=trial_id)
+                _log.warning("flight lost: the worker stopped during it", trial_id=trial_id)
         for flight_id in self._spool.flight_ids():
             self._recover_record(flight_id)
         self._spool.delete_unfinished()
@@ -146,7 +146,7 @@ class FlightRunner:
             telemetry_log(self._data_dir, request.flight_id).parent.mkdir(exist_ok=True)
             backend = self._acquire_backend(request)
         except (GainlineError, OSError) as error:
-            return FlightOutcome(problem=f"It was not begun: {error}")
+            return FlightOutcome(problem=f"It was not started: {error}")
         try:
             return self._fly_on_backend(backend, request, flag)
         finally:
@@ -203,7 +203,7 @@ class FlightRunner:
             else:
                 self._store(lambda session: queue.record_lift_off(session, request.flight_id))
         except GainlineError as error:
-            ended = FlightOutcome(problem=f"It was not flown, because that could not be recorded: {error}")
+            ended = FlightOutcome(problem=f"It was not flown, because its start could not be recorded: {error}")
         if ended.lifted_off:
             backend.take_off()
         else:
@@ -221,7 +221,7 @@ class FlightRunner:
             if flag.reason is not None:
                 return flag.reason
             if not backend.alive:
-                return "the process that has the vehicle ended"
+                return "the vehicle's process ended"
             try:
                 with self._database.read() as session:
                     if (reason := queue.stand_down_wanted(session, request.flight_id)) is not None:
@@ -229,10 +229,10 @@ class FlightRunner:
                     if queue.take_off_wanted(session, request.flight_id):
                         return None
             except StorageError as error:
-                _log.error("the operator's word cannot be read", why=str(error))
+                _log.error("the take-off request cannot be read", why=str(error))
                 self._clock.wait_s(RETRY_S)
             self._clock.wait_s(POLL_INTERVAL_S)
-        return f"nobody asked for its take-off within {STAGED_FOR_S / 60:g} minutes"
+        return f"its take-off was not requested within {STAGED_FOR_S / 60:g} minutes"
 
     def _phase(self, request: FlightRequest, phase: Phase, note: str = "") -> None:
         self._publish(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase=phase, note=note))
@@ -259,7 +259,7 @@ class FlightRunner:
         if ended.record is None:
             return why
         kept_as = self._spool.set_aside(request.flight_id)
-        return f"{why} The record is kept as {kept_as}." if kept_as else f"{why} The record could not be kept either."
+        return f"{why} The record is saved as {kept_as}." if kept_as else f"{why} The record could not be saved either."
 
     def _store_with_retry(self, request: FlightRequest, work: Callable[[Session], None]) -> bool:
         """Retry until the database accepts it; False when the worker closes meanwhile (the spool keeps the record)."""
@@ -268,7 +268,7 @@ class FlightRunner:
                 self._store(work)
             except StorageError as error:
                 _log.error("outcome not stored yet", why=str(error))
-                self._phase(request, "landed", f"The outcome is kept, but not stored yet: {error}")
+                self._phase(request, "landed", f"The outcome is not stored yet and will be retried: {error}")
                 if self._closing.wait(self._clock.wall_s(RETRY_S)):
                     return False
             else:
@@ -313,15 +313,15 @@ def describe_mismatch(asked: Mapping[str, float], read_back: Mapping[str, float]
         for name, value in asked.items()
         if read_back.get(name) != value
     ]
-    return f"The vehicle did not take the gains: {'; '.join(wrong)}. It was not flown." if wrong else None
+    return f"The vehicle did not accept the gains: {'; '.join(wrong)}. It was not flown." if wrong else None
 
 
 def _describe_error(error: Exception) -> str:
     """Describe an error for the operator; an internal error is logged in full."""
     if isinstance(error, GainlineError):
         return str(error)
-    _log.error("a mistake of the program", exc_info=error)
-    return f"The program made a mistake ({type(error).__name__}); see the worker's log."
+    _log.error("internal error", exc_info=error)
+    return f"Internal error ({type(error).__name__}); see the worker's log."
 
 
 def _record(session: Session, request: FlightRequest, ended: FlightOutcome) -> None:

@@ -83,12 +83,14 @@ def request_flight(
     """Add the flight row that the worker claims. Raises as `fly_trial` does."""
     vehicle = campaign.vehicle
     if mode == "stage" and not vehicle.registered:
-        raise ConflictError(f"{vehicle.name} is flown in one go.", hint="Fly it; only registered vehicles are staged.")
+        raise ConflictError(
+            f"{vehicle.name} is flown without staging.", hint="Fly it directly; only registered vehicles are staged."
+        )
     require_may_command(vehicle, context)
     if mode == "fly" and fleet.needs_staging(vehicle):
         raise NotAllowedError(
-            f"{vehicle.name} is a real vehicle: it takes off only on its operator's own act in the browser.",
-            hint="Stage the trial; its operator then takes off on the fly page.",
+            f"{vehicle.name} is a real vehicle: only its operator can start the take-off, in the browser.",
+            hint="Stage the trial; its operator then starts the take-off on the fly page.",
         )
     rehearsals.require_rehearsed(session, campaign)
     fleet.require_ready(session, vehicle, mode)
@@ -122,7 +124,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> 
     check_action(TRIAL_ACTIONS, "take-off", row.state, f"Trial {row.number}")
     campaign, flight = campaigns.get_row(session, row.campaign_id), _staged(session, row)
     if flight.take_off_at is not None:
-        raise ConflictError(f"The take-off of trial {row.number} was asked for already.", hint="Watch the flight.")
+        raise ConflictError(f"The take-off of trial {row.number} has already been requested.", hint="Watch the flight.")
     vehicle = campaign.vehicle
     if fleet.needs_staging(vehicle):
         require_control(vehicle, context)
@@ -148,7 +150,7 @@ def unstage_trial(session: Session, trial_id: int) -> Trial:
 def _staged(session: Session, row: TrialRow) -> FlightRow:
     flight = history.latest_flights(session, [row.id]).get(row.id)
     if flight is None or flight.mode != "stage" or flight.state != FlightState.RUNNING:
-        raise ConflictError(f"Trial {row.number} flies in one go.", hint="Watch it, or abort it.")
+        raise ConflictError(f"Trial {row.number} flies without staging.", hint="Watch it, or abort it.")
     if flight.stand_down:
         raise ConflictError(
             f"Trial {row.number} is being unstaged: {flight.stand_down}.", hint="Wait until it is planned again."
@@ -165,15 +167,15 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, problem=reason)
-        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not begun and is withdrawn.")
+        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started and is withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
         raise ConflictError(
             f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
             hint="Abort again. If a vehicle is in the air, use its own remote control now.",
         )
     if flight is not None:
-        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight is over already.")
+        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight has already ended.")
     raise ConflictError(
         f"Trial {row.number} is {row.state}: there is no flight to abort.",
-        hint="None was asked for; load the trial again.",
+        hint="Load the trial again.",
     )

@@ -47,14 +47,14 @@ from app.processes import process_context
 from app.vehicles.base import SafeGainsError, VehicleError
 
 _ENDED: Final = (
-    "The process that had the vehicle's link ended; nobody knows whether it told the vehicle. Use the vehicle's own "
-    "remote control now."
+    "The process that had the vehicle's link ended; it is unknown whether the command was sent. Use the vehicle's "
+    "own remote control now."
 )
 SILENT_AFTER_S: Final = 2.0
 """A process with an open link sends a status five times a second."""
 NOT_ANSWERING: Final = (
-    "The process that has its link does not answer: orders do not reach the vehicle. If it flies, use its own remote "
-    "control now."
+    "The process that has its link does not answer: commands do not reach the vehicle. If it flies, use its own "
+    "remote control now."
 )
 MAX_UNANSWERED_ORDERS: Final = 50
 """Far fewer than fill the pipe of a process that does not read, so that sending a command never blocks."""
@@ -118,7 +118,7 @@ class VehicleConnection:
             case FlightFailure(what, unsafe):
                 raise (SafeGainsError if unsafe else VehicleError)(what, hint="Then connect it again.")
             case other:
-                raise AssertionError(f"A session began with {other!r}.")
+                raise AssertionError(f"The connection started with {other!r}.")
 
     def ask(self, kind: ActKind, safe_gains: Mapping[str, float]) -> VehicleResponse:
         """Carry out an act and wait for its outcome. Raises VehicleError when the process dies."""

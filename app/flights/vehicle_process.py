@@ -61,7 +61,7 @@ LOCK_TIMEOUT_S: Final = 120.0
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
 """How long the process repeats a command after its worker's end; shorter than the next connection's wait for the
 lock."""
-_EXPIRED: Final = "It reached the vehicle's process too late and was not passed on; whoever asked was told so."
+_EXPIRED: Final = "The command reached the vehicle's process too late and was not sent; the caller was informed."
 
 
 def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
@@ -190,8 +190,8 @@ class VehicleProcess:
         if ordered is not None and self._forward_command(ordered) and self._may_interrupt:
             self._end_interruptions()
             raise InterruptedByOrderError(
-                f"It was interrupted: {ordered.order} was ordered ({ordered.reason}).",
-                hint="See what the vehicle does, then ask again.",
+                f"It was interrupted: {ordered.order} was commanded ({ordered.reason}).",
+                hint="Check what the vehicle does, then request it again.",
             )
 
     @contextmanager
@@ -245,7 +245,9 @@ class VehicleProcess:
     def _act(self, asked: VehicleRequest) -> VehicleResponse:
         try:
             if self._vehicle.condition().armed:  # a slow operation would delay Land
-                raise VehicleError("The vehicle is armed.", hint="Land it, and ask again once its motors have stopped.")
+                raise VehicleError(
+                    "The vehicle is armed.", hint="Land it, and request it again once its motors have stopped."
+                )
             self._require_safe_gains(asked.safe_gains)
             with self._interruptible():
                 answer = self._perform(asked.kind)
@@ -265,7 +267,9 @@ class VehicleProcess:
             case ActKind.RELEASE:
                 self._vehicle.release()
             case _:
-                raise VehicleError(f"A session cannot carry out “{kind}”.", hint="Report this with the worker's log.")
+                raise VehicleError(
+                    f"A vehicle connection cannot execute “{kind}”.", hint="Report this with the worker's log."
+                )
         return VehicleResponse(
             concern=self._vehicle.concern,
             held=self._held(),
@@ -365,7 +369,7 @@ class VehicleProcess:
                 self._note(message)
         except PipeClosedError:
             self._is_worker_gone = True
-            self._stop = self._stop or StopRequest("the worker is gone")
+            self._stop = self._stop or StopRequest("the worker has exited")
         return self._stop
 
     def _note(self, message: ToVehicleProcess) -> None:
@@ -390,8 +394,8 @@ def _has_expired(ordered: VehicleCommand) -> bool:
 
 def _late_take_off_error() -> VehicleError:
     error = VehicleError(
-        "It was not flown: the take-off came too late, because the vehicle's process stood still.",
-        hint="See that nothing holds up this computer, then ask for the flight again.",
+        "It was not flown: the take-off was too late, because the vehicle's process had stalled.",
+        hint="Check that this computer is not overloaded, then request the flight again.",
     )
     error.not_flown = True
     return error

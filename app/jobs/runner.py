@@ -31,7 +31,7 @@ def recover(database: Database) -> None:
     """Queue all running jobs again after a worker's start. Raises StorageError."""
     with database.write() as session:
         for job_id in jobs.requeue_running_jobs(session):
-            _log.warning("job waits again: its worker ended", job_id=job_id)
+            _log.warning("job queued again: its worker stopped", job_id=job_id)
 
 
 class JobRunner:
@@ -101,17 +101,17 @@ class JobRunner:
             _log.info("job begun", worker=self._worker, order=ordered or None)
             try:
                 self._perform(job)
-                _log.info("the worker is done with the job", seconds=round(self._clock.now_s() - began_s, 3))
+                _log.info("job finished", seconds=round(self._clock.now_s() - began_s, 3))
             except CancelledError:
-                _log.info("job dropped, because the worker ends; it runs again with the next one")
+                _log.info("job interrupted: the worker is shutting down; the next worker runs it again")
             except StorageError as error:
-                _log.error("job given up; it runs again when its lease is over", why=str(error))
+                _log.error("job abandoned; it runs again when its lease expires", why=str(error))
             except jobs.SupersededError as error:
                 self._withdraw(job, error)
             except GainlineError as error:
                 self._fail(job, error)
             except Exception as error:  # noqa: BLE001 - outermost frame of the thread
-                _log.exception("job failed by a mistake of the program")
+                _log.exception("job failed with an internal error")
                 self._fail(job, internal_error(f"{type(error).__name__}: {error}"))
             finally:
                 self._at_work.discard(job.id)
@@ -129,12 +129,12 @@ class JobRunner:
             with self._database.write() as session:
                 store(session)
         except StorageError as refused:
-            _log.error("job given up; it runs again when its lease is over", why=str(refused))
+            _log.error("job abandoned; it runs again when its lease expires", why=str(refused))
 
 
 def internal_error(what: str) -> GainlineError:
     """Error shown to a person after an internal error."""
     return GainlineError(
-        f"The program made a mistake ({what}).",
-        hint="Try again; if it happens again, report it with the job's log.",
+        f"Internal error ({what}).",
+        hint="Try again. If it happens again, report it with the job's log.",
     )

@@ -29,18 +29,18 @@ class Job(BaseModel):
 
     id: int
     kind: str
-    name: Annotated[str, Field(description="what exactly, for the kinds that have a choice; empty otherwise")]
+    name: Annotated[str, Field(description="variant, for the kinds that have several; empty otherwise")]
     state: JobState
     campaign_id: int | None
     problem: Trouble | None
-    done_share: Annotated[float | None, Field(description="0 … 1 while it runs, where the kind can tell")]
-    doing: Annotated[str, Field(description="what it is at")]
-    remaining_s: Annotated[float | None, Field(description="seconds that it will still take, at the pace so far")]
+    done_share: Annotated[float | None, Field(description="0 … 1 while it runs, if the kind reports progress")]
+    doing: Annotated[str, Field(description="current step")]
+    remaining_s: Annotated[float | None, Field(description="estimated remaining seconds")]
     attempts: int
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
-    actions: Annotated[list[str], Field(description="what may be done with it now: cancel, retry")]
+    actions: Annotated[list[str], Field(description="allowed actions: cancel, retry")]
 
 
 class JobLogLine(BaseModel):
@@ -303,8 +303,8 @@ def _requeue(row: JobRow) -> int:
     if row.attempts >= MAX_ATTEMPTS:
         _fail(
             row,
-            f"The worker went away {row.attempts} times while it did this.",
-            "Its log on the page of jobs may say why; then retry it.",
+            f"The worker stopped {row.attempts} times during this job.",
+            "Read its log on the page Jobs, then retry it.",
             [],
         )
     else:

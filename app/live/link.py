@@ -142,7 +142,7 @@ class LiveClient:
         finally:
             del self._waiting[question.request]
         if not isinstance(answer, kind):
-            raise _link_down(f"the worker gave another answer: {answer.type}")
+            raise _link_down(f"the worker sent an unexpected answer: {answer.type}")
         return answer
 
     async def _listen(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -164,7 +164,7 @@ class LiveClient:
                 if (answer := self._waiting.get(request)) is not None and not answer.done():
                     answer.set_result(message)
             case Abort() | VehicleOrder() | Ping():
-                raise InputError(f"The worker sent an {message.type}.", hint="Restart the worker.")
+                raise InputError(f"The worker sent an unexpected message: {message.type}.", hint="Restart the worker.")
             case _:
                 self._on_message(message)
 
@@ -172,7 +172,7 @@ class LiveClient:
         was_up, self._writer = self.connected, None
         for answer in self._waiting.values():
             if not answer.done():
-                answer.set_exception(_link_down("the worker went away"))
+                answer.set_exception(_link_down("the worker disconnected"))
         with suppress(OSError):
             writer.close()
         if was_up:
@@ -185,9 +185,9 @@ def _deadline_s() -> float:
 
 def _link_down(why: str) -> LinkDownError:
     return LinkDownError(
-        f"The worker could not be told: {why}.",
-        hint="If a vehicle is in the air, use its own remote control now. A supervised worker is restarted within "
-        "seconds; a separate one is started with `gainline worker`.",
+        f"The worker could not be reached: {why}.",
+        hint="If a vehicle is in the air, use its own remote control now. A supervised worker restarts within "
+        "seconds; start a separate one with `gainline worker`.",
     )
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 MAX_LINE_BYTES: Final = 256 * 1024
-NO_LINK: Final = "No worker has a link to this vehicle, so it was told nothing: use its own remote control now."
+NO_LINK: Final = "No worker has a link to this vehicle, so nothing was sent: use its own remote control now."
 
 Phase = Literal["staging", "staged", "flying", "landed", "ended"]
 VehicleLinkState = Literal["connecting", "connected", "gone", "not answering"]
@@ -182,7 +182,7 @@ def decode(line: bytes) -> Message:
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(
-            f"The live link carried a line that is no message: {'.'.join(map(str, first['loc']))} {first['msg']}.",
+            f"The live link received an invalid message: {'.'.join(map(str, first['loc']))} {first['msg']}.",
             hint="Run the web process and the worker from the same version of Gainline.",
         ) from error
 

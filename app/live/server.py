@@ -42,10 +42,10 @@ STUCK_CLIENT_BYTES: Final = 4 * 1024 * 1024
 """A client with more unread bytes is disconnected; it reconnects and reads the database."""
 CONFIRMATION_S: Final = 0.25
 """How long after a command's deadline to wait for the answer that it was forwarded in time."""
-LATE: Final = "The order reached the worker too late and is not carried out: use the vehicle's own remote control now."
+LATE: Final = "The command reached the worker too late and is not executed: use the vehicle's own remote control now."
 UNCONFIRMED: Final = (
-    "The process that has the vehicle's link did not answer, and does not carry the order out later: use the vehicle's "
-    "own remote control now."
+    "The process that has the vehicle's link did not answer, and will not execute the command later: use the "
+    "vehicle's own remote control now."
 )
 
 _log = structlog.get_logger(__name__)
@@ -137,7 +137,7 @@ class LiveServer:
                 answer = Pong(request=request)
             case other:
                 raise InputError(
-                    f"A client sent {other.type!r}, which only the worker sends.",
+                    f"A client sent {other.type!r}, which only the worker may send.",
                     hint="Connect to the worker's socket with Gainline only.",
                 )
         writer.write(encode(answer))

@@ -21,7 +21,7 @@ def contents(stream: BinaryIO) -> Contents:
     stream.seek(0)
     if size > MAX_BYTES:
         raise TrajectoryError(
-            f"The log is {size / 2**20:.0f} MiB large.",
+            f"The log has {size / 2**20:.0f} MiB.",
             hint=f"Cut it to the flight: at most {MAX_BYTES / 2**20:g} MiB are read.",
             problems=(Problem("file", f"is larger than {MAX_BYTES / 2**20:g} MiB"),),
         )

@@ -41,7 +41,7 @@ _MODES: Final[Mapping[float, str]] = MappingProxyType(
 )
 
 _WANTED: Final = frozenset({"PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT"})
-_HINT: Final = "Give ArduPilot's .bin log of the flight, with LOG_BITMASK including the control tuning (PSCD, CTUN)."
+_HINT: Final = "Give ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN)."
 
 Table = Mapping[str, NDArray[np.generic]]
 """Columns of one message type, each of shape (n,)."""
@@ -157,7 +157,7 @@ def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples],
         channels = {channel: _numbers(tuning[name]) for channel, name in up.items() if name in tuning}
         title = "altitude from CTUN.Alt"
     else:
-        raise refused("holds neither PSCD.PD nor CTUN.Alt, the altitude", _HINT)
+        raise refused("contains neither PSCD.PD nor CTUN.Alt, the altitude", _HINT)
     if {"TimeUS", "ThO"} <= tuning.keys() and len(tuning["TimeUS"]):
         channels["thrust"] = np.interp(time_s, _seconds(tuning), _numbers(tuning["ThO"]))
     return time_s, channels, title

@@ -23,7 +23,7 @@ _GZIP: Final = b"\x1f\x8b"
 _IN_MEMORY_BYTES: Final = 2**22
 _INTEGER: Final = re.compile(r"[+-]?[0-9]{1,19}")
 
-_HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row for each 1/512 s, whole numbers of 32 bits."
+_HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row per 1/512 s, as 32-bit integers."
 
 
 def read_loop_trace(path: Path) -> LoopTrace:
@@ -72,7 +72,7 @@ def _unpack(name: str, source: BinaryIO, plain: BinaryIO) -> None:
             raise InputError(
                 f"{name} cannot be replayed.",
                 hint=f"Cut the run: at most {MAX_BYTES // 2**20} MiB of text and {MAX_ROWS} rows are read.",
-                problems=(Problem("file", f"holds more than {MAX_BYTES // 2**20} MiB of text"),),
+                problems=(Problem("file", f"contains more than {MAX_BYTES // 2**20} MiB of text"),),
             )
     plain.seek(0)
 
@@ -98,7 +98,7 @@ def _read(name: str, text: io.TextIOWrapper) -> LoopTrace:
     for row in _rows(name, header, reader):
         values.extend(row)
     if not values:
-        raise InputError(f"{name} holds a header and no rows.", hint=_HINT, problems=(Problem("file", "has no rows"),))
+        raise InputError(f"{name} has a header and no rows.", hint=_HINT, problems=(Problem("file", "has no rows"),))
     rows = np.array(values, dtype=np.int64).reshape(-1, len(header))
     place = {column: index for index, column in enumerate(header)}
     return LoopTrace(rows[:, [place[column] for column in INPUTS]], rows[:, [place[column] for column in OUTPUTS]])
@@ -107,7 +107,7 @@ def _read(name: str, text: io.TextIOWrapper) -> LoopTrace:
 def _rows(name: str, header: Sequence[str], reader: Iterator[list[str]]) -> Iterator[list[int]]:
     for line, row in enumerate(reader, start=2):
         if line > MAX_ROWS + 1:
-            raise _malformed(name, line, header[0], f"a trace may hold at most {MAX_ROWS} rows")
+            raise _malformed(name, line, header[0], f"a trace may have at most {MAX_ROWS} rows")
         if len(row) != len(header):
             column = header[min(len(row), len(header) - 1)]
             raise _malformed(name, line, column, f"the row has {len(row)} values, the header {len(header)}")

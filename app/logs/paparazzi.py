@@ -56,7 +56,7 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Fligh
         starts, ends = _starts(log), _ends(log)
         if not set(GAINS) <= {setting.name for setting in settings} and (inferred := infer_gains(log)):
             settings = [Setting(-np.inf, name, value) for name, value in inferred.items()]
-            notes.append("gains worked out from the loop's commands, which follow from them")
+            notes.append("gains computed from the loop's commands")
     time_s, channels = _altitude(lines)
     if lines.others:
         notes.append(f"other aircraft in the log left out: {', '.join(sorted(lines.others)[:5])}")
@@ -81,7 +81,7 @@ def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> tuple[
     """
     lines = _read(stream)
     if not len(lines.loop_time_s):
-        raise refused("holds no VERT_LOOP, what the loop was given and commanded", _HINT)
+        raise refused("contains no VERT_LOOP, the loop's inputs and commands", _HINT)
     configuration = _Configuration()
     if companion is not None:
         configuration.read(companion)
@@ -116,7 +116,7 @@ def _read(stream: BinaryIO) -> _Lines:
     lines = _Lines()
     stream.seek(0)
     if not is_paparazzi(stream.read(_MAX_LINE_BYTES)):
-        raise refused("does not begin with a line of time, aircraft and message", _HINT)
+        raise refused("does not start with a line of time, aircraft and message", _HINT)
     stream.seek(0)
     while line := stream.readline(_MAX_LINE_BYTES):
         words = line.split(maxsplit=3)
@@ -168,7 +168,7 @@ def _float(text: bytes) -> float:
 def _altitude(lines: _Lines) -> tuple[Samples, dict[str, Samples]]:
     """Time and channels, from the more frequent message. Raises TrajectoryError if there is neither."""
     if not lines.loop_time_s and not lines.time_s:
-        raise refused("holds neither VERT_LOOP nor ROTORCRAFT_FP", _HINT)
+        raise refused("contains neither VERT_LOOP nor ROTORCRAFT_FP", _HINT)
     loop = _loop_channels(lines.loop_log()) if lines.loop_time_s else {}
     if len(lines.loop_time_s) >= len(lines.time_s):
         return lines.loop_log().time_s, loop
@@ -195,7 +195,7 @@ def _starts(log: LoopLog) -> list[LogEvent]:
     """The last samples before the reference starts to move by itself."""
     idle = log.idle
     sets_out = np.flatnonzero(idle[:-1] & ~idle[1:])
-    return [LogEvent(float(log.time_s[place]), "the reference setting out") for place in sets_out]
+    return [LogEvent(float(log.time_s[place]), "the reference starting to move") for place in sets_out]
 
 
 def _ends(log: LoopLog) -> list[LogEvent]:
@@ -225,7 +225,7 @@ class _Configuration:
         companion.seek(0)
         text = companion.read(MAX_COMPANION_BYTES + 1)
         if len(text) > MAX_COMPANION_BYTES:
-            raise refused("has a companion of more than 16 MiB", "Give the .log file that was written beside it.")
+            raise refused("has a companion of more than 16 MiB", "Add the .log file that was written with it.")
         parser = expat.ParserCreate()
         parser.StartElementHandler = self._element
         parser.EntityDeclHandler = _no_entities
@@ -233,7 +233,7 @@ class _Configuration:
             parser.Parse(text, True)
         except (expat.ExpatError, ValueError) as error:
             raise refused(
-                f"has a companion that is not XML: {error}", "Give the .log file that was written beside it, or none."
+                f"has a companion that is not XML: {error}", "Add the .log file that was written with it, or none."
             ) from error
 
     def settings(self, values: Sequence[tuple[float, int, float]]) -> list[Setting]:

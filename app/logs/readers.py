@@ -58,17 +58,17 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     suffix = PurePath(name).suffix.lower()
     if suffix == _COMPANION:
         raise TrajectoryError(
-            f"{PurePath(name).name[:80]} holds no flight.",
+            f"{PurePath(name).name[:80]} contains no flight.",
             hint="A .log file goes with Paparazzi's .data file of the same name: choose both.",
             problems=(Problem("file", "is a companion, not a record"),),
         )
     expected = next((reader for reader in READERS if reader.suffix == suffix), None)
     if expected is not None:
         raise TrajectoryError(
-            f"{PurePath(name).name[:80]} is not what its name says.",
-            hint=f"A {suffix} file is {expected.title}; check that it was copied completely. Read here are "
+            f"{PurePath(name).name[:80]} does not match its file extension.",
+            hint=f"A {suffix} file is {expected.title}; check that it was copied completely. Supported: "
             f"{', '.join(SUFFIXES)}.",
-            problems=(Problem("file", "is empty" if not head else f"does not begin as {expected.title} does"),),
+            problems=(Problem("file", "is empty" if not head else f"does not start like {expected.title}"),),
         )
     trajectory = read_takeoff_csv(stream)
     return (Takeoff(number=1, start_s=0.0, begins_with="the command", trajectory=trajectory, gains={}),)

@@ -85,7 +85,7 @@ class _Lines:
             raise _refused(
                 f"line {self.number}",
                 f"is one too many: a flight may have at most {MAX_ROWS} rows",
-                "Cut the log to the takeoff, or keep every tenth row: 50 a second are plenty.",
+                "Cut the log to the takeoff, or keep every tenth row: 50 per second are enough.",
             )
         if self.number == 1:
             if raw.startswith(_UTF_16):
@@ -96,7 +96,7 @@ class _Lines:
     def _decode(self, raw: bytes) -> str:
         where = f"line {self.number}"
         if b"\0" in raw:
-            raise _refused(where, "holds bytes that are not text", _FORMAT_HINT)
+            raise _refused(where, "contains bytes that are not text", _FORMAT_HINT)
         if len(raw) > _MAX_LINE_BYTES:
             raise _refused(where, f"is longer than {_MAX_LINE_BYTES} bytes", _FORMAT_HINT)
         try:
@@ -121,7 +121,7 @@ def _columns(header: Sequence[str]) -> list[str]:
     if problems:
         found = ", ".join(header[:10])
         raise TrajectoryError(
-            f"The header is not that of a flight; it reads: {found}.", hint=_FORMAT_HINT, problems=tuple(problems)
+            f"The header is not that of a flight: {found}.", hint=_FORMAT_HINT, problems=tuple(problems)
         )
     return ["time_s", *(name for name in CHANNEL_UNITS if name in header)]
 
@@ -145,7 +145,7 @@ def _read_rows(
         if numbers_of_row[0] <= last_s:
             raise _refused(
                 f"line {lines.number}, column time_s",
-                f"must rise, but {numbers_of_row[0]:g} s follows {last_s:g} s",
+                f"must increase, but {numbers_of_row[0]:g} s follows {last_s:g} s",
                 _ROW_HINT,
             )
         last_s = numbers_of_row[0]
@@ -173,7 +173,7 @@ def _number(text: str, line: int, column: str) -> float:
     if abs(value) > _LARGEST:
         raise _refused(
             where,
-            f"is beyond anything measured in a takeoff: {value:g}",
+            f"is outside the range of a takeoff: {value:g}",
             "Count time from the command and use metres and seconds.",
         )
     return value
@@ -182,7 +182,7 @@ def _number(text: str, line: int, column: str) -> float:
 def _require_rows(rows: int) -> None:
     if rows < MIN_ROWS:
         raise TrajectoryError(
-            f"The file holds {rows} {'sample' if rows == 1 else 'samples'}; a flight needs at least {MIN_ROWS}.",
+            f"The file has {rows} {'sample' if rows == 1 else 'samples'}; a flight needs at least {MIN_ROWS}.",
             hint="Upload the whole takeoff, from the command to 32.6 s after it.",
             problems=(Problem("time_s", "has too few rows"),),
         )
@@ -194,8 +194,8 @@ def _require_rising_when_stored(time_s: Samples, numbers: "array[int]") -> None:
     if (late := np.flatnonzero(np.diff(stored) <= 0.0)).size:
         raise _refused(
             f"line {numbers[int(late[0]) + 1]}, column time_s",
-            "is too close to the line before to be told apart",
-            "Count time from the command, and keep at most a few thousand rows a second.",
+            "is too close to the previous line",
+            "Count time from the command, and keep at most a few thousand rows per second.",
         )
 
 

@@ -128,19 +128,19 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
         free_from_s = float(time_s[down])
         if len(found) > MAX_TAKEOFFS:
             raise TrajectoryError(
-                f"The log holds more than {MAX_TAKEOFFS} takeoffs.",
+                f"The log contains more than {MAX_TAKEOFFS} takeoffs.",
                 hint="Cut it to the flights of one day, or choose the log of one flight.",
-                problems=(Problem("file", "holds too many flights"),),
+                problems=(Problem("file", "contains too many flights"),),
             )
     if not found:
         raise TrajectoryError(
-            "The log holds no takeoff.",
-            hint="Choose the log of the flight itself, recorded from before the takeoff on.",
+            "The log contains no takeoff.",
+            hint="Choose the log of the flight itself, recorded from before the takeoff.",
             problems=(
                 Problem(
                     "altitude_m",
                     f"varies by {np.ptp(altitude_m):.2f} m within {time_s[-1] - time_s[0]:.1f} s, without a rise by "
-                    f"{HIGHEST_HOP_M:g} m {_where_looked(log)} that {MIN_SAMPLES} samples show",
+                    f"{HIGHEST_HOP_M:g} m {_where_looked(log)} in at least {MIN_SAMPLES} samples",
                 ),
             ),
         )
@@ -153,10 +153,10 @@ def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
         return takeoffs[0]
     if number is not None and 1 <= number <= len(takeoffs):
         return takeoffs[number - 1]
-    happened = "The log holds one takeoff" if len(takeoffs) == 1 else f"The log holds {len(takeoffs)} takeoffs"
+    happened = "The log contains one takeoff" if len(takeoffs) == 1 else f"The log contains {len(takeoffs)} takeoffs"
     raise TrajectoryError(
         f"{happened}." if number is None else f"{happened}, and none with the number {number}.",
-        hint="Say which one is meant, by its number; nothing was stored.",
+        hint="Give the number of the takeoff; nothing was stored.",
         problems=tuple(Problem("takeoff", f"{each.number}: {each.summary}") for each in takeoffs[:_LISTED]),
     )
 
@@ -172,7 +172,7 @@ def _usable(log: FlightLog) -> tuple[Samples, Mapping[str, Samples]]:
     time_s = time_s[rising]
     if len(time_s) < MIN_SAMPLES:
         raise TrajectoryError(
-            f"The log holds {len(time_s)} usable samples of the altitude; a flight needs at least {MIN_SAMPLES}.",
+            f"The log contains {len(time_s)} usable samples of the altitude; a flight needs at least {MIN_SAMPLES}.",
             hint="Record the vehicle's local position at 20 Hz or more during the whole flight.",
             problems=(Problem("altitude_m", "has too few samples"),),
         )
@@ -182,7 +182,7 @@ def _usable(log: FlightLog) -> tuple[Samples, Mapping[str, Samples]]:
 def _where_looked(log: FlightLog) -> str:
     if log.in_air is None:
         return f"in {_RISE_S[-1]:g} s{'' if log.armed is None else ' while it was armed'}"
-    return f"while it was in the air, {len(log.in_air)} times as the autopilot says,"
+    return f"while it was in the air ({len(log.in_air)} times, from the autopilot's status)"
 
 
 def _flights(log: FlightLog, time_s: Samples, altitude_m: Samples) -> Iterator[tuple[int, int]]:
@@ -336,10 +336,10 @@ class _Record:
         if not self.is_commanded:
             yield "no command to take off in the log, so the delay before lift-off is not in the record"
         if self.log.from_ground:
-            yield f"altitude counted from the ground, where the log has {self.ground_m:.2f} m"
+            yield f"altitude relative to the ground, which is at {self.ground_m:.2f} m in the log"
         if self.held.learned_late:
             yield f"known only from after the takeoff: {', '.join(self.held.learned_late)}"
         if left_out:
-            yield f"left out, with values missing: {', '.join(left_out)}"
+            yield f"left out because of missing values: {', '.join(left_out)}"
         if self.end.what:
             yield f"ends after {self.end.time_s - self.begin.time_s:.1f} s with {self.end.what}"

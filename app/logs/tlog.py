@@ -33,8 +33,8 @@ _MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
 _PX4_TAKEOFF_MODE, _PX4_HOVER_MODE = 2, 3
 
 _HINT: Final = (
-    "Give a .tlog that holds the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff on; the ground "
-    "station's own commands should be in it too."
+    "Give a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
+    "contain the ground station's commands."
 )
 
 
@@ -167,7 +167,7 @@ def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
             if autopilot is not None:
                 return frame.system, autopilot
     known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
-    raise refused(f"holds no MAVLink heartbeat of {known}", _HINT)
+    raise refused(f"contains no MAVLink heartbeat of {known}", _HINT)
 
 
 def _is_whole(dialect: ModuleType, data: Contents, frame: _Frame, extra: bytes) -> bool:
@@ -251,7 +251,7 @@ class _Telemetry:
     def log(self) -> FlightLog:
         """The log as read so far. Raises TrajectoryError if there was no position."""
         if not self._time_s:
-            raise refused("holds no LOCAL_POSITION_NED of the vehicle", _HINT)
+            raise refused("contains no LOCAL_POSITION_NED of the vehicle", _HINT)
         for sent in self._sent.values():  # a command without an answer counts as accepted
             sent.moments.append(sent.moment)
         for time_s, number in self._activated:
@@ -281,9 +281,9 @@ class _Telemetry:
 
     def _notes(self) -> Iterator[str]:
         if self._restarts:
-            yield f"the vehicle restarted: its clock began anew ({self._restarts}×)"
+            yield f"the vehicle restarted and reset its clock ({self._restarts}×)"
         for name, value in self._asked.items():
-            yield f"{name} was to become {value:g}, which the vehicle never confirmed"
+            yield f"{name} was set to {value:g}, but the vehicle never confirmed it"
 
     def _is_vehicle(self, message: _Message) -> bool:
         return message.get_srcSystem() == self.system

@@ -174,7 +174,7 @@ class _LogFilter:
         if len(body) < 40:
             return
         if body[8] & ~_APPENDED or any(body[9:16]):
-            raise refused("was written by a newer PX4 in a way that is not read here", _HINT)
+            raise refused("was written by a newer PX4 in an unsupported format", _HINT)
         offsets = [int.from_bytes(body[at : at + 8], "little") for at in (16, 24, 32)]
         self._appended = sorted(offset for offset in offsets if offset)
 
@@ -301,17 +301,23 @@ def _missing(topics: Mapping[str, Topic]) -> Iterator[str]:
     has_status = any(True for _ in _rows(topics, _STATUS, "arming_state", "nav_state"))
     if not any(True for _ in _rows(topics, _LANDED, "landed")):
         how = "while it was armed" if has_status else "armed or not"
-        yield f"no {_LANDED} in the log, so the takeoff is a rise of the altitude, {how}: see that it is the flight"
+        yield (
+            f"no {_LANDED} in the log, so the takeoff is found from a rise of the altitude, {how}: check that "
+            "it is the flight"
+        )
     elif not has_status:
-        yield f"no {_STATUS} in the log, so the takeoff is told by the land detector alone: see that it is the flight"
+        yield (
+            f"no {_STATUS} in the log, so the takeoff is found from the land detector alone: check that it is "
+            "the flight"
+        )
 
 
 def _notes(sieve: _LogFilter, log: "ULog") -> Iterator[str]:
     if sieve.damages:
-        yield f"{sieve.damages} damaged stretches passed over"
+        yield f"{sieve.damages} damaged sections skipped"
     if log.dropouts:
         lost_s = sum(each.duration for each in log.dropouts) / 1000
-        yield f"the logger dropped data {len(log.dropouts)} times, {lost_s:.2f} s in all"
+        yield f"the logger dropped data {len(log.dropouts)} times, {lost_s:.2f} s in total"
 
 
 def _rows(topics: Mapping[str, Topic], topic: str, *names: str) -> Iterator[tuple[float, ...]]:

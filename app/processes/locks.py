@@ -49,7 +49,7 @@ def exclusive(
     except OSError as error:
         raise StorageError(
             f"The lock file {path} cannot be opened: {error.strerror}.",
-            hint="Give this user the right to read and write it, or choose another folder with --data-dir.",
+            hint="Give this user read and write permission for it, or choose another folder with --data-dir.",
         ) from error
     try:
         while not _take(descriptor):

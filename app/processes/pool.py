@@ -120,7 +120,7 @@ class ComputePool:
                 self._free.put(computer)
         raise CrashedError(
             f"The process that computed {function.__qualname__} died {ATTEMPTS} times.",
-            hint="It may have run out of memory. Free some and retry the job; the log says more.",
+            hint="It may have run out of memory. Free some memory and retry the job; see the log.",
         )
 
 

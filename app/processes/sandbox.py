@@ -47,8 +47,8 @@ def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwarg
     """
     if not _places.acquire(timeout=WAITS_S):
         raise UnavailableError(
-            f"{MAX_CONCURRENT} files are being read already.",
-            hint="Send this one again once they are done; nothing was stored.",
+            f"{MAX_CONCURRENT} files are already being read.",
+            hint="Send this file again in a moment; nothing was stored.",
         )
     try:
         return _run(limits, partial(function, *args, **kwargs))
@@ -102,10 +102,10 @@ def _address_space() -> int:
 
 def _too_much(limits: Limits) -> InputError:
     return InputError(
-        "This file cannot be read here; nothing was stored.",
+        "This file cannot be read; nothing was stored.",
         problems=(
-            Problem("file", f"takes more than {limits.processor_s} s or {limits.memory_bytes / 2**30:g} GiB to read"),
+            Problem("file", f"needs more than {limits.processor_s} s or {limits.memory_bytes / 2**30:g} GiB to read"),
         ),
-        hint="Check that it is the log that it is meant to be. `gainline import` and `gainline controller check` read "
+        hint="Check that it is the correct log. `gainline import` and `gainline controller check` read files "
         "without limits.",
     )

@@ -57,7 +57,7 @@ class Supervisor(Generic[T]):
             process.join(STOP_TIMEOUT_S)
         finally:
             if process.is_alive():
-                _log.error("child did not stop and is killed", child=self._name, pid=process.pid)
+                _log.error("child did not stop; killing it", child=self._name, pid=process.pid)
                 _dump_stacks(process)
                 process.kill()
                 process.join()
@@ -80,7 +80,7 @@ class Supervisor(Generic[T]):
             lived_s = self._clock.now_s() - started_s
             pause_s = FIRST_PAUSE_S if lived_s > HEALTHY_AFTER_S else min(2 * pause_s, LONGEST_PAUSE_S)
             _log.error(
-                "child died and is started again",
+                "child died; restarting it",
                 child=self._name,
                 pid=process.pid,
                 code=process.exitcode,

@@ -30,10 +30,10 @@ _OUTCOMES: Final = {
 _STATES: Final = {
     "draft": "Not flown yet",
     "ready": "Not flown yet",
-    "flying": "Not finished: a flight is under way",
+    "flying": "Not finished: a flight is in progress",
     "deciding": "Not finished: between two flights",
     "finished": "Finished",
-    "archived": "Finished, and archived",
+    "archived": "Finished and archived",
 }
 
 

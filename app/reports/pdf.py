@@ -44,7 +44,8 @@ def print_pdf(page: Callable[[], str]) -> bytes:
     browser = _browser()
     if not _places.acquire(blocking=False):
         raise UnavailableError(
-            f"{MAX_CONCURRENT} reports are being printed already.", hint="Try again in a few seconds, or take the HTML."
+            f"{MAX_CONCURRENT} reports are already being printed.",
+            hint="Try again in a few seconds, or use the HTML report.",
         )
     try:
         with tempfile.TemporaryDirectory(prefix="gainline-print-", ignore_cleanup_errors=True) as folder:
@@ -57,9 +58,9 @@ def _browser() -> str:
     found = next(filter(None, map(shutil.which, PRINTERS)), None)
     if found is None:
         raise UnavailableError(
-            "There is no Chromium on this server, and that is what prints reports as PDF.",
-            hint="Open the HTML report and print it from your browser (Save as PDF); or install Chromium where "
-            "Gainline runs.",
+            "Chromium is not installed on this server; PDF reports need it.",
+            hint="Open the HTML report and print it from your browser (Save as PDF); or install Chromium on the "
+            "computer that runs Gainline.",
         )
     return found
 
@@ -78,7 +79,7 @@ def _printed(browser: str, html: str, folder: Path) -> bytes:
         raise _failed(f"could not be started: {error.strerror or error}") from error
     if code != 0 or not out.is_file():
         _log.error("printing failed", code=code, said=said[-2000:])
-        raise _failed("ended without a PDF; the server's log has its last words")
+        raise _failed("ended without a PDF; see its output in the server's log")
     return out.read_bytes()
 
 

@@ -129,7 +129,7 @@ def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Ident
     kind = VEHICLE_KINDS.get(vehicle.kind)
     facts = [
         Fact("Vehicle", vehicle.name if vehicle.name == vehicle.title else f"{vehicle.name} ({vehicle.title})"),
-        Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation, nothing left the ground"),
+        Fact("Real or simulated", "REAL" if vehicle.is_real else "SIM: a simulation"),
     ]
     if identity is not None:
         known = f"{identity.autopilot} {identity.version}".strip()
@@ -161,7 +161,7 @@ def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, .
     first, later = percent(definition.first_step_fraction), percent(definition.step_fraction)
     facts.append(Fact("Largest step", f"{first} of each gain's range until a flight is valid, then {later}"))
     if experiment.output == "altitude_m":
-        facts.append(Fact("Ceiling of the gate", f"{definition.ceiling_m:g} m"))
+        facts.append(Fact("Gate ceiling", f"{definition.ceiling_m:g} m"))
     facts.append(Fact("Stop rule", _stop(definition.stop)))
     facts.append(Fact("Seed", str(definition.seed)))
     return tuple(facts)
@@ -191,10 +191,10 @@ def _stop(stop: StopRule) -> str:
     most = f"at most {count(stop.max_flights, 'flight')}"
     match stop.kind:
         case "paper":
-            said = f"two flights in a row less than {percent(stop.improvement)} better than the best; {most}"
+            said = f"two consecutive flights less than {percent(stop.improvement)} better than the best; {most}"
         case "noise":
             sure = percent(stop.confidence)
-            said = f"nothing left that flights could tell from noise with {sure} confidence; {most}"
+            said = f"no resolvable improvement at {sure} confidence; {most}"
         case _:
             said = most
     return said if stop.min_battery_v is None else f"{said}; or a flight that ends below {stop.min_battery_v:g} V"
@@ -202,9 +202,9 @@ def _stop(stop: StopRule) -> str:
 
 _ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
 _CAUSES: Final[Mapping[AbortCause, str]] = {
-    "limit": "(A limit was met: it counts against the gains.)",
-    "operator": "(Broken off by the operator, who has not said why: it does not count against the gains.)",
-    "behaved badly": "(The vehicle behaved badly, says the operator: it counts against the gains.)",
+    "limit": "(A limit was exceeded: it counts against the gains.)",
+    "operator": "(Aborted by the operator without a reason: it does not count against the gains.)",
+    "behaved badly": "(The operator reported that the vehicle behaved badly: it counts against the gains.)",
     "something else": "(The operator had another reason: it does not count against the gains.)",
 }
 
@@ -216,17 +216,17 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
             yield Anomaly(trial.number, kind, f"{trial.reason or 'No reason was given.'}{_counting(trial)}")
         if trial.overrule_reason:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
-            yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} The gate had said: {refused}")
+            yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} Refused by the gate: {refused}")
         if trial.read_back is not None and trial.read_back != trial.gains:
             sentence = f"Planned {gains(trial.gains)}; the vehicle read back {gains(trial.read_back)}."
-            yield Anomaly(trial.number, "Other gains read back", sentence)
+            yield Anomaly(trial.number, "Different gains read back", sentence)
         for glitch in trial.glitches:
             yield Anomaly(trial.number, "Glitch in the record", glitch.sentence)
         if trial.glitches and trial.repaired_error is not None:
             repaired = f"Without the glitches the error would be {number(trial.repaired_error)} {error_unit}."
             yield Anomaly(trial.number, "Glitch in the record", repaired)
         if trial.flight is not None and trial.flight.problem:
-            yield Anomaly(trial.number, "Trouble with the vehicle", trial.flight.problem)
+            yield Anomaly(trial.number, "Vehicle problem", trial.flight.problem)
 
 
 def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
@@ -235,8 +235,8 @@ def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
         yield Anomaly(
             number_of_flight,
             "Damaged record",
-            "Its stored record does not fit its checksum. Its curve here is the coarse one that was made at its "
-            "landing, and its error is the one computed then; take the record from an earlier backup.",
+            "The stored record does not match its checksum. The curve shown is the coarse copy made at landing, and "
+            "the error is the one computed then. Restore the record from an earlier backup.",
         )
 
 

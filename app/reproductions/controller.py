@@ -42,9 +42,9 @@ def run_controller(on_progress: Progress, trace_file: Path = RECORDED_TAKEOFF) -
     )
     on_progress(1.0, "compared")
     verdict = (
-        f"Every one of the {replay.rows} steps is exact in all {len(OUTPUTS)} signals"
+        f"All {replay.rows} steps are exact in all {len(OUTPUTS)} signals"
         if replay.exact
-        else f"The first difference stands in row {replay.first_different_row}"
+        else f"The first difference is in row {replay.first_different_row}"
     )
     return Result(
         rows=rows,
@@ -71,7 +71,7 @@ def _plot(title: str, signals: tuple[str, ...], trace: LoopTrace, computed: NDAr
     return Plot(
         title=title,
         summary=f"Recorded and replayed {', '.join(signals)} overlaid: {said}. z is positive downward.",
-        x_title="Time since the recording began (s)",
+        x_title="Time since the start of the recording (s)",
         panels=tuple(
             Panel(
                 y_title=signal,

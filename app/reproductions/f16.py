@@ -76,8 +76,8 @@ def run_f16(on_progress: Progress, full: bool) -> Result:
         figures=_figures(shown),
         notes=(
             (
-                "The paper gives no flight condition, reference amplitude, bounds or step sizes; this repeats the "
-                "shape of its figures."
+                "The paper gives no flight condition, reference amplitude, bounds or step sizes; this reproduces "
+                "the shape of its figures."
             ),
             (
                 f"The showcase is the inaccurate model of seed {SHOWCASE_SEED} at ±45 %, chosen because its campaign "
@@ -209,7 +209,7 @@ def _method(found: MethodResult) -> Iterator[Row]:
             measured=float(found.median_flights),
             reference=flights,
             digits=1,
-            note="of those that came near",
+            note="of those that reached it",
         )
 
 
@@ -221,7 +221,7 @@ def _by_the_second(found: MethodResult) -> Iterator[Row]:
         measured=found.share_by(2),
         reference=AT_LEAST_SECOND,
         digits=2,
-        note="to be at least the reference",
+        note="should be at least the reference",
     )
 
 

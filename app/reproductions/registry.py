@@ -64,10 +64,10 @@ _ALL: Final = (
     Reproduction(
         name="f16",
         title="Figs. 2, 3 and 4: the F-16",
-        line="The same method on an inaccurate model of an F-16 whose truth is known, and four other ways to the "
-        "optimum over many such models.",
-        paper="Nelder–Mead finds the optimum of the inaccurate model; flights of the truth then improve on it, most of "
-        "all in the first step, and come near the optimum after 16 of 27.",
+        line="The same method on an inaccurate model of an F-16 whose true model is known, compared with four "
+        "other methods over many such models.",
+        paper="Nelder–Mead finds the optimum of the inaccurate model. Flights of the true model then improve on "
+        "it, most in the first step, and come close to the optimum after 16 of 27.",
         figures={
             "figure2-left": "Fig. 2, left",
             "figure2-right": "Fig. 2, right",
@@ -76,8 +76,8 @@ _ALL: Final = (
             "figure4": "Fig. 4",
         },
         run=_f16,
-        long_form="Methods compared over 50 models instead of 10, the model identified again also at ±20 and ±80 % and "
-        "from noisy logs: ten times as long.",
+        long_form="Methods compared over 50 models instead of 10, the model identified again also at ±20 and ±80 % "
+        "and from noisy logs: takes ten times as long.",
     ),
     Reproduction(
         name="table1",
@@ -111,8 +111,8 @@ _ALL: Final = (
         title="Fig. 12: takeoffs repeated over a battery",
         line="Two gain sets flown ten times on each of 240 batteries of the twin, 200 steady and 40 fading: scatter, "
         "and trend over the battery.",
-        paper="The error scatters by 0.0141 m at the default gains and by 0.0066 m at the tuned ones; the battery does "
-        "not show.",
+        paper="The error scatters by 0.0141 m at the default gains and by 0.0066 m at the tuned ones; there is "
+        "no trend over the battery.",
         figures={"figure12": "Fig. 12"},
         run=_variability,
     ),
@@ -125,7 +125,7 @@ def get_reproduction(name: str) -> Reproduction:
     """The reproduction with this name. Raises InputError if there is none."""
     if name not in REPRODUCTIONS:
         raise InputError(
-            "There is no such reproduction.",
+            "Unknown reproduction.",
             hint=f"Choose one of: {', '.join(REPRODUCTIONS)}.",
             problems=(Problem("name", f"unknown name {name!r}"),),
         )

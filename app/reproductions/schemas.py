@@ -12,7 +12,7 @@ from app.jobs.service import Job
 class Run(Request):
     """How to run a reproduction."""
 
-    full: Annotated[bool, Field(description="the long form, where there is one")] = False
+    full: Annotated[bool, Field(description="the long version, if there is one")] = False
 
 
 class ReproductionFigure(BaseModel):
@@ -41,7 +41,7 @@ class ReproductionSummary(BaseModel):
     title: str
     line: str
     paper: str
-    long_form: Annotated[str, Field(description="what the long form does; empty where there is none")]
+    long_form: Annotated[str, Field(description="contents of the long version; empty if there is none")]
     figures: list[ReproductionFigure]
     job: Job | None
     latest: LatestRun | None

@@ -39,9 +39,9 @@ def read_order(order: object) -> Order:
     try:
         found = _ORDER.validate_python(order)
     except ValidationError as error:
-        raise GainlineError(f"The order {order!r} cannot be read.", hint="Run the reproduction anew.") from error
+        raise GainlineError(f"The job's order {order!r} cannot be read.", hint="Run the reproduction again.") from error
     if found.name not in REPRODUCTIONS:
-        raise GainlineError(f"There is no reproduction {found.name} any more.", hint="Run another one.")
+        raise GainlineError(f"The reproduction {found.name} no longer exists.", hint="Run another reproduction.")
     return found
 
 
@@ -77,7 +77,7 @@ def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> C
     """A figure of the newest result, or a waiting card if there is none. Raises NotFoundError."""
     each = _registered(name)
     if figure_name not in each.figures:
-        raise NotFoundError(f"figure {figure_name} of", name, hint=f"There are: {', '.join(each.figures)}.")
+        raise NotFoundError(f"figure {figure_name} of", name, hint=f"Available: {', '.join(each.figures)}.")
     title, result = each.figures[figure_name], _result(session, name)
     if result is None or figure_name not in result.figures:
         return Card(name=figure_name, title=title, state="waiting", reason="Run this reproduction to see its figures.")
@@ -95,7 +95,7 @@ def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> C
 
 def _registered(name: str) -> Reproduction:
     if name not in REPRODUCTIONS:
-        raise NotFoundError("reproduction", name, hint=f"There are: {', '.join(REPRODUCTIONS)}.")
+        raise NotFoundError("reproduction", name, hint=f"Available: {', '.join(REPRODUCTIONS)}.")
     return REPRODUCTIONS[name]
 
 

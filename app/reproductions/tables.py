@@ -128,13 +128,13 @@ def run_table(name: str, figure: str, on_progress: Progress) -> Result:
         },
         notes=(
             (
-                "Flown without noise. The reference is the measurement that this program is held to: within 1.5 % on "
-                "jsbsim, within 1 % on the twin."
+                "Flown without noise. The reference is this program's target: within 1.5 % on jsbsim, within 1 % on "
+                "the twin."
             ),
             (
-                "Every gain set is judged by a campaign's gate first. ki = 1356 and its neighbours can wrap and are "
-                "flown over its refusal. "
-                f"The reason recorded: {OVERRULE}. On a real vehicle nobody could."
+                "Every gain set is checked by a campaign's gate first. ki = 1356 and similar values can overflow "
+                f"and are flown by overruling the gate. The recorded reason: {OVERRULE}. The gate cannot be "
+                "overruled on a real vehicle."
             ),
         ),
     )
@@ -143,7 +143,7 @@ def run_table(name: str, figure: str, on_progress: Progress) -> Result:
 def _row(table: Table, kind: str, flown: Takeoff) -> Row:
     own = kind == table.vehicle
     return Row(
-        group=f"{kind}, which stands for the paper's vehicle" if own else f"{kind}, for comparison",
+        group=f"{kind}, which represents the paper's vehicle" if own else f"{kind}, for comparison",
         label=_label(flown.gains),
         unit="m",
         measured=flown.measured,

@@ -47,7 +47,7 @@ class ReproductionJob:
             try:
                 result = self._watch(job, process)
             except ProcessDiedError as death:
-                _log.warning("the process that computed died", name=order.name, exit_code=death.args[0])
+                _log.warning("the computing process died", name=order.name, exit_code=death.args[0])
                 with self._database.write() as session:
                     jobs.requeue_or_fail_job(session, job.id, worker=self._worker)
                 return
@@ -100,7 +100,7 @@ def _checked(said: StudyMessage) -> Result:
         case StudyError(message, hint, problems):
             raise GainlineError(message, hint=hint, problems=problems)
         case InternalFailure(what, traceback):
-            _log.error("the process that computed made a mistake", exception=traceback)
+            _log.error("internal error in the computing process", exception=traceback)
             raise internal_error(what)
         case Progress():
             raise AssertionError

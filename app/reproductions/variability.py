@@ -80,18 +80,19 @@ def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_group
         figures={"figure12": _plot([flown.steady[0] for flown in found])},
         notes=(
             (
-                f"{groups} batteries of {REPEATS} flights each at either gain set, on the twin with the real drone's "
-                "scatter. The scatter is to be within 40 % of the paper's, which comes from a single battery."
+                f"{groups} batteries of {REPEATS} flights each with both gain sets, on the twin with the real "
+                "drone's scatter. The scatter should be within 40 % of the paper's, which comes from a single "
+                "battery."
             ),
             (
-                f"A trend is the slope of the error over the {REPEATS} flights of a battery; it counts as seen when "
-                f"its {_percent(CONFIDENCE)} interval leaves out zero, which chance does on "
+                f"A trend is the slope of the error over the {REPEATS} flights of a battery; it counts as resolved "
+                f"if its {_percent(CONFIDENCE)} interval excludes zero, which happens by chance on "
                 f"{_percent(1 - CONFIDENCE)} of steady batteries. The fading battery is {_percent(FADE)} weaker in "
                 "its last flight than in its first."
             ),
             (
-                "Both gain sets are judged by a campaign's gate first. ki = 1356 can wrap and is flown over its "
-                f"refusal. The reason recorded: {OVERRULE}."
+                "Both gain sets are checked by a campaign's gate first. ki = 1356 can overflow and is flown by "
+                f"overruling the gate. The recorded reason: {OVERRULE}."
             ),
         ),
     )
@@ -163,7 +164,7 @@ def _rows(policy: RepeatedPolicy, flown: Repeats) -> Iterator[Row]:
         measured=share_with_trend(flown.steady),
         reference=1.0 - CONFIDENCE,
         digits=3,
-        note="what chance alone does",
+        note="expected by chance",
     )
     yield Row(
         group=policy.title,
@@ -171,7 +172,7 @@ def _rows(policy: RepeatedPolicy, flown: Repeats) -> Iterator[Row]:
         unit="share",
         measured=share_with_trend(flown.fading),
         digits=3,
-        note="what ten flights can reveal",
+        note="detected in ten flights",
     )
 
 

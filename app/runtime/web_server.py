@@ -85,7 +85,7 @@ class _Server(uvicorn.Server):
             except (BlockingIOError, ConnectionAbortedError):
                 return
             except OSError as error:
-                _log.error("no connection can be taken", why=str(error))
+                _log.error("connections cannot be accepted", why=str(error))
                 loop.remove_reader(self._listener)
                 loop.call_later(WITHOUT_DESCRIPTORS_S, self._listen)
                 return

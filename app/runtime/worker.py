@@ -139,7 +139,7 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
 def _shut_down_with_parent(ending: ShutdownRequest) -> None:
     if (parent := parent_process()) is not None:
         parent.join()
-        ending.set("the web process is gone")
+        ending.set("the web process has exited")
 
 
 class Worker:
@@ -243,7 +243,7 @@ class Worker:
                 try:
                     claim()
                 except StorageError as error:
-                    _log.error("no work can be claimed", why=str(error))
+                    _log.error("work cannot be claimed", why=str(error))
                     self._ending.event.wait(self._clock.wall_s(RETRY_S))
                 watch.wait(self._ending.event, LOOK_ANYWAY_S)
 
@@ -271,7 +271,7 @@ class Worker:
             try:
                 work()
             except StorageError as error:
-                _log.error("the worker cannot begin", why=str(error))
+                _log.error("the worker cannot start", why=str(error))
                 self._ending.event.wait(self._clock.wall_s(RETRY_S))
             else:
                 return

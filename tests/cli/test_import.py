@@ -84,7 +84,7 @@ def test_two_takeoffs_are_listed_and_one_is_taken_by_its_number(
     both.write_bytes(TUNED_LOG.read_bytes() + LOG.read_bytes())
     listed = run(settings, both, "--campaign", "Garage")
     assert listed.exit_code == 1
-    assert "The log holds 2 takeoffs" in listed.stderr
+    assert "The log contains 2 takeoffs" in listed.stderr
     assert "2: " in listed.stderr
     assert run(settings, both, "--campaign", "Garage", "--takeoff", 2).exit_code == 0
 

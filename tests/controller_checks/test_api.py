@@ -164,7 +164,7 @@ def test_gains_that_are_none_and_a_form_without_a_file_are_refused_naming_the_fi
 def test_a_small_file_that_unpacks_to_a_huge_one_is_refused(client: TestClient) -> None:
     bomb = gzip.compress(b"step,mode\n" + bytes(300 * 2**20), compresslevel=1)
     answer = send(client, "bomb.csv.gz", bomb)
-    assert (answer.status_code, problems_of(answer)) == (422, {"file": "holds more than 256 MiB of text"})
+    assert (answer.status_code, problems_of(answer)) == (422, {"file": "contains more than 256 MiB of text"})
 
 
 def test_more_than_the_limit_is_refused_before_it_arrives(client: TestClient) -> None:

@@ -1,4 +1,4 @@
-"""Rows that can be read and make no sense any more: told as a damaged database, not as a mistake of the program."""
+"""Rows that can be read and make no sense any more: told as a damaged database, not as internal error."""
 
 import pytest
 from fastapi.testclient import TestClient

@@ -256,7 +256,7 @@ def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server, 
 @provokes(GainlineError)
 def _one_without_a_kind_of_its_own(dashboard: Dashboard, _server: Server, _states: States) -> None:
     """None reaches the API at present, so the program's own answer to one is made here."""
-    made = over_http.problem_response(GainlineError("The order cannot be read.", hint="Run the reproduction anew."))
+    made = over_http.problem_response(GainlineError("The order cannot be read.", hint="Run the reproduction again."))
     dashboard.page.route(
         "**/api/campaigns",
         lambda route: (

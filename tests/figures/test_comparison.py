@@ -76,6 +76,6 @@ def test_what_a_campaign_is_called_is_drawn_as_it_is_written() -> None:
 
 def test_without_any_record_it_says_so() -> None:
     card = card_of(ComparisonFigure(compared(None, None)))
-    assert (card.state, card.reason) == ("waiting", "None of these flights left a record.")
+    assert (card.state, card.reason) == ("waiting", "None of these flights has a record.")
     alone = card_of(ComparisonFigure(compared(None, climb(0.2))))
     assert [one["meta"]["role"] for one in traces(alone)] == ["set point", "flight"]

@@ -71,4 +71,4 @@ def test_a_long_line_is_tabled_at_even_steps() -> None:
 
 def test_nothing_to_draw_is_said() -> None:
     card = card_of(PanelsFigure(plot(Panel(y_title="y", lines=()))))
-    assert (card.state, card.reason) == ("waiting", "There is nothing to draw.")
+    assert (card.state, card.reason) == ("waiting", "Nothing to draw.")

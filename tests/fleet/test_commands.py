@@ -119,7 +119,7 @@ def test_a_second_request_is_refused_and_the_same_one_sent_again_is_harmless(
     assert (again.status_code, again.json()) == (202, first.json())
     other = client.post(f"/api/vehicles/{vehicle['id']}/restore")
     assert other.status_code == 409
-    assert other.json()["detail"] == "Drone is busy: “check” is under way."
+    assert other.json()["detail"] == "Drone is busy: “check” is in progress."
     finish_act(database)
     assert client.post(f"/api/vehicles/{vehicle['id']}/restore").status_code == 202
 
@@ -130,7 +130,7 @@ def test_nothing_is_asked_beside_a_flight_and_no_flight_beside_an_act(client: Te
     trial = create_trial(client, campaign["id"])
     client.post(f"/api/vehicles/{vehicle['id']}/check")
     refused = client.post(f"/api/trials/{trial['id']}/stage")
-    assert (refused.status_code, refused.json()["detail"]) == (409, "Drone is busy: “check” is under way.")
+    assert (refused.status_code, refused.json()["detail"]) == (409, "Drone is busy: “check” is in progress.")
     finish_act(database)
     assert client.post(f"/api/trials/{trial['id']}/stage").status_code == 202
     beside = client.post(f"/api/vehicles/{vehicle['id']}/check")
@@ -147,7 +147,7 @@ def test_what_nobody_begins_in_time_is_given_up(client: TestClient, database: Da
     with database.write() as session:
         assert commands.claim_act(session, WORKER) is None
     act = newest(client, vehicle)
-    assert (act["state"], act["problem"]) == ("failed", "It could not be begun within 10 s. Ask again.")
+    assert (act["state"], act["problem"]) == ("failed", "It could not be started within 10 s. Request it again.")
 
 
 def test_a_check_keeps_every_item_it_found(client: TestClient, database: Database) -> None:
@@ -353,10 +353,10 @@ def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: 
     with database.write() as session:
         commands.withdraw_acts(session)
     assert [(newest(client, vehicle)["state"], newest(client, vehicle)["problem"]) for vehicle in (begun, waiting)] == [
-        ("failed", "It was not finished: the worker ended. Ask again if it is still wanted."),
+        ("failed", "It was not finished: the worker stopped. Ask again if it is still wanted."),
         (
             "failed",
-            "It was not begun: the worker was away when it was asked for. Ask again if it is still wanted.",
+            "It was not started: no worker was running when it was requested. Ask again if it is still wanted.",
         ),
     ]
 

@@ -174,7 +174,7 @@ def test_a_flight_that_was_asked_for_while_the_worker_was_away_does_not_take_off
     assert field.runner.claim() is None
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "cancelled")
-    assert "the worker was away when it was asked for" in after["flight"]["problem"]
+    assert "no worker was running when it was requested" in after["flight"]["problem"]
     assert client.post(f"/api/trials/{trial_id}/fly").status_code in {202, 503}, "it can be asked for again"
 
 
@@ -344,5 +344,5 @@ def test_a_vehicle_that_is_staged_and_not_flown_within_ten_minutes_has_its_safe_
     field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "cancelled")
-    assert after["flight"]["problem"] == "nobody asked for its take-off within 10 minutes"
+    assert after["flight"]["problem"] == "its take-off was not requested within 10 minutes"
     assert vehicle_state(client) == "ready"

@@ -82,13 +82,13 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
 ) -> None:
     assert staged["actions"] == ["take-off", "unstage", "cancel", "abort", "note"]
     assert is_wanted(database, staged) == (False, None)
-    with pytest.raises(ConflictError, match="nobody has asked for its take-off"), database.write() as session:
+    with pytest.raises(ConflictError, match="its take-off has not been requested"), database.write() as session:
         queue.record_lift_off(session, staged["flight"]["id"])
 
     status, sentence = take_off(client, staged, {})
     assert (status, sentence) == (
         403,
-        "Drone is a real vehicle: it takes off only on its operator's own act in the browser.",
+        "Drone is a real vehicle: only its operator can start the take-off, in the browser.",
     )
     script = control_header(client, real)
     assert take_off(client, staged, script)[0] == 403
@@ -101,7 +101,7 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
     assert is_wanted(database, staged) == (True, None)
     assert take_off(client, staged, {**OUR_PAGE, **script}) == (
         409,
-        f"The take-off of trial {staged['number']} was asked for already.",
+        f"The take-off of trial {staged['number']} has already been requested.",
     )
     with database.write() as session:
         queue.record_lift_off(session, staged["flight"]["id"])
@@ -110,7 +110,7 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
 
 
 def test_without_anybody_in_control_nothing_real_takes_off(client: TestClient, staged: Json) -> None:
-    assert take_off(client, staged, OUR_PAGE) == (409, "Nobody is in control of Drone.")
+    assert take_off(client, staged, OUR_PAGE) == (409, "No operator is in control of Drone.")
 
 
 def test_a_rehearsal_that_is_found_bad_while_its_vehicle_is_staged_keeps_it_on_the_ground(
@@ -138,7 +138,7 @@ def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     with database.write() as session:
         session.get_one(FlightRow, staged["flight"]["id"]).take_off_at = utc_now() - timedelta(seconds=11)
-    why = "it could not take off within 10 s of the operator's word"
+    why = "the take-off did not start within 10 s of the operator's request"
     assert is_wanted(database, staged) == (False, why)
     with pytest.raises(ConflictError, match=why), database.write() as session:
         queue.record_lift_off(session, staged["flight"]["id"])
@@ -213,7 +213,7 @@ def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
         assert queue.lose_running_flights(session) == []
     assert is_wanted(database, staged) == (False, "the flight is failed")
     after = trial(client, staged)
-    assert (after["state"], after["flight"]["problem"]) == ("planned", "the worker ended before lift-off")
+    assert (after["state"], after["flight"]["problem"]) == ("planned", "the worker stopped before lift-off")
     assert seen(client, real)["state"] == "quarantined"
 
 

@@ -83,7 +83,7 @@ def test_a_job_that_kills_its_workers_is_failed_after_three_times(database: Data
         found = jobs.get_job(session, job)
     assert found.state == JobState.FAILED
     assert found.problem is not None
-    assert found.problem.title == "The worker went away 3 times while it did this."
+    assert found.problem.title == "The worker stopped 3 times during this job."
 
 
 def test_a_failed_job_says_why_and_can_be_retried(client: TestClient, database: Database) -> None:

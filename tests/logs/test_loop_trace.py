@@ -60,7 +60,7 @@ def test_malformed_files_are_refused_naming_line_and_column(tmp_path: Path, line
 
 def test_traces_beyond_the_limit_are_refused_while_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.logs.loop_trace.MAX_ROWS", 2)
-    with pytest.raises(InputError, match=r"line 4, step: a trace may hold at most 2 rows"):
+    with pytest.raises(InputError, match=r"line 4, step: a trace may have at most 2 rows"):
         read_loop_trace(trace(tmp_path, HEADER, *[ROW] * 3))
 
 

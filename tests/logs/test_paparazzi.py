@@ -20,7 +20,7 @@ def stream(text: str) -> io.BytesIO:
 def test_the_loop_s_own_message_tells_everything() -> None:
     flown = read_takeoff(stream(data_of(Flight(DEFAULT))), companion=stream(COMPANION))
     assert flown.gains == DEFAULT
-    assert flown.begins_with == "the reference setting out"
+    assert flown.begins_with == "the reference starting to move"
     assert set(flown.trajectory.channels) == {
         "altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "feed_forward", "feedback",
     }  # fmt: skip
@@ -33,7 +33,7 @@ def test_the_loop_s_own_message_tells_everything() -> None:
 def test_without_its_companion_the_gains_are_those_that_the_commands_follow_from() -> None:
     flown = read_takeoff(stream(data_of(Flight(TUNED))))
     assert flown.gains == TUNED
-    assert "gains worked out from the loop's commands, which follow from them" in flown.notes
+    assert "gains computed from the loop's commands" in flown.notes
 
 
 def test_settings_that_the_vehicle_reported_win_over_those_built_in() -> None:
@@ -53,7 +53,7 @@ def test_where_the_position_comes_more_often_than_the_loop_its_altitude_is_taken
     lines = data_of(Flight(DEFAULT, every=10)).splitlines()
     rare = [line for number, line in enumerate(lines) if "VERT_LOOP" not in line or number % 20 == 2]
     flown = read_takeoff(stream("\n".join(rare)))
-    assert flown.begins_with == "the reference setting out"
+    assert flown.begins_with == "the reference starting to move"
     assert len(flown.trajectory) > 1700
     assert "reference_m" in flown.trajectory.channels
 
@@ -105,5 +105,5 @@ def test_lines_that_cannot_be_are_passed_over(line: str) -> None:
 
 
 def test_a_file_without_any_altitude_is_refused() -> None:
-    with pytest.raises(TrajectoryError, match="holds neither VERT_LOOP nor ROTORCRAFT_FP"):
+    with pytest.raises(TrajectoryError, match="contains neither VERT_LOOP nor ROTORCRAFT_FP"):
         read_takeoffs(stream("1.0 31 ALIVE 1,2\n" * 100))

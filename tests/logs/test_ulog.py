@@ -26,7 +26,7 @@ def test_the_recorded_takeoff_is_found_with_its_gains() -> None:
     assert flown.trajectory["altitude_m"].max() == pytest.approx(2.80, abs=0.005)
     assert flown.trajectory["climb_rate_m_s"].max() > 0.9
     assert flown.trajectory["battery_v"][0] == pytest.approx(16.2, abs=0.01)
-    assert "altitude counted from the ground, where the log has 0.58 m" in flown.notes
+    assert "altitude relative to the ground, which is at 0.58 m in the log" in flown.notes
     assert "ends after 8.9 s with the command NAV_LAND" in flown.notes
 
 
@@ -67,13 +67,13 @@ def test_a_gain_that_is_changed_in_flight_ends_the_record() -> None:
 
 def test_dropouts_are_told() -> None:
     flown = read_takeoff(io.BytesIO(small_log(after=message("O", struct.pack("<H", 300)))))
-    assert "the logger dropped data 1 times, 0.30 s in all" in flown.notes
+    assert "the logger dropped data 1 times, 0.30 s in total" in flown.notes
 
 
 def test_after_damage_reading_goes_on_at_the_next_mark() -> None:
     mark = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
     flown = read_takeoff(io.BytesIO(small_log(after=b"\0\0\0damage" + mark)))
-    assert "1 damaged stretches passed over" in flown.notes
+    assert "1 damaged sections skipped" in flown.notes
     assert flown.trajectory["altitude_m"].max() == pytest.approx(3.0, abs=0.01)
 
 

@@ -142,7 +142,7 @@ def test_an_order_that_cannot_be_read_fails_with_its_reason(working: Working) ->
     failed = working.job(job_id)
     assert failed.state == JobState.FAILED
     assert failed.problem is not None
-    assert failed.problem.title == "There is no reproduction table9 any more."
+    assert failed.problem.title == "The reproduction table9 no longer exists."
 
 
 def test_a_desk_takes_no_more_than_it_has_room_for(working: Working) -> None:

@@ -61,7 +61,7 @@ def test_a_worker_killed_in_mid_flight_leaves_a_lost_trial_and_a_free_vehicle(se
     pids = children(first)
     os.kill(first, signal.SIGKILL)
     lost = serving.trial(trial_id, "lost")
-    assert lost["reason"] == "the worker ended while it flew"
+    assert lost["reason"] == "the worker stopped during the flight"
     assert lost["flight"]["state"] == "lost"
     assert serving.worker_pid() != first
     wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in pids))

@@ -135,7 +135,7 @@ def test_a_vehicle_in_the_air_is_landed_when_the_worker_is_killed_and_is_there_a
         vehicle.in_the_air(trial_id)
         before, session = serving.worker_pid(), vehicle.session_pid()
         os.kill(before, signal.SIGKILL)
-        assert serving.trial(trial_id, "lost")["reason"] == "the worker ended while it flew"
+        assert serving.trial(trial_id, "lost")["reason"] == "the worker stopped during the flight"
         wait_for("a session of the new worker", lambda: vehicle.session_pid() not in {0, session})
         assert vehicle.in_state("ready")["held"] == SAFE
         assert serving.worker_pid() != before

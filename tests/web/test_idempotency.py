@@ -43,7 +43,7 @@ def test_a_key_that_stands_for_another_request_is_refused(client: TestClient, ot
     path, body = other
     answer = client.post(path, json=body, headers=KEY) if body else client.post(path, headers=KEY)
     assert answer.status_code == 422
-    assert problems_of(answer) == {"Idempotency-Key": "stands for another request"}
+    assert problems_of(answer) == {"Idempotency-Key": "belongs to another request"}
 
 
 def test_a_refused_request_may_be_tried_again_with_its_key(client: TestClient, database: Database) -> None:

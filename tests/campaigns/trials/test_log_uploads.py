@@ -117,4 +117,4 @@ def test_a_log_without_gains_leaves_them_as_planned(client: TestClient, trial: J
 def test_a_file_of_the_wrong_kind_is_refused_by_its_name(client: TestClient, trial: Json) -> None:
     answer = client.post(path_of(trial), files={"file": ("flight.ulg", b"\x7fELF" + bytes(100))})
     assert answer.status_code == 422
-    assert answer.json()["detail"] == "flight.ulg is not what its name says."
+    assert answer.json()["detail"] == "flight.ulg does not match its file extension."

@@ -151,7 +151,7 @@ def test_aborting_a_flight_that_is_over_is_harmless(client: TestClient, database
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     trial = create_flown_trial(client, database, campaign["id"])
     answer = client.post(f"/api/trials/{trial['id']}/abort")
-    assert (answer.status_code, answer.json()["sentence"]) == (202, "The flight is over already.")
+    assert (answer.status_code, answer.json()["sentence"]) == (202, "The flight has already ended.")
     planned = create_trial(client, campaign["id"])
     assert client.post(f"/api/trials/{planned['id']}/abort").status_code == 409
 
