@@ -130,7 +130,7 @@ def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], context: Req
     if kind.is_real_with(options, context.simulation_hosts) != row.is_real:
         raise InputError(
             f"{row.name} is {'REAL' if row.is_real else 'simulated'}. This cannot be changed, because its flights "
-            "are classified by it.",
+            "are recorded as such.",
             hint="Register the other vehicle separately.",
             problems=(Problem("options", "would change whether the vehicle is real"),),
         )

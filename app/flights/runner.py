@@ -268,7 +268,7 @@ class FlightRunner:
                 self._store(work)
             except StorageError as error:
                 _log.error("outcome not stored yet", why=str(error))
-                self._phase(request, "landed", f"The outcome is not stored yet and will be retried: {error}")
+                self._phase(request, "landed", f"The outcome is not stored yet; storing is retried: {error}")
                 if self._closing.wait(self._clock.wall_s(RETRY_S)):
                     return False
             else:

@@ -48,8 +48,8 @@ def test_a_refusal_names_the_vehicle_and_the_way_out() -> None:
     with pytest.raises(NotAllowedError, match="Bee is a real vehicle") as locked:
         require(Permission.REAL, Caller(), "Bee")
     assert "gainline unlock" in locked.value.hint
-    assert "Abort and land need neither" in locked.value.hint
+    assert "Abort and land need no key" in locked.value.hint
     with pytest.raises(NotAllowedError, match=r"from another device \(192.0.2.9\)"):
         require(Permission.REAL, Caller(RequestOrigin.ELSEWHERE, Key.BROWSER, because=ELSEWHERE), "Bee")
-    with pytest.raises(NotAllowedError, match="can be reached over the network"):
+    with pytest.raises(NotAllowedError, match="is reachable over the network"):
         require(Permission.LINK, Caller(key=Key.BROWSER, exposed=True), "Bee")

@@ -165,7 +165,7 @@ def test_a_directory_without_end_is_not_read(client: TestClient, database: Datab
             out.writestr(f"records/{number:040}.zst", b"")
     found: dict[str, str] = {}
     peak = peak_bytes(lambda: found.update(refused(client, database, file.getvalue())))
-    assert "directory takes more than 4 MiB" in found["file"]
+    assert "directory is larger than 4 MiB" in found["file"]
     assert peak < 50 * 2**20
 
 

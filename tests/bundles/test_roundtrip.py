@@ -225,7 +225,7 @@ def test_a_longer_chain_of_warm_starts_than_a_bundle_holds_is_refused_in_words(
     assert client.get(f"/api/campaigns/{ids[19]}/bundle").status_code == 200
     refused = client.get(f"/api/campaigns/{ids[20]}/bundle")
     assert refused.status_code == 409, refused.text
-    assert "goes back over 20 warm starts, and a bundle holds 20 campaigns" in refused.json()["detail"]
+    assert "has a chain of 20 warm starts, and a bundle can hold 20 campaigns" in refused.json()["detail"]
     assert f"campaign {ids[19]} is the last that fits" in refused.json()["hint"]
 
 
@@ -236,7 +236,7 @@ def test_what_a_bundle_cannot_hold_is_refused_in_words(client: TestClient, datab
         trial.curve = [[float(time), 0.0] for time in range(5001)]
     refused = client.get(f"/api/campaigns/{campaign['id']}/bundle")
     assert refused.status_code == 409, refused.text
-    assert "does not fit into a bundle: curve: List should have at most 5000 items" in refused.json()["detail"]
+    assert "cannot be exported as a bundle: curve: List should have at most 5000 items" in refused.json()["detail"]
 
 
 def test_the_same_bundle_sent_twice_with_one_key_is_one_campaign(client: TestClient, campaign: Json) -> None:

@@ -77,7 +77,7 @@ def test_a_real_vehicle_is_staged_only_after_three_flights_on_its_simulation(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
     assert campaign["rehearsal"]["state"] == "missing"
-    assert campaign["next_action"] == "Rehearse on the simulation"
+    assert campaign["next_action"] == "Rehearse on a simulation"
     planned = create_trial(client, campaign["id"])
     assert "stage" not in planned["actions"]
     refused = client.post(f"/api/trials/{planned['id']}/stage")
@@ -112,7 +112,7 @@ def test_a_spoilt_one_is_flown_anew(client: TestClient, database: Database, camp
     land(database, lift_off(database), create_record(ending="aborted", reason="too high", until_s=4.0))
     failed = again(client, campaign)
     assert (failed["rehearsal"]["state"], failed["rehearsal"]["reason"]) == ("failed", "flight 1 is aborted")
-    assert failed["next_action"] == "Rehearse on the simulation"
+    assert failed["next_action"] == "Rehearse on a simulation"
     assert rehearse(client, campaign)["id"] != rehearsal["id"]
     assert again(client, campaign)["rehearsal"]["state"] == "under way"
 

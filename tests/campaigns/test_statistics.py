@@ -216,7 +216,7 @@ def test_a_clone_on_another_vehicle_starts_from_the_best_flight(
     ("settling_s", "decided", "agreement"),
     [
         (1.0, "The model fitted to the other vehicle's flight replaces the data sheet: ", "agreement 100\u00a0%"),
-        (6.0, "Nothing is taken over from the other vehicle: ", "less than 50\u00a0%"),
+        (6.0, "Nothing is used from the other vehicle: ", "less than 50\u00a0%"),
     ],
 )
 def test_the_proposals_after_a_warm_starts_first_flight_say_what_was_taken_over(

@@ -32,7 +32,7 @@ def test_other_gains_are_noticed_and_the_flown_ones_suggested(tmp_path: Path) ->
     result = check(write(tmp_path, Flight(DEFAULT)), "--gains", "300,13,82")
     assert result.exit_code == 1
     assert "The replica differs." in result.stdout
-    assert "More commands follow from kp 283, ki 13, kd 82" in result.stdout
+    assert "More commands match with kp 283, ki 13, kd 82" in result.stdout
 
 
 def test_without_companion_the_gains_are_worked_out(tmp_path: Path) -> None:
@@ -57,5 +57,5 @@ def test_what_cannot_be_checked_is_said_in_words(tmp_path: Path) -> None:
     result = check(tmp_path / "absent.data", other)
     assert result.exit_code == 1
     assert "absent.data could not be read" in result.stderr
-    assert "holds no VERT_LOOP" in result.stderr
+    assert "contains no VERT_LOOP" in result.stderr
     assert "must be three whole numbers" in check(other, "--gains", "1,2").stderr

@@ -38,7 +38,7 @@ def test_a_pdf_is_asked_for_by_the_files_name_and_refused_in_words_where_nothing
     monkeypatch.setenv("PATH", str(tmp_path))
     result = run(settings, "report", "Garage", "--out", tmp_path / "garage.pdf")
     assert result.exit_code == 1
-    assert "There is no Chromium" in result.stderr
+    assert "Chromium is not installed" in result.stderr
     assert not (tmp_path / "garage.pdf").exists()
 
 
@@ -61,7 +61,7 @@ def test_what_is_no_bundle_or_no_campaign_is_refused_in_words(
 ) -> None:
     (tmp_path / "holiday.zip").write_bytes(b"sun")
     refused = run(settings, "unbundle", tmp_path / "holiday.zip")
-    assert (refused.exit_code, "is no zip file" in refused.stderr) == (1, True)
+    assert (refused.exit_code, "is not a zip file" in refused.stderr) == (1, True)
     assert run(settings, "unbundle", tmp_path / "nothing.zip").exit_code == 1
     missing = run(settings, "bundle", "Shed", "--out", tmp_path / "shed.zip")
     assert (missing.exit_code, "There is no campaign" in missing.stderr) == (1, True)

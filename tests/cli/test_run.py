@@ -38,7 +38,7 @@ def test_the_gradient_tunes_the_jsbsim_drone_by_the_fourth_flight(tmp_path: Path
     assert errors(campaign)[0] == pytest.approx(0.3267, rel=0.015)
     assert min(errors(campaign)[:4]) <= 0.1000
     assert len(campaign["trials"]) <= 7
-    assert "did not improve by more than 5\u00a0%" in campaign["stopped_because"]
+    assert "did not improve on the best before them by more than 5\u00a0%" in campaign["stopped_because"]
 
 
 @pytest.mark.complete

@@ -56,7 +56,7 @@ def drone(autopilot: str, *options: str) -> Iterator[str]:
         command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
     ) as process:
         try:
-            said(process.stdout, f"Its time runs {SPEED} times")
+            said(process.stdout, f"Simulated time runs at {SPEED} times real time")
             yield str(address)
         finally:
             process.send_signal(signal.SIGTERM)
@@ -167,7 +167,7 @@ def see_sets_flown(profile: str, count: int, out: Path, said: str) -> None:
     assert [trial["gains"] for trial in trials] == read_preset(f"{profile}-takeoff").gains[:count]
     assert all(0.05 < trial["error"] < 0.6 for trial in trials)
     assert [(trial["kind"], trial["predicted_error"]) for trial in trials] == [("manual", None)] * count
-    assert "The vehicle holds its safe gains again, read back:" in said
+    assert "The safe gains are restored and read back:" in said
 
 
 def test_gains_that_a_vehicle_is_never_given_are_refused_whoever_overrules(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +194,10 @@ def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> No
 @pytest.mark.parametrize(
     ("arguments", "said_of_it"),
     [
-        (("px4-takeoff", "--set", "autopilot=ardupilot"), "definition.experiment: 'takeoff-px4' has other gains than"),
+        (
+            ("px4-takeoff", "--set", "autopilot=ardupilot"),
+            "definition.experiment: 'takeoff-px4' tunes other gains than",
+        ),
         (("px4-takeoff", "--strategy", "gradient"), "there is no model for the gains of 'takeoff-px4'"),
         (
             ("ardrone-takeoff", "--vehicle", "mavlink:udpin:127.0.0.1:14550", "--set", "autopilot=px4"),

@@ -86,7 +86,7 @@ def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains
     assert "The safe gains are restored and read back: kp 283, ki 13, kd 82." in printed
     document = json.loads(out.read_text())
     assert [trial["outcome"] for trial in document["trials"]] == ["valid"]
-    assert document["stopped_because"].startswith("An error ended it")
+    assert document["stopped_because"].startswith("After an error")
 
 
 def test_when_the_safe_gains_could_not_be_verified_it_says_that_nobody_knows_what_the_vehicle_holds(
@@ -101,4 +101,4 @@ def test_when_the_safe_gains_could_not_be_verified_it_says_that_nobody_knows_wha
     monkeypatch.setattr(MavlinkVehicle, "fly", forget)
     result = gainline(*RUN, "--vehicle", VEHICLE, "--set", "simulated=true")
     assert result.exit_code == 1
-    assert "Nobody knows which gains the vehicle holds" in " ".join(result.output.split())
+    assert "The gains on the vehicle are unknown" in " ".join(result.output.split())

@@ -68,7 +68,7 @@ def test_a_script_with_its_token_plans_on_a_real_vehicle_and_is_refused_in_words
         Client(http=client).fly(campaign["id"], {"kp": 300, "ki": 20, "kd": 90})
     assert (refused.value.status, refused.value.title) == (403, "Not allowed")
     script = Client(http=client, token=Keyring.open(settings.data_dir).value(Key.SCRIPT))
-    with pytest.raises(NotAllowedError, match="takes off only on its operator's own act"):
+    with pytest.raises(NotAllowedError, match="only its operator can start the take-off"):
         script.fly(campaign["id"], {"kp": 300, "ki": 20, "kd": 90})
     assert script.ask(campaign["id"]).kind == "start"
 
@@ -141,7 +141,7 @@ def test_refusals_are_raised_with_the_servers_own_words(gainline: Client, databa
 
 def test_asking_without_a_worker_ends_with_what_to_look_for(gainline: Client) -> None:
     campaign = gainline.create_campaign("Mine")
-    with pytest.raises(UnavailableError, match="Look whether a worker runs"):
+    with pytest.raises(UnavailableError, match="Check that a worker is running"):
         gainline.ask(campaign.id, timeout_s=0.0)
 
 

@@ -82,7 +82,7 @@ def test_a_folder_that_stays_open_to_others_is_refused(tmp_path: Path, monkeypat
     folder.mkdir()
     folder.chmod(0o755)
     monkeypatch.setattr(Path, "chmod", lambda *_: None)
-    with pytest.raises(StorageError, match="Other users of this computer may open") as refused:
+    with pytest.raises(StorageError, match="Other users of this computer can open") as refused:
         make_private(folder)
     assert [problem.field for problem in refused.value.problems] == ["--data-dir"]
 

@@ -86,7 +86,7 @@ def test_numbers_are_those_of_the_command(client: TestClient, tmp_path: Path) ->
     assert (check["passed"], check["gains"], check["gains_from"]) == (True, DEFAULT, "of the log")
     commands = said["commands"]
     assert check["rows"] == commands["rows"] == 669
-    assert f"{commands['exact']} of {commands['rows']} commands follow to the last bit" in check["sentence"]
+    assert f"{commands['exact']} of {commands['rows']} commands are bit-exact" in check["sentence"]
     simulated = {signal["name"]: signal for signal in check["signals"][:4]}
     assert {name: signal["largest_difference"] for name, signal in simulated.items()} == (
         said["simulation"]["largest_difference"]
@@ -134,7 +134,7 @@ def test_a_calm_flight_asks_for_its_gains(client: TestClient) -> None:
     [
         ("empty.data", b"", "file", "is empty"),
         ("flight.ulg", b"ULog\x01\x12\x35" + bytes(100), "file", "is neither"),
-        ("alive.data", b"1.0 31 ALIVE 1\n", "file", "holds no VERT_LOOP"),
+        ("alive.data", b"1.0 31 ALIVE 1\n", "file", "contains no VERT_LOOP"),
         ("cut.csv.gz", TRACES[0].read_bytes()[:5000], "file", "is damaged"),
         ("noise.csv.gz", b"\x1f\x8b" + bytes(range(200)), "file", "is damaged"),
         ("text.csv.gz", gzip.compress(b"a,b\n1,2\n", mtime=0), "line 1, step", "column is missing"),

@@ -1,4 +1,4 @@
-"""Rows that can be read and make no sense any more: told as a damaged database, not as internal error."""
+"""Rows that can be read and make no sense any more: reported as a damaged database, not as an internal error."""
 
 import pytest
 from fastapi.testclient import TestClient

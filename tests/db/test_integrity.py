@@ -60,7 +60,9 @@ def test_a_backup_names_every_damaged_trial(client: TestClient, settings: Settin
     for trial in get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]:
         damage(settings, trial)
     answer = client.get("/api/system/backup").json()
-    assert answer["detail"].startswith("The backup was not made: 3 records are damaged, those of trial 1 of campaign")
+    assert answer["detail"].startswith(
+        "The backup was not created: 3 records are damaged, those of trial 1 of campaign"
+    )
     assert len(answer["problems"]) == 3
 
 
@@ -84,7 +86,7 @@ def test_a_report_shows_the_rest_and_says_which_record_is_damaged(
     answer = client.get(f"/api/campaigns/{campaign['id']}/report.html")
     assert answer.status_code == 200, answer.text
     assert "Damaged record" in answer.text
-    assert "Its stored record does not fit its checksum." in answer.text
+    assert "The stored record does not match its checksum." in answer.text
     assert f"{damaged['error']:.3f}" in answer.text
     card = get(client, f"/api/campaigns/{campaign['id']}/figures/takeoffs")
     assert card["state"] == "ready"

@@ -76,7 +76,7 @@ def test_a_log_that_was_flown_with_other_gains_is_marked_where_it_differs_and_ch
     assert marks is not None
     assert len(marks["x"]) == 200
     dashboard.button("Check again with kp 283, ki 13, kd 82").click()
-    expect(page.get_by_text("The replica agrees: 669 of 669 commands follow to the last bit.")).to_be_visible()
+    expect(page.get_by_text("The replica agrees: 669 of 669 commands are bit-exact.")).to_be_visible()
     checked = page.get_by_role("list", name="Earlier checks").get_by_role("listitem")
     expect(checked).to_have_count(2)
     expect(checked.first).to_contain_text("Agrees")
@@ -92,7 +92,7 @@ def test_a_calm_log_asks_for_its_gains(page_of_checks: Dashboard) -> None:
     dashboard, page = page_of_checks, page_of_checks.page
     lines = data_of(Flight(DEFAULT)).splitlines()
     choose(dashboard, file_of("calm.data", "\n".join(line for line in lines if float(line.split()[0]) > 40.0)))
-    expect(page.get_by_role("alert")).to_contain_text("calm.data does not say which gains were flown")
+    expect(page.get_by_role("alert")).to_contain_text("calm.data does not contain the gains flown")
     page.get_by_label("Gains flown: kp, ki, kd").fill("283, 13, 82")
     dashboard.button("Check calm.data with these gains").click()
     expect(page.get_by_text("The replica agrees: ")).to_be_visible()
@@ -102,7 +102,7 @@ def test_a_calm_log_asks_for_its_gains(page_of_checks: Dashboard) -> None:
 def test_what_is_no_recording_is_refused_in_words(page_of_checks: Dashboard) -> None:
     dashboard, page = page_of_checks, page_of_checks.page
     choose(dashboard, file_of("alive.data", "1.0 31 ALIVE 1\n"))
-    expect(page.get_by_role("alert")).to_contain_text("holds no VERT_LOOP")
+    expect(page.get_by_role("alert")).to_contain_text("contains no VERT_LOOP")
     choose(dashboard, FilePayload(name="cut.csv.gz", mimeType="application/gzip",
                                   buffer=(TRACES / "climb_rates.csv.gz").read_bytes()[:4000]))  # fmt: skip
     expect(page.get_by_role("alert")).to_contain_text("cut.csv.gz is damaged or not a text file")

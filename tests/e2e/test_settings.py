@@ -70,7 +70,7 @@ def test_a_server_that_others_reach_shows_its_address_to_a_camera(open_dashboard
         expect(code).to_be_visible()
         dashboard.until(lambda: bool(code.evaluate("image => image.naturalWidth > 0")))
         expect(panel.get_by_role("link", name=addresses[0])).to_be_visible()
-        expect(panel).to_contain_text("anybody who can reach this machine")
+        expect(panel).to_contain_text("anyone who can reach this computer")
 
 
 def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
@@ -89,12 +89,12 @@ def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
 
 def test_a_backup_that_is_refused_says_why_instead_of_failing_as_a_download(dashboard: Dashboard) -> None:
     dashboard.open("/settings")
-    problem = {"title": "Storage trouble", "status": 507, "detail": "There is too little room for a copy.",
+    problem = {"title": "Storage trouble", "status": 507, "detail": "There is too little disk space for a copy.",
                "hint": "Free some disk space."}  # fmt: skip
     dashboard.page.route("**/api/system/backup", lambda route: route.fulfill(status=507, json=problem))
     dashboard.button("Download backup").click()
     told = dashboard.panel("Backup").get_by_role("alert")
-    expect(told).to_contain_text("There is too little room for a copy.")
+    expect(told).to_contain_text("There is too little disk space for a copy.")
     expect(told).to_contain_text("Free some disk space.")
 
 

@@ -353,10 +353,10 @@ def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: 
     with database.write() as session:
         commands.withdraw_acts(session)
     assert [(newest(client, vehicle)["state"], newest(client, vehicle)["problem"]) for vehicle in (begun, waiting)] == [
-        ("failed", "It was not finished: the worker stopped. Ask again if it is still wanted."),
+        ("failed", "It was not finished: the worker stopped. Request it again if it is still needed."),
         (
             "failed",
-            "It was not started: no worker was running when it was requested. Ask again if it is still wanted.",
+            "It was not started: no worker was running when it was requested. Request it again if it is still needed.",
         ),
     ]
 
@@ -385,14 +385,14 @@ def test_a_vehicle_with_a_link_is_asked_nothing_but_to_be_let_go_over_a_server_t
         for vehicle, kind, body in asked:
             refused = network.post(f"/api/vehicles/{vehicle['id']}/{kind}", json=body)
             assert refused.status_code == 403, kind
-            assert "is a real vehicle, and this server can be reached over the network" in refused.json()["detail"]
+            assert "is a real vehicle, and this server is reachable over the network" in refused.json()["detail"]
         edit = {"version": met["version"], "safe_gains": {"kp": 300, "ki": 13, "kd": 82}, "statement": "Ada says so"}
         assert network.patch(f"/api/vehicles/{met['id']}", json=edit).status_code == 403
         assert network.post(f"/api/vehicles/{met['id']}/disconnect").status_code == 403
         unlock(network)
         assert network.post(f"/api/vehicles/{met['id']}/disconnect").status_code == 202
         refused = network.post(f"/api/vehicles/{simulated['id']}/connect")
-        assert (refused.status_code, "is flown over a link" in refused.json()["detail"]) == (403, True)
+        assert (refused.status_code, "is connected over a link" in refused.json()["detail"]) == (403, True)
 
 
 @pytest.mark.parametrize("links", [False, True])

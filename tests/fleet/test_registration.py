@@ -79,7 +79,7 @@ def test_a_vehicle_with_a_link_is_registered_only_where_nobody_else_reaches_the_
     with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000", client=HERE) as client:
         refused = client.post("/api/vehicles", json={"name": "Drone", "kind": "mavlink", "options": {}, **SEEN})
         assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
-        assert "can be reached over the network" in refused.json()["detail"]
+        assert "is reachable over the network" in refused.json()["detail"]
         refused = client.post(
             "/api/vehicles", json={"name": "Drone", "kind": "mavlink", "options": {"simulated": True}}
         )

@@ -187,7 +187,7 @@ def test_a_flight_that_waited_too_long_is_withdrawn_and_one_of_now_is_flown(
     assert field.runner.claim() is None
     flight = get(client, f"/api/trials/{trial_id}")["flight"]
     assert flight["state"] == "cancelled"
-    assert "could not be begun within 10 s" in flight["problem"]
+    assert "could not be started within 10 s" in flight["problem"]
 
 
 def test_an_outcome_that_the_database_refuses_costs_the_flight_but_blocks_nothing(
@@ -220,7 +220,7 @@ def test_a_refused_outcome_whose_record_was_not_spooled_either_is_said_so(
     field.fly_next()
     lost = get(client, f"/api/trials/{trial_id}")
     assert lost["state"] == "lost"
-    assert "could not be kept either" in lost["reason"]
+    assert "could not be saved either" in lost["reason"]
     assert vehicle_state(client) == "ready"
 
 
@@ -237,7 +237,7 @@ def test_a_process_that_dies_with_the_vehicle_leaves_a_real_one_in_quarantine(
     assert "exit code -9" in after["flight"]["problem"]
     vehicle = get(client, "/api/vehicles/1")
     assert vehicle["state"] == then
-    assert ("nobody knows which gains it holds" in vehicle["concern"]) == real
+    assert ("the gains on the vehicle are unknown" in vehicle["concern"]) == real
 
 
 @pytest.mark.parametrize(("real", "then"), [(True, "quarantined"), (False, "ready")])
@@ -258,7 +258,7 @@ def test_a_real_vehicle_is_not_in_doubt_when_nothing_was_sent_to_it(
     make_vehicle_real(database)
     (settings.data_dir / "spool").write_text("a file in the way")
     field.fly_next()
-    assert "no room for the flight's record" in get(client, f"/api/trials/{trial_id}")["flight"]["problem"]
+    assert "no space for the flight record" in get(client, f"/api/trials/{trial_id}")["flight"]["problem"]
     assert vehicle_state(client) == "ready"
 
 

@@ -167,7 +167,7 @@ def test_real_vehicles_fly_only_from_a_server_that_nobody_else_reaches(
         assert client.post(f"/api/trials/{planned['id']}/stage", headers=headers).status_code == 202
         stage_claimed(database)
         status, sentence = take_off(network, planned, headers)
-        assert (status, "can be reached over the network" in sentence) == (403, True)
+        assert (status, "is reachable over the network" in sentence) == (403, True)
 
 
 def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_again(
@@ -248,12 +248,12 @@ def test_a_simulated_vehicle_is_staged_by_a_script_too(client: TestClient, datab
 def test_a_shared_simulation_is_not_staged(client: TestClient, database: Database) -> None:
     planned = create_trial(client, create_ready_campaign(client, database)["id"])
     refused = client.post(f"/api/trials/{planned['id']}/stage")
-    assert (refused.status_code, "is flown in one go" in refused.json()["detail"]) == (409, True)
+    assert (refused.status_code, "is flown without staging" in refused.json()["detail"]) == (409, True)
     client.post(f"/api/trials/{planned['id']}/fly")
     stage_claimed(database)
     for act in ("take-off", "unstage"):
         answer = client.post(f"/api/trials/{planned['id']}/{act}")
-        assert (answer.status_code, "flies in one go" in answer.json()["detail"]) == (409, True)
+        assert (answer.status_code, "flies without staging" in answer.json()["detail"]) == (409, True)
 
 
 def fly(client: TestClient, database: Database, vehicle: Json, planned: Json, record: FlightRecord) -> Json:
@@ -293,7 +293,7 @@ def test_a_measurement_that_is_no_good_is_suggested_for_a_real_flight_and_said_o
     flown = fly(client, database, real, planned, void)
     assert (flown["state"], flown["reason"]) == ("captured", "the clock stood still for 0.3 s")
     assert flown["record"]["ending"] == "invalid"
-    assert "the measurement is in doubt: the clock stood still for 0.3 s" in flown["verdict"]
+    assert "the measurement is doubtful: the clock stood still for 0.3 s" in flown["verdict"]
     assert flown["flight"]["state"] == "landed"
 
     simulated = create_connected(client, database, "Simulated")

@@ -118,7 +118,7 @@ def test_an_order_that_the_vehicle_cannot_be_given_is_answered_with_the_reason(t
 
 def test_orders_to_a_process_that_dies_of_them_are_answered(tmp_path: Path) -> None:
     with session(dies_of_it, tmp_path) as (one, _):
-        assert "nobody knows whether it told the vehicle" in told(one.send_command("land", "it drifts", 1.0))
+        assert "it is unknown whether the command was sent" in told(one.send_command("land", "it drifts", 1.0))
         assert one.send_command("motors off", "again", 1.0).done()
 
 
@@ -132,7 +132,7 @@ def test_a_process_that_stands_still_is_shown_again_and_again_until_it_goes_on(
             silent = heard.get(timeout=PATIENCE_S)
             assert isinstance(silent, VehicleStatus)
             assert (silent.vehicle_id, silent.state, silent.step, silent.armed) == (5, "not answering", "record", True)
-            assert "orders do not reach the vehicle" in silent.trouble
+            assert "commands do not reach the vehicle" in silent.trouble
             assert "remote control" in silent.trouble
         assert one.pid is not None
         one.send_command("land", "go on", 1.0)
@@ -160,4 +160,4 @@ def test_orders_to_a_process_that_reads_nothing_hold_up_nobody(tmp_path: Path) -
         assert "does not answer" in told(answers[-1])
         assert one.pid is not None
         os.kill(one.pid, signal.SIGKILL)
-        assert "nobody knows whether it told the vehicle" in told(answers[0])
+        assert "it is unknown whether the command was sent" in told(answers[0])

@@ -273,7 +273,7 @@ def test_an_order_that_nobody_takes_is_told_to_be_not_carried_out(
                 await web.until(lambda: web.client.connected)
                 answer = await web.client.order(5, "motors off", "it burns")
                 assert not answer.accepted
-                assert "did not answer, and does not carry the order out later" in answer.problem
+                assert "did not answer, and will not execute the command later" in answer.problem
                 assert time.monotonic() > deadlines_s[0], "from then on its process refuses it"
                 never.set_result("")  # late, to nobody
 

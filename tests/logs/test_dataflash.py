@@ -85,7 +85,7 @@ def test_a_log_without_any_altitude_is_refused() -> None:
     log = Log()
     log.define(10, "ATT", "Qf", "TimeUS,Roll")
     log.add(10, "<Qf", 1, 2.0)
-    with pytest.raises(TrajectoryError, match=r"holds neither PSCD.PD nor CTUN.Alt"):
+    with pytest.raises(TrajectoryError, match=r"contains neither PSCD.PD nor CTUN.Alt"):
         read_takeoffs(io.BytesIO(log.content))
 
 

@@ -48,7 +48,7 @@ def test_columns_are_found_by_name_in_any_order(tmp_path: Path) -> None:
         ((HEADER, ROW.replace("283", "2147483648")), "line 2, kp: must lie in -2147483648 … 2147483647"),
         ((HEADER, ROW, "1,alt,768"), "line 3, kp: the row has 3 values, the header 18"),
         ((HEADER, ROW + ",5"), "line 2, thrust: the row has 19 values, the header 18"),
-        ((HEADER,), "holds a header and no rows"),
+        ((HEADER,), "has a header and no rows"),
         ((), "line 1, step: column is missing"),
     ],
 )

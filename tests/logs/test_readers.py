@@ -99,7 +99,7 @@ def test_any_companion_is_read_or_refused_in_words(companion: bytes) -> None:
 
 @pytest.mark.parametrize("suffix", SUFFIXES[1:])
 def test_a_file_that_is_not_what_its_name_says_is_refused_by_its_name(suffix: str) -> None:
-    for content, reason in ((b"", "is empty"), (b"time_s,altitude_m\n0,0\n", "does not begin as")):
+    for content, reason in ((b"", "is empty"), (b"time_s,altitude_m\n0,0\n", "does not start like")):
         with pytest.raises(
             TrajectoryError, match=rf"flight\{suffix} does not match its file extension. file: {reason}"
         ):
@@ -107,7 +107,7 @@ def test_a_file_that_is_not_what_its_name_says_is_refused_by_its_name(suffix: st
 
 
 def test_a_companion_without_its_record_is_refused_as_such() -> None:
-    with pytest.raises(TrajectoryError, match=r"flight\.log holds no flight\. .*choose both"):
+    with pytest.raises(TrajectoryError, match=r"flight\.log contains no flight\. .*choose both"):
         read_takeoffs(io.BytesIO(COMPANION.encode()), name="flight.log")
 
 

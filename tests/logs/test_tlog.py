@@ -138,7 +138,7 @@ def test_other_autopilots_begin_with_the_command_that_they_accepted(
     assert flown.start_s == pytest.approx(5.98, abs=0.03)
     assert flown.trajectory.time_s[-1] == pytest.approx(4.0, abs=0.03)
     assert flown.trajectory["altitude_m"].max() == pytest.approx(3.0, abs=0.02)
-    assert any("altitude counted from the ground" in note for note in flown.notes)
+    assert any("altitude relative to the ground" in note for note in flown.notes)
 
 
 def test_a_mode_that_a_heartbeat_tells_after_the_command_does_not_end_the_flight() -> None:
@@ -197,12 +197,12 @@ def test_a_log_without_a_vehicle_that_is_known_is_refused() -> None:
 
 
 def test_a_log_without_positions_is_refused() -> None:
-    with pytest.raises(TrajectoryError, match="holds no LOCAL_POSITION_NED"):
+    with pytest.raises(TrajectoryError, match="contains no LOCAL_POSITION_NED"):
         read_takeoffs(io.BytesIO(paparazzi_log().content))
 
 
 def test_a_flight_that_never_left_the_ground_is_refused() -> None:
     log = paparazzi_log()
     log.fly(30.0, to_m=0.2)
-    with pytest.raises(TrajectoryError, match="The log holds no takeoff"):
+    with pytest.raises(TrajectoryError, match="The log contains no takeoff"):
         read_takeoffs(io.BytesIO(log.content))

@@ -58,7 +58,7 @@ def test_what_it_refuses_is_told_as_it_is() -> None:
     ids=["processor", "time", "ends by itself"],
 )
 def test_a_file_that_takes_too_long_is_refused_by_its_name(limits: Limits, work: Callable[[], None]) -> None:
-    with pytest.raises(InputError, match="cannot be read here") as refused:
+    with pytest.raises(InputError, match="This file cannot be read; nothing was stored") as refused:
         run_limited(limits, work)
     assert [problem.field for problem in refused.value.problems] == ["file"]
 

@@ -56,7 +56,7 @@ def test_a_method_is_told_by_the_share_that_comes_near_and_its_median_flights() 
     rows = list(_method(MethodResult(method="identified", title="Identified", perturbation=0.45, campaigns=campaigns)))
     assert [(row.measured, row.reference, row.note) for row in rows] == [
         (0.5, 1.0, "1 of 2"),
-        (2.0, 2.0, "of those that came near"),
+        (2.0, 2.0, "of those that reached it"),
     ]
 
 

@@ -138,7 +138,7 @@ def test_without_a_server_there_is_no_link(tmp_path: Path) -> None:
         check=False,
     )
     assert refused.returncode == 1
-    assert "No Gainline server runs on" in refused.stderr
+    assert "No Gainline server is running on" in refused.stderr
     assert list(tmp_path.iterdir()) == []
 
 

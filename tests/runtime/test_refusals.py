@@ -49,7 +49,7 @@ def test_a_busy_port_is_named_with_the_option_that_helps(tmp_path: Path) -> None
 def test_a_host_that_is_not_this_machine_is_refused(tmp_path: Path) -> None:
     refused = gainline("serve", "--host", "192.0.2.1", "--port", "0", "--data-dir", str(tmp_path))
     assert refused.returncode == 1
-    assert "host: 192.0.2.1 is no address of this machine" in refused.stderr
+    assert "host: 192.0.2.1 is not an address of this computer" in refused.stderr
 
 
 def test_a_second_server_on_the_same_database_is_refused_and_the_first_goes_on(serving: Serving) -> None:

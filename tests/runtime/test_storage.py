@@ -103,7 +103,7 @@ def test_a_flight_whose_record_would_not_fit_does_not_start(disk: Path, serving:
         "the refusal",
         lambda: (found := serving.get(f"/trials/{trial_id}")["flight"])["state"] == "failed" and found,
     )
-    assert "no room for the flight's record" in flight["problem"]
+    assert "no space for the flight record" in flight["problem"]
     assert serving.trial(trial_id, "planned")["read_back"] is None
     filler.unlink()
     serving.post(f"/trials/{trial_id}/fly", {"speed": None})

@@ -118,7 +118,7 @@ def test_a_key_is_worth_nothing_through_a_proxy_or_under_another_name(
     assert client.post("/api/vehicles", json=REAL, headers=OUR_PAGE).status_code == 201
     refused = client.post("/api/vehicles", json={**REAL, "name": "Wasp"}, headers={**OUR_PAGE, **headers})
     assert refused.status_code == 403
-    assert "it is commanded from this computer alone" in refused.json()["detail"]
+    assert "it accepts commands from this computer only" in refused.json()["detail"]
     assert client.get("/api/access", headers=headers).json()["elsewhere"]
     assert get(client, "/api/vehicles")["total"] == 1
 
@@ -191,7 +191,7 @@ def test_a_scripts_token_stages_a_real_vehicle_and_does_not_take_it_off(
     for headers in (lease, {**lease, **OUR_PAGE}):
         refused = stranger.post(path, headers=headers)
         assert refused.status_code == 403
-        assert "takes off only on its operator's own act in an unlocked browser" in refused.json()["detail"]
+        assert "only its operator can start the take-off, in an unlocked browser" in refused.json()["detail"]
     without_cookie = stranger.post(path, headers={**OUR_PAGE, **control_header(client, real)})
     assert without_cookie.status_code == 403
     assert client.post(path, headers={**OUR_PAGE, **control_header(client, real)}).status_code == 202

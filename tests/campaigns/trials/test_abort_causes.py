@@ -139,9 +139,9 @@ def test_an_abort_from_before_its_cause_was_recorded_counts_until_its_operator_s
 def test_the_report_says_which_aborts_count(client: TestClient, database: Database, campaign: Json) -> None:
     trial = aborted(client, database, campaign, on_request=True)
     path = f"/api/campaigns/{campaign['id']}/report.html"
-    assert "who has not said why: it does not count against the gains" in client.get(path).text
+    assert "Aborted by the operator without a reason: it does not count against the gains" in client.get(path).text
     assert judge(client, trial, "behaved badly") == 200
-    assert "The vehicle behaved badly, says the operator: it counts against the gains." in client.get(path).text
+    assert "The operator reported that the vehicle behaved badly: it counts against the gains." in client.get(path).text
 
 
 @pytest.mark.parametrize(

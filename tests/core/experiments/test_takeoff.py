@@ -198,7 +198,7 @@ def test_bounds_defaults_and_scales_are_those_of_the_method() -> None:
 
 def test_experiments_are_found_by_name_and_unknown_ones_are_refused_with_the_choices() -> None:
     assert get_experiment("takeoff") is EXPERIMENTS["takeoff"]
-    with pytest.raises(InputError, match=r"no such experiment.*experiment: unknown name 'landing'.*takeoff"):
+    with pytest.raises(InputError, match=r"Unknown experiment.*experiment: unknown name 'landing'.*takeoff"):
         get_experiment("landing")
 
 

@@ -111,7 +111,7 @@ def said(proposal: Proposal) -> tuple[str, Gains]:
 def test_a_campaign_by_hand_proposes_the_start_and_then_the_best_flown_and_predicts_nothing() -> None:
     first = next_proposal(BY_HAND, ())
     assert said(first) == ("start", DEFAULT)
-    assert "there is no model of this vehicle's controller to predict it with" in first.explanation.summary
+    assert "there is no model of this vehicle's controller, so there is no prediction" in first.explanation.summary
     then = next_proposal(BY_HAND, FLOWN)
     assert said(then) == ("manual", FIRMER)
     assert "The best so far are those of flight 2" in then.explanation.summary
@@ -160,4 +160,4 @@ def test_the_gate_holds_gains_to_bounds_and_steps_and_simulates_nothing() -> Non
 
 def test_of_a_vehicle_without_a_model_nothing_is_known_however_often_it_flew() -> None:
     assert known_distribution(PX4, FLOWN).mean == ()
-    assert known_distribution(PX4, ()).origin == "nothing: there is no model"
+    assert known_distribution(PX4, ()).origin == "none: there is no model"

@@ -72,7 +72,7 @@ def test_a_gain_that_no_start_drives_to_its_limit_is_refused_all_the_same() -> N
 def test_an_estimate_that_freezes_early_in_the_climb_drives_the_sum_as_far() -> None:
     """Frozen from 0.5 … 1.5 s on, the vehicle seems to hang low for good; later it seems to have arrived."""
     (refused,) = checked(1624, 1356, 195)
-    assert "so it does in 3 of 6 other starts" in refused.sentence
+    assert "It also overflows in 3 of 6 other starts" in refused.sentence
 
 
 @compiled_only

@@ -74,8 +74,8 @@ def second_source(time_s: Samples, channels: Channels) -> None:
     [
         (spike, "acceleration", 5.0, 5.1, "A jump by +0.40 m at 5.00 s, and back 0.1"),
         (hold, "frozen", 2.0, 3.0, "The same 1.91 m for 0.98 s from 2.00 s on"),
-        (hold_everything, "frozen", 20.0, 21.0, "nothing in the air holds so still"),
-        (second_source, "disagreement", 7.0, 8.0, "Two sources are up to 0.50 m further apart"),
+        (hold_everything, "frozen", 20.0, 21.0, "a vehicle in the air is never so steady"),
+        (second_source, "disagreement", 7.0, 8.0, "The difference of the two sources is up to 0.50 m larger"),
     ],
 )
 def test_what_no_vehicle_can_have_flown_is_found_where_it_is(

@@ -79,7 +79,7 @@ def test_an_undecided_comparison_goes_on_until_the_budget_ends_and_says_what_wou
     found = confirm(NOISE, QuadraticExperiment(), flown(*runs), proposed("none"))
     assert found.phase == "repeat"
     assert "Unresolved" in found.why
-    assert "would decide it" in found.why
+    assert "would resolve it" in found.why
     spent = Definition(stop=StopRule(kind="noise", max_flights=4))
     assert phase(flown(*runs), proposed(error=0.0), spent) == "decided"
 
@@ -136,7 +136,7 @@ def test_a_difference_that_nothing_would_decide_is_said_to_be_one() -> None:
     now = compare_winner(NOISE, QuadraticExperiment(), flown((1, 0.2), (2, 0.2), (2, 0.1999999)))
     assert now is not None
     assert now.comparison is not None
-    assert "Not even 100 further flights" in verdict_sentence(QuadraticExperiment(), now)
+    assert "Even 100 more flights would not resolve it" in verdict_sentence(QuadraticExperiment(), now)
 
 
 def test_before_the_first_flight_nothing_stands() -> None:

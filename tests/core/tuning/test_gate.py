@@ -122,7 +122,7 @@ def test_a_refusal_is_overruled_on_a_simulated_vehicle_and_on_a_real_one_by_nobo
     passed = check_policy(Definition(), TAKEOFF, SPACE, DEFAULT, [])
     assert require_flyable(refused, overrule="the paper flew it") == "the paper flew it"
     assert require_flyable(passed, overrule="to be sure") == require_flyable(passed) == ""
-    with pytest.raises(GainsError, match="Nobody can overrule"):
+    with pytest.raises(GainsError, match="The gate cannot be overruled on a real vehicle"):
         require_flyable(refused, overrule="the paper flew it", is_real=True)
 
 
@@ -148,7 +148,7 @@ def test_what_is_offered_for_several_refusals_passes_all_of_these_checks() -> No
         require_flyable(refused)
     assert "ki = 281" in raised.value.hint
     assert "stuck on the ground" in str(raised.value)
-    assert "The largest ki that cannot wrap is 1073." in str(raised.value)
+    assert "The largest ki that cannot overflow is 1073." in str(raised.value)
     assert ".." not in str(raised.value)
     limits = {"bounds", "step", "wrapping"}
     offered = check_policy(Definition(), TAKEOFF, SPACE, asked | merged, [])
@@ -169,7 +169,7 @@ def test_gains_that_have_flown_may_fly_again_although_simulated_takeoffs_go_astr
     assert "altitude" in {one.name for one in fresh.refusals}
     assert "altitude" not in {one.name for one in again.refusals}
     told = [one for one in again.checks if one.name == "altitude"]
-    assert told[0].sentence.endswith("flew these gains to its end, so they may fly again.")
+    assert told[0].sentence.endswith("completed with these gains, so they are allowed again.")
     papers: dict[str, float] = DEFAULT | {"ki": 1356}
     wrapping = check_policy(Definition(), TAKEOFF, SPACE, papers, [*flown, fly(2, papers)], spread=far)
     assert {"bounds", "wrapping"} <= {one.name for one in wrapping.refusals}

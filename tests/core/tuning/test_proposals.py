@@ -163,7 +163,9 @@ def test_under_the_rule_noise_a_campaign_ends_where_the_gate_refuses_what_it_wou
     proposal = next_proposal(definition, flights)
     assert not check_policy(definition, TAKEOFF, TAKEOFF.space, undamped, flights, spread=proposal.spread).passed
     assert (proposal.kind, proposal.gains) == ("none", flights[1].gains)
-    assert "kp 1500, ki 1000, kd 40 cannot be flown again, the gate refuses them: " in proposal.explanation.summary
+    assert (
+        "kp 1500, ki 1000, kd 40 cannot be flown again, because the gate refuses them: " in proposal.explanation.summary
+    )
 
 
 def test_a_recorded_flight_of_the_real_autopilot_can_be_told() -> None:

@@ -50,7 +50,7 @@ def test_an_alike_vehicle_takes_the_others_fitted_model_over_and_a_shorter_first
     assert 0.5 < found.agreement < 1.0
     assert found.step_fraction == pytest.approx(found.agreement * WARM.step_fraction)
     assert found.experiment.nominal_model.tolist() == calibrate(TAKEOFF, [donor()]).model.tolist()
-    assert "takes the data sheet's place" in found.sentence
+    assert "replaces the data sheet" in found.sentence
     assert f"agreement {100.0 * found.agreement:.0f}\u00a0%" in found.sentence
     notes = next_proposal(WARM, [first], donor()).explanation.notes
     assert found.sentence in notes
@@ -72,7 +72,7 @@ def test_an_unlike_vehicle_takes_nothing_over() -> None:
     assert found.agreement < 0.5
     assert found.experiment is TAKEOFF
     assert found.step_fraction == WARM.step_fraction
-    assert found.sentence.startswith("Nothing is taken over from the other vehicle: ")
+    assert found.sentence.startswith("Nothing is used from the other vehicle: ")
     plain = next_proposal(replace(WARM, start=Start(kind="given", gains=TUNED)), [first])
     warm = next_proposal(WARM, [first], donor())
     assert (warm.gains, warm.predicted_error) == (plain.gains, plain.predicted_error)

@@ -159,7 +159,7 @@ def test_a_step_that_the_gate_refuses_is_halved_until_it_passes(monkeypatch: pyt
     assert proposal.kind == "shorter step"
     assert proposal.gains == pytest.approx({"a": 34.0, "b": 64})
     assert proposal.explanation.notes[-1] == "The gate refuses a 18, b 58."
-    assert "is refused by the gate, so the next one goes less far" in proposal.explanation.summary
+    assert "is refused by the gate, so the next one is shorter" in proposal.explanation.summary
 
 
 @pytest.mark.parametrize(("safe_gains", "a"), [({"a": 50.0, "b": 70}, 34.0), (None, 18.0)])
