@@ -210,11 +210,11 @@ def _too_much(error: ValidationError) -> ConflictError:
 
 def _vehicle(row: VehicleRow) -> Vehicle:
     """The vehicle's description; for a placeholder, that of the vehicle it stands for."""
-    said = Vehicle.model_validate(row)
+    described = Vehicle.model_validate(row)
     if (origin := origin_of(row)) is None:
-        return said
+        return described
     kind, name = origin
-    return said.model_copy(update={"kind": kind, "name": name, "registered": True})
+    return described.model_copy(update={"kind": kind, "name": name, "registered": True})
 
 
 def _digest(data: bytes) -> str:

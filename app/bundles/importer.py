@@ -67,22 +67,22 @@ def keep_telemetry(bundle: Bundle, arrived: ImportedCampaigns, data_dir: Path) -
         file.write_bytes(bundle.part(part))
 
 
-def _campaign(session: Session, where: str, said: Campaign, new_ids: Mapping[int, int]) -> CampaignRow:
-    definition = _definition(where, said.definition, new_ids)
-    vehicle, options = _vehicle(session, where, said)
+def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[int, int]) -> CampaignRow:
+    definition = _definition(where, source.definition, new_ids)
+    vehicle, options = _vehicle(session, where, source)
     row = CampaignRow(
-        name=said.name,
-        state=said.state,
-        outcome=said.outcome,
-        stop_reason=said.stop_reason,
+        name=source.name,
+        state=source.state,
+        outcome=source.outcome,
+        stop_reason=source.stop_reason,
         experiment=definition["experiment"],
         strategy=definition["strategy"],
         definition=definition,
-        definition_digest=said.definition_digest,
-        safe_gains=said.safe_gains or (said.vehicle.safe_gains if said.vehicle.registered else None),
+        definition_digest=source.definition_digest,
+        safe_gains=source.safe_gains or (source.vehicle.safe_gains if source.vehicle.registered else None),
         vehicle=vehicle,
         vehicle_options=options,
-        created_at=said.created_at,
+        created_at=source.created_at,
         updated_at=utc_now(),
     )
     session.add(row)
@@ -90,22 +90,25 @@ def _campaign(session: Session, where: str, said: Campaign, new_ids: Mapping[int
     return row
 
 
-def _definition(where: str, said: JsonObject, new_ids: Mapping[int, int]) -> JsonObject:
+def _definition(where: str, source: JsonObject, new_ids: Mapping[int, int]) -> JsonObject:
     """The definition with the new id of the campaign that it starts from."""
-    donor = (said.get("start") or {}).get("donor")
+    donor = (source.get("start") or {}).get("donor")
     if donor is not None and donor["campaign_id"] not in new_ids:
         raise _refused(f"{where}.definition.start.donor.campaign_id", "names a campaign that is not in the bundle")
     if donor is not None:
-        said = {**said, "start": {**said["start"], "donor": {**donor, "campaign_id": new_ids[donor["campaign_id"]]}}}
-    if wrong := problems_of(core_definition(Definition.model_validate(said))):
+        source = {
+            **source,
+            "start": {**source["start"], "donor": {**donor, "campaign_id": new_ids[donor["campaign_id"]]}},
+        }
+    if wrong := problems_of(core_definition(Definition.model_validate(source))):
         raise _refused(f"{where}.definition.{wrong[0].field}", wrong[0].reason)
-    return said
+    return source
 
 
-def _vehicle(session: Session, where: str, said: Campaign) -> tuple[VehicleRow, JsonObject]:
+def _vehicle(session: Session, where: str, source: Campaign) -> tuple[VehicleRow, JsonObject]:
     """The vehicle's row and options: a simulation as it is, a placeholder for a registered vehicle, whatever its
     name."""
-    vehicle = said.vehicle
+    vehicle = source.vehicle
     if vehicle.registered:
         row = get_or_create_imported_vehicle(
             session, name=vehicle.name, kind=vehicle.kind, is_real=vehicle.is_real, safe_gains=vehicle.safe_gains
@@ -113,14 +116,14 @@ def _vehicle(session: Session, where: str, said: Campaign) -> tuple[VehicleRow, 
         return row, {}
     if vehicle.kind not in VEHICLE_KINDS:
         raise _refused(f"{where}.vehicle.kind", f"{vehicle.kind!r} is not supported by this version")
-    options = check_options(vehicle.kind, said.vehicle_options, field=f"{where}.vehicle")
+    options = check_options(vehicle.kind, source.vehicle_options, field=f"{where}.vehicle")
     choice = VehicleChoice(kind=vehicle.kind, options=options)
     return fleet.chosen_vehicle(session, choice, default_gains=vehicle.safe_gains), options
 
 
-def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, said: Proposal) -> ProposalRow:
+def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, source: Proposal) -> ProposalRow:
     row = ProposalRow(
-        campaign_id=campaign.id, predicted=_record(bundle, said.predicted), **_fields(said, {"predicted"})
+        campaign_id=campaign.id, predicted=_record(bundle, source.predicted), **_fields(source, {"predicted"})
     )
     session.add(row)
     session.flush()
@@ -128,13 +131,13 @@ def _proposal(session: Session, bundle: Bundle, campaign: CampaignRow, said: Pro
 
 
 def _trials(
-    session: Session, bundle: Bundle, campaign: CampaignRow, said: Sequence[Trial], proposals: Sequence[ProposalRow]
+    session: Session, bundle: Bundle, campaign: CampaignRow, sources: Sequence[Trial], proposals: Sequence[ProposalRow]
 ) -> list[TrialRow]:
     """Store trials in large batches, because other writers wait meanwhile, but limited by memory."""
     made: list[TrialRow] = []
     waiting: list[TrajectoryRow | TrialPhotoRow] = []
     size = 0
-    for each in said:
+    for each in sources:
         row = _trial(bundle, campaign, each, proposals)
         photos = [_photo(bundle, row, photo) for photo in each.photos]
         session.add_all((row, *photos))
@@ -157,23 +160,25 @@ def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> N
     waiting.clear()
 
 
-def _trial(bundle: Bundle, campaign: CampaignRow, said: Trial, proposals: Sequence[ProposalRow]) -> TrialRow:
-    kept = _fields(said, {"proposal", "record", "photos", "telemetry", "curve"})
+def _trial(bundle: Bundle, campaign: CampaignRow, source: Trial, proposals: Sequence[ProposalRow]) -> TrialRow:
+    kept = _fields(source, {"proposal", "record", "photos", "telemetry", "curve"})
     return TrialRow(
         campaign_id=campaign.id,
-        proposal_id=None if said.proposal is None else proposals[said.proposal].id,
-        trajectory=_record(bundle, said.record),
-        curve=None if said.curve is None else [list(point) for point in said.curve],
+        proposal_id=None if source.proposal is None else proposals[source.proposal].id,
+        trajectory=_record(bundle, source.record),
+        curve=None if source.curve is None else [list(point) for point in source.curve],
         **kept,
     )
 
 
-def _photo(bundle: Bundle, trial: TrialRow, said: Photo) -> TrialPhotoRow:
-    return TrialPhotoRow(trial=trial, media_type=said.media_type, data=bundle.part(said.part), added_at=said.added_at)
+def _photo(bundle: Bundle, trial: TrialRow, source: Photo) -> TrialPhotoRow:
+    return TrialPhotoRow(
+        trial=trial, media_type=source.media_type, data=bundle.part(source.part), added_at=source.added_at
+    )
 
 
-def _record(bundle: Bundle, said: Record | None) -> TrajectoryRow | None:
-    return None if said is None else TrajectoryRow(data=bundle.part(said.part), **_fields(said, {"part"}))
+def _record(bundle: Bundle, source: Record | None) -> TrajectoryRow | None:
+    return None if source is None else TrajectoryRow(data=bundle.part(source.part), **_fields(source, {"part"}))
 
 
 def _propose(session: Session, campaign: CampaignRow, proposals: Sequence[ProposalRow]) -> None:
@@ -183,9 +188,9 @@ def _propose(session: Session, campaign: CampaignRow, proposals: Sequence[Propos
         request_proposal(session, campaign)
 
 
-def _fields(said: BaseModel, without: set[str]) -> JsonObject:
+def _fields(source: BaseModel, without: set[str]) -> JsonObject:
     """Fields of a model with their values as they came; a dump would change the types of stored numbers."""
-    return {name: getattr(said, name) for name in type(said).model_fields.keys() - without}
+    return {name: getattr(source, name) for name in type(source).model_fields.keys() - without}
 
 
 def _refused(field: str, reason: str) -> InputError:

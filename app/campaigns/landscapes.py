@@ -109,8 +109,8 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     job = _job(session, campaign.id, proposal.id)
     wanted = _is_wanted(job)
     if job is not None and not wanted and job.state in {JobState.FAILED, JobState.CANCELLED}:
-        said = jobs.job_problem(job)
-        why = "It was cancelled." if said is None else f"{said.title} {said.hint}"
+        problem = jobs.job_problem(job)
+        why = "It was cancelled." if problem is None else f"{problem.title} {problem.hint}"
         return _waiting(f"The landscape could not be computed. {why} Retry it on the page Jobs.")
     reason = (
         "The model is being evaluated at several hundred gain sets around the flown and the proposed ones. This "
@@ -158,9 +158,11 @@ def _grid_centre(past: CampaignHistory, proposal: ProposalRow) -> dict[str, floa
 
 def _search(proposal: ProposalRow) -> Search:
     """The strategy's search for the next gains, from the proposal's explanation."""
-    said = proposal.explanation
+    explanation = proposal.explanation
     return Search(
-        gradient=dict(said.get("gradient", {})),
-        direction=dict(said.get("direction", {})),
-        tried=tuple(Tried(dict(step["gains"]), float(step["predicted_error"])) for step in said.get("ladder", ())),
+        gradient=dict(explanation.get("gradient", {})),
+        direction=dict(explanation.get("direction", {})),
+        tried=tuple(
+            Tried(dict(step["gains"]), float(step["predicted_error"])) for step in explanation.get("ladder", ())
+        ),
     )

@@ -101,15 +101,15 @@ def store_proposal(session: Session, campaign_id: int, computed: ProposalComputa
     return row
 
 
-def _apply_to_campaign(session: Session, campaign: CampaignRow, said: StopVerdict) -> None:
+def _apply_to_campaign(session: Session, campaign: CampaignRow, verdict: StopVerdict) -> None:
     if campaign.state == CampaignState.DRAFT:
         set_campaign_state(campaign, CampaignState.READY)
-    elif campaign.state == CampaignState.DECIDING and said.reason is not None:
-        end_campaign(session, campaign, _OUTCOMES[said.reason], said.why)
+    elif campaign.state == CampaignState.DECIDING and verdict.reason is not None:
+        end_campaign(session, campaign, _OUTCOMES[verdict.reason], verdict.why)
     elif campaign.state == CampaignState.FINISHED and campaign.outcome != Outcome.STOPPED:
         # A flight was reclassified: the reason for the end is updated.
-        campaign.outcome = None if said.reason is None else _OUTCOMES[said.reason]
-        campaign.stop_reason = said.why if said.reason is not None else f"{_UNSUPPORTED} {said.why}"
+        campaign.outcome = None if verdict.reason is None else _OUTCOMES[verdict.reason]
+        campaign.stop_reason = verdict.why if verdict.reason is not None else f"{_UNSUPPORTED} {verdict.why}"
 
 
 def request_proposal(session: Session, campaign: CampaignRow) -> None:

@@ -70,18 +70,18 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     )
 
 
-def is_rehearsal_satisfied(said: Rehearsal) -> bool:
-    return said.state in {"not needed", "passed"}
+def is_rehearsal_satisfied(rehearsal: Rehearsal) -> bool:
+    return rehearsal.state in {"not needed", "passed"}
 
 
 def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
     """Raise ConflictError while a campaign on a real vehicle has no rehearsal that passed."""
-    said = rehearsal_of(session, campaign)
-    if not is_rehearsal_satisfied(said):
-        where = "on its simulation" if said.campaign_id is None else f"in campaign {said.campaign_id}"
+    result = rehearsal_of(session, campaign)
+    if not is_rehearsal_satisfied(result):
+        where = "on its simulation" if result.campaign_id is None else f"in campaign {result.campaign_id}"
         raise ConflictError(
             f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal: "
-            f"{said.reason}.",
+            f"{result.reason}.",
             hint=f"Rehearse it {where} first: fly {FLIGHTS} valid flights, or the campaign until its stop rule "
             "ends it, with no flight aborted or invalid.",
         )

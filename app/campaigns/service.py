@@ -276,10 +276,10 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))
     if now is None or now.comparison is None:
         raise _not_shown(row, "no gains are better than its first gains")
-    said = now.comparison
-    if said.verdict != "better":
+    compared = now.comparison
+    if compared.verdict != "better":
         raise _not_shown(
-            row, f"the comparison of {format_gains(now.winner.gains)} with its first gains is {said.verdict}"
+            row, f"the comparison of {format_gains(now.winner.gains)} with its first gains is {compared.verdict}"
         )
     gains = dict(now.winner.gains)
     promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), context=context)
@@ -313,12 +313,14 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
     Raises ConflictError where no rehearsal is needed, and where no simulation can fly the experiment.
     """
     row = repository.get_campaign(session, campaign_id)
-    said = rehearsal_of(session, row)
-    if said.state == "not needed":
-        why = f": {said.reason}" if said.reason else f", {row.vehicle.name} is not a real vehicle flown from here"
+    existing = rehearsal_of(session, row)
+    if existing.state == "not needed":
+        why = (
+            f": {existing.reason}" if existing.reason else f", {row.vehicle.name} is not a real vehicle flown from here"
+        )
         raise ConflictError(f"Campaign {row.id} needs no rehearsal{why}.", hint="Fly it.")
-    if said.campaign_id is not None and said.state != "failed":
-        return campaign_view(session, repository.get_campaign(session, said.campaign_id))
+    if existing.campaign_id is not None and existing.state != "failed":
+        return campaign_view(session, repository.get_campaign(session, existing.campaign_id))
     made = add_campaign(
         session,
         f"Rehearsal: {row.name[:_NAME_ROOM]}",

@@ -99,17 +99,17 @@ def _group(now: ComparisonState, group: Group) -> RepeatGroup:
 
 
 def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | None:
-    said = now.comparison
-    if said is None:
+    comparison = now.comparison
+    if comparison is None:
         return None
     return Comparison(
-        verdict=said.verdict,
-        confidence=said.confidence,
-        difference=said.difference,
-        standard_error=said.standard_error,
+        verdict=comparison.verdict,
+        confidence=comparison.confidence,
+        difference=comparison.difference,
+        standard_error=comparison.standard_error,
         further=None
-        if said.further is None
-        else FlightsToDecide(best=said.further.first, baseline=said.further.second),
+        if comparison.further is None
+        else FlightsToDecide(best=comparison.further.first, baseline=comparison.further.second),
         sentence=verdict_sentence(experiment, now),
     )
 
@@ -123,15 +123,15 @@ def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
     if found is None:
         return None
     amount = plus_minus(found.difference, found.standard_error, experiment.error_unit, sign="+")
-    word = "has drifted" if found.confidence >= _SURE else "shows no resolvable drift"
+    finding = "has drifted" if found.confidence >= _SURE else "shows no resolvable drift"
     return Drift(
         first_trial=found.first_number,
         last_trial=found.last_number,
         difference=found.difference,
         standard_error=found.standard_error,
         confidence=found.confidence,
-        sentence=f"From flight {found.first_number} to {found.last_number}, with the same gains, the vehicle {word}: "
-        f"{amount}, {percent(found.confidence)} confidence.",
+        sentence=f"From flight {found.first_number} to {found.last_number}, with the same gains, the vehicle "
+        f"{finding}: {amount}, {percent(found.confidence)} confidence.",
     )
 
 
@@ -139,14 +139,20 @@ def _trends(experiment: Experiment, group: Group, trials: Sequence[TrialRow]) ->
     """Trends of the gains flown most often: their errors by flight number, and by battery voltage where it was
     measured."""
     voltages = {row.number: row.landing_battery_v for row in trials}
-    told = [
+    with_voltage = [
         (volts, error)
         for number, error in zip(group.numbers, group.errors, strict=True)
         if (volts := voltages[number]) is not None
     ]
     found = (
         _trend("flight number", "per flight", experiment, [float(number) for number in group.numbers], group.errors),
-        _trend("battery voltage", "per V", experiment, [volts for volts, _ in told], [error for _, error in told]),
+        _trend(
+            "battery voltage",
+            "per V",
+            experiment,
+            [volts for volts, _ in with_voltage],
+            [error for _, error in with_voltage],
+        ),
     )
     return [trend for trend in found if trend is not None]
 
@@ -162,14 +168,14 @@ def _trend(
     if found is None:
         return None
     unit = f"{experiment.error_unit} {per}"
-    word = "changes with" if found.is_resolved else "shows no dependence on"
+    relation = "changes with" if found.is_resolved else "shows no dependence on"
     return Trend(
         against=against,
         unit=unit,
         slope=found.slope,
         lower=found.lower,
         upper=found.upper,
-        sentence=f"The error {word} the {against}: {found.slope:+.2g} {unit}, {percent(_SURE)} interval "
+        sentence=f"The error {relation} the {against}: {found.slope:+.2g} {unit}, {percent(_SURE)} interval "
         f"{found.lower:+.2g} … {found.upper:+.2g}.",
     )
 

@@ -148,9 +148,9 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
 def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> Proposal:
     best = history.best_of(trials)
     now = best.gains if best is not None else campaign.vehicle.safe_gains
-    said = row.stop_verdict
+    stop = row.stop_verdict
     verdict = StopVerdict(
-        stop=said["stop"], reason=said["reason"] or "", sentence=said["why"], threshold=said["threshold"]
+        stop=stop["stop"], reason=stop["reason"] or "", sentence=stop["why"], threshold=stop["threshold"]
     )
     advice = _advice(row, verdict)
     return Proposal(

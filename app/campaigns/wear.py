@@ -149,16 +149,16 @@ def _estimate(row: ProposalRow, flight: int, number: int) -> Estimate:
 
 def _retune(estimates: Sequence[Estimate], ends: Sequence[int]) -> Retune:
     if not estimates:
-        said = "No data yet: no campaign with the calibrated model has flown on this vehicle."
-        return Retune(due=False, since=None, drifted=[], sentence=said)
+        finding = "No data yet: no campaign with the calibrated model has flown on this vehicle."
+        return Retune(due=False, since=None, drifted=[], sentence=finding)
     if not ends:
-        said = "No verdict yet: no campaign with the calibrated model is finished on this vehicle."
-        return Retune(due=False, since=None, drifted=[], sentence=said)
+        finding = "No verdict yet: no campaign with the calibrated model is finished on this vehicle."
+        return Retune(due=False, since=None, drifted=[], sentence=finding)
     since = max(ends)
     tuned = next(one for one in reversed(estimates) if one.flight == since)
     if tuned is estimates[-1]:
-        said = f"Tuned with flight {since}; no campaign with the calibrated model has flown since."
-        return Retune(due=False, since=since, drifted=[], sentence=said)
+        finding = f"Tuned with flight {since}; no campaign with the calibrated model has flown since."
+        return Retune(due=False, since=since, drifted=[], sentence=finding)
     found: Drift = drift(_by_name(tuned), _by_name(estimates[-1]))
     return Retune(due=found.due, since=since, drifted=list(found.drifted), sentence=found.sentence)
 

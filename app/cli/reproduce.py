@@ -155,7 +155,7 @@ def _check(file: Path, given: Mapping[str, float] | None) -> LogCheck:
 
 def _print(out: Console, file: Path, checked: LogCheck) -> None:
     commands, simulation = checked.commands, checked.simulation
-    spoken = ", ".join(f"{name} {value:g}" for name, value in checked.gains.items())
+    gain_list = ", ".join(f"{name} {value:g}" for name, value in checked.gains.items())
     tilted = f" ({commands.tilted} of them tilted by up to {commands.largest_tilt_deg:.1f}°)" if commands.tilted else ""
     rows = [
         ("bit-exact commands", f"{commands.exact} of {commands.rows}{tilted}"),
@@ -175,7 +175,7 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
             )
             for name, value in simulation.largest_difference.items()
         ]
-    out.print(table(("", ""), rows, title=f"{file.name}, {spoken} ({checked.gains_from})"))
+    out.print(table(("", ""), rows, title=f"{file.name}, {gain_list} ({checked.gains_from})"))
     if checked.better_gains is not None:
         better = ", ".join(f"{name} {value:g}" for name, value in checked.better_gains.items())
         out.print(f"More commands match with {better}: were other gains flown?")

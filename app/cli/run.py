@@ -143,8 +143,8 @@ class _Display:
 
     def broken_off(self, error: BaseException) -> HeadlessCampaign:
         """The campaign with the flights until the error."""
-        said = str(error) or type(error).__name__
-        return HeadlessCampaign(trials=tuple(self._trials), stopped_because=f"After an error: {said}")
+        message = str(error) or type(error).__name__
+        return HeadlessCampaign(trials=tuple(self._trials), stopped_because=f"After an error: {message}")
 
     def _holding(self, gains: Mapping[str, float] | None) -> None:
         self.touched, self.held = True, gains

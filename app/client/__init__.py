@@ -248,14 +248,14 @@ class Client:
     def trial(self, trial_id: int) -> Trial:
         return self._get(f"/api/trials/{trial_id}", Trial)
 
-    def classify(self, trial: Trial, said: Classification) -> Trial:
+    def classify(self, trial: Trial, classification: Classification) -> Trial:
         """Classify a flight; whatever was computed from it is recomputed."""
-        return self._post(f"/api/trials/{trial.id}/classify", Trial, said)
+        return self._post(f"/api/trials/{trial.id}/classify", Trial, classification)
 
     def judge_abort(self, trial: Trial, cause: Literal["behaved badly", "something else"]) -> Trial:
         """Record why a flight was aborted; it counts against its gains only if the vehicle behaved badly."""
-        said = AbortJudgement(version=trial.version, cause=cause)
-        return self._post(f"/api/trials/{trial.id}/judge-abort", Trial, said)
+        judgement = AbortJudgement(version=trial.version, cause=cause)
+        return self._post(f"/api/trials/{trial.id}/judge-abort", Trial, judgement)
 
     def trajectory(self, trial_id: int, *, points: int = 1000) -> Trajectory:
         """The record, thinned to at most `points` samples."""
@@ -323,15 +323,15 @@ class Client:
 def _refusal(answer: httpx2.Response) -> RefusedError:
     kind = _REFUSALS.get(answer.status_code, RefusedError)
     try:
-        said = ProblemDetails.model_validate_json(answer.content)
+        details = ProblemDetails.model_validate_json(answer.content)
     except ValidationError:
         return kind(
             f"The server answered {answer.status_code} {answer.reason_phrase}.",
             status=answer.status_code,
             hint="Check that the address belongs to a Gainline server of this version.",
         )
-    problems = tuple(Problem(problem.field, problem.reason, problem.offer) for problem in said.problems)
-    return kind(said.detail, hint=said.hint, problems=problems, status=said.status, title=said.title)
+    problems = tuple(Problem(problem.field, problem.reason, problem.offer) for problem in details.problems)
+    return kind(details.detail, hint=details.hint, problems=problems, status=details.status, title=details.title)
 
 
 def _content(record: Record) -> bytes:

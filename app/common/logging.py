@@ -118,15 +118,15 @@ def _of_file(file: Path, job_id: int, since: datetime) -> Iterator[LogLine]:
 
 def _parsed(text: str, job_id: int) -> LogLine | None:
     try:
-        said = json.loads(text)
-        if said.get("job_id") != job_id:
+        entry = json.loads(text)
+        if entry.get("job_id") != job_id:
             return None
         return LogLine(
-            at=datetime.fromisoformat(said["timestamp"]),
-            level=str(said.get("level", "info")),
-            message=str(said["event"]),
-            details={name: str(value) for name, value in said.items() if name not in _KNOWN and value is not None},
-            exception=str(said.get("exception", "")),
+            at=datetime.fromisoformat(entry["timestamp"]),
+            level=str(entry.get("level", "info")),
+            message=str(entry["event"]),
+            details={name: str(value) for name, value in entry.items() if name not in _KNOWN and value is not None},
+            exception=str(entry.get("exception", "")),
         )
     except (ValueError, TypeError, KeyError, AttributeError):  # a line truncated by a crash
         return None

@@ -152,11 +152,11 @@ def decode_cursor(order: str, text: str, kind: type[str] | type[float]) -> Posit
     """Decode a cursor. Raises InputError unless it is one of this order, with a sort value of this kind."""
     try:
         found = json.loads(base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True))
-        said, value, identity = found
+        cursor_order, value, identity = found
         value = kind(value) if isinstance(value, int | float | str) and not isinstance(value, bool) else None
     except (ValueError, TypeError, OverflowError, binascii.Error, RecursionError):
         raise _refused("is not a cursor of this list") from None
-    if said != order:
+    if cursor_order != order:
         raise _refused("belongs to a different sort order of the list")
     if value is None or type(identity) is not int or not 0 < identity <= _LARGEST_ID:
         raise _refused("is not a cursor of this list")

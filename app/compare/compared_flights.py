@@ -35,8 +35,8 @@ def trials_by_id(session: Session, trial_ids: Collection[int]) -> Mapping[int, T
 def batteries_of(session: Session, trial_ids: Collection[int]) -> Mapping[int, str]:
     """Battery label of each trial's last flight, if one was entered."""
     last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
-    told = select(FlightRow).where(FlightRow.id.in_(last), FlightRow.battery != "")
-    return {row.trial_id: row.battery for row in session.scalars(told)}
+    labelled = select(FlightRow).where(FlightRow.id.in_(last), FlightRow.battery != "")
+    return {row.trial_id: row.battery for row in session.scalars(labelled)}
 
 
 def measured(value: float, standard_error: float | None, unit: str) -> str:
@@ -223,8 +223,8 @@ def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
         found.append(FlightSetting(title="Battery", unit="", value=battery))
     if row.landing_battery_v is not None:
         found.append(FlightSetting(title="Battery after landing", unit="V", value=round(row.landing_battery_v, 2)))
-    said = row.settings.items() - options.items()
-    return found + [FlightSetting(title=name, unit="", value=value) for name, value in sorted(said)]
+    reported = row.settings.items() - options.items()
+    return found + [FlightSetting(title=name, unit="", value=value) for name, value in sorted(reported)]
 
 
 def setting_differences(flights: Sequence[Sequence[FlightSetting]]) -> list[FlightDifference]:

@@ -27,18 +27,24 @@ def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidate
         return _apart(side, side.group, against, against.group)
     if side.group is against.group:
         return _repeats(side, against, side.group)
-    said = compare(side.group, against.group, side.scatter, CONFIDENCE, candidates=candidates)
+    comparison = compare(side.group, against.group, side.scatter, CONFIDENCE, candidates=candidates)
     same = dict(side.group.gains) == dict(against.group.gains)
-    sentence = _changed(side, against, said) if same else _told(side, side.group, against, against.group, said)
+    sentence = (
+        _changed(side, against, comparison)
+        if same
+        else _comparison_sentence(side, side.group, against, against.group, comparison)
+    )
     return FlightPair(
         trial_id=side.row.id,
         against_id=against.row.id,
         basis="repeats" if same else "gains",
-        verdict=said.verdict,
-        confidence=said.confidence,
-        difference=said.difference,
-        standard_error=said.standard_error,
-        further=None if said.further is None else FurtherFlights(trial=said.further.first, against=said.further.second),
+        verdict=comparison.verdict,
+        confidence=comparison.confidence,
+        difference=comparison.difference,
+        standard_error=comparison.standard_error,
+        further=None
+        if comparison.further is None
+        else FurtherFlights(trial=comparison.further.first, against=comparison.further.second),
         sentence=sentence,
     )
 
@@ -58,8 +64,8 @@ def overall_verdict(sides: Sequence[ComparisonFlight]) -> tuple[Verdict | None, 
         if first.group not in (None, best.group)
         else next((side for side in ranked if side.group is not best.group), ranked[1])
     )
-    said = compare_pair(best, other, candidates=max(1, policies - 1))
-    return said.verdict, f"{_among(best, policies)}{said.sentence}"
+    pair = compare_pair(best, other, candidates=max(1, policies - 1))
+    return pair.verdict, f"{_among(best, policies)}{pair.sentence}"
 
 
 def list_notes(sides: Sequence[ComparisonFlight]) -> list[str]:
@@ -112,8 +118,8 @@ def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other:
     direction = "lower" if difference < 0.0 else "higher"
     how, _ = _why_apart(side, against)
     sentence = f"No verdict on the gains: {side.name}, {how}, is {amount} {direction} than {against.name}."
-    told = _pair(side, against, "apart", sentence)
-    return told.model_copy(update={"difference": difference, "standard_error": standard_error})
+    pair = _pair(side, against, "apart", sentence)
+    return pair.model_copy(update={"difference": difference, "standard_error": standard_error})
 
 
 def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, str]:
@@ -144,15 +150,15 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
     found = drift_of(Group(group.gains, numbers, (errors[numbers[0]], errors[numbers[1]])), side.scatter)
     assert found is not None
     amount = measured(abs(found.difference), found.standard_error, side.experiment.error_unit)
-    word = (
+    relation = (
         "more than the scatter of flights" if found.confidence >= CONFIDENCE else "no more than the scatter of flights"
     )
     sentence = (
-        f"The same gains ({format_gains(group.gains)}): {side.name} and {against.name} are {amount} apart, {word} "
+        f"The same gains ({format_gains(group.gains)}): {side.name} and {against.name} are {amount} apart, {relation} "
         f"({percent(found.confidence)} confidence that something has changed)."
     )
-    told = _pair(side, against, "repeats", sentence)
-    return told.model_copy(
+    pair = _pair(side, against, "repeats", sentence)
+    return pair.model_copy(
         update={
             "difference": found.difference,
             "standard_error": found.standard_error,
@@ -161,47 +167,50 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
     )
 
 
-def _changed(side: ComparisonFlight, against: ComparisonFlight, said: Comparison) -> str:
+def _changed(side: ComparisonFlight, against: ComparisonFlight, comparison: Comparison) -> str:
     """Sentence for the same gains in two campaigns."""
-    amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
-    if said.confidence is None:
+    amount = measured(abs(comparison.difference), comparison.standard_error, side.experiment.error_unit)
+    if comparison.confidence is None:
         return (
-            f"Not known yet: with the same gains in two campaigns {side.name} is {amount} {_direction(said)} than "
-            f"{against.name}. {SCATTER_NOT_KNOWN}"
+            f"Not known yet: with the same gains in two campaigns {side.name} is {amount} "
+            f"{_direction(comparison)} than {against.name}. {SCATTER_NOT_KNOWN}"
         )
-    word = (
+    relation = (
         "within the scatter"
-        if said.verdict == "unresolved"
+        if comparison.verdict == "unresolved"
         else "more than the scatter: the vehicle or its environment has changed"
     )
     return (
-        f"The same gains in two campaigns: {side.name} is {amount} {_direction(said)} than {against.name}, {word} "
-        f"({percent(said.confidence)} confidence)."
+        f"The same gains in two campaigns: {side.name} is {amount} {_direction(comparison)} than {against.name}, "
+        f"{relation} ({percent(comparison.confidence)} confidence)."
     )
 
 
-def _told(side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group, said: Comparison) -> str:
-    amount = measured(abs(said.difference), said.standard_error, side.experiment.error_unit)
+def _comparison_sentence(
+    side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group, comparison: Comparison
+) -> str:
+    amount = measured(abs(comparison.difference), comparison.standard_error, side.experiment.error_unit)
     pair = f"{named(own, side.name)} against {named(other, against.name)}"
-    if said.confidence is None:
-        return f"Not known yet: {pair}, {amount} {_direction(said)}. {SCATTER_NOT_KNOWN}"
-    both = f"{amount} {_direction(said)}, {percent(said.confidence)} confidence"
-    if said.verdict == "unresolved":
-        return f"Unresolved: {pair}, {both}. {_deciding(side, against, said)}"
-    return f"{capitalised(named(own, side.name))} is {said.verdict} than {named(other, against.name)}: {both}."
+    if comparison.confidence is None:
+        return f"Not known yet: {pair}, {amount} {_direction(comparison)}. {SCATTER_NOT_KNOWN}"
+    both = f"{amount} {_direction(comparison)}, {percent(comparison.confidence)} confidence"
+    if comparison.verdict == "unresolved":
+        return f"Unresolved: {pair}, {both}. {_deciding(side, against, comparison)}"
+    return f"{capitalised(named(own, side.name))} is {comparison.verdict} than {named(other, against.name)}: {both}."
 
 
-def _direction(said: Comparison) -> str:
-    return "lower" if said.difference < 0.0 else "higher"
+def _direction(comparison: Comparison) -> str:
+    return "lower" if comparison.difference < 0.0 else "higher"
 
 
-def _deciding(side: ComparisonFlight, against: ComparisonFlight, said: Comparison) -> str:
-    if said.further is None:
+def _deciding(side: ComparisonFlight, against: ComparisonFlight, comparison: Comparison) -> str:
+    if comparison.further is None:
         return "Even 100 more flights would not resolve it."
     parts = [
         f"{count} with the gains of {name}"
-        for count, name in ((said.further.first, side.name), (said.further.second, against.name))
+        for count, name in ((comparison.further.first, side.name), (comparison.further.second, against.name))
         if count
     ]
-    flights = "flight" if said.further.total == 1 else "flights"
-    return f"If the difference persists, {said.further.total} more {flights} would resolve it: {' and '.join(parts)}."
+    flights = "flight" if comparison.further.total == 1 else "flights"
+    needed = f"{comparison.further.total} more {flights}"
+    return f"If the difference persists, {needed} would resolve it: {' and '.join(parts)}."

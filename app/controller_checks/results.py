@@ -116,7 +116,7 @@ def _result_of_trace(checked: TraceCheck) -> Result:
     return Result(
         kind="trace",
         passed=replay.exact,
-        sentence=_said_of_trace(checked, differs),
+        sentence=_trace_sentence(checked, differs),
         rows=replay.rows,
         gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
         gains_from="of the recording" if is_constant else "not constant",
@@ -146,7 +146,7 @@ def _result_of_log(checked: LogCheck) -> Result:
     return Result(
         kind="log",
         passed=checked.passed,
-        sentence=_said_of_log(checked),
+        sentence=_log_sentence(checked),
         rows=commands.rows,
         gains=dict(checked.gains),
         gains_from=checked.gains_from,
@@ -175,7 +175,7 @@ def _signal(
     )
 
 
-def _said_of_trace(checked: TraceCheck, differs: Mapping[str, NDArray[np.bool_]]) -> str:
+def _trace_sentence(checked: TraceCheck, differs: Mapping[str, NDArray[np.bool_]]) -> str:
     replay = checked.replay
     if replay.first_different_row is None:
         return f"The replica agrees: all {_grouped(replay.rows)} steps are exact in all {len(OUTPUTS)} signals."
@@ -188,7 +188,7 @@ def _said_of_trace(checked: TraceCheck, differs: Mapping[str, NDArray[np.bool_]]
     )
 
 
-def _said_of_log(checked: LogCheck) -> str:
+def _log_sentence(checked: LogCheck) -> str:
     commands, simulation = checked.commands, checked.simulation
     if not commands.rows:
         return "Nothing could be compared: the loop was not in control in this log."

@@ -136,13 +136,13 @@ def figure(session: Session, check_id: int, name: str, theme: ThemeName) -> Card
     if name not in FIGURES:
         raise NotFoundError("figure", name, hint=f"Available: {', '.join(FIGURES)}.")
     title, signals = FIGURES[name]
-    said = "; ".join(
+    summary = "; ".join(
         f"{signal.name} {signal.verdict}, largest difference {signal.largest_difference:.4g} {signal.difference_unit}"
         for signal in result.signals
         if signal.name in signals
     )
     drawn = [result.curves[signal] for signal in signals if signal in result.curves]
-    return card_of(ControllerFigure(drawn, title, f"Recorded and replica overlaid: {said}. z points down.", theme))
+    return card_of(ControllerFigure(drawn, title, f"Recorded and replica overlaid: {summary}. z points down.", theme))
 
 
 def delete_check(session: Session, check_id: int) -> None:

@@ -29,9 +29,10 @@ def record_changes(session: Session, _context: UOWTransaction) -> None:
     changed = [row for row in (*session.new, *session.dirty, *session.deleted) if isinstance(row, Reported)]
     if not changed:
         return
-    at, said = utc_now(), [row.reported_as() for row in changed]
+    at, changes = utc_now(), [row.reported_as() for row in changed]
     session.connection().execute(
-        insert(EventRow), [{"topic": topic, "entity_id": id_, "campaign_id": of, "at": at} for topic, id_, of in said]
+        insert(EventRow),
+        [{"topic": topic, "entity_id": id_, "campaign_id": of, "at": at} for topic, id_, of in changes],
     )
     latest = latest_event_id(session)
     if latest % _PRUNE_EVERY < len(changed):

@@ -114,8 +114,8 @@ def translated(database_file: Path) -> Iterator[None]:
 def _storage_error(error: DBAPIError | sqlite3.Error, database_file: Path) -> StorageError | None:
     """StorageError for a driver's error, or None when it is of another kind."""
     message = str(error.orig if isinstance(error, DBAPIError) else error).lower()
-    for words, (happened, hint) in _TROUBLES.items():
-        if words in message:
+    for reason, (happened, hint) in _TROUBLES.items():
+        if reason in message:
             return StorageError(happened.format(file=database_file), hint=hint.format(file=database_file))
     return None
 

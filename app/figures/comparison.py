@@ -170,7 +170,7 @@ class ComparisonFigure:
 
     def _summary(self, outside: int) -> str:
         data = self.data
-        told = "; ".join(
+        listed = "; ".join(
             f"{flight.label}, {flight.name}, "
             + ("no error" if flight.error is None else f"error {flight.error:.3f} {data.error_unit}")
             for flight in data.flights
@@ -178,7 +178,7 @@ class ComparisonFigure:
         off = f" {outside} off scale, marked at the edge." if outside else ""
         return (
             f"{data.output_title} of {len(data.flights)} flights over time, and below the difference of each from "
-            f"{data.flights[0].label}: {told}.{off}"
+            f"{data.flights[0].label}: {listed}.{off}"
         )
 
     def _table(self, recorded: list[Drawn]) -> Table:

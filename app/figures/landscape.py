@@ -135,7 +135,7 @@ class LandscapeFigure:
             "text": numbers(flights, best, one, aside=None if proposal is None else proposal.gains),
             "textposition": ["bottom center" if is_high(one, flight.gains) else "top center" for flight in flights],
             "textfont": {"size": 12, "color": palette.ink, "weight": 700},
-            "hovertext": [_told(flight, unit) for flight in flights],
+            "hovertext": [_hover_text(flight, unit) for flight in flights],
         }
         if best is None:
             return [path]
@@ -149,7 +149,7 @@ class LandscapeFigure:
                 "opacity": 1,
                 "line": {"width": 1.5, "color": palette.surface},
             },
-            "hovertext": [_told(best, unit)],
+            "hovertext": [_hover_text(best, unit)],
         }
         return [path, star]
 
@@ -191,7 +191,7 @@ class LandscapeFigure:
         proposal = self.history.proposal
         if proposal is None:
             return []
-        told = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
+        prediction = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
         mark = _marks(index, one, [proposal.gains], "proposed") | {
             "name": f"Next, flight {proposal.number}",
             "mode": "markers",
@@ -202,7 +202,9 @@ class LandscapeFigure:
                 "opacity": 1,
                 "line": {"width": 1.5, "color": palette.surface},
             },
-            "hovertext": [f"Flight {proposal.number}, proposed{told} {self.history.error_unit if told else ''}"],
+            "hovertext": [
+                f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
+            ],
         }
         return [mark]
 
@@ -365,7 +367,7 @@ def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str) -> dict[st
     }
 
 
-def _told(flight: FlightData, unit: str) -> str:
+def _hover_text(flight: FlightData, unit: str) -> str:
     error = "no error" if flight.error is None else f"{flight.error:.4f} {unit} measured"
     return f"Flight {flight.number}, {error}"
 

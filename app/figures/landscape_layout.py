@@ -25,15 +25,15 @@ def numbers(
     leading = {flights[0].number, flights[-1].number, *([best.number] if best else [])}
     spots = {flight.number: spot(one, flight.gains) for flight in flights}
     covered = [] if aside is None else [spot(one, aside)]
-    told: dict[int, list[int]] = {}
+    shared: dict[int, list[int]] = {}
     for number in sorted(spots, key=lambda number: (number not in leading, number)):
-        near = next((other for other in told if _collide(spots[number], spots[other], len(told[other]))), None)
+        near = next((other for other in shared if _collide(spots[number], spots[other], len(shared[other]))), None)
         if near is not None:
             if number in leading or spots[number] == spots[near]:
-                told[near].append(number)
+                shared[near].append(number)
         elif number in leading or not any(_collide(spots[number], other) for other in covered):
-            told[number] = [number]
-    return [", ".join(map(str, sorted(told.pop(flight.number, [])))) for flight in flights]
+            shared[number] = [number]
+    return [", ".join(map(str, sorted(shared.pop(flight.number, [])))) for flight in flights]
 
 
 def spot(one: Slice, gains: Gains) -> PlotPosition:

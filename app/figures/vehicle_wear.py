@@ -109,9 +109,9 @@ class CalibrationFigure:
             "anchor": f"y{suffix}",
             "matches": None if index == 1 else "x",
         }
-        told = "Flight of this vehicle"
+        axis_title = "Flight of this vehicle"
         return {
-            f"xaxis{suffix}": theme.titled(palette, told, **x) if index == count else theme.axis(palette, **x),
+            f"xaxis{suffix}": theme.titled(palette, axis_title, **x) if index == count else theme.axis(palette, **x),
             f"yaxis{suffix}": theme.axis(
                 palette, domain=[bottom, bottom + height], anchor=f"x{suffix}", nticks=4, rangemode="normal"
             ),
@@ -262,5 +262,7 @@ class BatteriesFigure:
 
     def _summary(self, labels: list[str]) -> str:
         counted = [(label, sum(flight.battery == label for flight in self.flights)) for label in labels]
-        told = ", ".join(f"{label or 'no label'}: {count} flight{'s' if count > 1 else ''}" for label, count in counted)
-        return f"Open marks: before a flight; smaller filled marks: after it. {told}."
+        counts = ", ".join(
+            f"{label or 'no label'}: {count} flight{'s' if count > 1 else ''}" for label, count in counted
+        )
+        return f"Open marks: before a flight; smaller filled marks: after it. {counts}."

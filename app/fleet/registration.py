@@ -177,9 +177,9 @@ def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
     if not new.statement.strip():
         problems.append(Problem("statement", "must name the reviewer"))
     if problems:
-        spoken = ", ".join(f"{name} {value:g}" for name, value in gains.items())
+        listed = ", ".join(f"{name} {value:g}" for name, value in gains.items())
         raise UnconfirmedError(
-            f"{new.name} is a real vehicle, and every flight of it ends with {spoken}. A person must review these "
+            f"{new.name} is a real vehicle, and every flight of it ends with {listed}. A person must review these "
             "gains first.",
             hint="Compare them with gains that fly well on this vehicle, then confirm them and give your name.",
             problems=tuple(problems),

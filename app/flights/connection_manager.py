@@ -116,10 +116,10 @@ class VehicleConnectionManager:
         slot = self._slots.get(vehicle_id)
         if slot is None or (session := slot.live) is None:
             return _refused(NO_LINK)
-        told = session.send_command(order, reason, by_s)
+        answer = session.send_command(order, reason, by_s)
         if (trial_id := session.trial_id) is not None:
             self._abort_registry.abort(trial_id, reason)
-        return told
+        return answer
 
     def session(self, vehicle_id: int) -> VehicleConnection:
         """The vehicle's connection, for a flight. Raises VehicleError when there is none."""
@@ -149,7 +149,7 @@ class VehicleConnectionManager:
         try:
             self._acquire_slot(slot)
             try:
-                said = self._open_connection(slot, task.vehicle)
+                opened = self._open_connection(slot, task.vehicle)
             finally:
                 slot.busy.release()
         except GainlineError as error:
@@ -160,7 +160,7 @@ class VehicleConnectionManager:
                 also=lambda t: commands.record_disconnected(t, task.vehicle.vehicle_id, concern=concern),
             )
             return
-        self._store_with_retry(partial(_connected, task=task, said=said))
+        self._store_with_retry(partial(_connected, task=task, opened=opened))
 
     def _disconnect(self, task: ActTask) -> None:
         self._close(task.vehicle.vehicle_id)
@@ -245,7 +245,7 @@ class VehicleConnectionManager:
         """Connect a wanted vehicle, with `busy` held. Errors are logged only, because the next attempt follows
         anyway."""
         try:
-            said = self._open_connection(slot, vehicle, patient=True)
+            opened = self._open_connection(slot, vehicle, patient=True)
             found = slot.session
         except GainlineError as error:
             _log.info("not connected", vehicle_id=vehicle.vehicle_id, why=str(error))
@@ -254,7 +254,7 @@ class VehicleConnectionManager:
             slot.busy.release()
         kept = self._store_with_retry(
             lambda t: commands.record_reconnected(
-                t, vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held
+                t, vehicle.vehicle_id, opened.identity, concern=opened.concern, held=opened.held
             )
         )
         if kept is False:
@@ -283,16 +283,16 @@ class VehicleConnectionManager:
         try:
             if self._closing.is_set():
                 raise _no_link_error()
-            said = session.wait_until_open()
+            opened = session.wait_until_open()
         except BaseException:
             session.close()
             self._publish_state(vehicle_id, "gone")
             raise
         finally:
             slot.reconnecting = None
-        slot.concern, slot.session = said.concern, session
-        _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(said.identity), concern=said.concern)
-        return said
+        slot.concern, slot.session = opened.concern, session
+        _log.info("vehicle connected", vehicle_id=vehicle_id, identity=str(opened.identity), concern=opened.concern)
+        return opened
 
     def _slot(self, vehicle_id: int) -> VehicleSlot:
         return self._slots.setdefault(vehicle_id, VehicleSlot())
@@ -339,11 +339,11 @@ class VehicleConnectionManager:
                 return None
 
 
-def _connected(transaction: Transaction, task: ActTask, said: ConnectionOpened) -> None:
+def _connected(transaction: Transaction, task: ActTask, opened: ConnectionOpened) -> None:
     commands.record_connected(
-        transaction, task.vehicle.vehicle_id, said.identity, concern=said.concern, held=said.held or None
+        transaction, task.vehicle.vehicle_id, opened.identity, concern=opened.concern, held=opened.held or None
     )
-    commands.finish_act(transaction, task.act_id, read_back=said.held or None)
+    commands.finish_act(transaction, task.act_id, read_back=opened.held or None)
 
 
 def _disconnected(transaction: Transaction, task: ActTask) -> None:
@@ -370,9 +370,9 @@ def _answered(transaction: Transaction, task: ActTask, answered: VehicleResponse
 
 
 def _refused(problem: str) -> Future[str]:
-    told: Future[str] = Future()
-    told.set_result(problem)
-    return told
+    refused: Future[str] = Future()
+    refused.set_result(problem)
+    return refused
 
 
 def _no_link_error() -> VehicleError:

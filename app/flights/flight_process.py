@@ -66,8 +66,8 @@ class FlightProcess:
         """
         try:
             self._send(request)
-            while not isinstance(said := self._pipe.recv(), FlightFinished):
-                yield said
+            while not isinstance(message := self._pipe.recv(), FlightFinished):
+                yield message
         except (EOFError, OSError) as error:
             self._process.join(SHUTDOWN_TIMEOUT_S)
             raise process_died_error(self._process.exitcode) from error
@@ -191,12 +191,12 @@ def _listener(pipe: Connection, trial_id: int, standing_down: str | None, asked:
     """
 
     def should_stop() -> StopRequest | None:
-        stop = heard()
+        stop = received_stop()
         if stop is not None:
             asked.add(stop.reason)
         return stop
 
-    def heard() -> StopRequest | None:
+    def received_stop() -> StopRequest | None:
         if standing_down is not None:
             return StopRequest(standing_down)
         try:

@@ -148,8 +148,8 @@ class FlightBackend(Protocol):
 def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
     """Return the record with `on_request` set: whether the flight was aborted for one of these reasons, which were sent
     by the worker, and not for a limit."""
-    said = record.reason.removeprefix(MOTORS_OFF_REQUESTED)
-    asked = record.ending == "aborted" and any(said.startswith(reason) for reason in reasons)
+    stated = record.reason.removeprefix(MOTORS_OFF_REQUESTED)
+    asked = record.ending == "aborted" and any(stated.startswith(reason) for reason in reasons)
     return replace(record, on_request=asked)
 
 

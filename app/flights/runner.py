@@ -165,10 +165,10 @@ class FlightRunner:
         try:
             self._phase(request, "staging")
             flag.add_listener(lambda reason: backend.cancel_flight(request.trial_id, reason))
-            for said in backend.fly(request):
-                match said:
+            for message in backend.fly(request):
+                match message:
                     case Telemetry() | FlightPhase():
-                        self._publish(said)
+                        self._publish(message)
                     case GainsStaged(read_back):
                         ended = self._staged(request, flag, backend, read_back)
                     case FlightLanded(record):

@@ -84,7 +84,7 @@ class VehicleConnection:
         context = process_context()
         self._pipe, theirs = context.Pipe()
         self._sending = threading.Lock()
-        self._said: queue.SimpleQueue[FromVehicleProcess | None] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[FromVehicleProcess | None] = queue.SimpleQueue()
         self._process = context.Process(target=run, args=(theirs, call), name=f"session {call.name}", daemon=True)
         self._process.start()
         theirs.close()
@@ -112,9 +112,9 @@ class VehicleConnection:
         has then ended.
         """
         match self._next():
-            case ConnectionOpened() as said:
+            case ConnectionOpened() as opened:
                 self._open = True
-                return said
+                return opened
             case FlightFailure(what, unsafe):
                 raise (SafeGainsError if unsafe else VehicleError)(what, hint="Then connect it again.")
             case other:
@@ -123,20 +123,20 @@ class VehicleConnection:
     def ask(self, kind: ActKind, safe_gains: Mapping[str, float]) -> VehicleResponse:
         """Carry out an act and wait for its outcome. Raises VehicleError when the process dies."""
         self._post(VehicleRequest(kind=kind, safe_gains=dict(safe_gains)))
-        said = self._next()
-        assert isinstance(said, VehicleResponse), said
-        return said
+        response = self._next()
+        assert isinstance(response, VehicleResponse), response
+        return response
 
     def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
         """See `FlightBackend.fly`."""
         self.trial_id = orders.trial_id
         try:
             self._post(orders)
-            while not isinstance(said := self._next(), FlightFinished):
+            while not isinstance(message := self._next(), FlightFinished):
                 assert isinstance(
-                    said, GainsStaged | Telemetry | FlightPhase | FlightLanded | SafeGainsRestored | FlightFailure
-                ), said
-                yield said
+                    message, GainsStaged | Telemetry | FlightPhase | FlightLanded | SafeGainsRestored | FlightFailure
+                ), message
+                yield message
         finally:
             self.trial_id = None
 
@@ -151,20 +151,20 @@ class VehicleConnection:
 
     def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
         """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was."""
-        told: Future[str] = Future()
+        answer: Future[str] = Future()
         if len(self._orders) >= MAX_UNANSWERED_ORDERS:
-            told.set_result(NOT_ANSWERING)
-            return told
+            answer.set_result(NOT_ANSWERING)
+            return answer
         number = next(self._numbers)
-        self._orders[number] = told
+        self._orders[number] = answer
         command = VehicleCommand(number, order, reason, by_s)
         if not (self._open and self.alive and self._post(command)):
             self._answer_order(number, NO_LINK)
-        return told
+        return answer
 
     def _answer_order(self, number: int, problem: str) -> None:
-        if (told := self._orders.pop(number, None)) is not None:
-            told.set_result(problem)
+        if (answer := self._orders.pop(number, None)) is not None:
+            answer.set_result(problem)
 
     def request_close(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
@@ -178,10 +178,10 @@ class VehicleConnection:
 
     def _next(self) -> FromVehicleProcess:
         """Return the process's next flight or act message. Raises VehicleError when the process is dead."""
-        if (said := self._said.get()) is None:
-            self._said.put(None)
+        if (received := self._messages.get()) is None:
+            self._messages.put(None)
             raise process_died_error(self._process.exitcode)
-        return said
+        return received
 
     def _listen(self) -> None:
         status = VehicleStatus(vehicle_id=self.call.vehicle_id, state="connecting", at=status_time(), step="")
@@ -198,14 +198,14 @@ class VehicleConnection:
                         self._hear_of(forwarded)
                     case ConnectionOpened(concern=concern) as opened:
                         status, patience_s = replace(status, concern=concern), self.call.clock.wall_s(SILENT_AFTER_S)
-                        self._said.put(opened)
-                    case said:
-                        self._said.put(said)
+                        self._messages.put(opened)
+                    case message:
+                        self._messages.put(message)
         except (EOFError, OSError):
             self._process.join(SHUTDOWN_TIMEOUT_S)
         finally:
             self._ended.set()
-            self._said.put(None)
+            self._messages.put(None)
             for number in tuple(self._orders):
                 self._answer_order(number, _ENDED)
             with self._sending:

@@ -320,8 +320,8 @@ def _fail(row: JobRow, happened: str, hint: str, problems: list[str]) -> None:
 
 def _end(row: JobRow, state: JobState, happened: str, hint: str, problems: list[str]) -> None:
     _move(row, state)
-    said: JsonObject = {"title": happened, "detail": "; ".join(problems), "hint": hint}
-    row.problem, row.finished_at, row.lease_until = said, utc_now(), None
+    description: JsonObject = {"title": happened, "detail": "; ".join(problems), "hint": hint}
+    row.problem, row.finished_at, row.lease_until = description, utc_now(), None
 
 
 def _move(row: JobRow, to: JobState) -> None:

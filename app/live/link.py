@@ -257,7 +257,9 @@ class Live:
     def __init__(self, data_dir: Path) -> None:
         self.hub = Hub()
         self.client = LiveClient(
-            live_address(data_dir), on_message=self._heard, on_link=lambda up: self.hub.publish(LinkState(worker=up))
+            live_address(data_dir),
+            on_message=self._on_message,
+            on_link=lambda up: self.hub.publish(LinkState(worker=up)),
         )
 
     @property
@@ -289,7 +291,7 @@ class Live:
         """End every stream."""
         self.hub.close()
 
-    def _heard(self, message: FromWorker) -> None:
+    def _on_message(self, message: FromWorker) -> None:
         if isinstance(message, Telemetry | FlightPhase | VehicleStatus):
             self.hub.publish(message)
 

@@ -147,9 +147,11 @@ class LiveServer:
         it does not."""
         problem = LATE
         if _is_in_time(ordered.by_s):
-            told = asyncio.wrap_future(self._order(ordered.vehicle_id, ordered.order, ordered.reason, ordered.by_s))
-            await asyncio.wait({told}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
-            problem = told.result() if told.done() else UNCONFIRMED
+            forwarded = asyncio.wrap_future(
+                self._order(ordered.vehicle_id, ordered.order, ordered.reason, ordered.by_s)
+            )
+            await asyncio.wait({forwarded}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
+            problem = forwarded.result() if forwarded.done() else UNCONFIRMED
         vehicle_id, accepted = ordered.vehicle_id, not problem
         _log.info("order given", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
         answer = VehicleOrderAnswer(request=ordered.request, vehicle_id=vehicle_id, accepted=accepted, problem=problem)

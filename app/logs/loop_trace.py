@@ -51,7 +51,9 @@ def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
 def may_be_loop_trace(head: bytes) -> bool:
     """Whether a file with this head can be a trace: gzipped, or text whose first line names a column of a trace."""
     first = head.partition(b"\n")[0]
-    return head.startswith(_GZIP) or bool({b"mode", b"z_ref", b"r33"} & {word.strip() for word in first.split(b",")})
+    return head.startswith(_GZIP) or bool(
+        {b"mode", b"z_ref", b"r33"} & {column.strip() for column in first.split(b",")}
+    )
 
 
 def _read_bytes(name: str, raw: BinaryIO, *, zipped: bool) -> LoopTrace:

@@ -119,9 +119,9 @@ def _read(stream: BinaryIO) -> _Lines:
         raise refused("does not start with a line of time, aircraft and message", _HINT)
     stream.seek(0)
     while line := stream.readline(_MAX_LINE_BYTES):
-        words = line.split(maxsplit=3)
-        if len(words) == 4 and words[2] in _WANTED:
-            _take(lines, words[0], words[1].decode("ascii", "replace")[:32], words[2], words[3].split())
+        fields = line.split(maxsplit=3)
+        if len(fields) == 4 and fields[2] in _WANTED:
+            _take(lines, fields[0], fields[1].decode("ascii", "replace")[:32], fields[2], fields[3].split())
     return lines
 
 

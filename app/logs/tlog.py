@@ -200,7 +200,7 @@ class _Telemetry:
 
     autopilot: _Autopilot
     system: int
-    heard: dict[int, Callable[[_Message], None]] = field(init=False)
+    handlers: dict[int, Callable[[_Message], None]] = field(init=False)
     _now_s: float = -np.inf
     _offset_s: float = 0.0
     _stamp_s: float = 0.0

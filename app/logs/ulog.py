@@ -223,8 +223,8 @@ def _moments(topics: Mapping[str, Topic]) -> tuple[list[LogEvent], list[LogEvent
     for time_s, command in _rows(topics, _COMMAND, "command"):
         refused_at = [at for at, what in refusals if what == command and 0.0 <= at - time_s <= _ANSWERED_WITHIN_S]
         if command in {_TAKEOFF, _LAND} and not refused_at:
-            moments, spoken = (starts, "NAV_TAKEOFF") if command == _TAKEOFF else (ends, "NAV_LAND")
-            moments.append(LogEvent(time_s, f"the command {spoken}"))
+            moments, name = (starts, "NAV_TAKEOFF") if command == _TAKEOFF else (ends, "NAV_LAND")
+            moments.append(LogEvent(time_s, f"the command {name}"))
     before: float | None = None
     is_armed = _at(_rows(topics, _STATUS, "arming_state"))
     was_taking_off = False
@@ -271,11 +271,11 @@ def _armed(topics: Mapping[str, Topic]) -> list[Span] | None:
     return _spans((time_s, state == _ARMED) for time_s, state in arming) if arming else None
 
 
-def _spans(told: Iterable[tuple[float, bool]]) -> list[Span]:
+def _spans(states: Iterable[tuple[float, bool]]) -> list[Span]:
     """Intervals in which a condition held, from timed reports of it."""
     spans: list[Span] = []
     since_s: float | None = None
-    for time_s, holds in told:
+    for time_s, holds in states:
         if holds and since_s is None:
             since_s = time_s
         elif not holds and since_s is not None:
@@ -286,12 +286,12 @@ def _spans(told: Iterable[tuple[float, bool]]) -> list[Span]:
 
 def _at(rows: Iterable[tuple[float, ...]]) -> Callable[[float], float | None]:
     """A function of time that returns the latest value of these rows (time, value); None before the first."""
-    told = sorted((time_s, value) for time_s, value in rows)
-    times = [time_s for time_s, _ in told]
+    samples = sorted((time_s, value) for time_s, value in rows)
+    times = [time_s for time_s, _ in samples]
 
     def value_at(time_s: float) -> float | None:
         place = bisect_right(times, time_s)
-        return told[place - 1][1] if place else None
+        return samples[place - 1][1] if place else None
 
     return value_at
 

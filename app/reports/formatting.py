@@ -61,11 +61,11 @@ def instant(at: datetime | None, zone: tzinfo) -> str:
         return NOTHING
     here = at.astimezone(zone)
     there = at.astimezone(UTC)
-    said = f"{here.day} {here:%b %Y, %H:%M}"
+    local = f"{here.day} {here:%b %Y, %H:%M}"
     if not here.utcoffset():
-        return f"{said} UTC"
+        return f"{local} UTC"
     utc = f"{there:%H:%M}" if there.date() == here.date() else f"{there.day} {there:%b, %H:%M}"
-    return f"{said} {here.tzname()} ({utc} UTC)"
+    return f"{local} {here.tzname()} ({utc} UTC)"
 
 
 def count(amount: int, noun: str) -> str:

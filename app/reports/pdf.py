@@ -72,13 +72,13 @@ def _printed(browser: str, html: str, folder: Path) -> bytes:
     flags = [*_FLAGS, *(["--no-sandbox"] if os.geteuid() == 0 else []), f"--user-data-dir={folder / 'profile'}"]
     command = [browser, *flags, f"--print-to-pdf={out}", page.as_uri()]
     try:
-        code, said = _run(command)
+        code, log_text = _run(command)
     except subprocess.TimeoutExpired as error:
         raise _failed(f"did not finish within {TIMEOUT_S:g} s") from error
     except OSError as error:
         raise _failed(f"could not be started: {error.strerror or error}") from error
     if code != 0 or not out.is_file():
-        _log.error("printing failed", code=code, said=said[-2000:])
+        _log.error("printing failed", code=code, output=log_text[-2000:])
         raise _failed("ended without a PDF; see its output in the server's log")
     return out.read_bytes()
 
@@ -93,11 +93,11 @@ def _run(command: list[str]) -> tuple[int, str]:
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace", process_group=0
     ) as browser:
         try:
-            _, said = browser.communicate(timeout=TIMEOUT_S)
+            _, log_text = browser.communicate(timeout=TIMEOUT_S)
         except BaseException:
             os.killpg(browser.pid, signal.SIGKILL)
             raise
-    return browser.returncode, said
+    return browser.returncode, log_text
 
 
 def _failed(how: str) -> UnavailableError:

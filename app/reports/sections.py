@@ -181,23 +181,23 @@ def _options(chosen: Mapping[str, OptionValue], known: Iterable[_Described]) -> 
 
 
 def _start(start: Start) -> str:
-    words = _STARTS[start.kind]
+    origin = _STARTS[start.kind]
     if start.donor is not None:
-        words = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
-    return words if start.gains is None else f"{words}: {gains(start.gains)}"
+        origin = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
+    return origin if start.gains is None else f"{origin}: {gains(start.gains)}"
 
 
 def _stop(stop: StopRule) -> str:
     most = f"at most {count(stop.max_flights, 'flight')}"
     match stop.kind:
         case "paper":
-            said = f"two consecutive flights less than {percent(stop.improvement)} better than the best; {most}"
+            rule = f"two consecutive flights less than {percent(stop.improvement)} better than the best; {most}"
         case "noise":
             sure = percent(stop.confidence)
-            said = f"no resolvable improvement at {sure} confidence; {most}"
+            rule = f"no resolvable improvement at {sure} confidence; {most}"
         case _:
-            said = most
-    return said if stop.min_battery_v is None else f"{said}; or a flight that ends below {stop.min_battery_v:g} V"
+            rule = most
+    return rule if stop.min_battery_v is None else f"{rule}; or a flight that ends below {stop.min_battery_v:g} V"
 
 
 _ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}

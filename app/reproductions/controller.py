@@ -67,10 +67,10 @@ def _plot(title: str, signals: tuple[str, ...], trace: LoopTrace, computed: NDAr
     time_s = np.arange(len(trace)) / RATE_HZ
     differences = {signal: int(np.abs(computed - trace.outputs)[:, OUTPUTS.index(signal)].max()) for signal in signals}
     largest = max(differences.values())
-    said = "no difference anywhere" if largest == 0 else f"largest difference {largest} counts"
+    finding = "no difference anywhere" if largest == 0 else f"largest difference {largest} counts"
     return Plot(
         title=title,
-        summary=f"Recorded and replayed {', '.join(signals)} overlaid: {said}. z is positive downward.",
+        summary=f"Recorded and replayed {', '.join(signals)} overlaid: {finding}. z is positive downward.",
         x_title="Time since the start of the recording (s)",
         panels=tuple(
             Panel(

@@ -82,11 +82,11 @@ class StudyProcess:
         try:
             if not self._pipe.poll(within_s):
                 return None
-            said: StudyMessage = self._pipe.recv()
+            received: StudyMessage = self._pipe.recv()
         except (EOFError, OSError) as error:
             self._process.join(SHUTDOWN_TIMEOUT_S)
             raise ProcessDiedError(self._process.exitcode) from error
-        return said
+        return received
 
 
 def _work(pipe: Connection, name: str, full: bool) -> None:

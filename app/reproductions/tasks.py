@@ -63,11 +63,11 @@ class ReproductionJob:
         latest, stored = Progress(0.0, "starting"), Progress(0.0, "")
         due_s = 0.0
         while True:
-            said = process.listen(max(due_s - monotonic(), 0.0))
-            if isinstance(said, Progress):
-                latest = said
-            elif said is not None:
-                return _checked(said)
+            message = process.listen(max(due_s - monotonic(), 0.0))
+            if isinstance(message, Progress):
+                latest = message
+            elif message is not None:
+                return _checked(message)
             if monotonic() < due_s:
                 continue
             due_s = monotonic() + LOOK_S
@@ -92,11 +92,11 @@ class ReproductionJob:
             )
 
 
-def _checked(said: StudyMessage) -> Result:
+def _checked(answer: StudyMessage) -> Result:
     """The result. Raises GainlineError if the process reported an error."""
-    match said:
+    match answer:
         case Result():
-            return said
+            return answer
         case StudyError(message, hint, problems):
             raise GainlineError(message, hint=hint, problems=problems)
         case InternalFailure(what, traceback):

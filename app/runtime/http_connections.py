@@ -173,7 +173,7 @@ class LimitedProtocol(HttpToolsProtocol):
         super().__init__(config, server_state, app_state, _loop)
         self._all = connections
         self._own: Connection | None = None
-        self._head_bytes = self._told_bytes = 0
+        self._head_bytes = self._parsed_bytes = 0
         self._refused = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as Uvicorn has it
@@ -206,19 +206,19 @@ class LimitedProtocol(HttpToolsProtocol):
 
     def on_message_begin(self) -> None:
         super().on_message_begin()
-        self._told_bytes = 0
+        self._parsed_bytes = 0
         self._enter(Phase.HEAD)
 
     def on_url(self, url: bytes) -> None:
         super().on_url(url)
-        self._told_bytes += len(url)
+        self._parsed_bytes += len(url)
 
     def on_header(self, name: bytes, value: bytes) -> None:
         super().on_header(name, value)
-        self._told_bytes += len(name) + len(value) + len(b": \r\n")
+        self._parsed_bytes += len(name) + len(value) + len(b": \r\n")
 
     def on_headers_complete(self) -> None:
-        self._head_bytes = max(self._told_bytes, self._head_bytes)
+        self._head_bytes = max(self._parsed_bytes, self._head_bytes)
         self._refuse_long_head()
         self._head_bytes = 0
         if self._refused:

@@ -125,13 +125,13 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
     def note(number: int, _frame: FrameType | None) -> None:
         asked.put(f"the worker was stopped ({signal.Signals(number).name})")
 
-    def heed() -> None:
+    def handle_signals() -> None:
         while True:
             reason = asked.get()
             ending.set(reason)
             abort_registry.abort_all(reason)
 
-    threading.Thread(target=heed, name="signals", daemon=True).start()
+    threading.Thread(target=handle_signals, name="signals", daemon=True).start()
     for number in signals:
         signal.signal(number, note)
 

@@ -17,7 +17,9 @@ from app.db.models import CampaignRow, TrialRow
 from app.fleet.control import require_may
 
 
-def classify_trial(session: Session, trial_id: int, said: Classification, context: RequestContext = LOCAL_CLI) -> Trial:
+def classify_trial(
+    session: Session, trial_id: int, classification: Classification, context: RequestContext = LOCAL_CLI
+) -> Trial:
     """Classify a flight by a person's decision; the next gains are computed again from what counts now.
 
     Raises ConflictError when the transition is not in the table or another client changed the trial first, InputError
@@ -26,24 +28,26 @@ def classify_trial(session: Session, trial_id: int, said: Classification, contex
     row = repository.get_trial(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
-    outcome = TrialState(said.outcome)
+    outcome = TrialState(classification.outcome)
     check_version(
-        said.version,
+        classification.version,
         row.version,
         f"Trial {row.number}",
-        {"outcome": (row.state, outcome), "reason": (row.reason, said.reason)},
+        {"outcome": (row.state, outcome), "reason": (row.reason, classification.reason)},
     )
     check_action(TRIAL_ACTIONS, "classify", row.state, f"Trial {row.number}")
     check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Trial {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
-    set_trial_state(row, outcome, reason=said.reason)
+    set_trial_state(row, outcome, reason=classification.reason)
     row.version += 1
     proposals.history_changed(session, campaign)
     return trial_view(session, campaign, row)
 
 
-def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: RequestContext = LOCAL_CLI) -> Trial:
+def judge_abort(
+    session: Session, trial_id: int, judgement: AbortJudgement, context: RequestContext = LOCAL_CLI
+) -> Trial:
     """Record why the operator aborted a flight; the next gains are computed again from what counts now.
 
     Raises ConflictError when the trial is not aborted, when the program aborted it for a limit, or when another client
@@ -52,7 +56,9 @@ def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: 
     row = repository.get_trial(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
-    check_version(said.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", said.cause)})
+    check_version(
+        judgement.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", judgement.cause)}
+    )
     check_action(TRIAL_ACTIONS, "judge abort", row.state, f"Trial {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     if row.abort_cause == "limit":
@@ -60,7 +66,7 @@ def judge_abort(session: Session, trial_id: int, said: AbortJudgement, context: 
             f"Trial {row.number} was aborted automatically because a limit was exceeded: it counts against its gains.",
             hint="If the measurement is wrong, mark it invalid.",
         )
-    row.abort_cause = said.cause
+    row.abort_cause = judgement.cause
     row.version += 1
     proposals.history_changed(session, campaign)
     return trial_view(session, campaign, row)

@@ -75,15 +75,15 @@ def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]
         other = field.group_of(number)
         if other is None or other.gains == own.gains:
             continue
-        said = compare(own, other, field.scatter, CONFIDENCE, foresee=False)
+        comparison = compare(own, other, field.scatter, CONFIDENCE, foresee=False)
         found.append(
             TrialComparison(
                 against=against,
                 trial_number=number,
-                verdict=said.verdict,
-                confidence=said.confidence,
-                difference=said.difference,
-                standard_error=said.standard_error,
+                verdict=comparison.verdict,
+                confidence=comparison.confidence,
+                difference=comparison.difference,
+                standard_error=comparison.standard_error,
             )
         )
     return found
@@ -208,8 +208,8 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
     match row.state:
         case TrialState.VALID if row.error is not None:
             compared = _compared(row.error, field.best_before(row.number), unit)
-            said = f" {_once_more(again)}" if again else f": {compared}"
-            return f"{row.error:.3f} {unit}{said}{_against_prediction(row, unit)}."
+            outcome = f" {_once_more(again)}" if again else f": {compared}"
+            return f"{row.error:.3f} {unit}{outcome}{_against_prediction(row, unit)}."
         case TrialState.ABORTED:
             return f"Aborted: {row.reason}"
         case TrialState.INVALID:
@@ -242,9 +242,9 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
     if f"{error:.3f}" == f"{best:.3f}":
         return f"the same as {than}"
     gain = best - error
-    word = "lower than" if gain > 0 else "higher than"
+    relation = "lower than" if gain > 0 else "higher than"
     share = f" ({percent(abs(gain) / best)})" if best else ""
-    return f"{abs(gain):.3f} {unit}{share} {word} {than}"
+    return f"{abs(gain):.3f} {unit}{share} {relation} {than}"
 
 
 def _against_prediction(row: TrialRow, unit: str) -> str:

@@ -213,10 +213,10 @@ def _abort(
 
 def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | None = None, event: str = "") -> str:
     """Description of the vehicle, and the time of the event, counted from the command."""
-    return ", ".join(_words(parameters, model, step, event))
+    return ", ".join(_case_parts(parameters, model, step, event))
 
 
-def _words(parameters: Sequence["ModelParameter"], model: Vector, step: float | None, event: str) -> Iterator[str]:
+def _case_parts(parameters: Sequence["ModelParameter"], model: Vector, step: float | None, event: str) -> Iterator[str]:
     for parameter, value in zip(parameters, model.tolist(), strict=True):
         if value or parameter.nominal:
             unit = f" {parameter.unit}" if parameter.unit in {"s", "1/s", "m"} else ""
@@ -289,10 +289,10 @@ def _refusals(refused: list[int], gains: list[int], wraps: Counts) -> Iterator[C
     for place in refused:
         product, offered = PRODUCTS[place], PRODUCTS[place].largest_safe_gain
         worst = abs(gains[place]) * product.largest_error
-        case, told = _wrap_case(product, wraps[:, place])
+        case, explanation = _wrap_case(product, wraps[:, place])
         sentence = (
             f"{product.gain}·({product.error}) can reach {_grouped(worst)} and overflow 32 bits "
-            f"({_grouped(INT32_MAX)}): full up becomes full down. {told} The largest {product.gain} that cannot "
+            f"({_grouped(INT32_MAX)}): full up becomes full down. {explanation} The largest {product.gain} that cannot "
             f"overflow is {offered}."
         )
         offer = {product.gain: offered if gains[place] > 0 else -offered}

@@ -62,12 +62,12 @@ def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
         compared = " or ".join(filter(None, (", ".join(titles[:-1]), titles[-1])))
         sentence = f"No significant change of {compared} since the vehicle was last tuned."
         return Drift(due=False, drifted=(), sentence=sentence)
-    told = "; ".join(
+    changes = "; ".join(
         f"{now[name].title.lower()} from {_measured(before[name])} to {_measured(now[name])} {now[name].unit}"
         for name in drifted
     )
     sentence = (
-        f"The vehicle has changed significantly since it was last tuned: {told}. Find the cause "
+        f"The vehicle has changed significantly since it was last tuned: {changes}. Find the cause "
         f"({', '.join(MONITORED_PARAMETERS[name] for name in drifted)}), then tune it again."
     )
     return Drift(due=True, drifted=drifted, sentence=sentence)

@@ -145,17 +145,20 @@ def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
     """The winner compared with the first gains, in a sentence."""
     if now.comparison is None:
         return f"The first flight's gains ({format_gains(now.baseline.gains)}) are the best flown."
-    unit, said = experiment.error_unit, now.comparison
+    unit, comparison = experiment.error_unit, now.comparison
     pair = f"{format_gains(now.winner.gains)} against the first flight's {format_gains(now.baseline.gains)}"
-    if said.confidence is None or said.standard_error is None:
-        return f"Not known yet: {pair}, {short(abs(said.difference))} {unit} {_direction(said)}. {SCATTER_NOT_KNOWN}"
-    amount = plus_minus(abs(said.difference), said.standard_error, unit)
-    if said.verdict == "unresolved":
+    if comparison.confidence is None or comparison.standard_error is None:
+        amount = f"{short(abs(comparison.difference))} {unit}"
+        return f"Not known yet: {pair}, {amount} {_direction(comparison)}. {SCATTER_NOT_KNOWN}"
+    amount = plus_minus(abs(comparison.difference), comparison.standard_error, unit)
+    if comparison.verdict == "unresolved":
         return (
-            f"Unresolved: {pair}, {amount} {_direction(said)}, {percent(said.confidence)} confidence. {_deciding(said)}"
+            f"Unresolved: {pair}, {amount} {_direction(comparison)}, {percent(comparison.confidence)} confidence. "
+            f"{_deciding(comparison)}"
         )
     return (
-        f"{said.verdict.capitalize()} with {_percent(said.confidence)} confidence: {pair}, {amount} {_direction(said)}."
+        f"{comparison.verdict.capitalize()} with {_percent(comparison.confidence)} confidence: {pair}, {amount} "
+        f"{_direction(comparison)}."
     )
 
 
@@ -171,10 +174,10 @@ def _confirm_baseline(
 
 
 def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
-    said = now.comparison
-    assert said is not None
+    comparison = now.comparison
+    assert comparison is not None
     sentence = verdict_sentence(experiment, now)
-    if now.looks and said.verdict != "unresolved":
+    if now.looks and comparison.verdict != "unresolved":
         return Confirmation(phase="decided", why=sentence)
     if now.winner.size <= now.baseline.size:
         why = f"The winner, {format_gains(now.winner.gains)}, is flown again, to confirm that it is better."
@@ -207,29 +210,30 @@ def _describe_improvement(
     unit = experiment.error_unit
     if proposal.kind in {"none", "manual"} or left <= 0:
         return "The strategy proposes no further step." if proposal.kind == "none" else ""
-    told = _detectable_difference(definition, now, left)
-    promised = _predicted_improvement(now, proposal)
-    relation = "at least" if promised >= told else "below"
+    detectable = _detectable_difference(definition, now, left)
+    improvement = _predicted_improvement(now, proposal)
+    relation = "at least" if improvement >= detectable else "below"
     return (
-        f"The next step is predicted to reduce the error by {short(promised)} {unit}, {relation} the {short(told)} "
-        f"{unit} that {_flights(left)} can resolve at {percent(definition.stop.confidence)} confidence."
+        f"The next step is predicted to reduce the error by {short(improvement)} {unit}, {relation} the "
+        f"{short(detectable)} {unit} that {_flights(left)} can resolve at {percent(definition.stop.confidence)} "
+        "confidence."
     )
 
 
-def _direction(said: Comparison) -> str:
-    return "lower" if said.difference < 0.0 else "higher"
+def _direction(comparison: Comparison) -> str:
+    return "lower" if comparison.difference < 0.0 else "higher"
 
 
 def _percent(confidence: float) -> str:
     return f"more than {percent(0.999, 1)}" if confidence > 0.999 else percent(confidence, 1)
 
 
-def _deciding(said: Comparison) -> str:
-    if said.further is None:
+def _deciding(comparison: Comparison) -> str:
+    if comparison.further is None:
         return "Even 100 more flights would not resolve it."
     return (
-        f"If the difference persists, {_flights(said.further.total)} more would resolve it: {said.further.first} of "
-        f"the winner, {said.further.second} of the first gains."
+        f"If the difference persists, {_flights(comparison.further.total)} more would resolve it: "
+        f"{comparison.further.first} of the winner, {comparison.further.second} of the first gains."
     )
 
 

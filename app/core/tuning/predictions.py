@@ -74,12 +74,12 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
     for flight in flights:
         if flight.outcome != "valid" or flight.error is None:
             continue
-        told, gains = flight.predicted, frozenset(flight.gains.items())
-        if told is not None and told.lower is not None and told.upper is not None:
+        prediction, gains = flight.predicted, frozenset(flight.gains.items())
+        if prediction is not None and prediction.lower is not None and prediction.upper is not None:
             of += 1
-            inside += told.lower <= flight.error <= told.upper
-        if told is not None and best is not None and gains not in seen:
-            agreed = (told.error - best) * (flight.error - best)
+            inside += prediction.lower <= flight.error <= prediction.upper
+        if prediction is not None and best is not None and gains not in seen:
+            agreed = (prediction.error - best) * (flight.error - best)
             agreeing += agreed > 0.0
             disagreeing += agreed < 0.0
         best = flight.error if best is None else min(best, flight.error)
@@ -173,12 +173,17 @@ def interval_scale(flights: Sequence[Flight]) -> float:
 
     half_width = float(ndtri(0.5 + CONFIDENCE / 2))
     squares = [
-        ((2.0 * flight.error - told.lower - told.upper) / max(told.upper - told.lower, _TINY) * half_width) ** 2
+        (
+            (2.0 * flight.error - interval.lower - interval.upper)
+            / max(interval.upper - interval.lower, _TINY)
+            * half_width
+        )
+        ** 2
         for flight in flights
         if flight.error is not None
-        and (told := flight.predicted) is not None
-        and told.lower is not None
-        and told.upper is not None
+        and (interval := flight.predicted) is not None
+        and interval.lower is not None
+        and interval.upper is not None
     ]
     return float(np.sqrt((_PRIOR_WEIGHT + sum(squares)) / (_PRIOR_WEIGHT + len(squares))))
 

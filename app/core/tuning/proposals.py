@@ -93,9 +93,9 @@ def _start(
     gains = start_gains(definition, experiment, space)
     model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
     trajectory, error = model.predict(space.vector(gains))
-    teller = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
+    source = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     summary = (
-        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {teller} "
+        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {source} "
         f"predicts {short(error)} {experiment.error_unit}."
     )
     lesson = (
@@ -175,7 +175,7 @@ def advise(
     experiment: Experiment,
     flights: Sequence[Flight],
     proposal: Proposal,
-    said: StopVerdict,
+    verdict: StopVerdict,
 ) -> Advice:
     """Recommend the next action.
 
@@ -185,9 +185,11 @@ def advise(
     of all flights.
     """
     tells_noise = definition.stop.kind == "noise"
-    now = (compare_winner if said.stop and not tells_noise else standing_within_bounds)(definition, experiment, flights)
-    if said.stop:
-        return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=said.why)
+    now = (compare_winner if verdict.stop and not tells_noise else standing_within_bounds)(
+        definition, experiment, flights
+    )
+    if verdict.stop:
+        return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=verdict.why)
     if now is None or tells_noise:
         kind = _MANUAL_KINDS.get(proposal.kind, "step")
         return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)

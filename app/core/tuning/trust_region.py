@@ -34,10 +34,10 @@ def trust_fraction(flights: Sequence[Flight]) -> float:
     for flight in flights:
         if flight.outcome == "aborted":
             fraction *= SHRINK if flight.against_gains else 1.0
-        elif is_calibrated and flight.error is not None and (told := flight.predicted) is not None:
-            if told.upper is not None and flight.error > told.upper:
+        elif is_calibrated and flight.error is not None and (predicted := flight.predicted) is not None:
+            if predicted.upper is not None and flight.error > predicted.upper:
                 fraction *= SHRINK
-            elif told.lower is not None and flight.error >= told.lower:
+            elif predicted.lower is not None and flight.error >= predicted.lower:
                 fraction = min(fraction * GROW, 1.0)
         is_calibrated = is_calibrated or flight.outcome == "valid"
     return fraction

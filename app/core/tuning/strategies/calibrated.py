@@ -146,15 +146,15 @@ def _summary(
     experiment: ModelledExperiment, base: Flight, choice: _ChosenGains, prediction: FlightPrediction, flights: int
 ) -> str:
     unit = experiment.error_unit
-    told = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
+    subject = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
     best = f"flight {base.number} ({format_gains(base.gains)}, error {short(base.error)} {unit})"
     if choice.kind == "none":
-        return f"{told} predicts no allowed gains that are better than {best} by {percent(MIN_IMPROVEMENT, 1)}."
+        return f"{subject} predicts no allowed gains that are better than {best} by {percent(MIN_IMPROVEMENT, 1)}."
     low, high = prediction.interval.lower, prediction.interval.upper
     assert base.error is not None
     share = 1.0 - prediction.error / base.error
     return (
-        f"{told} predicts {short(prediction.error)} {unit} ({percent(prediction.interval.confidence)} interval "
+        f"{subject} predicts {short(prediction.error)} {unit} ({percent(prediction.interval.confidence)} interval "
         f"{short(low)} … {short(high)} {unit}), {percent(abs(share))} {'less' if share >= 0.0 else 'more'} error than "
         f"{best}."
     )
