@@ -81,7 +81,7 @@ def card_of(figure: Figure) -> Card:
             name=figure.name,
             title=figure.title,
             state="failed",
-            reason="This figure could not be drawn. The flights are safe; the server's log says why.",
+            reason="This figure could not be drawn. No data is lost; see the server's log.",
         )
 
 

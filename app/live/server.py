@@ -127,7 +127,7 @@ class LiveServer:
             case Abort(request=request, trial_id=trial_id, reason=reason, by_s=by_s):
                 accepted = _is_in_time(by_s) and self._abort(trial_id, reason)
                 answer = AbortAnswer(request=request, trial_id=trial_id, accepted=accepted)
-                _log.info("abort asked", trial_id=trial_id, reason=reason, accepted=accepted)
+                _log.info("abort requested", trial_id=trial_id, reason=reason, accepted=accepted)
             case VehicleOrder() as ordered:
                 task = self._loop.create_task(self._pass_on(ordered, writer))
                 self._orders.add(task)
@@ -153,7 +153,7 @@ class LiveServer:
             await asyncio.wait({forwarded}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
             problem = forwarded.result() if forwarded.done() else UNCONFIRMED
         vehicle_id, accepted = ordered.vehicle_id, not problem
-        _log.info("order given", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
+        _log.info("command sent", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
         answer = VehicleOrderAnswer(request=ordered.request, vehicle_id=vehicle_id, accepted=accepted, problem=problem)
         writer.write(encode(answer))
 

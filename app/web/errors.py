@@ -82,7 +82,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _invalid_request)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(OSError, _system_error)
-    app.add_exception_handler(Exception, _unforeseen)
+    app.add_exception_handler(Exception, _unexpected)
 
 
 def kind_of(error: GainlineError) -> tuple[HTTPStatus, str]:
@@ -179,12 +179,12 @@ async def _system_error(request: Request, error: Exception) -> Response:
                 hint="Free some disk space, then try again. Everything stored before is intact.",
             ),
         )
-    return await _unforeseen(request, error)
+    return await _unexpected(request, error)
 
 
-async def _unforeseen(request: Request, error: Exception) -> Response:
+async def _unexpected(request: Request, error: Exception) -> Response:
     number = uuid.uuid4().hex[:12]
-    _log.error("unforeseen error", error_id=number, method=request.method, path=request.url.path, exc_info=error)
+    _log.error("unexpected error", error_id=number, method=request.method, path=request.url.path, exc_info=error)
     return _problem(
         HTTPStatus.INTERNAL_SERVER_ERROR,
         f"Internal error {number}; nothing from this request was stored.",

@@ -1,4 +1,4 @@
-"""Campaigns of other autopilots over HTTP: asked and told by hand, scored and drawn, and nothing foretold."""
+"""Campaigns of other autopilots over HTTP: gains chosen by the operator, scored and drawn, without predictions."""
 
 import pytest
 from fastapi.testclient import TestClient

@@ -39,7 +39,7 @@ from tests.logs.recorded import recorded
 
 AT_START: Final = {app.common.errors.SchemaError, app.common.errors.AlreadyRunningError, app.common.errors.AddressError}
 """These end the program before it answers anybody."""
-FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unforeseen")
+FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unexpected")
 """What is refused before our own code, or by nobody on purpose."""
 RETRIED_MS: Final = 40_000
 """A read that failed at the server is tried three times more before the page says so."""
@@ -297,7 +297,7 @@ def _a_page_of_another_site(dashboard: Dashboard, _server: Server, _states: Stat
     create_instead(dashboard, headers={"origin": "http://elsewhere.example"})
 
 
-@provokes("unforeseen")
+@provokes("unexpected")
 def _a_trial_that_somebody_broke_in_the_database(dashboard: Dashboard, server: Server, states: States) -> Undo:
     campaign_id = states.campaign("import")
     trial = states.plan(campaign_id, {"kp": 283, "ki": 13, "kd": 82})
@@ -312,7 +312,7 @@ def _a_trial_that_somebody_broke_in_the_database(dashboard: Dashboard, server: S
 
 TITLES: Final = {
     "400": "Bad Request", "404": "Not Found", "405": "Method Not Allowed", "invalid": "Unusable input",
-    "foreign": "Foreign request", "unforeseen": "Internal Server Error",
+    "foreign": "Foreign request", "unexpected": "Internal Server Error",
 }  # fmt: skip
 
 

@@ -171,7 +171,7 @@ def drawn(client: TestClient, campaign: Json) -> Json:
 def test_a_campaign_that_has_not_flown_has_a_report_too(client: TestClient, database: Database) -> None:
     page = read(client, create_ready_campaign(client, database))
     assert "No valid flight yet" in page.said
-    assert "Nothing has flown yet." in page.said
+    assert "No flights yet." in page.said
 
 
 def test_the_report_of_no_campaign_is_not_found(client: TestClient) -> None:

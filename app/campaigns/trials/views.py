@@ -75,7 +75,7 @@ def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]
         other = field.group_of(number)
         if other is None or other.gains == own.gains:
             continue
-        comparison = compare(own, other, field.scatter, CONFIDENCE, foresee=False)
+        comparison = compare(own, other, field.scatter, CONFIDENCE, plan_further=False)
         found.append(
             TrialComparison(
                 against=against,

@@ -182,14 +182,14 @@ def compare(
     *,
     candidates: int = 1,
     looks: int = 0,
-    foresee: bool = True,
+    plan_further: bool = True,
 ) -> Comparison:
     """Compare two means by Student's t test.
 
     `candidates` is the number of policies from which `first` was chosen for its low error; the error probability is
     multiplied by it (Bonferroni), so that the best of N gets no credit for having been chosen. `looks` is the number of
     comparisons of growing data so far; at the k-th the error probability is multiplied by k(k + 1). As Σ 1/(k(k + 1)) =
-    1, the probability of ever reaching a wrong verdict stays below 1 − confidence. `foresee` also computes how many
+    1, the probability of ever reaching a wrong verdict stays below 1 − confidence. `plan_further` also computes how many
     `further` flights would decide, which takes most of the time.
     """
     allowance = candidates * max(looks * (looks + 1), 1)
@@ -206,7 +206,7 @@ def compare(
         difference=difference,
         standard_error=_standard_error(scatter, (first.size, second.size)),
         further=_further(first, second, scatter, confidence, candidates, looks)
-        if foresee and verdict == "unresolved"
+        if plan_further and verdict == "unresolved"
         else None,
     )
 

@@ -125,23 +125,23 @@ def plan_grid(plan: LandscapePlan) -> LandscapeGrid | None:
 
     Pure; a calibration takes up to a second.
     """
-    foresee, space = _error_model(plan.definition, plan.flights, plan.donor), space_of(plan.definition)
-    if foresee is None or free_gains(space) < 2:
+    predict_errors, space = _error_model(plan.definition, plan.flights, plan.donor), space_of(plan.definition)
+    if predict_errors is None or free_gains(space) < 2:
         return None
     centre = space.nearest(space.vector(plan.centre))
     marks = np.array([space.vector(gains) for gains in (*plan.marks, space.mapping(centre))])
     return LandscapeGrid(
         space=space,
-        predict_errors=foresee,
+        predict_errors=predict_errors,
         centre=centre,
-        pairs=tuple(_pairs(space, centre, foresee)),
+        pairs=tuple(_pairs(space, centre, predict_errors)),
         values=tuple(_values(gain, column) for gain, column in zip(space.gains, marks.T, strict=True)),
     )
 
 
-def predict_points(foresee: ErrorsOf, gains: Matrix) -> Vector:
+def predict_points(predict_errors: ErrorsOf, gains: Matrix) -> Vector:
     """Predicted errors at a chunk of points, (c, n) → (c,): the work of a separate process. Pure."""
-    return foresee(gains)
+    return predict_errors(gains)
 
 
 def free_gains(space: PolicySpace) -> int:
@@ -161,21 +161,21 @@ def _error_model(definition: Definition, flights: Sequence[Flight], donor: Fligh
     return STRATEGIES[definition.strategy].predict_errors(definition, experiment, flights)
 
 
-def _pairs(space: PolicySpace, centre: Vector, foresee: ErrorsOf) -> list[tuple[int, int]]:
+def _pairs(space: PolicySpace, centre: Vector, predict_errors: ErrorsOf) -> list[tuple[int, int]]:
     """Pairs of free gains, those with the largest shares of the gradient first; each pair in the order of the gains."""
     free = [place for place, gain in enumerate(space.gains) if gain.span > 0.0]
     pairs = list(combinations(free, 2))
     if len(pairs) <= MAX_SLICES:
         return pairs
-    shares = _shares(space, centre, foresee)
+    shares = _shares(space, centre, predict_errors)
     return sorted(pairs, key=lambda pair: -(shares[pair[0]] + shares[pair[1]]))[:MAX_SLICES]
 
 
-def _shares(space: PolicySpace, centre: Vector, foresee: ErrorsOf) -> Vector:
+def _shares(space: PolicySpace, centre: Vector, predict_errors: ErrorsOf) -> Vector:
     """|∂E/∂gᵢ|·scaleᵢ at `centre` by central differences, shape (n,); zero for a pinned gain."""
     steps = np.diag(_DIFFERENCE * space.scale)
     above, below = np.minimum(centre + steps, space.upper), np.maximum(centre - steps, space.lower)
-    errors = foresee(np.concatenate((above, below)))
+    errors = predict_errors(np.concatenate((above, below)))
     run = np.diag(above - below)
     rise = np.abs(errors[: len(centre)] - errors[len(centre) :])
     return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run > 0.0) * space.scale)

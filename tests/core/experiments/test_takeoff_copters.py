@@ -103,7 +103,7 @@ def test_a_start_that_is_searched_on_a_model_is_refused_where_there_is_none() ->
 
 
 def said(proposal: Proposal) -> tuple[str, Gains]:
-    """Kind and gains of a proposal that foretells nothing."""
+    """Kind and gains of a proposal without a prediction."""
     assert (proposal.predicted, proposal.predicted_error, proposal.interval) == (None, None, None)
     return proposal.kind, proposal.gains
 

@@ -73,7 +73,7 @@ def test_a_slice_holds_every_flown_and_proposed_gain_set_and_stays_within_the_bo
 
 
 @compiled_only
-def test_the_grid_holds_what_the_calibrated_model_foretells() -> None:
+def test_the_grid_holds_the_errors_that_the_calibrated_model_predicts() -> None:
     flights = [flight(), flight(2, {"kp": 900, "ki": 300, "kd": 120})]
     definition = Definition(strategy="calibrated", bounds={"kd": (120, 120)})
     centre = flights[1].gains

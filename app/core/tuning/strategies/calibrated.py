@@ -83,7 +83,7 @@ def propose(
     )
 
 
-def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+def error_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
     """The errors predicted by the calibrated model. At least one flight must be valid."""
     calibration = calibrate(experiment, flights)
     base = best_flight([flight for flight in flights if flight.number in calibration.numbers])
@@ -186,6 +186,6 @@ CALIBRATED: Final = Strategy(
     line="Fits the model to all flights and flies its robust optimum. Typically two flights.",
     options=(),
     propose=propose,
-    predict_errors=foresee,
+    predict_errors=error_model,
     experiments=("takeoff",),
 )

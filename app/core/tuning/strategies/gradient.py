@@ -142,7 +142,7 @@ def propose(
     )
 
 
-def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+def error_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
     """The errors of the model corrected by the best flight. At least one flight must be valid."""
     return _corrected(definition, experiment, best_flight(flights))[0].errors
 
@@ -243,5 +243,5 @@ GRADIENT: Final = Strategy(
         ),
     ),
     propose=propose,
-    predict_errors=foresee,
+    predict_errors=error_model,
 )

@@ -64,7 +64,7 @@ def propose(
     )
 
 
-def foresee(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+def error_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
     """The errors of the model identified from all flights.
 
     Those of the nominal model if no flight recorded the required channels.
@@ -219,6 +219,6 @@ IDENTIFIED: Final = Strategy(
         ),
     ),
     propose=propose,
-    predict_errors=foresee,
+    predict_errors=error_model,
     experiments=("pitch-tracking",),
 )

@@ -33,7 +33,7 @@ def propose(_definition: Definition, experiment: Experiment, space: PolicySpace,
     )
 
 
-def foresee(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
+def error_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
     """The errors of the model corrected by the best flight. At least one flight must be valid."""
     return correct_by_bias(experiment, best_flight(flights)).errors
 
@@ -44,6 +44,6 @@ MANUAL: Final = Strategy(
     line="You choose every gain set; bounds and step limits are checked as for any other.",
     options=(),
     propose=propose,
-    predict_errors=foresee,
+    predict_errors=error_model,
     needs_model=False,
 )

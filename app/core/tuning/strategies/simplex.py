@@ -48,7 +48,7 @@ def propose(
     )
 
 
-def foresee(_definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]) -> ErrorsOf:
+def error_model(_definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]) -> ErrorsOf:
     """The errors of the nominal model, which flights do not change."""
     return uncorrected_model(experiment).errors
 
@@ -59,6 +59,6 @@ SIMPLEX: Final = Strategy(
     line="Nelder–Mead on the nominal model alone, then that one set is flown.",
     options=(),
     propose=propose,
-    predict_errors=foresee,
+    predict_errors=error_model,
     corrects_model=False,
 )

@@ -7,7 +7,7 @@ from app.core.definition import Definition, Flight, OptionValue, Start
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import uncorrected_model
 from app.core.tuning.proposals import next_proposal
-from app.core.tuning.strategies.identified import foresee
+from app.core.tuning.strategies.identified import error_model
 from app.core.tuning.strategy import Proposal
 from app.vehicles.f16 import LOG_NOISE
 from tests.core.tuning.flying import compiled_only
@@ -98,7 +98,7 @@ def test_without_recorded_states_the_best_stays_and_it_is_said_why() -> None:
 
 def test_its_landscape_is_the_identified_models_and_holds_for_the_truth() -> None:
     campaign, first = definition(1, fit="least-squares"), flight(1, HAND)
-    errors = foresee(campaign, MODEL, [first])
+    errors = error_model(campaign, MODEL, [first])
     for number, gains in enumerate((HAND, TRACKING), start=1):
         truth = flight(number, gains).error
         assert errors(MODEL.space.vector(gains)[np.newaxis])[0] == pytest.approx(truth, rel=0.02)
@@ -108,5 +108,5 @@ def test_without_recorded_states_its_landscape_is_the_nominal_models() -> None:
     first = flight(1, HAND)
     bare = Trajectory(first.trajectory.time_s, {"pitch_error_rad": first.trajectory["pitch_error_rad"]}, "csv", "x")
     points = MODEL.space.vector(TRACKING)[np.newaxis]
-    unseen = foresee(definition(), MODEL, [replace(first, trajectory=bare)])
+    unseen = error_model(definition(), MODEL, [replace(first, trajectory=bare)])
     assert unseen(points) == pytest.approx(uncorrected_model(MODEL).errors(points))

@@ -3,7 +3,7 @@ import pytest
 
 from app.core.definition import Definition
 from app.core.tuning.corrected_model import correct_by_bias
-from app.core.tuning.strategies.manual import foresee, propose
+from app.core.tuning.strategies.manual import error_model, propose
 from tests.core.tuning.bowl import QuadraticExperiment, fly
 
 
@@ -24,7 +24,7 @@ def test_the_operator_starts_from_the_best_flown_gains() -> None:
 
 def test_the_landscape_that_is_shown_beside_them_is_the_models_corrected_by_the_best_flight() -> None:
     flights = [fly(1, 90, 90), fly(2, 40, 50)]
-    errors = foresee(Definition(strategy="manual"), QuadraticExperiment(), flights)(
+    errors = error_model(Definition(strategy="manual"), QuadraticExperiment(), flights)(
         np.array([[40.0, 50.0], [30.0, 40.0]])
     )
     corrected = correct_by_bias(QuadraticExperiment(), flights[1])

@@ -4,7 +4,7 @@ import pytest
 from app.core.definition import Definition
 from app.core.experiments.takeoff import Takeoff
 from app.core.tuning.corrected_model import model_optimum
-from app.core.tuning.strategies.simplex import foresee, propose
+from app.core.tuning.strategies.simplex import error_model, propose
 from tests.core.tuning.bowl import QuadraticExperiment, fly
 from tests.core.tuning.flying import compiled_only
 
@@ -54,6 +54,6 @@ def test_the_search_leaves_a_pinned_gain_where_it_is() -> None:
 
 
 def test_its_landscape_is_the_nominal_models_whatever_flew() -> None:
-    errors = foresee(Definition(), BOWL, [fly(1, 90.0, 90)])(np.array([[30.0, 40.0], [90.0, 90.0]]))
+    errors = error_model(Definition(), BOWL, [fly(1, 90.0, 90)])(np.array([[30.0, 40.0], [90.0, 90.0]]))
     assert errors[0] == pytest.approx(1.0, abs=1e-6)
     assert errors[1] > errors[0]
