@@ -216,7 +216,7 @@ def idle(address: tuple[str, int], connections: int, pipe: Connection) -> None:
 
 
 @dataclass(slots=True)
-class Asked:
+class RequestTimes:
     """When something was asked for, ns since 1970, of each vehicle."""
 
     aborts: list[tuple[int, int]] = field(default_factory=list)
@@ -226,7 +226,7 @@ class Asked:
 class Operator:
     """One person with one vehicle: flights, each aborted soon after its take-off, until the time is over."""
 
-    def __init__(self, url: str, index: int, address: str, asked: Asked) -> None:
+    def __init__(self, url: str, index: int, address: str, asked: RequestTimes) -> None:
         each_its_own = httpx2.Limits(max_keepalive_connections=0)
         self._api = httpx2.Client(base_url=f"{url}/api", timeout=PATIENCE_S, limits=each_its_own)
         self._index, self._asked = index, asked
@@ -327,7 +327,7 @@ def main() -> int:
     arguments.add_argument("--files", type=int, help="that the server may have open")
     chosen = arguments.parse_args()
     seconds = chosen.seconds
-    asked = Asked()
+    asked = RequestTimes()
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         drones = [stack.enter_context(tapped_drone()) for _ in range(VEHICLES)]

@@ -4,7 +4,7 @@
 
 A real server on a database of a campaign with 50 flights, one with a thousand (16 700 samples each) and 2000 small ones
 (`bench.seeding`), up for ten seconds, in which its worker has loaded what it computes with; a Chromium that has never
-seen it, for every figure anew. Interactive: the list's search takes a letter. Drawn: all three charts of the campaign
+seen it, again for every figure. Interactive: the list's search takes a letter. Drawn: all three charts of the campaign
 have been painted. Interactions: a scripted session on the campaign of a thousand flights (pointing along its curves,
 marks and rows, choosing rows and marks, switching the span, zooming and coming back, opening tables), of which the
 browser tells how long each event took to the next paint (Event Timing, from 16 ms on; quicker ones are not told, so

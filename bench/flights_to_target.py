@@ -56,7 +56,7 @@ def chosen_methods(wanted: str) -> tuple[str, ...]:
 
 
 def tasks(methods: tuple[str, ...], vehicles: int, twins: int, seed: int) -> list[tuple[Task, SampledVehicle]]:
-    """What there is to do, vehicle by vehicle in all populations, its own optimum first."""
+    """The tasks, vehicle by vehicle in all populations, its own optimum first."""
     optima: list[tuple[Task, SampledVehicle]] = []
     tunings: list[tuple[Task, SampledVehicle]] = []
     for name, count in (("four-parameter", vehicles), ("further-physics", vehicles), ("twin", twins)):

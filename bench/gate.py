@@ -126,7 +126,7 @@ def _aborted(gains: Counts, models: Matrix, seed: int) -> str:
     harmful = (aborts[beyond, 0] > np.maximum(highest, CEILING_M)) | (
         aborts[beyond, 1] > np.maximum(fastest, LARGEST_TOUCH_DOWN_M_S)
     )
-    return "an abort goes astray" if harmful.any() else ""
+    return "an abort fails" if harmful.any() else ""
 
 
 def judge(gains: Vector, spread: ParameterDistribution) -> tuple[tuple[Check, ...], float]:

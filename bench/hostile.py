@@ -119,7 +119,7 @@ What may never be, read from the packets at the vehicle's antenna, its true heig
 - anything sent to a vehicle that a pilot flies, once two heartbeats must have told so (it is theirs from then on, also
   when they switch back: whether they bring it down is not looked at); one taken from a pilot whom a heartbeat told of;
 - *safe* said of one that is armed or holds other gains; nothing said of one that is armed or in the air;
-- a trial *not flown* that left the ground; *completed* that was aborted, or met what is not to be borne; a reason that
+- a trial *not flown* that left the ground; *completed* that was aborted, or met what is not tolerated; a reason that
   does not name what befell it; gains blamed for what is not theirs; a quarantine without need
   (`bench/hazards/expectations.py` says what each may do);
 - a record that counts, and is not whole, or more than 0.35 m from where the vehicle was.

@@ -3,8 +3,8 @@
     ./dev exec python -m bench.recording [--minutes 10] [--autopilot px4]
 
 A process of its own is a simulated drone in real time; this one flies a whole trial with it whose record lasts that
-long, telemetry log and all. Positions are told apart by the vehicle's own time stamps: each that was sent between the
-first and the last of the record must be in the record, and in the log, once. Processor time is that of this process
+long, telemetry log and all. Positions are distinguished by the vehicle's own time stamps: each that was sent between
+the first and the last of the record must be in the record, and in the log, once. Processor time is that of this process
 from the take-off command to the end of the record. Prints the figures; exits 1 when a sample is missing or recording
 takes more than a tenth of a core.
 """
@@ -54,7 +54,7 @@ GAINS: Final[Mapping[str, Mapping[str, float]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class DroneReport:
     """What a drone sent in the `on_s` that it was on, and by how much the computer made its clock late."""
 
     sent_ms: list[int]
@@ -111,11 +111,11 @@ def be_vehicle(pipe: Connection, autopilot: str, address: UdpAddress) -> None:
     pipe.recv()
     server.stop()
     thread.join()
-    pipe.send(Said(transport.sent_ms, transport.packets, drone.time_s, server.lost_s))
+    pipe.send(DroneReport(transport.sent_ms, transport.packets, drone.time_s, server.lost_s))
 
 
 class LongRecord(MavlinkVehicle):
-    """The vehicle as ever, but for the length of its record; `kept_ms` are the time stamps of its samples."""
+    """The usual vehicle, except for the length of its record; `kept_ms` are the time stamps of its samples."""
 
     record_s = DEFAULT_S
     kept_ms: tuple[int, ...] = ()
@@ -217,30 +217,30 @@ def measure(autopilot: str, seconds: float) -> bool:
         record, kept = fly(autopilot, options, meter)
         in_log = logged(Path(folder), autopilot)
         pipe.send("end")
-        said: Said = pipe.recv()
-    return report(record, meter, kept, in_log, said)
+        reported: DroneReport = pipe.recv()
+    return report(record, meter, kept, in_log, reported)
 
 
-def report(record: FlightRecord, meter: Meter, kept: Counter[int], in_log: Counter[int], said: Said) -> bool:
+def report(record: FlightRecord, meter: Meter, kept: Counter[int], in_log: Counter[int], reported: DroneReport) -> bool:
     first_ms, last_ms = min(kept), max(kept)
-    sent = [each for each in said.sent_ms if first_ms <= each <= last_ms]
+    sent = [each for each in reported.sent_ms if first_ms <= each <= last_ms]
     missing = sum(kept[each] != 1 for each in sent) + len(set(kept) - set(sent))
     unlogged = sum(in_log[each] != 1 for each in sent)
     time_s = record.trajectory.time_s
     print(
         f"{record.ending} after {time_s[-1]:.0f} s{f' ({record.reason})' if record.reason else ''}: "
         f"{len(sent)} positions sent, {len(sent) / (time_s[-1] - time_s[0]):.1f} a second "
-        f"({said.packets / said.on_s:.0f} packets of all kinds), {missing} not once in the record, "
+        f"({reported.packets / reported.on_s:.0f} packets of all kinds), {missing} not once in the record, "
         f"{unlogged} not once in the log; {meter.share:.1%} of a core (limit {CORE_SHARE_LIMIT:.0%})"
     )
-    if said.late_s > 0.0:
-        print(f"this computer was too slow for the drone: its clock is {said.late_s:.1f} s late")
+    if reported.late_s > 0.0:
+        print(f"this computer was too slow for the drone: its clock is {reported.late_s:.1f} s late")
     return record.ending == "completed" and not missing and not unlogged and meter.share <= CORE_SHARE_LIMIT
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="bench.recording")
-    parser.add_argument("--minutes", type=float, default=DEFAULT_S / 60.0, help="how long the record is to be")
+    parser.add_argument("--minutes", type=float, default=DEFAULT_S / 60.0, help="length of the record")
     parser.add_argument("--autopilot", choices=tuple(GAINS), default="ardupilot")
     options = parser.parse_args()
     return 0 if measure(options.autopilot, options.minutes * 60.0) else 1

@@ -40,7 +40,7 @@ _NOISE_M: Final = 0.008
 
 @cache
 def _gate() -> JsonObject:
-    """The gate's whole word on gains that it lets pass."""
+    """The gate's complete result for gains that pass."""
     experiment = Takeoff()
     space = experiment.space
     return gate_json(check_policy(Definition(), experiment, space, space.mapping(space.default), ()))

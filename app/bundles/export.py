@@ -78,8 +78,8 @@ class Packer:
     def pack(self, campaigns: Sequence[CampaignRow]) -> None:
         """Write the bundle; the campaign comes last, after those that it starts from.
 
-        Raises ConflictError for what a bundle cannot hold, StorageError that names the trial when a record or photo is
-        damaged, and StorageError when the file does not hold what was written to it.
+        Raises ConflictError if a bundle cannot hold the campaign, StorageError that names the trial when a record or
+        photo is damaged, and StorageError when the file does not hold what was written to it.
         """
         with self._zip:
             try:

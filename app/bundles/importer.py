@@ -43,8 +43,8 @@ class ImportedCampaigns:
 
 
 def store(session: Session, bundle: Bundle) -> ImportedCampaigns:
-    """Store the bundle's campaigns. The bundle must have been checked. Raises InputError for what this version cannot
-    hold."""
+    """Store the bundle's campaigns. The bundle must have been checked. Raises InputError if this version does not
+    support the content."""
     arrived, new_ids = ImportedCampaigns(), dict[int, int]()
     for place, campaign in enumerate(bundle.contents.campaigns):
         row = _campaign(session, f"{CONTENTS}: campaigns.{place}", campaign, new_ids)
@@ -202,8 +202,8 @@ def _refused(field: str, reason: str) -> InputError:
 def store_bundle(session: Session, bundle: Bundle, data_dir: Path) -> CampaignView:
     """Import a checked bundle: a new campaign, and those that it starts from.
 
-    Raises InputError for what this version cannot hold, and ConflictError while any flight is active, because a large
-    bundle holds the write lock for longer than a flight may wait.
+    Raises InputError if this version does not support the content, and ConflictError while any flight is active,
+    because a large bundle holds the write lock for longer than a flight may wait.
     """
     if (flight := history.any_flight_under_way(session)) is not None:
         raise ConflictError(

@@ -80,7 +80,7 @@ def fly_campaign(
     """Fly proposals as fast as possible until the campaign's stop rule ends it; or fly `gains`, complete sets, until
     all are flown.
 
-    `overrule` is the reason why gains that the gate refuses are flown all the same, on a simulated vehicle. A flight
+    `overrule` is the reason why gains that the gate refuses are flown nevertheless, on a simulated vehicle. A flight
     with glitches does not count, because no person reviews it. `trial_parameters` is as in `open_vehicle`.
 
     The definition must have been checked. Raises InputError for a warm start, whose donor is in a database, GainsError

@@ -50,7 +50,7 @@ class Start(Request):
 
 class StopRule(Request):
     """`paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
-    the budget. `noise`: ends when no remaining difference can be told from noise with `confidence`, after the winner
+    the budget. `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner
     was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
     kind a flight that ends below `min_battery_v` ends it."""
 

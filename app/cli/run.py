@@ -48,8 +48,8 @@ def run_campaign(
     """Fly the campaign of a preset or file and print its table.
 
     When an error ends the campaign, print the flights until then and the gains on the vehicle. What a trial changes on
-    a vehicle with a link is kept in `data_dir`. Raises InputError for what cannot be flown, StorageError when the
-    folder cannot be used.
+    a vehicle with a link is kept in `data_dir`. Raises InputError if the campaign cannot be flown, StorageError when
+    the folder cannot be used.
     """
     file = override(
         _read(source),

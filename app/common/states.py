@@ -103,7 +103,7 @@ VEHICLE_ACTIONS: Final[Mapping[str, frozenset[VehicleState]]] = {
     "release": frozenset({VehicleState.QUARANTINED}),
 }
 """Actions that a person may take on a vehicle, and in which states. A vehicle that is not registered takes only `fly`
-and `release`. To disconnect a vehicle that is not connected is to stop looking for it."""
+and `release`. Disconnecting a vehicle that is not connected stops reconnecting it."""
 
 
 class ActKind(StrEnum):

@@ -333,7 +333,7 @@ class FlightRow(Base, Reported):
     """One request to a vehicle, written before it is sent, and what the vehicle answered.
 
     A flight of mode `stage` waits with its gains on the vehicle until an operator sets `take_off_at`, or `stand_down`
-    says why it is not to fly. `safe_gains` are those to be restored after it, `restored` those read back then;
+    is the reason why it must not fly. `safe_gains` are those to be restored after it, `restored` those read back then;
     `battery` is the label of the installed battery.
 
     A line of the vehicle's ledger: while it exists, neither its trial nor its campaign can be deleted.
@@ -412,7 +412,7 @@ class ProposalRow(Base, Reported):
 class JobRow(Base, Reported):
     """Numeric work: queued, running or done.
 
-    `order` says what exactly is to be done, `done_share` (0 … 1) and `doing` the progress. `result` is loaded only on
+    `order` describes the work, `done_share` (0 … 1) and `doing` the progress. `result` is loaded only on
     access. `lease_until` passes when the worker stops renewing it.
     """
 

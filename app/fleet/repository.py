@@ -29,7 +29,7 @@ def one_or_none(session: Session, vehicle_id: int) -> VehicleRow | None:
 
 
 def shared_of_kind_or_none(session: Session, kind: str) -> VehicleRow | None:
-    """The vehicle that campaigns share; placeholders for vehicles elsewhere are told apart by their options."""
+    """The vehicle that campaigns share; placeholders for vehicles elsewhere are distinguished by their options."""
     rows = session.scalars(select(VehicleRow).where(VehicleRow.kind == kind, VehicleRow.registered.is_(False)))
     return next((row for row in rows if not row.options), None)
 

@@ -52,7 +52,7 @@ class NewVehicle(Request):
 
 class VehicleEdit(Request):
     """Changes of a registered vehicle; omitted fields stay as they are. Options can change only while it is
-    disconnected, and the next connection then pins the identity anew; safe gains need a statement of who decided and
+    disconnected, and the next connection then pins the identity again; safe gains need a statement of who decided and
     why."""
 
     version: Version
@@ -176,7 +176,7 @@ class Release(Request):
 
 
 class VehicleOrder(Request):
-    """Why the vehicle is to land, or its motors are to stop, now."""
+    """Reason for landing the vehicle, or stopping its motors, now."""
 
     reason: OrderReason = "asked for by the operator"
 

@@ -128,7 +128,7 @@ def take_off_wanted(session: Session, flight_id: int) -> bool:
 
 
 def stand_down_wanted(session: Session, flight_id: int) -> str | None:
-    """Why a staged flight is not to take place; None while it may.
+    """Why a staged flight must not take place; None while it may.
 
     Reasons: it was unstaged, its trial was cancelled, or its take-off was requested and could not begin in time. The
     worker then restores the safe gains and calls `record_withdrawal` with this reason.

@@ -77,7 +77,7 @@ def enqueue_job(
 ) -> JobRow:
     """Queue a job, or return a queued one of the same kind for the same campaign.
 
-    `order` says what exactly is to be done; `latest_ordered` finds the job by its `name`.
+    `order` describes the work; `latest_ordered` finds the job by its `name`.
     """
     if campaign_id is not None and (waiting := repository.waiting_of_campaign(session, campaign_id, kind)) is not None:
         return waiting

@@ -153,7 +153,7 @@ class LiveServer:
             await asyncio.wait({forwarded}, timeout=ordered.by_s + CONFIRMATION_S - time.monotonic())
             problem = forwarded.result() if forwarded.done() else UNCONFIRMED
         vehicle_id, accepted = ordered.vehicle_id, not problem
-        _log.info("command sent", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
+        _log.info("vehicle command", vehicle_id=vehicle_id, order=ordered.order, reason=ordered.reason, problem=problem)
         answer = VehicleOrderAnswer(request=ordered.request, vehicle_id=vehicle_id, accepted=accepted, problem=problem)
         writer.write(encode(answer))
 

@@ -65,7 +65,7 @@ class FlightLog:
 
     `time_s` has shape (n,) and may repeat or step back. `channels`, each of shape (n,) with NaN for missing values,
     include `altitude_m`. `gain_sets` are alternative sets of gain names; the first one whose names are all known
-    applies. `from_ground`: the altitude is to be measured from where the vehicle stood. `starts` (takeoff commands),
+    applies. `from_ground`: measure the altitude from where the vehicle stood. `starts` (takeoff commands),
     `ends` (commands that end the flight) and `landings` (reported by the autopilot) may be empty. `in_air` are the
     intervals from lift-off to touchdown, `armed` those with the motors armed, both as reported by the autopilot and in
     order; None if the log does not report them.

@@ -76,7 +76,7 @@ class Remark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """A campaign as the API returns it, with its settings in words and its figures drawn for a light page.
+    """A campaign as the API returns it, with its settings described and its figures drawn for a light page.
 
     `remarks` are in the order of the trials, with at most `photo_bytes` of photos in all; `what` was tuned and `how`;
     `anomalies` are in the order of the flights; `made_at` is the time of creation, by program `version`.

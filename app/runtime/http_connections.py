@@ -2,7 +2,7 @@
 protocol, Uvicorn's own, that reports each connection's phase and refuses headers that are too large.
 
 Descriptors are limited, while opening a connection costs a client nothing. So a new connection is always accepted: at
-the limit the one that has waited longest for its client is closed, be it idle, partly sent, or an event stream, which
+the limit the one that has waited longest for its client is closed, whether idle, partly sent, or an event stream, which
 reconnects by itself. Requests being answered stay; where all others are being answered, the last places are reserved
 for requests that end a flight.
 """

@@ -50,7 +50,7 @@ def exposure(host: str) -> str | None:
 def addresses_elsewhere(host: str, port: int) -> list[Address]:
     """Addresses under which other devices reach a server that listens there, the likeliest first; none on loopback.
 
-    In a container they are the container's own, which cannot be reached from outside unless it shares the host's
+    In a container they are the container's own, which are not reachable from other hosts unless it shares the host's
     network.
     """
     if is_loopback(host):

@@ -29,7 +29,7 @@ LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "p
 IMPACT_M_S: Final = 1.9
 """At more than this it has truly come to the ground in a fall."""
 LAND_AGAIN_S: Final[Mapping[str, float]] = {"paparazzi": 6.0, "ardupilot": 1.0, "px4": 1.0}
-"""After five seconds: under Paparazzi every order to land begins the landing anew."""
+"""After five seconds: under Paparazzi every order to land restarts the landing."""
 DRIFT_M_S: Final = 0.1
 SLACK_S: Final = 0.35
 """Of the rig's clock, and of a packet under way."""
@@ -89,7 +89,7 @@ class _Judgement:
             allowed.add("completed")
         if outcome not in allowed:
             known = ", ".join(sorted(f"{cause.failure} {cause.outcome}" for cause in causes)) or "nothing"
-            yield f"the trial is {outcome}, where {known} was to be met ({self.flown.reason})"
+            yield f"the trial is {outcome}, where {known} was expected ({self.flown.reason})"
         if outcome == "completed" and self.stages.first_s(Stage.LAND) is None:
             yield "a completed trial did not record to the end"
         if outcome == "refused" and self.took_off_s is not None:
@@ -195,7 +195,7 @@ class _Judgement:
         if any(self.within(self.of(kind), Stage.LAND) > 0.0 for kind in ("reboot", OTHER_MODE)):
             yield Cause("F10", "invalid")
 
-    # ---- what becomes of the vehicle
+    # ---- the vehicle's end state
 
     def _vehicle(self) -> Iterator[str]:
         match self.flown.vehicle:

@@ -1,4 +1,4 @@
-"""Carries out one case: connect, stage, fly, as the program does it, and notes what came of it."""
+"""Carries out one case: connect, stage, fly, as the program does it, and records the outcome."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ from bench.hazards.stages import Stages
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flown:
-    """What came of a case. `outcome`: completed, aborted, invalid (a record was left) or refused (nothing flew).
+    """Outcome of a case. `outcome`: completed, aborted, invalid (a record was left) or refused (nothing flew).
     `vehicle`: what the program says of it afterwards: safe, quarantined, or unopened (it never had control).
     `flew_on`: the gains that it truly held when it left the ground; `impact_m_s`: the fastest that it truly sank within
     half a metre of the ground."""

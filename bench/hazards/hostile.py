@@ -13,7 +13,7 @@ from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, Mishap, tuned_gai
 from bench.hazards.hostility import HAZARDS, HOSTILITIES, MISFORTUNES, PILOTS, Hostility, Speaker
 from bench.hazards.rig import Rig, Struck
 from bench.hazards.stages import Stage
-from bench.hazards.truth import Moment, Said, Truth, judge
+from bench.hazards.truth import Moment, ReportedOutcome, Truth, judge
 from bench.hazards.wire import DIALECTS
 
 SHORT_S: Final = 1.5
@@ -27,7 +27,7 @@ _AIR: Final = (Stage.TAKEOFF, Stage.RECORD, Stage.LAND)
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """What came of a case; `wrong` is what may never be."""
+    """Outcome of a case; `wrong` is what may never be."""
 
     outcome: str
     vehicle: str
@@ -147,7 +147,7 @@ def carry_out(case: Case) -> Ended:
         )
     except VehicleError as error:
         rig.stages.over_s = rig.drone.time_s
-        return _ended(rig, Said("refused", "unopened", str(error)))
+        return _ended(rig, ReportedOutcome("refused", "unopened", str(error)))
     try:
         return _flown(rig, vehicle)
     finally:
@@ -169,7 +169,7 @@ def _flown(rig: HostileRig, vehicle: MavlinkVehicle) -> Ended:
     left = _leave(rig, vehicle)
     _attend(rig, vehicle)
     trajectory = None if record is None else record.trajectory
-    return _ended(rig, Said(outcome, left, reason, concern or vehicle.concern, vehicle.concern, trajectory))
+    return _ended(rig, ReportedOutcome(outcome, left, reason, concern or vehicle.concern, vehicle.concern, trajectory))
 
 
 def _attend(rig: HostileRig, vehicle: MavlinkVehicle) -> None:
@@ -191,10 +191,10 @@ def _leave(rig: HostileRig, vehicle: MavlinkVehicle) -> str:
     return "safe" if held == rig.case.safe else "quarantined"
 
 
-def _ended(rig: HostileRig, said: Said) -> Ended:
+def _ended(rig: HostileRig, reported: ReportedOutcome) -> Ended:
     first = rig.case.mishaps[0]
     struck = f"{first.kind} from {first.stage} on, for {first.duration_s:g} s"
-    return Ended(said.outcome, said.vehicle, said.reason, struck, judge(rig.truth, said))
+    return Ended(reported.outcome, reported.vehicle, reported.reason, struck, judge(rig.truth, reported))
 
 
 def _unwatched(_sample: Sample) -> None:

@@ -18,7 +18,7 @@ class _Struck(TypedDict):
 
 
 def summary(lines: Sequence[Line]) -> str:
-    """What is to be seen at a glance, and the seeds of what went wrong."""
+    """The summary, and the seeds of what went wrong."""
     wrong = [line for line in lines if line["wrong"]]
     return "\n".join(
         (
@@ -59,7 +59,7 @@ def _where(lines: Sequence[Line]) -> Iterator[str]:
 
 
 def _ends(lines: Sequence[Line]) -> Iterator[str]:
-    """What came of runs in which nothing else set in."""
+    """Outcomes of runs in which nothing else set in."""
     yield from _header("what set in, alone", [*OUTCOMES, *VEHICLE])
     for kind in MISHAPS:
         alone = [line for line in lines if {each["kind"] for each in _struck(line)} == {kind}]
@@ -147,7 +147,7 @@ How often each mishap set in in each state:
 `wild-gains` the gains of the trial do not fly; `mocap-…` are faults of a second source of altitude, which only these
 trials have.
 
-What came of runs in which nothing else set in:
+Outcomes of runs in which nothing else set in:
 
 {ends}
 

@@ -46,8 +46,8 @@ class Moment:
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
-    """What the program said: of the trial when it was over, and of the vehicle (safe, quarantined, unopened), with its
+class ReportedOutcome:
+    """Reports of the program: on the finished trial, and on the vehicle (safe, quarantined, unopened), with its
     concern then and at last."""
 
     outcome: str
@@ -105,12 +105,12 @@ class Truth:
         return seen_s if flown and self.overruled_s > seen_s else FOR_GOOD_S
 
 
-def judge(truth: Truth, said: Said) -> tuple[str, ...]:
+def judge(truth: Truth, reported: ReportedOutcome) -> tuple[str, ...]:
     """Everything that may not be."""
-    return (*_vehicle(truth, said), *_orders(truth), *_verdict(truth, said), *_record(truth, said))
+    return (*_vehicle(truth, reported), *_orders(truth), *_verdict(truth, reported), *_record(truth, reported))
 
 
-def _vehicle(truth: Truth, said: Said) -> Iterator[str]:
+def _vehicle(truth: Truth, reported: ReportedOutcome) -> Iterator[str]:
     stops = [stop.height_m for stop in truth.stops if stop.height_m > LIFTED_M]
     if stops:
         yield f"its motors were told to stop at {max(stops):.2f} m"
@@ -118,14 +118,14 @@ def _vehicle(truth: Truth, said: Said) -> Iterator[str]:
         yield f"it was left at {truth.moments[-1].height_m:.2f} m"
     if (highest_m := max((each.height_m for each in truth.moments), default=0.0)) > CEILING_M:
         yield f"it rose to {highest_m:.2f} m"
-    if said.vehicle == "safe" and (truth.armed or not truth.holds_safe):
+    if reported.vehicle == "safe" and (truth.armed or not truth.holds_safe):
         yield f"it is said to be safe, and is {'armed' if truth.armed else 'not on its safe gains'}"
-    if said.vehicle == "unopened":
+    if reported.vehicle == "unopened":
         return
     over = truth.after[0] if truth.after else None
-    if over is not None and (over.armed or over.flies) and not said.concern:
+    if over is not None and (over.armed or over.flies) and not reported.concern:
         yield "its trial is over, and nothing is said of one that is armed or flies"
-    if (truth.armed or truth.flies) and not said.concern_at_last:
+    if (truth.armed or truth.flies) and not reported.concern_at_last:
         yield "at last nothing is said of one that is armed or flies"
 
 
@@ -159,31 +159,31 @@ def _waits(truth: Truth) -> Iterator[float]:
         yield now.time_s - max(since_s, told_s)
 
 
-def _verdict(truth: Truth, said: Said) -> Iterator[str]:
+def _verdict(truth: Truth, reported: ReportedOutcome) -> Iterator[str]:
     """What is said of the trial is what happened, and names what befell it."""
     hazard = truth.hazard
     expected = HARMLESS if hazard is None else EXPECTED[hazard.kind]
     led = {each.kind for each in truth.struck if each.kind in LEADS}
     known = (*expected.told, *(LEADS[kind] for kind in led))
-    if said.outcome == "refused" and truth.rose:
-        yield f"it is said not to have flown, and did ({said.reason})"
-    if said.outcome == "completed":
+    if reported.outcome == "refused" and truth.rose:
+        yield f"it is said not to have flown, and did ({reported.reason})"
+    if reported.outcome == "completed":
         if ABORT in led:
             yield "its trial counts as completed, though it was aborted"
         if truth.case.mishaps[0].duration_s == FOR_GOOD_S and hazard is not None and hazard.stage in expected.ends:
             yield f"its trial counts as completed, though {truth.case.mishaps[0].kind} set in"
-    elif not any(words in said.reason for words in known):
-        yield f"it is {said.outcome} for what did not happen ({said.reason})"
-    if said.outcome == "aborted" and ABORT not in led and not expected.aborts:
-        yield f"its gains are blamed for {truth.case.mishaps[0].kind} ({said.reason})"
-    if said.vehicle == "quarantined" and not expected.quarantines:
-        yield f"it was quarantined without need ({said.concern})"
+    elif not any(words in reported.reason for words in known):
+        yield f"it is {reported.outcome} for what did not happen ({reported.reason})"
+    if reported.outcome == "aborted" and ABORT not in led and not expected.aborts:
+        yield f"its gains are blamed for {truth.case.mishaps[0].kind} ({reported.reason})"
+    if reported.vehicle == "quarantined" and not expected.quarantines:
+        yield f"it was quarantined without need ({reported.concern})"
 
 
-def _record(truth: Truth, said: Said) -> Iterator[str]:
+def _record(truth: Truth, reported: ReportedOutcome) -> Iterator[str]:
     """A record that counts is whole, of a flight, and where the vehicle truly was: compared where it hovers."""
-    took_off_s, record = truth.stages.first_s(Stage.TAKEOFF), said.record
-    if said.outcome != "completed" or record is None:
+    took_off_s, record = truth.stages.first_s(Stage.TAKEOFF), reported.record
+    if reported.outcome != "completed" or record is None:
         return
     if took_off_s is None or not truth.rose:
         yield "a record of a flight that never was"

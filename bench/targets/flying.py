@@ -63,7 +63,7 @@ class Tuning:
         return min(float(self.fly(SPACE.nearest(gains)).error or WORST_M), WORST_M)
 
     def fly(self, gains: Vector, interval: Interval | None = None) -> Flight:
-        """Fly flyable gains and keep what came of it. Raises BudgetSpentError when no flights are left."""
+        """Fly flyable gains and keep the outcome. Raises BudgetSpentError when no flights are left."""
         asked_s = time.process_time() - self._asked_s
         number = len(self.flights) + 1
         if number > self.budget:

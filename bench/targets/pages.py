@@ -64,7 +64,7 @@ _COLOURS: Final[Mapping[str, str]] = {
     "gp": "#CC79A7",
     "bayes-opt": "#7F7F7F",
 }
-"""Okabe and Ito's palette, told apart also by colour-blind readers, with two neutral ones."""
+"""Okabe and Ito's palette, distinguishable also for colour-blind readers, with two neutral ones."""
 
 
 def summary(found: Mapping[str, Outcome], target: float) -> list[str]:

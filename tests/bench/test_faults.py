@@ -141,12 +141,12 @@ WRONG: Final[list[tuple[Flown, str]]] = [
     (flown(armed=True), "is armed"),
     (flown(height_m=1.0), "off the ground"),
     (flown(vehicle="quarantined"), "quarantined without need"),
-    (flown(outcome="invalid"), "the trial is invalid, where nothing was to be met"),
+    (flown(outcome="invalid"), "the trial is invalid, where nothing was expected"),
     (flown(LINK_LOST), "the trial is completed, where F5 invalid"),
-    (flown(ABORT), "where F8 aborted was to be met"),
+    (flown(ABORT), "where F8 aborted was expected"),
     (flown(ABORT), "an abort was not acted on"),
     (flown(Struck("reboot", Stage.RECORD, 20.0, 22.0), outcome="invalid"), "was not quarantined"),
-    (flown(Struck("jumping-position", Stage.RECORD, 20.0, 30.0)), "F9b invalid was to be met"),
+    (flown(Struck("jumping-position", Stage.RECORD, 20.0, 30.0)), "F9b invalid was expected"),
     (flown(Struck("low-battery", Stage.ARM, 9.2, 99.0)), "F7 invalid"),
     (flown(flew_on=SAFE["paparazzi"]), "it lifted off holding"),
 ]
@@ -161,7 +161,7 @@ def test_what_is_not_as_asked_is_found(wrong: Flown, complaint: str) -> None:
 
 
 FOUND: Final = [
-    # seed 20261148: each lone sample began the two seconds of rest on the ground anew, until quarantine
+    # seed 20261148: each lone sample restarted the two seconds of rest on the ground, until quarantine
     (case(Mishap("jumping-position", Stage.LAND, 4.4)), "completed", "safe"),
     # seed 20261209: a stop before arming left the gains of the trial on the vehicle
     (case(Mishap("abort", Stage.SET_GAINS, 2.0)), "aborted", "safe"),

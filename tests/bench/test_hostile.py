@@ -15,7 +15,7 @@ from bench.hazards.hostile import carry_out, cases
 from bench.hazards.hostility import HAZARDS, MISFORTUNES
 from bench.hazards.rig import Stopping, Struck
 from bench.hazards.stages import Stage, Stages
-from bench.hazards.truth import Moment, Said, Truth, judge
+from bench.hazards.truth import Moment, ReportedOutcome, Truth, judge
 from bench.hazards.wire import Order
 
 
@@ -85,8 +85,10 @@ UP = tuple(replace(each, height_m=3.0, armed=True) if each.time_s >= 10.0 else e
 """Left hovering."""
 DOWN = tuple(replace(each, height_m=0.0, armed=False) if each.time_s > 48.0 else each for each in UP)
 WHOLE = Trajectory(np.arange(0.0, 33.5, 0.5), {"altitude_m": np.full(67, 3.0)}, "mavlink", "vehicle")
-SAFE_AND_SOUND = Said("completed", "safe", "", record=WHOLE)
-QUARANTINED = Said("invalid", "quarantined", "A pilot took over manual control.", "It flies.", "It flies.")
+SAFE_AND_SOUND = ReportedOutcome("completed", "safe", "", record=WHOLE)
+QUARANTINED = ReportedOutcome(
+    "invalid", "quarantined", "A pilot took over manual control.", "It flies.", "It flies."
+)
 LANDED_ON = tuple((at_s, Order.LAND) for at_s in np.arange(45.0, 70.0, 6.0))
 
 
@@ -106,7 +108,10 @@ def happened(moments: Sequence[Moment] = DOWN, kind: str = "disarmed once", **mo
 def test_a_trial_that_is_told_as_it_was_is_right() -> None:
     assert judge(happened(), SAFE_AND_SOUND) == ()
     assert judge(happened(UP, "pilot", pilot_told_s=[16.5, 17.0]), QUARANTINED) == ()
-    assert judge(happened(kind="deaf"), Said("invalid", "quarantined", "It did not confirm.", "Look at it.")) == ()
+    assert (
+        judge(happened(kind="deaf"), ReportedOutcome("invalid", "quarantined", "It did not confirm.", "Look at it."))
+        == ()
+    )
 
 
 def test_after_its_trial_a_vehicle_in_the_air_is_told_to_land_again_and_again() -> None:
@@ -160,22 +165,32 @@ def test_the_judge_sees_motors_stopped_in_the_air_and_one_that_rises() -> None:
         ("disarmed once", UP, SAFE_AND_SOUND, "at last nothing is said of one that is armed or flies"),
         ("disarmed once", UP, SAFE_AND_SOUND, "its trial is over, and nothing is said of one that is armed or flies"),
         ("z nan", DOWN, SAFE_AND_SOUND, "its trial counts as completed, though z nan set in"),
-        ("disarmed once", DOWN, Said("refused", "safe", ""), "it is said not to have flown, and did ()"),
-        ("z nan", DOWN, Said("invalid", "safe", "Low."), "it is invalid for what did not happen (Low.)"),
-        ("z nan", DOWN, Said("aborted", "safe", "It stood still."), "its gains are blamed for z nan (It stood still.)"),
-        ("disarmed once", DOWN, Said("completed", "quarantined", "", "?"), "it was quarantined without need (?)"),
+        ("disarmed once", DOWN, ReportedOutcome("refused", "safe", ""), "it is said not to have flown, and did ()"),
+        ("z nan", DOWN, ReportedOutcome("invalid", "safe", "Low."), "it is invalid for what did not happen (Low.)"),
+        (
+            "z nan",
+            DOWN,
+            ReportedOutcome("aborted", "safe", "It stood still."),
+            "its gains are blamed for z nan (It stood still.)",
+        ),
+        (
+            "disarmed once",
+            DOWN,
+            ReportedOutcome("completed", "quarantined", "", "?"),
+            "it was quarantined without need (?)",
+        ),
         ("disarmed once", ON_GROUND, SAFE_AND_SOUND, "a record of a flight that never was"),
     ],
 )
 def test_a_verdict_that_is_not_what_happened_is_wrong(
-    kind: str, moments: Sequence[Moment], said: Said, wrong: str
+    kind: str, moments: Sequence[Moment], reported: ReportedOutcome, wrong: str
 ) -> None:
-    assert wrong in judge(happened(moments, kind), said)
+    assert wrong in judge(happened(moments, kind), reported)
 
 
 def test_a_hazard_that_never_set_in_is_no_reason() -> None:
-    said = Said("invalid", "safe", "Its position was lost.")
-    assert judge(happened(kind="z nan", struck=[]), said) == (
+    reported = ReportedOutcome("invalid", "safe", "Its position was lost.")
+    assert judge(happened(kind="z nan", struck=[]), reported) == (
         "it is invalid for what did not happen (Its position was lost.)",
     )
 

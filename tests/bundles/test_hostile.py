@@ -1,4 +1,4 @@
-"""Bundles that are not what they say: refused in words that name the field, and nothing is stored."""
+"""Bundles that are not what they say: refused with a message that names the field, and nothing is stored."""
 
 import json
 import struct

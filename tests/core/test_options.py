@@ -1,4 +1,4 @@
-"""Settings: what each refuses, in words."""
+"""Settings: what each refuses, and why."""
 
 import pytest
 

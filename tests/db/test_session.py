@@ -1,4 +1,4 @@
-"""Transactions on a real SQLite file: writers in turn, nothing half done, trouble said in words."""
+"""Transactions on a real SQLite file: writers in turn, nothing half done, errors with a reason."""
 
 import sqlite3
 import threading

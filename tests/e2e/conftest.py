@@ -188,7 +188,7 @@ def shared_server(tmp_path_factory: pytest.TempPathFactory) -> Server:
 
 @pytest.fixture(scope="module")
 def states(shared_server: Server) -> States:
-    """What the shared server's database is to hold."""
+    """The contents of the shared server's database."""
     return STARTED.get("states", States, lambda: written(shared_server))
 
 
@@ -321,11 +321,11 @@ def watch(page: Page, url: str, wrong: list[str]) -> None:
         if parts.scheme in {"http", "https", "ws", "wss"} and parts.netloc != own:
             wrong.append(f"request to another host: {address}")
 
-    def heed(text: str) -> None:
+    def note(text: str) -> None:
         if "Content Security Policy" in text or "Warning:" in text:
             wrong.append(f"console: {text}")
 
-    page.on("console", lambda message: heed(message.text))
+    page.on("console", lambda message: note(message.text))
     page.on("request", lambda request: look(request.url))
     page.on("websocket", lambda socket: look(socket.url))
 

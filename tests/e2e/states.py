@@ -50,7 +50,7 @@ TRIES: Final = 5
 
 
 class States:
-    """What a server's database is to hold, written while it runs or before it does."""
+    """The contents of a server's database, written while it runs or before it does."""
 
     def __init__(self, data_dir: Path) -> None:
         self._database = Database(Settings(data_dir=data_dir).database_file)
@@ -122,7 +122,7 @@ class States:
         return self._write(upload)
 
     def classify(self, trial_id: int, outcome: str, reason: str) -> None:
-        """A person's word on a flight, and the gains that follow from it."""
+        """A person's review of a flight, and the gains that follow from it."""
 
         def say(session: Session) -> None:
             trial = trials.get_trial(session, trial_id)

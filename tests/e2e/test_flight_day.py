@@ -304,7 +304,7 @@ def open_the_report(dashboard: Dashboard, campaign_id: int) -> None:
 
 
 def runs_row(trial: Json, sigma: float) -> list[str]:
-    """Gains and error of a flight as they are to be printed."""
+    """Gains and error of a flight as they should be printed."""
     gains = [f"{trial['gains'][name]:g}" for name in ("kp", "ki", "kd")]
     return [*gains, "–" if trial["error"] is None else printed(trial["error"], sigma, "").strip()]
 

@@ -34,7 +34,7 @@ def is_live(dashboard: Dashboard) -> None:
 
 
 def is_away(dashboard: Dashboard) -> None:
-    """Said in words, with the time up to which the page is right, and the page without its colours."""
+    """A message, with the time up to which the page is right, and the page without its colours."""
     expect(dashboard.page.get_by_text("Server unreachable", exact=True)).to_be_visible(timeout=LOST_MS)
     notice = dashboard.page.get_by_role("status").filter(has_text="The server is not responding.")
     expect(notice.locator("time")).to_be_visible()
@@ -106,7 +106,7 @@ def test_what_changed_before_the_stream_was_there_is_shown(dashboard: Dashboard,
 
 
 def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboard: Opener, own_server: Server) -> None:
-    """Pages open all the same meanwhile: they were fetched before the server was lost."""
+    """Pages still open meanwhile: they were fetched before the server was lost."""
     dashboard, other = open_dashboard(own_server.url), open_dashboard(own_server.url)
     campaign_id = dashboard.create("twin", name="Before")
     dashboard.open_campaign(campaign_id)

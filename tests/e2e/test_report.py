@@ -143,7 +143,7 @@ def test_the_pdf_is_saved_from_the_campaign(
 
 @pytest.fixture
 def server_elsewhere(tmp_path: Path) -> Iterator[Server]:
-    """Without a worker: nothing is to fly or to be computed there."""
+    """Without a worker: nothing flies or is computed there."""
     with served(tmp_path / "data", 0, "--no-worker") as server:
         yield server
 

@@ -1,4 +1,4 @@
-"""What a registered vehicle is asked beside its flights: when it may be, once at a time, and what comes of it."""
+"""What a registered vehicle is asked beside its flights: when it may be, once at a time, and its outcome."""
 
 import threading
 from dataclasses import replace

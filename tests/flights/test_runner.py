@@ -129,7 +129,7 @@ def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field
     assert vehicle_state(client) == "ready"
 
 
-def test_an_abort_during_the_bookkeeping_of_the_lift_off_is_an_abort_on_the_ground(
+def test_an_abort_while_the_lift_off_is_stored_is_an_abort_on_the_ground(
     client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, trial_id: int
 ) -> None:
     when_changed_to(TrialState.FLYING, lambda: field.abort_registry.abort(trial_id, "somebody walked in"))
@@ -155,7 +155,7 @@ def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(
     assert ended["read_back"] is None, "nothing was sent to the vehicle"
 
 
-def test_a_claim_that_is_not_stored_leaves_the_airspace_free(
+def test_a_claim_that_is_not_stored_leaves_the_abort_registry_free(
     client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, trial_id: int
 ) -> None:
     def fail() -> None:

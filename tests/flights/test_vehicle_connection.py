@@ -68,15 +68,15 @@ def reads_nothing(pipe: Connection, _call: ConnectionRequest) -> None:
     signal.pause()
 
 
-Heard = VehicleStatus | CommandForwarded
+LiveMessage = VehicleStatus | CommandForwarded
 
 
 @contextmanager
 def session(
     run: Callable[[Connection, ConnectionRequest], None], folder: Path
-) -> Iterator[tuple[VehicleConnection, "queue.SimpleQueue[Heard]"]]:
+) -> Iterator[tuple[VehicleConnection, "queue.SimpleQueue[LiveMessage]"]]:
     """One that is open, and what it hears."""
-    heard: queue.SimpleQueue[Heard] = queue.SimpleQueue()
+    heard: queue.SimpleQueue[LiveMessage] = queue.SimpleQueue()
     call = ConnectionRequest(
         vehicle_id=5,
         name="Drone",

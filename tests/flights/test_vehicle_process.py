@@ -13,7 +13,7 @@ import pytest
 
 from app.common.data_folder import telemetry_log
 from app.common.states import ActKind
-from app.flights import vehicle_process as seat_module
+from app.flights import vehicle_process as vehicle_process_module
 from app.flights.process_messages import (
     CancelFlight,
     CancelTakeOff,
@@ -102,7 +102,7 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[AnsweringRig]:
 
     with AnsweringRig() as one:
         kind = replace(MAVLINK, connect=connect)
-        monkeypatch.setattr(seat_module, "get_kind", lambda _: kind)
+        monkeypatch.setattr(vehicle_process_module, "get_kind", lambda _: kind)
         yield one
 
 
@@ -185,7 +185,7 @@ def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
     clock = SimpleNamespace(monotonic=lambda: time.monotonic() + stood_still_s)
-    monkeypatch.setattr(seat_module, "time", clock)
+    monkeypatch.setattr(vehicle_process_module, "time", clock)
 
     def stand_still(message: Message) -> None:
         nonlocal stood_still_s

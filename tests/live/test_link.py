@@ -62,7 +62,7 @@ def status(altitude_m: float = 0.1) -> VehicleStatus:
 
 
 def told(problem: str = "") -> Future[str]:
-    """What became of an order, at once."""
+    """The outcome of an order, at once."""
     answer: Future[str] = Future()
     answer.set_result(problem)
     return answer

@@ -1,4 +1,4 @@
-"""Any file at all: read, or refused in words; and large ones within bounded time and memory."""
+"""Any file at all: read, or refused with a reason; and large ones within bounded time and memory."""
 
 import io
 import random
@@ -47,7 +47,7 @@ ORIGINALS = originals()
 
 
 def read_or_refuse(content: bytes | Path, companion: bytes | None = None) -> None:
-    """Whatever else than a refusal in words is raised fails the test."""
+    """Anything raised other than a refusal with a reason fails the test."""
     beside = None if companion is None else io.BytesIO(companion)
     with io.BytesIO(content) if isinstance(content, bytes) else content.open("rb") as stream:
         try:

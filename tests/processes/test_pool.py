@@ -18,7 +18,7 @@ def double(number: int) -> int:
 
 
 def die_once(flag: Path) -> int:
-    """Killed from outside as it were, the first time only."""
+    """Killed like by another process, the first time only."""
     if not flag.exists():
         flag.touch()
         os.kill(os.getpid(), signal.SIGKILL)

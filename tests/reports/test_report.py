@@ -144,8 +144,8 @@ def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_e
         "Photo 1 of flight 1",
         "Photo 1 of flight 3",
     ]
-    assert "2 photos left out" in page.said
-    assert "2 photos of this flight left out" in page.said
+    assert "2 photos omitted" in page.said
+    assert "2 photos of this flight omitted" in page.said
 
 
 def test_the_landscape_is_in_the_report_once_it_is_computed(

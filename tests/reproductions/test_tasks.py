@@ -145,7 +145,7 @@ def test_an_order_that_cannot_be_read_fails_with_its_reason(working: Working) ->
     assert failed.problem.title == "The reproduction table9 no longer exists."
 
 
-def test_a_desk_takes_no_more_than_it_has_room_for(working: Working) -> None:
+def test_a_runner_claims_no_more_than_its_concurrency(working: Working) -> None:
     job_id, other = working.ask("controller"), working.ask("table1")
     with working.under_way(job_id):
         assert working.runner.claim() is None

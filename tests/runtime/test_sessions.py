@@ -119,7 +119,9 @@ def test_a_vehicle_whose_session_is_killed_in_the_air_is_found_armed_and_only_to
         vehicle.status(lambda status: status["altitude_m"] < 0.15)
         assert serving.post(f"/vehicles/{vehicle.id}/motors-off", {"reason": "it is down"})["accepted"]
         vehicle.status(lambda status: status["armed"] is False)
-        orders = wait_for("the orders in the books", lambda: vehicle.orders() if len(vehicle.orders()) == 2 else None)
+        orders = wait_for(
+            "the orders in the database", lambda: vehicle.orders() if len(vehicle.orders()) == 2 else None
+        )
         assert [(act["kind"], act["reason"], act["state"]) for act in orders] == [
             ("motors off", "it is down", "done"),
             ("land", "nobody flies it", "done"),
@@ -166,7 +168,9 @@ def test_a_vehicle_whose_process_stands_still_takes_no_order_and_does_not_fly_wh
         assert (ready["armed"], ready["trouble"]) == (False, "")
         assert serving.get("/health")["vehicles_not_answering"] == []
         assert vehicle.in_state("ready")["held"] == SAFE
-        orders = wait_for("the orders in the books", lambda: vehicle.orders() if len(vehicle.orders()) == 2 else None)
+        orders = wait_for(
+            "the orders in the database", lambda: vehicle.orders() if len(vehicle.orders()) == 2 else None
+        )
         assert [(act["kind"], act["state"], "too late" in act["problem"]) for act in orders] == [
             ("motors off", "failed", True),
             ("land", "failed", True),

@@ -1,4 +1,4 @@
-"""Records sent in: every malformed one is refused in words and stores nothing; the largest never fills the memory."""
+"""Records sent in: every malformed one is refused and stores nothing; the largest never fills the memory."""
 
 import hashlib
 import resource

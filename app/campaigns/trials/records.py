@@ -46,7 +46,7 @@ _SINGLE_PRECISION: Final = 1e-6
 
 
 def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
-    """Set the trial's gains to what the log says.
+    """Set the trial's gains to those in the log.
 
     A log without gains leaves them as planned. Where the sets differ and that is `confirmed`, the trial takes the gains
     that were flown and loses the prediction for the planned ones; gains under other names are stored as read back only.

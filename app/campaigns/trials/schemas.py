@@ -69,7 +69,7 @@ class AbortJudgement(Request):
 
 
 class Abort(Request):
-    """Why the flight is to be aborted."""
+    """Reason for aborting the flight."""
 
     reason: Annotated[str, Field(max_length=500)] = "aborted by the operator"
 

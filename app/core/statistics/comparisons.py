@@ -189,8 +189,8 @@ def compare(
     `candidates` is the number of policies from which `first` was chosen for its low error; the error probability is
     multiplied by it (Bonferroni), so that the best of N gets no credit for having been chosen. `looks` is the number of
     comparisons of growing data so far; at the k-th the error probability is multiplied by k(k + 1). As Σ 1/(k(k + 1)) =
-    1, the probability of ever reaching a wrong verdict stays below 1 − confidence. `plan_further` also computes how many
-    `further` flights would decide, which takes most of the time.
+    1, the probability of ever reaching a wrong verdict stays below 1 − confidence. `plan_further` also computes how
+    many `further` flights would decide, which takes most of the time.
     """
     allowance = candidates * max(looks * (looks + 1), 1)
     difference = first.mean - second.mean

@@ -169,8 +169,8 @@ def _confirm_baseline(
         return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
     tried = len(now.groups) - 1
     found = f"None of the other sets flown ({tried}) is better." if tried else "No other set was flown."
-    promise = _describe_improvement(definition, experiment, now, left, proposal)
-    return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {promise}".strip())
+    outlook = _describe_improvement(definition, experiment, now, left, proposal)
+    return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {outlook}".strip())
 
 
 def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:

@@ -191,8 +191,8 @@ def require_flyable(gate: GateResult, *, overrule: str = "", is_real: bool = Fal
     """Return the reason to record with the flight: `overrule` if it lets refused gains fly, else empty.
 
     On a simulated vehicle an operator may overrule a refusal with a reason, for example to fly the paper's gains (ki =
-    1356 can wrap); on a real one nobody can. Numbers that the controller cannot hold are never overruled. Raises
-    GainsError naming every refusal with its gain and, if there is one, a value that would pass.
+    1356 can wrap); on a real one this is impossible. Numbers that the controller cannot hold are never overruled.
+    Raises GainsError naming every refusal with its gain and, if there is one, a value that would pass.
     """
     if overrule and is_real:
         raise GainsError(

@@ -1,4 +1,4 @@
-"""Logs sent in over HTTP: takeoff and gains are found, and gains that were not planned need a person's word."""
+"""Logs sent in over HTTP: takeoff and gains are found, and gains that were not planned need a person's confirmation."""
 
 import pytest
 from fastapi.testclient import TestClient

@@ -45,16 +45,16 @@ def phase(flights: list[Flight], proposal: Proposal, definition: Definition = NO
     return confirm(definition, QuadraticExperiment(), flights, proposal).phase
 
 
-def test_a_step_that_promises_more_than_noise_is_flown() -> None:
+def test_a_step_with_a_resolvable_improvement_is_flown() -> None:
     found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.3))
     assert found.phase == "step"
-    assert "promises 0.200 m less, at least the" in found.why
+    assert "is predicted to reduce the error by 0.200 m, at least the" in found.why
 
 
-def test_a_step_that_promises_less_than_noise_ends_a_campaign_without_a_winner() -> None:
+def test_a_step_without_a_resolvable_improvement_ends_a_campaign_without_a_winner() -> None:
     found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.499))
     assert found.phase == "decided"
-    assert "promises 0.0010 m less, below the" in found.why
+    assert "is predicted to reduce the error by 0.0010 m, below the" in found.why
     assert "No other set was flown." in found.why
     tried = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
     assert tried.phase == "decided"

@@ -50,8 +50,8 @@ def propose(
     optimum = _optimum(aircraft, space, low, high, here)
     gains = space.mapping(optimum.gains)
     expected = _expected_error(aircraft, found, here)
-    promised = _expected_error(aircraft, found, optimum.gains)
-    stays = was_flown(gains, flights) or promised > expected - _MIN_IMPROVEMENT * expected
+    predicted_at_optimum = _expected_error(aircraft, found, optimum.gains)
+    stays = was_flown(gains, flights) or predicted_at_optimum > expected - _MIN_IMPROVEMENT * expected
     chosen = space.mapping(here) if stays else gains
     trajectory, error, interval = _prediction(aircraft, found, space.vector(chosen))
     return Proposal(

@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.core.definition import Definition, Flight, Prediction, StopRule
+from app.core.formatting import short
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.predictions import predict_flight, prediction_of, remaining_bias
@@ -73,7 +74,9 @@ def test_a_proposal_explains_itself() -> None:
     assert "calibrated on 1 flight" in why.summary
     assert first.error is not None
     assert proposal.predicted_error is not None
-    assert f"promises {100.0 * (1.0 - proposal.predicted_error / first.error):.0f}\u00a0% less error" in why.summary
+    share = 1.0 - proposal.predicted_error / first.error
+    assert f"predicts {short(proposal.predicted_error)} m (90\u00a0% interval" in why.summary
+    assert f"{100.0 * share:.0f}\u00a0% less error than flight 1 (" in why.summary
     assert [one.name for one in why.fitted] == [parameter.name for parameter in TAKEOFF.model_parameters]
     assert why.fitted[0].value == pytest.approx(0.61, abs=0.01)
     assert why.gradient["ki"] < 0.0
@@ -218,7 +221,7 @@ def test_the_same_history_gives_the_same_proposal_bit_for_bit(
 
 
 @compiled_only
-def test_the_hedge_prefers_what_is_safe_on_every_plausible_model() -> None:
+def test_the_robust_optimum_prefers_what_is_safe_on_every_plausible_model() -> None:
     """The merit is the mean error where nothing is unsafe, and worse by what is."""
     models = np.array([TWIN, HEAVY])
     gains = np.array([[1500.0, 1000, 170], [283, 13, 82], [4000, 1073, 0]])
