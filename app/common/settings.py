@@ -55,7 +55,7 @@ class Settings(BaseSettings):
         default_factory=default_data_dir, description="folder of the database and of the worker's socket"
     )
     host: str = Field(default="127.0.0.1", description="address of the dashboard")
-    port: int = Field(default=8000, ge=0, le=65535, description="port of the dashboard; 0 takes a free one")
+    port: int = Field(default=8000, ge=0, le=65535, description="port of the dashboard; 0 selects a free one")
     ui_dir: Path = Field(default_factory=default_ui_dir, description="folder of the built dashboard")
     max_upload_bytes: int = Field(default=48 * 2**20, ge=2**16, description="largest flight record accepted")
     lease_s: float = Field(

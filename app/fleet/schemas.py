@@ -178,7 +178,7 @@ class Release(Request):
 class VehicleOrder(Request):
     """Reason for landing the vehicle, or stopping its motors, now."""
 
-    reason: OrderReason = "asked for by the operator"
+    reason: OrderReason = "requested by the operator"
 
 
 class OrderAnswer(BaseModel):

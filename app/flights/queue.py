@@ -165,7 +165,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
         raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
     if trial.read_back != trial.gains:
         raise ConflictError(
-            f"Trial {trial.number} must not fly: the vehicle holds {trial.read_back}.",
+            f"Trial {trial.number} must not fly: the vehicle has the gains {trial.read_back}.",
             hint="Stage it again. If this happens again, check the vehicle's link.",
         )
     set_trial_state(trial, TrialState.FLYING, reason="")

@@ -98,7 +98,7 @@ class JobRunner:
         with structlog.contextvars.bound_contextvars(campaign_id=job.campaign_id, job_id=job.id):
             began_s = self._clock.now_s()
             ordered = ", ".join(f"{name}: {value}" for name, value in job.order.items())
-            _log.info("job begun", worker=self._worker, order=ordered or None)
+            _log.info("job started", worker=self._worker, order=ordered or None)
             try:
                 self._perform(job)
                 _log.info("job finished", seconds=round(self._clock.now_s() - began_s, 3))

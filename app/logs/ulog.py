@@ -77,7 +77,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
     topics: dict[str, Topic] = {each.name: each.data for each in log.data_list}
     position = topics.get(_POSITION, {})
     if not {"timestamp", "z"} <= position.keys():
-        raise refused("holds no vehicle_local_position.z, the altitude", _HINT)
+        raise refused("contains no vehicle_local_position.z, the altitude", _HINT)
     starts, ends, landings = _moments(topics)
     return FlightLog(
         title="PX4's log (ULog)",

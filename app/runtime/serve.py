@@ -105,7 +105,7 @@ def _no_address(host: str, port: int, error: OSError) -> AddressError:
     match error.errno:
         case errno.EADDRINUSE:
             problem = Problem("port", f"{port} is in use by another program")
-            hint = f"Stop that program, or choose another port: --port {port % 65535 + 1} (0 takes a free one)."
+            hint = f"Stop that program, or choose another port: --port {port % 65535 + 1} (0 selects a free one)."
         case errno.EACCES:
             problem = Problem("port", f"this user has no permission to open port {port}")
             hint = "Choose a port above 1023, for instance --port 8000."

@@ -23,7 +23,7 @@ def test_a_job_s_lines_are_found_in_turned_over_files_too_and_nobody_elses(
         assert jobs.enqueue_job(session, "reproduction", order={"name": "table1"}).id == 1
     folder = settings.data_dir / "log"
     folder.mkdir()
-    older = [line(-3600, "of an older database"), line(60, "job begun", order="name: table1")]
+    older = [line(-3600, "of an older database"), line(60, "job started", order="name: table1")]
     newer = [
         line(61, "of another job", 11),
         json.dumps({"event": 'says "job_id": 1', "timestamp": datetime.now(UTC).isoformat()}),
@@ -34,7 +34,7 @@ def test_a_job_s_lines_are_found_in_turned_over_files_too_and_nobody_elses(
     (folder / "worker.log").write_text("\n".join(newer))
     found = get(client, "/api/jobs/1/log")
     assert [(each["message"], each["details"]) for each in found["lines"]] == [
-        ("job begun", {"order": "name: table1"}),
+        ("job started", {"order": "name: table1"}),
         ("job failed", {"why": "no such thing"}),
     ]
     assert found["lines"][1]["exception"] == "Traceback\nValueError: 3"

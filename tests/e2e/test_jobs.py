@@ -69,7 +69,7 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     expect(first).to_contain_text(job["problem"]["hint"])
     first.get_by_text(f"Log of job {job_id}").click()
     lines = first.get_by_role("listitem")
-    expect(lines.first).to_contain_text("job begun")
+    expect(lines.first).to_contain_text("job started")
     expect(lines.filter(has_text="the computing process died")).to_have_count(3)
     told = dashboard.get(f"/jobs/{job_id}/log")
     expect(lines).to_have_count(told["total"])

@@ -40,7 +40,7 @@ def error_model(_definition: Definition, experiment: ModelledExperiment, flights
 
 MANUAL: Final = Strategy(
     name="manual",
-    title="By hand",
+    title="Manual",
     line="You choose every gain set; bounds and step limits are checked as for any other.",
     options=(),
     propose=propose,
