@@ -93,5 +93,5 @@ def test_no_token_is_stored_and_none_leads_out_of_the_folder(tmp_path: Path) -> 
 def test_a_damaged_secret_is_told_with_what_to_do(tmp_path: Path) -> None:
     Keyring.open(tmp_path)
     os.truncate(tmp_path / "access" / "secret", 3)
-    with pytest.raises(StorageError, match="does not hold 32 bytes"):
+    with pytest.raises(StorageError, match="does not contain 32 bytes"):
         Keyring.open(tmp_path)

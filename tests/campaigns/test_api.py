@@ -256,4 +256,4 @@ def test_an_imported_campaign_cannot_be_flown_from_here(client: TestClient, data
     assert trial["actions"] == ["cancel", "upload", "note"]
     answer = client.post(f"/api/trials/{trial['id']}/fly")
     assert answer.status_code == 409
-    assert "upload the record" in answer.json()["hint"]
+    assert "upload the flight record" in answer.json()["hint"]

@@ -67,7 +67,7 @@ def test_nothing_is_better_before_a_gain_set_was_flown_twice_under_an_autopilot_
     found = said["comparison"]
     assert (found["verdict"], found["confidence"], found["standard_error"]) == ("not known yet", None, None)
     assert (said["sigma"], said["shrunk_error"], campaign["best"]["standard_error"]) == (None, None, None)
-    assert found["sentence"].endswith("fly one of the gain sets again.")
+    assert found["sentence"].endswith("Fly one of the gain sets again.")
     assert campaign["verdict"] == "not known yet"
     last = get(client, f"/api/trials/{trials[-1]['id']}")
     assert {each["verdict"] for each in last["comparisons"]} == {"not known yet"}
@@ -76,7 +76,7 @@ def test_nothing_is_better_before_a_gain_set_was_flown_twice_under_an_autopilot_
         "not known yet",
         {"not known yet"},
     )
-    assert "fly one of the gain sets again" in compared["sentence"]
+    assert "Fly one of the gain sets again" in compared["sentence"]
     report = client.get(f"/api/campaigns/{campaign['id']}/report.html").text
     assert "Not known yet" in report
     assert "no gain set has been flown twice" in report

@@ -125,7 +125,7 @@ def test_one_that_the_flights_overtake_is_withdrawn_and_asked_for_anew_once_its_
     assert "being computed" in card_of(client, campaign_id)["reason"]
     assert waiting_jobs(client) == []
     classify(client, campaign_id, "valid")
-    assert "by itself" in card_of(client, campaign_id)["reason"]
+    assert "automatically" in card_of(client, campaign_id)["reason"]
     assert len(waiting_jobs(client)) == 1
     assert run_landscapes(database) == 1
     assert card_of(client, campaign_id)["state"] == "ready"

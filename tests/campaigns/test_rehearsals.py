@@ -83,7 +83,7 @@ def test_a_real_vehicle_is_staged_only_after_three_flights_on_its_simulation(
     refused = client.post(f"/api/trials/{planned['id']}/stage")
     assert refused.status_code == 409
     assert "has not passed its rehearsal: it has not been flown on a simulation" in refused.json()["detail"]
-    assert "Rehearse it on its simulation first: 3 valid flights" in refused.json()["hint"]
+    assert "Rehearse it on its simulation first: fly 3 valid flights" in refused.json()["hint"]
 
     rehearsal = rehearse(client, campaign)
     assert (rehearsal["vehicle"]["kind"], rehearsal["rehearses"], rehearsal["name"]) == (

@@ -165,7 +165,7 @@ def test_exactly_one_of_proposal_gains_and_variant_is_taken(client: TestClient, 
     path = f"/api/campaigns/{campaign['id']}/trials"
     for body in ({}, {"variant": "repeat", "gains": DEFAULT}):
         answer = client.post(path, json=body)
-        assert "exactly one of the three" in problems_of(answer)["proposal_id"]
+        assert "exactly one of them is required" in problems_of(answer)["proposal_id"]
 
 
 def test_half_of_no_step_is_refused(client: TestClient, database: Database) -> None:

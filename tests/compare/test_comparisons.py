@@ -230,7 +230,7 @@ def test_what_cannot_be_compared_is_named_by_its_place(client: TestClient, datab
         assert said.keys() == {"trial.1", "trial.2", "trial.3"}
         assert "has not flown: it is planned" in said["trial.1"]
         assert "there is no trial 999" in said["trial.2"]
-        assert "named twice" in said["trial.3"]
+        assert "listed twice" in said["trial.3"]
     assert "at least 2 items" in refusal(client, [flown])["trial"]
     assert "at most 20 items" in refusal(client, range(1, 22))["trial"]
 

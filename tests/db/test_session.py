@@ -93,7 +93,7 @@ def test_a_full_disk_is_said_in_words_and_loses_nothing(database: Database, list
     with database.write() as session:
         session.add(JobRow(kind="before", state=JobState.QUEUED))
     fill_up(database, listen)
-    with pytest.raises(StorageError, match=r"is full; nothing.*Free some space"), database.write() as session:
+    with pytest.raises(StorageError, match=r"is full; nothing.*Free some disk space"), database.write() as session:
         session.add(JobRow(kind="too much", state=JobState.QUEUED, worker="x" * 100_000))
     with database.read() as session:
         assert [row.kind for row in session.query(JobRow)] == ["before"]

@@ -61,7 +61,7 @@ def test_a_wild_flight_is_marked_and_does_not_flatten_the_others() -> None:
     card = card_of(ComparisonFigure(compared(climb(0.2), climb(0.3), climb(0.25), climb(40.0))))
     assert layout(card)["yaxis"]["range"][1] < 5.0
     assert trace(card, "off scale", trial=13)["text"] == ["D ↑ 43.0"]
-    assert "1 off the scale" in card.summary
+    assert "1 off scale" in card.summary
 
 
 def test_what_a_campaign_is_called_is_drawn_as_it_is_written() -> None:

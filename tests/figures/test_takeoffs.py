@@ -100,7 +100,7 @@ def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others()
     assert low == pytest.approx(-0.2, abs=0.1)
     assert 3.2 < high < 4.0
     assert trace(card, "off scale", trial=2)["text"] == ["2 ↑ 12.0"]
-    assert "1 off the scale" in card.summary
+    assert "1 off scale" in card.summary
 
 
 def test_the_table_gives_the_same_curves_in_numbers() -> None:

@@ -135,7 +135,7 @@ def test_nothing_is_asked_beside_a_flight_and_no_flight_beside_an_act(client: Te
     assert client.post(f"/api/trials/{trial['id']}/stage").status_code == 202
     beside = client.post(f"/api/vehicles/{vehicle['id']}/check")
     assert (beside.status_code, beside.json()["title"]) == (409, "Vehicle busy")
-    assert "has a flight already" in beside.json()["detail"]
+    assert "already has a flight" in beside.json()["detail"]
 
 
 def test_what_nobody_begins_in_time_is_given_up(client: TestClient, database: Database) -> None:

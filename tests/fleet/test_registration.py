@@ -1,4 +1,4 @@
-"""Vehicles registered one by one: their settings, their safe gains, and what of them may change when."""
+"""Vehicles each vehicle of this kind is registered: their settings, their safe gains, and what of them may change when."""
 
 from fastapi.testclient import TestClient
 
@@ -123,7 +123,7 @@ def test_a_name_belongs_to_one_vehicle(client: TestClient) -> None:
 def test_a_campaign_names_the_registered_vehicle_that_flies_it(client: TestClient, database: Database) -> None:
     missing = client.post("/api/campaigns", json={"name": "A", "vehicle": {"kind": "mavlink"}})
     assert missing.status_code == 422
-    assert "registered one by one" in problems_of(missing)["vehicle.id"]
+    assert "each vehicle of this kind is registered" in problems_of(missing)["vehicle.id"]
     assert "POST /api/vehicles" in missing.json()["hint"]
     one, two = register(client, "One"), register(client, "Two", real=True)
     campaign = create_campaign_on(client, database, two)
@@ -181,7 +181,7 @@ def test_a_simulated_vehicle_never_becomes_a_real_one(client: TestClient) -> Non
     path = f"/api/vehicles/{vehicle['id']}"
     refused = client.patch(path, json={"version": 1, "options": {"simulated": False}})
     assert (refused.status_code, set(problems_of(refused))) == (422, {"options"})
-    assert "a vehicle of its own" in refused.json()["hint"]
+    assert "Register the other vehicle separately" in refused.json()["hint"]
 
 
 def test_an_edit_of_an_outdated_version_is_a_conflict(client: TestClient) -> None:

@@ -198,7 +198,7 @@ def test_an_outcome_that_the_database_refuses_costs_the_flight_but_blocks_nothin
     lost = get(client, f"/api/trials/{trial_id}")
     assert (lost["state"], lost["flight"]["state"]) == ("lost", "lost")
     (kept,) = (settings.data_dir / "spool").iterdir()
-    assert f"kept as {kept}" in lost["reason"]
+    assert f"saved as {kept}" in lost["reason"]
     assert kept.suffix == ".unusable"
     assert vehicle_state(client) == "ready"
     assert field.abort_registry.trial_ids() == []

@@ -368,7 +368,7 @@ def test_the_telemetry_log_of_a_flight_is_handed_out(
 ) -> None:
     path = f"/api/trials/{staged['id']}/tlog"
     missing = client.get(path)
-    assert (missing.status_code, "leave one" in missing.json()["hint"]) == (404, True)
+    assert (missing.status_code, "vehicles with a link" in missing.json()["hint"]) == (404, True)
     file = telemetry_log(settings.data_dir, staged["flight"]["id"])
     file.parent.mkdir()
     file.write_bytes(b"\x00\x01frames")

@@ -280,7 +280,7 @@ def test_an_order_is_carried_out_at_once_and_ends_the_act_under_way(
     process = started(rig, line, tmp_path)
     ordered_s, told = order_when(rig, line, while_it_hears, MOTORS_OFF), len(stops_told_s(rig))
     answered = process._act(VehicleRequest(kind=kind, safe_gains=SAFE))
-    assert "interrupted: motors off was ordered (people below)" in answered.problem
+    assert "interrupted: motors off was commanded (people below)" in answered.problem
     assert line.said[-1] == CommandForwarded(7, "motors off", "people below")
     assert stops_told_s(rig)[told] - ordered_s[0] < 0.5
 
@@ -328,7 +328,7 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
     answers = [said for said in line.said if isinstance(said, CommandForwarded)]
     assert [(said.order, said.problem) for said in answers] == [("land", ""), ("motors off", "")]
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
-    assert ("interrupted: land was ordered (it drifts)" in failure.what, failure.unsafe) == (True, False)
+    assert ("interrupted: land was commanded (it drifts)" in failure.what, failure.unsafe) == (True, False)
     assert SafeGainsRestored(dict(SAFE)) in line.said
     assert not any(isinstance(said, GainsStaged) for said in line.said)
     assert line.receive() == CancelFlight(9, "of another flight")
@@ -344,7 +344,7 @@ def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_groun
     line.on_staged = partial(order_when, rig, line, "PARAM_REQUEST_READ", LAND)
     process._fly(flight_of(rig, tmp_path))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
-    assert ("land was ordered" in failure.what, failure.not_flown, failure.unsafe) == (True, True, False)
+    assert ("land was commanded" in failure.what, failure.not_flown, failure.unsafe) == (True, True, False)
     assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
     assert process._vehicle.read_gains() == SAFE
 

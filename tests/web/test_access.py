@@ -255,7 +255,7 @@ def test_a_server_that_others_reach_has_no_links_whoever_asks(
         edit = {"version": vehicle["version"], "options": options}
         assert exposed.patch(f"/api/vehicles/{vehicle['id']}", json=edit).status_code == 403
     refused = exposed.post(f"/api/vehicles/{vehicle['id']}/connect")
-    assert (refused.status_code, "flown over a link" in refused.json()["detail"]) == (403, True)
+    assert (refused.status_code, "connected over a link" in refused.json()["detail"]) == (403, True)
     assert take_control(exposed, vehicle).status_code == 403
     connected = create_connected(client, database, "Connected")
     trial = create_trial(client, create_campaign_on(client, database, connected)["id"])

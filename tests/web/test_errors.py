@@ -215,7 +215,7 @@ def test_a_full_disk_is_503_and_loses_nothing(client: TestClient, database: Data
     refused = [answer for answer in answers if answer.status_code != 201]
     assert refused
     assert {answer.status_code for answer in refused} == {503}
-    assert all(is_problem(answer) and "Free some space" in answer.json()["hint"] for answer in refused)
+    assert all(is_problem(answer) and "Free some disk space" in answer.json()["hint"] for answer in refused)
     kept = get(client, f"{CAMPAIGN}?limit=200")["items"]
     assert len(kept) == 1 + len(answers) - len(refused)
     assert kept[-1]["id"] == campaign["id"]

@@ -47,7 +47,7 @@ def test_the_papers_ki_is_refused_with_the_case_that_wraps_and_the_largest_that_
     campaign = create_ready_campaign(client, database, definition=OPEN)
     answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": PAPERS})
     assert answer.status_code == 422
-    wrapping = [problem for problem in answer.json()["problems"] if "wrap" in problem["reason"]]
+    wrapping = [problem for problem in answer.json()["problems"] if "overflow" in problem["reason"]]
     assert [(problem["field"], problem["offer"]) for problem in wrapping] == [("gains.ki", {"ki": 1073})]
     assert "Simulated stuck on the ground, 5.25 s after the start" in wrapping[0]["reason"]
     assert "ki = 1073" in answer.json()["hint"]

@@ -33,7 +33,7 @@ def test_gains_flown_again_on_purpose_are_not_held_against_the_best(client: Test
         again = create_trial(client, campaign["id"], gains=first["gains"])
         upload(client, again["id"], create_csv(settling_s))
     second, third = (get(client, f"/api/trials/{number}") for number in (2, 3))
-    assert second["verdict"] == f"{second['error']:.3f} m with the gains of flight 1 once more."
+    assert second["verdict"] == f"{second['error']:.3f} m with the gains of flight 1 again."
     assert third["verdict"] == f"{third['error']:.3f} m with the gains of flights 1, 2 again."
 
 

@@ -127,7 +127,7 @@ def test_thrust_without_feedback_is_lost_to_the_sky() -> None:
     answers = checks((0, 0, 0), around(0.6), ceiling_m=100.0)
     assert refused(answers) == ["altitude", "divergence", "abort altitude"]
     assert answers["altitude"].worst == pytest.approx(LOST_M, abs=0.2)
-    assert "moves away" in answers["divergence"].sentence
+    assert "diverges" in answers["divergence"].sentence
 
 
 @compiled_only

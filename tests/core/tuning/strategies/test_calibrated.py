@@ -99,7 +99,7 @@ def test_once_the_models_optimum_is_flown_nothing_better_is_offered() -> None:
         assert len(flights) < 6
     best = min(flights, key=lambda flight: flight.error or np.inf)
     assert proposal.gains == best.gains
-    assert "nothing" in proposal.explanation.summary
+    assert "no allowed gains that are better" in proposal.explanation.summary
 
 
 @compiled_only

@@ -101,7 +101,7 @@ def test_at_the_optimum_nothing_better_is_offered() -> None:
     assert proposal.kind == "none"
     assert proposal.gains == {"a": 30.0, "b": 40}
     assert proposal.explanation.chosen_length is None
-    assert "nothing better" in proposal.explanation.summary
+    assert "no better gains" in proposal.explanation.summary
 
 
 def test_a_line_that_shrinks_to_its_base_offers_nothing_more() -> None:

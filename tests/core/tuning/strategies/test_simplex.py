@@ -38,7 +38,7 @@ def test_as_a_strategy_it_flies_the_models_optimum_once() -> None:
     second = propose(Definition(), BOWL, QuadraticExperiment.space, flown)
     assert second.kind == "none"
     assert second.gains == flown[1].gains
-    assert "nothing more" in second.explanation.summary
+    assert "proposes nothing else" in second.explanation.summary
 
 
 def test_a_step_limit_lets_it_approach_the_optimum_flight_by_flight() -> None:
