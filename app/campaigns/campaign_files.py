@@ -194,8 +194,8 @@ def override(
     """The file with the values given on the command line in place of its own.
 
     Another vehicle or strategy starts from its default options; `vehicle` may include an address, as in
-    mavlink:udp:127.0.0.1:4245. Each of `gains` is a set to fly with the strategy manual. Raises InputError that names what cannot
-    be used.
+    mavlink:udp:127.0.0.1:4245. Each of `gains` is a set to fly with the strategy manual. Raises InputError that
+    names what cannot be used.
     """
     chosen: dict[SettingPath, object] = {}
     if vehicle is not None:

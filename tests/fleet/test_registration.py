@@ -1,4 +1,4 @@
-"""Vehicles each vehicle of this kind is registered: their settings, their safe gains, and what of them may change when."""
+"""Vehicles registered one by one: their settings, their safe gains, and what of them may change when."""
 
 from fastapi.testclient import TestClient
 
