@@ -17,8 +17,8 @@ from app.core.tuning.strategy import Proposal
 class CampaignHistory:
     """All that a proposal is computed from. `digest` changes as soon as any of it does.
 
-    `donor` is the flight that a warm start begins from; the definition holds the checksum of its record. `battery_v` is
-    the battery voltage, V, at the end of the last flight, including one that does not count.
+    `donor` is the flight that a warm start uses; the definition holds the checksum of its record. `battery_v`
+    is the battery voltage, V, at the end of the last flight, including one that does not count.
     """
 
     campaign_id: int

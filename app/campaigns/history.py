@@ -67,7 +67,7 @@ def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
 
 
 def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight | None:
-    """The flight that a warm start begins from; None when its record does not match the checksum.
+    """The flight that a warm start uses; None when its record does not match the checksum.
 
     Valid and scored from its record, whatever its present class, because the computed start may depend on the record
     alone.

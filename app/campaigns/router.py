@@ -79,7 +79,7 @@ def edit_campaign(session: Writer, campaign_id: Id, body: CampaignEdit) -> Campa
 def delete_campaign(
     session: Writer, campaign_id: Id, version: Annotated[int, Query(ge=1, description="version as last read")]
 ) -> None:
-    """Delete a campaign in which no flight was begun."""
+    """Delete a campaign in which no flight was started."""
     service.delete_campaign(session, campaign_id, version)
 
 

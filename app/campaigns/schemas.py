@@ -21,7 +21,7 @@ VERDICT: Final = (
 
 
 class Sort(StrEnum):
-    """Orders of the list of campaigns; `error` begins with the lowest best error."""
+    """Orders of the list of campaigns; `error` starts with the lowest best error."""
 
     NEWEST = "-created"
     OLDEST = "created"
@@ -31,7 +31,7 @@ class Sort(StrEnum):
 
 
 class Donor(Request):
-    """The flight of another campaign that a warm start begins from, with the checksum of its record. Without a trial
+    """The flight of another campaign that a warm start uses, with the checksum of its record. Without a trial
     number it is the best valid one; the checksum is filled in."""
 
     campaign_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)]
@@ -40,7 +40,7 @@ class Donor(Request):
 
 
 class Start(Request):
-    """Where the first flight's gains come from. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
+    """Source of the first flight's gains. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
     gains are filled in."""
 
     kind: Literal["default", "simplex", "given", "campaign"] = "default"
@@ -343,7 +343,7 @@ class TrackRecord(BaseModel):
 
 
 class CampaignStatistics(BaseModel):
-    """What the flights say about the gains, with confidence. `sigma` is the flight-to-flight scatter, pooled over all
+    """Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all
     repeats and the experiment's prior; null while unknown, that is before the first repeat under an autopilot whose
     scatter was never measured. `optimism` is how much the best is expected to look better than it is because it was
     chosen, and `shrunk_error` its error corrected for that."""

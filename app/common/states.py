@@ -68,7 +68,7 @@ class VehicleState(StrEnum):
                   └───────────┴── released by a person ──────┘
 
     Quarantined: something could not be verified, for instance that the safe gains are restored. The vehicle is grounded
-    until a person has looked at it and releases it.
+    until a person has inspected it and releases it.
     """
 
     DISCONNECTED = "disconnected"
@@ -107,7 +107,7 @@ and `release`. Disconnecting a vehicle that is not connected stops reconnecting 
 
 
 class ActKind(StrEnum):
-    """Kinds of acts: requests to a registered vehicle and decisions about it, beside its flights."""
+    """Kinds of acts: requests to a registered vehicle and decisions about it, outside its flights."""
 
     CONNECT = "connect"
     DISCONNECT = "disconnect"

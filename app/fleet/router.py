@@ -87,7 +87,7 @@ def read_parameters(act: IdempotentPost, asking: RequestContextDep, vehicle_id: 
 
 @router.get("/{vehicle_id}/acts")
 def list_acts(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[VehicleAct]:
-    """Acts of the vehicle, newest first: requests beside its flights."""
+    """Acts of the vehicle, newest first: requests outside its flights."""
     return views.acts_view(session, vehicle_id, limit=limit, cursor=cursor)
 
 
@@ -131,7 +131,7 @@ async def _order(
 
 @router.post("/{vehicle_id}/release")
 def release_vehicle(act: IdempotentPost, asking: RequestContextDep, vehicle_id: Id, body: Release) -> Vehicle:
-    """Release a vehicle from quarantine, on the statement of a person who has looked at it. A vehicle with a link is
+    """Release a vehicle from quarantine, on the statement of a person who has inspected it. A vehicle with a link is
     released once the worker has verified that it is disarmed and holds its safe gains; the act reports the outcome."""
     return act(Vehicle, lambda session: commands.release_vehicle(session, vehicle_id, body.statement, asking))
 

@@ -39,8 +39,8 @@ class CampaignVehicle(BaseModel):
 
 
 class NewVehicle(Request):
-    """A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real vehicle a
-    person has to confirm them (`safe_gains_confirmed`) and say so in `statement`."""
+    """A vehicle to register. Without `safe_gains` it has the experiment's default gains. For a real vehicle a person
+    must confirm them (`safe_gains_confirmed`) and state it in `statement`."""
 
     name: Name
     kind: Annotated[str, Field(max_length=40, examples=["mavlink"])]
@@ -135,8 +135,8 @@ class Vehicle(BaseModel):
 
 
 class VehicleAct(BaseModel):
-    """A request to a vehicle beside its flights: by whom and why, and its outcome. `result` holds the items of a check,
-    or all parameters of the vehicle for `parameters`."""
+    """A request to a vehicle outside its flights: its operator, reason and outcome. `result` holds the items of a
+    check, or all parameters of the vehicle for `parameters`."""
 
     id: int
     vehicle_id: int
@@ -170,7 +170,7 @@ class GivenGains(BaseModel):
 
 
 class Release(Request):
-    """Statement of who has looked at the vehicle and what they found."""
+    """Statement of the person who inspected the vehicle, and of their findings."""
 
     statement: Reason
 
@@ -182,7 +182,7 @@ class VehicleOrder(Request):
 
 
 class OrderAnswer(BaseModel):
-    """`accepted` is true once the process that has the vehicle's link has forwarded the command; the effect is seen in
+    """`accepted` is true once the process that has the vehicle's link has forwarded the command; the effect appears in
     the vehicle's status. When it is false, `sentence` says why, and the command is not carried out later."""
 
     accepted: bool
