@@ -121,12 +121,12 @@ def read_tlog(stream: BinaryIO) -> FlightLog:
         if frame.message == dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
             if frame.system == system and _is_whole(dialect, data, frame, extra):
                 conversation.position(_payload(data, frame, _POSITION.size), frame.stamp_s(data))
-        elif frame.message in conversation.heard:
+        elif frame.message in conversation.handlers:
             try:
                 message: _Message = decoder.decode(bytearray(data[frame.start : frame.end]))
             except dialect.MAVError:
                 continue
-            conversation.heard[frame.message](message)
+            conversation.handlers[frame.message](message)
     return conversation.log()
 
 
@@ -234,7 +234,7 @@ class _Telemetry:
         }
         dialect = self.autopilot.dialect
         numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in by_name}
-        self.heard = {number: by_name[name] for name, number in numbers.items() if number is not None}
+        self.handlers = {number: by_name[name] for name, number in numbers.items() if number is not None}
 
     def position(self, payload: bytes, stamp_s: float) -> None:
         boot_ms, _, _, down_m, _, _, down_m_s = _POSITION.unpack(payload)

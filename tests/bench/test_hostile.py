@@ -86,9 +86,7 @@ UP = tuple(replace(each, height_m=3.0, armed=True) if each.time_s >= 10.0 else e
 DOWN = tuple(replace(each, height_m=0.0, armed=False) if each.time_s > 48.0 else each for each in UP)
 WHOLE = Trajectory(np.arange(0.0, 33.5, 0.5), {"altitude_m": np.full(67, 3.0)}, "mavlink", "vehicle")
 SAFE_AND_SOUND = ReportedOutcome("completed", "safe", "", record=WHOLE)
-QUARANTINED = ReportedOutcome(
-    "invalid", "quarantined", "A pilot took over manual control.", "It flies.", "It flies."
-)
+QUARANTINED = ReportedOutcome("invalid", "quarantined", "A pilot took over manual control.", "It flies.", "It flies.")
 LANDED_ON = tuple((at_s, Order.LAND) for at_s in np.arange(45.0, 70.0, 6.0))
 
 

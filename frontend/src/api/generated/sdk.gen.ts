@@ -88,7 +88,7 @@ export const createCampaign = <ThrowOnError extends boolean = false>(options: Op
 /**
  * Delete Campaign
  *
- * Delete a campaign in which no flight was begun.
+ * Delete a campaign in which no flight was started.
  */
 export const deleteCampaign = <ThrowOnError extends boolean = false>(options: Options<DeleteCampaignData, ThrowOnError>): RequestResult<DeleteCampaignResponses, DeleteCampaignErrors, ThrowOnError> => (options.client ?? client).delete<DeleteCampaignResponses, DeleteCampaignErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}', ...options });
 
@@ -471,7 +471,7 @@ export const readParameters = <ThrowOnError extends boolean = false>(options: Op
 /**
  * List Acts
  *
- * Acts of the vehicle, newest first: requests beside its flights.
+ * Acts of the vehicle, newest first: requests outside its flights.
  */
 export const listActs = <ThrowOnError extends boolean = false>(options: Options<ListActsData, ThrowOnError>): RequestResult<ListActsResponses, ListActsErrors, ThrowOnError> => (options.client ?? client).get<ListActsResponses, ListActsErrors, ThrowOnError>({ url: '/api/vehicles/{vehicle_id}/acts', ...options });
 
@@ -514,7 +514,7 @@ export const stopMotors = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Release Vehicle
  *
- * Release a vehicle from quarantine, on the statement of a person who has looked at it. A vehicle with a link is
+ * Release a vehicle from quarantine, on the statement of a person who has inspected it. A vehicle with a link is
  * released once the worker has verified that it is disarmed and holds its safe gains; the act reports the outcome.
  */
 export const releaseVehicle = <ThrowOnError extends boolean = false>(options: Options<ReleaseVehicleData, ThrowOnError>): RequestResult<ReleaseVehicleResponses, ReleaseVehicleErrors, ThrowOnError> => (options.client ?? client).post<ReleaseVehicleResponses, ReleaseVehicleErrors, ThrowOnError>({

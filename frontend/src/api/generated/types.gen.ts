@@ -7,7 +7,7 @@ export type ClientOptions = {
 /**
  * Abort
  *
- * Why the flight is to be aborted.
+ * Reason for aborting the flight.
  */
 export type Abort = {
     /**
@@ -46,7 +46,7 @@ export type AbortJudgement = {
     /**
      * Version
      *
-     * the version that was edited, as last read
+     * the version on which the edit is based, as last read
      */
     version: number;
     /**
@@ -58,9 +58,9 @@ export type AbortJudgement = {
 /**
  * Access
  *
- * What the client may do: `may_change` campaigns and simulated flights, `may_link` vehicles that are flown over a
- * link, `may_command` real ones. `elsewhere`: the client is not on this computer. `hint` says how to unlock a browser;
- * empty where a link would change nothing.
+ * What the client may do: `may_change` campaigns and simulated flights, `may_link` vehicles with a link,
+ * `may_command` real ones. `elsewhere`: the client is not on this computer. `hint` describes how to unlock a browser;
+ * empty if a link would change nothing.
  */
 export type Access = {
     /**
@@ -88,7 +88,7 @@ export type Access = {
 /**
  * ActKind
  *
- * Kinds of acts: requests to a registered vehicle and decisions about it, beside its flights.
+ * Kinds of acts: requests to a registered vehicle and decisions about it, outside its flights.
  */
 export type ActKind = 'connect' | 'disconnect' | 'check' | 'restore' | 'parameters' | 'release' | 'land' | 'motors off' | 'safe gains' | 'control';
 
@@ -220,14 +220,14 @@ export type Campaign = {
     /**
      * Rehearses
      *
-     * the campaign that this one is the rehearsal of
+     * the campaign that this one rehearses
      */
     rehearses: number | null;
     best: BestTrial | null;
     /**
      * Verdict
      *
-     * the best gains against the first flight's; null while they are the same, or nothing has flown
+     * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
      */
     verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     trials: TrialCounts;
@@ -239,7 +239,7 @@ export type Campaign = {
     /**
      * Actions
      *
-     * what may be done with it now: plan, define, finish, archive, …
+     * allowed actions: plan, define, finish, archive, …
      */
     actions: Array<string>;
     /**
@@ -262,7 +262,7 @@ export type CampaignEdit = {
     /**
      * Version
      *
-     * the version that was edited, as last read
+     * the version on which the edit is based, as last read
      */
     version: number;
     /**
@@ -289,7 +289,7 @@ export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finishe
 /**
  * CampaignStatistics
  *
- * What the flights say about the gains, with confidence. `sigma` is the flight-to-flight scatter, pooled over all
+ * Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all
  * repeats and the experiment's prior; null while unknown, that is before the first repeat under an autopilot whose
  * scatter was never measured. `optimism` is how much the best is expected to look better than it is because it was
  * chosen, and `shrunk_error` its error corrected for that.
@@ -373,7 +373,7 @@ export type CampaignSummary = {
     /**
      * Verdict
      *
-     * the best gains against the first flight's; null while they are the same, or nothing has flown
+     * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
      */
     verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
     /**
@@ -433,7 +433,7 @@ export type CampaignVehicle = {
     /**
      * Needs Staging
      *
-     * true when a flight is staged first, and taken off by a person
+     * true if a flight is staged first and its operator starts the take-off
      */
     needs_staging: boolean;
     state: VehicleState;
@@ -557,7 +557,7 @@ export type CheckedSignal = {
     /**
      * Allowance
      *
-     * what the tolerance means, in words
+     * description of the tolerance
      */
     allowance: string;
     /**
@@ -567,7 +567,7 @@ export type CheckedSignal = {
     /**
      * Different
      *
-     * how many samples differ by more than is allowed
+     * number of samples that differ by more than the tolerance
      */
     different: number;
     /**
@@ -585,7 +585,7 @@ export type Classification = {
     /**
      * Version
      *
-     * the version that was edited, as last read
+     * the version on which the edit is based, as last read
      */
     version: number;
     /**
@@ -768,13 +768,13 @@ export type ControllerCheck = {
     /**
      * Rows
      *
-     * how many samples or steps were compared
+     * number of samples or steps compared
      */
     rows: number;
     /**
      * Gains
      *
-     * null where they change within the recording
+     * null if they change within the recording
      */
     gains: {
         [key: string]: number | number;
@@ -786,7 +786,7 @@ export type ControllerCheck = {
     /**
      * Better Gains
      *
-     * other gains that more of the commands follow from
+     * other gains that reproduce more of the commands
      */
     better_gains: {
         [key: string]: number | number;
@@ -955,7 +955,7 @@ export type DefinitionOutput = {
 /**
  * Donor
  *
- * The flight of another campaign that a warm start begins from, with the checksum of its record. Without a trial
+ * The flight of another campaign that a warm start uses, with the checksum of its record. Without a trial
  * number it is the best valid one; the checksum is filled in.
  */
 export type DonorInput = {
@@ -976,7 +976,7 @@ export type DonorInput = {
 /**
  * Donor
  *
- * The flight of another campaign that a warm start begins from, with the checksum of its record. Without a trial
+ * The flight of another campaign that a warm start uses, with the checksum of its record. Without a trial
  * number it is the best valid one; the checksum is filled in.
  */
 export type DonorOutput = {
@@ -1330,13 +1330,13 @@ export type FlightBrief = {
     /**
      * Take Off At
      *
-     * when the take-off was asked for
+     * time of the take-off request
      */
     take_off_at: string | null;
     /**
      * Standing Down
      *
-     * why a staged flight does not take place; empty while it may
+     * why a staged flight was cancelled; empty otherwise
      */
     standing_down: string;
     /**
@@ -1346,7 +1346,7 @@ export type FlightBrief = {
     /**
      * Battery
      *
-     * label of the battery that was in; empty when nobody said
+     * label of the battery used; empty if not given
      */
     battery: string;
     /**
@@ -1403,7 +1403,7 @@ export type FlightComparison = {
     /**
      * File Stem
      *
-     * for the names of files made of this comparison
+     * stem of the names of files exported from this comparison
      */
     file_stem: string;
 };
@@ -1467,7 +1467,7 @@ export type FlightPair = {
     /**
      * Basis
      *
-     * what the difference is of: other `gains` on one vehicle; `repeats` of the same gains; flights that are `apart`, for their vehicles or experiments differ; or there is none, because one of them has `no error`
+     * kind of comparison: different `gains` on one vehicle; `repeats` of the same gains; flights that are `apart`, because their vehicles or experiments differ; or none, because one of them has `no error`
      */
     basis: 'gains' | 'repeats' | 'apart' | 'no error';
     /**
@@ -1780,13 +1780,13 @@ export type Identity = {
     /**
      * Version
      *
-     * empty where the autopilot does not tell
+     * empty if the autopilot does not report it
      */
     version: string;
     /**
      * Uid
      *
-     * hardware id in hexadecimal digits; empty where it is not told
+     * hardware id in hexadecimal digits; empty if it is not reported
      */
     uid?: string;
 };
@@ -1828,7 +1828,7 @@ export type Job = {
     /**
      * Name
      *
-     * what exactly, for the kinds that have a choice; empty otherwise
+     * variant, for the kinds that have several; empty otherwise
      */
     name: string;
     state: JobState;
@@ -1840,19 +1840,19 @@ export type Job = {
     /**
      * Done Share
      *
-     * 0 … 1 while it runs, where the kind can tell
+     * 0 … 1 while it runs, if the kind reports progress
      */
     done_share: number | null;
     /**
      * Doing
      *
-     * what it is at
+     * current step
      */
     doing: string;
     /**
      * Remaining S
      *
-     * seconds that it will still take, at the pace so far
+     * estimated remaining seconds
      */
     remaining_s: number | null;
     /**
@@ -1874,7 +1874,7 @@ export type Job = {
     /**
      * Actions
      *
-     * what may be done with it now: cancel, retry
+     * allowed actions: cancel, retry
      */
     actions: Array<string>;
 };
@@ -2084,7 +2084,7 @@ export type NewTrial = {
     /**
      * Overrule
      *
-     * why gains that the gate refuses shall fly all the same; simulated vehicles only
+     * reason to fly gains that the gate refuses; simulated vehicles only
      */
     overrule?: string | null;
     /**
@@ -2097,8 +2097,8 @@ export type NewTrial = {
 /**
  * NewVehicle
  *
- * A vehicle to be registered. Without `safe_gains` it has the experiment's default gains. For a real vehicle a
- * person has to confirm them (`safe_gains_confirmed`) and say so in `statement`.
+ * A vehicle to register. Without `safe_gains` it has the experiment's default gains. For a real vehicle a person
+ * must confirm them (`safe_gains_confirmed`) and state it in `statement`.
  */
 export type NewVehicle = {
     /**
@@ -2185,7 +2185,7 @@ export type OptionInfo = {
 /**
  * OrderAnswer
  *
- * `accepted` is true once the process that has the vehicle's link has forwarded the command; the effect is seen in
+ * `accepted` is true once the process that has the vehicle's link has forwarded the command; the effect appears in
  * the vehicle's status. When it is false, `sentence` says why, and the command is not carried out later.
  */
 export type OrderAnswer = {
@@ -2380,7 +2380,7 @@ export type Promotion = {
     /**
      * Version
      *
-     * the version that was edited, as last read
+     * the version on which the edit is based, as last read
      */
     version: number;
     /**
@@ -2487,7 +2487,7 @@ export type RecordBrief = {
     /**
      * Checksum
      *
-     * SHA-256 of the stored samples; docs/api.md says how to verify it
+     * SHA-256 of the stored samples; see docs/api.md for its verification
      */
     checksum: string;
 };
@@ -2516,7 +2516,7 @@ export type Rehearsal = {
 /**
  * Release
  *
- * Statement of who has looked at the vehicle and what they found.
+ * Statement of the person who inspected the vehicle, and of their findings.
  */
 export type Release = {
     /**
@@ -2552,7 +2552,7 @@ export type RepeatGroup = {
     /**
      * Standard Error
      *
-     * from the pooled scatter; null while that is not known
+     * from the pooled scatter; null while that is unknown
      */
     standard_error: number | null;
     /**
@@ -2590,7 +2590,7 @@ export type Reproduction = {
     /**
      * Long Form
      *
-     * what the long form does; empty where there is none
+     * contents of the long version; empty if there is none
      */
     long_form: string;
     /**
@@ -2717,7 +2717,7 @@ export type ReproductionSummary = {
     /**
      * Long Form
      *
-     * what the long form does; empty where there is none
+     * contents of the long version; empty if there is none
      */
     long_form: string;
     /**
@@ -2761,7 +2761,7 @@ export type Run = {
     /**
      * Full
      *
-     * the long form, where there is one
+     * the long version, if there is one
      */
     full?: boolean;
 };
@@ -2769,7 +2769,7 @@ export type Run = {
 /**
  * Sort
  *
- * Orders of the list of campaigns; `error` begins with the lowest best error.
+ * Orders of the list of campaigns; `error` starts with the lowest best error.
  */
 export type Sort = '-created' | 'created' | '-updated' | 'name' | 'error';
 
@@ -2800,7 +2800,7 @@ export type SparkCurve = {
 /**
  * Start
  *
- * Where the first flight's gains come from. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
+ * Source of the first flight's gains. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
  * gains are filled in.
  */
 export type StartInput = {
@@ -2820,7 +2820,7 @@ export type StartInput = {
 /**
  * Start
  *
- * Where the first flight's gains come from. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
+ * Source of the first flight's gains. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
  * gains are filled in.
  */
 export type StartOutput = {
@@ -2841,7 +2841,7 @@ export type StartOutput = {
  * StopRule
  *
  * `paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
- * the budget. `noise`: ends when no remaining difference can be told from noise with `confidence`, after the winner
+ * the budget. `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner
  * was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
  * kind a flight that ends below `min_battery_v` ends it.
  */
@@ -2872,7 +2872,7 @@ export type StopRuleInput = {
  * StopRule
  *
  * `paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
- * the budget. `noise`: ends when no remaining difference can be told from noise with `confidence`, after the winner
+ * the budget. `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner
  * was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
  * kind a flight that ends below `min_battery_v` ends it.
  */
@@ -2920,7 +2920,7 @@ export type StopVerdict = {
     /**
      * Threshold
      *
-     * error that the next flight has to beat to count as better
+     * error below which the next flight counts as better
      */
     threshold: number | null;
 };
@@ -3180,7 +3180,7 @@ export type Trial = {
     /**
      * Inside Interval
      *
-     * whether a valid flight's error lay where it was expected
+     * whether a valid flight's error was inside the predicted interval
      */
     inside_interval: boolean | null;
     /**
@@ -3198,19 +3198,19 @@ export type Trial = {
     /**
      * Verdict
      *
-     * the flight against the best before it and against its prediction
+     * comparison of the flight with the best before it and with its prediction
      */
     verdict: string;
     /**
      * Reason
      *
-     * why it has the state that it has, where somebody or something said so
+     * reason for the state; empty if none was given
      */
     reason: string;
     /**
      * Abort Cause
      *
-     * why it was broken off: `limit` and `behaved badly` count against its gains, `operator` (who has not said why) and `something else` do not; null where it was not, and where nobody recorded it
+     * abort cause: `limit` and `behaved badly` count against the gains, `operator` (no reason given) and `something else` do not; null if the flight was not aborted or the cause was not recorded
      */
     abort_cause: 'limit' | 'operator' | 'behaved badly' | 'something else' | null;
     /**
@@ -3221,19 +3221,19 @@ export type Trial = {
     /**
      * Overrule Reason
      *
-     * why the gate's refusal was overruled; empty when it was not
+     * why the gate's refusal was overruled; empty if it was not
      */
     overrule_reason: string;
     /**
      * Glitches
      *
-     * what the record cannot have seen; the record itself stays
+     * implausible parts of the record; the record is not changed
      */
     glitches: Array<Glitch>;
     /**
      * Repaired Error
      *
-     * the error with straight lines over the glitches; null without any
+     * error with the glitches replaced by straight lines; null without glitches
      */
     repaired_error: number | null;
     record: RecordBrief | null;
@@ -3249,7 +3249,7 @@ export type Trial = {
     /**
      * Settings
      *
-     * what the vehicle said of itself after the flight
+     * settings that the vehicle reported after the flight
      */
     settings: {
         [key: string]: boolean | number | number | string;
@@ -3265,7 +3265,7 @@ export type Trial = {
     /**
      * Actions
      *
-     * what may be done with it now: fly, cancel, abort, upload, …
+     * allowed actions: fly, cancel, abort, upload, …
      */
     actions: Array<string>;
 };
@@ -3345,7 +3345,7 @@ export type TrialEdit = {
     /**
      * Version
      *
-     * the version that was edited, as last read
+     * the version on which the edit is based, as last read
      */
     version: number;
     /**
@@ -3463,7 +3463,7 @@ export type Vehicle = {
     /**
      * Experiments
      *
-     * those that it can fly: whose gains it has
+     * experiments that it can fly: those whose gains it has
      */
     experiments: Array<string>;
     /**
@@ -3500,17 +3500,17 @@ export type Vehicle = {
     /**
      * Battery
      *
-     * label of the battery that is in; empty when nobody said
+     * label of the installed battery; empty if not given
      */
     battery: string;
     /**
-     * null while nobody is in control
+     * null while no operator is in control
      */
     control: Control | null;
     /**
      * Actions
      *
-     * what may be done with it now: fly, stage, connect, release, …
+     * allowed actions: fly, stage, connect, release, …
      */
     actions: Array<string>;
 };
@@ -3518,8 +3518,8 @@ export type Vehicle = {
 /**
  * VehicleAct
  *
- * A request to a vehicle beside its flights: by whom and why, and its outcome. `result` holds the items of a check,
- * or all parameters of the vehicle for `parameters`.
+ * A request to a vehicle outside its flights: its operator, reason and outcome. `result` holds the items of a
+ * check, or all parameters of the vehicle for `parameters`.
  */
 export type VehicleAct = {
     /**
@@ -3535,7 +3535,7 @@ export type VehicleAct = {
     /**
      * By
      *
-     * the operator in control; empty when nobody was
+     * the operator in control; empty if there was none
      */
     by: string;
     /**
@@ -3563,7 +3563,7 @@ export type VehicleAct = {
     /**
      * Problem
      *
-     * why it failed; empty when it did not
+     * why it failed; empty if it did not
      */
     problem: string;
     /**
@@ -3671,14 +3671,14 @@ export type VehicleChoiceOutput = {
  * VehicleEdit
  *
  * Changes of a registered vehicle; omitted fields stay as they are. Options can change only while it is
- * disconnected, and the next connection then pins the identity anew; safe gains need a statement of who decided and
+ * disconnected, and the next connection then pins the identity again; safe gains need a statement of who decided and
  * why.
  */
 export type VehicleEdit = {
     /**
      * Version
      *
-     * the version that was edited, as last read
+     * the version on which the edit is based, as last read
      */
     version: number;
     /**
@@ -3751,7 +3751,7 @@ export type VehicleKindInfo = {
 /**
  * VehicleOrder
  *
- * Why the vehicle is to land, or its motors are to stop, now.
+ * Reason for landing the vehicle, or stopping its motors, now.
  */
 export type VehicleOrder = {
     /**
@@ -3770,7 +3770,7 @@ export type VehicleOrder = {
  * └───────────┴── released by a person ──────┘
  *
  * Quarantined: something could not be verified, for instance that the safe gains are restored. The vehicle is grounded
- * until a person has looked at it and releases it.
+ * until a person has inspected it and releases it.
  */
 export type VehicleState = 'disconnected' | 'ready' | 'staged' | 'flying' | 'quarantined';
 
@@ -3852,7 +3852,7 @@ export type GetHealthData = {
 
 export type GetHealthErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -3877,7 +3877,7 @@ export type GetCatalogueData = {
 
 export type GetCatalogueErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -3902,7 +3902,7 @@ export type GetSystemData = {
 
 export type GetSystemErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -3934,7 +3934,7 @@ export type GetAddressCodeData = {
 
 export type GetAddressCodeErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -3959,7 +3959,7 @@ export type GetBackupData = {
 
 export type GetBackupErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -3984,7 +3984,7 @@ export type GetAccessData = {
 
 export type GetAccessErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4024,13 +4024,13 @@ export type ListCampaignsData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
         /**
          * Cursor
          *
-         * `next_cursor` of the page before
+         * `next_cursor` of the previous page
          */
         cursor?: string | null;
     };
@@ -4039,7 +4039,7 @@ export type ListCampaignsData = {
 
 export type ListCampaignsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4061,7 +4061,7 @@ export type CreateCampaignData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4072,7 +4072,7 @@ export type CreateCampaignData = {
 
 export type CreateCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4100,7 +4100,7 @@ export type DeleteCampaignData = {
         /**
          * Version
          *
-         * the version, as last read
+         * version as last read
          */
         version: number;
     };
@@ -4109,7 +4109,7 @@ export type DeleteCampaignData = {
 
 export type DeleteCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4139,7 +4139,7 @@ export type GetCampaignData = {
 
 export type GetCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4169,7 +4169,7 @@ export type EditCampaignData = {
 
 export type EditCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4194,7 +4194,7 @@ export type FinishCampaignData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4210,7 +4210,7 @@ export type FinishCampaignData = {
 
 export type FinishCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4232,7 +4232,7 @@ export type ArchiveCampaignData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4248,7 +4248,7 @@ export type ArchiveCampaignData = {
 
 export type ArchiveCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4273,7 +4273,7 @@ export type CloneCampaignData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4289,7 +4289,7 @@ export type CloneCampaignData = {
 
 export type CloneCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4311,7 +4311,7 @@ export type RehearseCampaignData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4327,7 +4327,7 @@ export type RehearseCampaignData = {
 
 export type RehearseCampaignErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4349,13 +4349,13 @@ export type PromoteBestData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -4371,7 +4371,7 @@ export type PromoteBestData = {
 
 export type PromoteBestErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4401,7 +4401,7 @@ export type GetStatisticsData = {
 
 export type GetStatisticsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4431,7 +4431,7 @@ export type GetProposalData = {
 
 export type GetProposalErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4453,7 +4453,7 @@ export type ComputeProposalData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4469,7 +4469,7 @@ export type ComputeProposalData = {
 
 export type ComputeProposalErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4497,13 +4497,13 @@ export type ListTrialsData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
         /**
          * Cursor
          *
-         * `next_cursor` of the page before
+         * `next_cursor` of the previous page
          */
         cursor?: string | null;
     };
@@ -4512,7 +4512,7 @@ export type ListTrialsData = {
 
 export type ListTrialsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4534,13 +4534,13 @@ export type CreateTrialData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -4556,7 +4556,7 @@ export type CreateTrialData = {
 
 export type CreateTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4586,7 +4586,7 @@ export type GetTrialData = {
 
 export type GetTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4616,7 +4616,7 @@ export type EditTrialData = {
 
 export type EditTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4638,7 +4638,7 @@ export type CancelTrialData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4654,7 +4654,7 @@ export type CancelTrialData = {
 
 export type CancelTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4676,13 +4676,13 @@ export type ClassifyTrialData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -4698,7 +4698,7 @@ export type ClassifyTrialData = {
 
 export type ClassifyTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4720,13 +4720,13 @@ export type JudgeAbortData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -4742,7 +4742,7 @@ export type JudgeAbortData = {
 
 export type JudgeAbortErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4777,7 +4777,7 @@ export type GetTrajectoryData = {
 
 export type GetTrajectoryErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4797,7 +4797,7 @@ export type UploadTrajectoryData = {
     body: {
         file: Blob | File;
         /**
-         * the .log file that Paparazzi writes beside a .data file
+         * the .log file that Paparazzi writes next to a .data file
          */
         companion?: Blob | File;
     };
@@ -4805,13 +4805,13 @@ export type UploadTrajectoryData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -4825,13 +4825,13 @@ export type UploadTrajectoryData = {
         /**
          * Takeoff
          *
-         * which one of a log with several
+         * number of the takeoff in a log with several
          */
         takeoff?: number | null;
         /**
          * Confirm
          *
-         * take a log that was flown with other gains; the trial then has those
+         * accept a log that was flown with other gains; the trial takes the gains in the log
          */
         confirm?: boolean;
     };
@@ -4840,7 +4840,7 @@ export type UploadTrajectoryData = {
 
 export type UploadTrajectoryErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4870,7 +4870,7 @@ export type GetTrajectoryCsvData = {
 
 export type GetTrajectoryCsvErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4900,7 +4900,7 @@ export type GetTelemetryLogData = {
 
 export type GetTelemetryLogErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4930,7 +4930,7 @@ export type ListPhotosData = {
 
 export type ListPhotosErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -4956,7 +4956,7 @@ export type AddPhotoData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -4972,7 +4972,7 @@ export type AddPhotoData = {
 
 export type AddPhotoErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5006,7 +5006,7 @@ export type DeletePhotoData = {
 
 export type DeletePhotoErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5040,7 +5040,7 @@ export type GetPhotoData = {
 
 export type GetPhotoErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5065,13 +5065,13 @@ export type FlyTrialData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5087,7 +5087,7 @@ export type FlyTrialData = {
 
 export type FlyTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5109,13 +5109,13 @@ export type StageTrialData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5131,7 +5131,7 @@ export type StageTrialData = {
 
 export type StageTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5153,7 +5153,7 @@ export type UnstageTrialData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -5169,7 +5169,7 @@ export type UnstageTrialData = {
 
 export type UnstageTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5191,13 +5191,13 @@ export type TakeOffTrialData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5213,7 +5213,7 @@ export type TakeOffTrialData = {
 
 export type TakeOffTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5246,7 +5246,7 @@ export type AbortTrialData = {
 
 export type AbortTrialErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5269,13 +5269,13 @@ export type ListVehiclesData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
         /**
          * Cursor
          *
-         * `next_cursor` of the page before
+         * `next_cursor` of the previous page
          */
         cursor?: string | null;
     };
@@ -5284,7 +5284,7 @@ export type ListVehiclesData = {
 
 export type ListVehiclesErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5306,13 +5306,13 @@ export type RegisterVehicleData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5323,7 +5323,7 @@ export type RegisterVehicleData = {
 
 export type RegisterVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5353,7 +5353,7 @@ export type GetVehicleData = {
 
 export type GetVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5375,7 +5375,7 @@ export type EditVehicleData = {
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5391,7 +5391,7 @@ export type EditVehicleData = {
 
 export type EditVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5413,13 +5413,13 @@ export type ConnectVehicleData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5435,7 +5435,7 @@ export type ConnectVehicleData = {
 
 export type ConnectVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5457,13 +5457,13 @@ export type DisconnectVehicleData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5479,7 +5479,7 @@ export type DisconnectVehicleData = {
 
 export type DisconnectVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5501,13 +5501,13 @@ export type CheckVehicleData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5523,7 +5523,7 @@ export type CheckVehicleData = {
 
 export type CheckVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5545,13 +5545,13 @@ export type RestoreSafeGainsData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5567,7 +5567,7 @@ export type RestoreSafeGainsData = {
 
 export type RestoreSafeGainsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5589,13 +5589,13 @@ export type ReadParametersData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5611,7 +5611,7 @@ export type ReadParametersData = {
 
 export type ReadParametersErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5639,13 +5639,13 @@ export type ListActsData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
         /**
          * Cursor
          *
-         * `next_cursor` of the page before
+         * `next_cursor` of the previous page
          */
         cursor?: string | null;
     };
@@ -5654,7 +5654,7 @@ export type ListActsData = {
 
 export type ListActsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5682,13 +5682,13 @@ export type ListGivenGainsData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
         /**
          * Cursor
          *
-         * `next_cursor` of the page before
+         * `next_cursor` of the previous page
          */
         cursor?: string | null;
     };
@@ -5697,7 +5697,7 @@ export type ListGivenGainsData = {
 
 export type ListGivenGainsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5730,7 +5730,7 @@ export type LandVehicleData = {
 
 export type LandVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5755,7 +5755,7 @@ export type StopMotorsData = {
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5771,7 +5771,7 @@ export type StopMotorsData = {
 
 export type StopMotorsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5793,13 +5793,13 @@ export type ReleaseVehicleData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5815,7 +5815,7 @@ export type ReleaseVehicleData = {
 
 export type ReleaseVehicleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5837,7 +5837,7 @@ export type GiveUpControlData = {
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5853,7 +5853,7 @@ export type GiveUpControlData = {
 
 export type GiveUpControlErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5875,7 +5875,7 @@ export type TakeControlData = {
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -5891,7 +5891,7 @@ export type TakeControlData = {
 
 export type TakeControlErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5922,13 +5922,13 @@ export type ListJobsData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
         /**
          * Cursor
          *
-         * `next_cursor` of the page before
+         * `next_cursor` of the previous page
          */
         cursor?: string | null;
     };
@@ -5937,7 +5937,7 @@ export type ListJobsData = {
 
 export type ListJobsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5967,7 +5967,7 @@ export type GetJobData = {
 
 export type GetJobErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -5995,7 +5995,7 @@ export type GetJobLogData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
     };
@@ -6004,7 +6004,7 @@ export type GetJobLogData = {
 
 export type GetJobLogErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6026,7 +6026,7 @@ export type CancelJobData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -6042,7 +6042,7 @@ export type CancelJobData = {
 
 export type CancelJobErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6064,7 +6064,7 @@ export type RetryJobData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -6080,7 +6080,7 @@ export type RetryJobData = {
 
 export type RetryJobErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6105,7 +6105,7 @@ export type ListReproductionsData = {
 
 export type ListReproductionsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6135,7 +6135,7 @@ export type GetReproductionData = {
 
 export type GetReproductionErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6160,7 +6160,7 @@ export type RunReproductionData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -6176,7 +6176,7 @@ export type RunReproductionData = {
 
 export type RunReproductionErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6217,7 +6217,7 @@ export type GetReproductionFigureData = {
 
 export type GetReproductionFigureErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6240,13 +6240,13 @@ export type ListControllerChecksData = {
         /**
          * Limit
          *
-         * how many items the page may hold
+         * maximum number of items on the page
          */
         limit?: number;
         /**
          * Cursor
          *
-         * `next_cursor` of the page before
+         * `next_cursor` of the previous page
          */
         cursor?: string | null;
     };
@@ -6255,7 +6255,7 @@ export type ListControllerChecksData = {
 
 export type ListControllerChecksErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6275,7 +6275,7 @@ export type CheckControllerData = {
     body: {
         file: Blob | File;
         /**
-         * the .log file that Paparazzi writes beside a .data file
+         * the .log file that Paparazzi writes next to a .data file
          */
         companion?: Blob | File;
     };
@@ -6283,7 +6283,7 @@ export type CheckControllerData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -6292,7 +6292,7 @@ export type CheckControllerData = {
         /**
          * Gains
          *
-         * KP,KI,KD that were flown, where the log does not say so
+         * KP,KI,KD flown, if the log does not contain them
          */
         gains?: string | null;
     };
@@ -6301,7 +6301,7 @@ export type CheckControllerData = {
 
 export type CheckControllerErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6323,7 +6323,7 @@ export type CheckExampleControllerData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -6334,7 +6334,7 @@ export type CheckExampleControllerData = {
 
 export type CheckExampleControllerErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6364,7 +6364,7 @@ export type DeleteControllerCheckData = {
 
 export type DeleteControllerCheckErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6394,7 +6394,7 @@ export type GetControllerCheckData = {
 
 export type GetControllerCheckErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6435,7 +6435,7 @@ export type GetControllerCheckFigureData = {
 
 export type GetControllerCheckFigureErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6458,7 +6458,7 @@ export type CompareFlightsData = {
         /**
          * Trial
          *
-         * 2 to 20 flights; the first is what others change
+         * 2 to 20 flights; the first is the reference
          */
         trial: Array<number>;
     };
@@ -6467,7 +6467,7 @@ export type CompareFlightsData = {
 
 export type CompareFlightsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6490,7 +6490,7 @@ export type GetComparisonFigureData = {
         /**
          * Trial
          *
-         * 2 to 20 flights; the first is what others change
+         * 2 to 20 flights; the first is the reference
          */
         trial: Array<number>;
         /**
@@ -6505,7 +6505,7 @@ export type GetComparisonFigureData = {
 
 export type GetComparisonFigureErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6528,7 +6528,7 @@ export type GetComparisonCsvData = {
         /**
          * Trial
          *
-         * 2 to 20 flights; the first is what others change
+         * 2 to 20 flights; the first is the reference
          */
         trial: Array<number>;
     };
@@ -6537,7 +6537,7 @@ export type GetComparisonCsvData = {
 
 export type GetComparisonCsvErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6567,7 +6567,7 @@ export type GetReportData = {
 
 export type GetReportErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6597,7 +6597,7 @@ export type GetReportAsPdfData = {
 
 export type GetReportAsPdfErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6627,7 +6627,7 @@ export type GetBundleData = {
 
 export type GetBundleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6651,7 +6651,7 @@ export type BringInBundleData = {
         /**
          * Idempotency-Key
          *
-         * a text of the caller's own, new for each act: the same request sent again with it is harmless
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
     };
@@ -6662,7 +6662,7 @@ export type BringInBundleData = {
 
 export type BringInBundleErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6684,7 +6684,7 @@ export type GetLandscapeData = {
         /**
          * X-Gainline-Control
          *
-         * token of the lease by which one is in control of the vehicle
+         * token of the lease that gives control of the vehicle
          */
         'X-Gainline-Control'?: string | null;
     };
@@ -6704,7 +6704,7 @@ export type GetLandscapeData = {
         /**
          * Stacked
          *
-         * slices one below the other, for a narrow page
+         * one column of slices, for a narrow page
          */
         stacked?: boolean;
     };
@@ -6713,7 +6713,7 @@ export type GetLandscapeData = {
 
 export type GetLandscapeErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6743,7 +6743,7 @@ export type GetCalibrationData = {
 
 export type GetCalibrationErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6784,7 +6784,7 @@ export type GetVehicleFigureData = {
 
 export type GetVehicleFigureErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6822,19 +6822,19 @@ export type GetCampaignFigureData = {
         /**
          * From S
          *
-         * first second of the curves that is looked at
+         * start of the displayed time range in seconds
          */
         from_s?: number | null;
         /**
          * To S
          *
-         * last second of the curves that is looked at
+         * end of the displayed time range in seconds
          */
         to_s?: number | null;
         /**
          * Flight
          *
-         * number of a flight that is to have a curve of its own
+         * number of a flight to draw as a separate curve
          */
         flight?: number | null;
     };
@@ -6843,7 +6843,7 @@ export type GetCampaignFigureData = {
 
 export type GetCampaignFigureErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6880,7 +6880,7 @@ export type GetFlightFigureData = {
 
 export type GetFlightFigureErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
@@ -6909,7 +6909,7 @@ export type EventsData = {
         /**
          * Since S
          *
-         * seconds before now whose changes come first
+         * length in seconds of the recent past whose changes are sent first
          */
         since_s?: number;
     };
@@ -6918,7 +6918,7 @@ export type EventsData = {
 
 export type EventsErrors = {
     /**
-     * An error: what happened, what to do about it, and the fields that are to blame.
+     * An error: what happened, what to do about it, and the invalid fields.
      */
     default: Problem;
 };
