@@ -35,10 +35,6 @@ PROSE: Final = {
 }
 """Patterns for docstrings, comments, string literals and documents, searched in any case and across line breaks."""
 
-ALLOWED: Final = {
-}
-"""False friends: (file, matched text) and why it stays."""
-
 SOURCES: Final = ("app", "tests", "bench", "frontend/src", "docs")
 SUFFIXES: Final = {".py", ".ts", ".tsx", ".md", ".j2"}
 LEFT_OUT: Final = (
@@ -113,21 +109,13 @@ def rejected_identifiers(path: Path, source: str) -> list[str]:
         and not place(path).startswith(("app/vehicles/", "app/simdrone/"))
     ):
         patterns.append(LOCAL_NAMES)
-    return [
-        name
-        for name in sorted(identifiers(path, source))
-        if any(re.search(pattern, name) for pattern in patterns) and (place(path), name) not in ALLOWED
-    ]
+    return [name for name in sorted(identifiers(path, source)) if any(re.search(pattern, name) for pattern in patterns)]
 
 
 def rejected_prose(path: Path, source: str) -> list[str]:
     text = prose(path, source)
     found = [match for pattern in PROSE.values() for match in re.finditer(pattern, text, re.IGNORECASE)]
-    return [
-        text[max(0, match.start() - 40) : match.end() + 40]
-        for match in found
-        if (place(path), match.group()) not in ALLOWED
-    ]
+    return [text[max(0, match.start() - 40) : match.end() + 40] for match in found]
 
 
 def test_no_identifier_is_a_rejected_word() -> None:
@@ -173,8 +161,3 @@ def test_words_of_the_field_are_not_rejected() -> None:
     source = '"""32-bit words on deck: predictions, and the person who reviews them."""\nword = registry.book(desktop)'
     path = ROOT / "app/jobs/runner.py"
     assert (rejected_identifiers(path, source), rejected_prose(path, source)) == ([], [])
-
-
-@pytest.mark.parametrize(("name", "word"), ALLOWED)
-def test_every_exception_is_needed(name: str, word: str) -> None:
-    assert re.search(rf"\b{word}\b", (ROOT / name).read_text())
