@@ -157,7 +157,7 @@ def test_the_judge_sees_motors_stopped_in_the_air_and_one_that_rises() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "moments", "said", "wrong"),
+    ("kind", "moments", "reported", "wrong"),
     [
         ("disarmed once", UP, SAFE_AND_SOUND, "it is said to be safe, and is armed"),
         ("disarmed once", UP, SAFE_AND_SOUND, "at last nothing is said of one that is armed or flies"),

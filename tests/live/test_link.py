@@ -118,7 +118,7 @@ def test_every_message_survives_the_line(message: FromWorker) -> None:
 
 @pytest.mark.parametrize("line", [b"", b"{}", b"not json", b'{"type": "launch"}', b'{"type":"abort","request":1}'])
 def test_a_line_that_is_no_message_is_refused_with_a_reason(line: bytes) -> None:
-    with pytest.raises(InputError, match="no message"):
+    with pytest.raises(InputError, match="received an invalid message"):
         decode(line)
 
 

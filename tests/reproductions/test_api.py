@@ -158,7 +158,7 @@ def test_a_failed_run_says_why_beside_the_older_result_until_a_newer_one(
 def test_what_there_is_not_is_not_found(client: TestClient, method: str, path: str) -> None:
     answer = client.request(method, path)
     assert answer.status_code == 404
-    assert answer.json()["hint"].startswith("There are: ")
+    assert answer.json()["hint"].startswith("Available: ")
 
 
 def test_an_unknown_field_is_refused(client: TestClient) -> None:

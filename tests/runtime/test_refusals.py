@@ -125,7 +125,7 @@ def test_what_others_can_do_is_said_before_it_is_possible(host: str) -> None:
     warning = exposure(host)
     assert warning is not None
     assert host in warning
-    assert "no accounts" in warning
+    assert "no user accounts" in warning
 
 
 @pytest.mark.complete

@@ -87,7 +87,7 @@ def test_a_request_on_a_full_disk_is_refused_with_a_remedy_and_works_once_there_
     refused = serving.api.post("/campaigns", json={"name": "no room", "vehicle": {"kind": "twin"}, "definition": {}})
     assert refused.status_code == 503
     assert "full" in refused.json()["detail"]
-    assert "Free some space" in refused.json()["hint"]
+    assert "Free some disk space" in refused.json()["hint"]
     assert serving.get(f"/trials/{flown['id']}") == flown, "what was there is there"
     filler.unlink()
     serving.trial(serving.fly(serving.campaign()), "valid")
