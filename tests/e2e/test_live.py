@@ -106,7 +106,7 @@ def test_what_changed_before_the_stream_was_there_is_shown(dashboard: Dashboard,
 
 
 def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboard: Opener, own_server: Server) -> None:
-    """Pages still open meanwhile: they were fetched before the server was lost."""
+    """Pages open anyway, because they were fetched before the server was lost."""
     dashboard, other = open_dashboard(own_server.url), open_dashboard(own_server.url)
     campaign_id = dashboard.create("twin", name="Before")
     dashboard.open_campaign(campaign_id)
