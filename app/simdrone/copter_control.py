@@ -137,6 +137,11 @@ class AltitudeGuidance:
     def flies(self) -> bool:
         return self.phase is not Phase.IDLE
 
+    @property
+    def left_m(self) -> float:
+        """Climb that is left to its height, m."""
+        return self._goal_m - self._body.altitude_m
+
     def take_off(self, height_m: float, speed_m_s: float) -> None:
         """Climb from the ground or from the current altitude."""
         if self.phase is Phase.IDLE:

@@ -28,6 +28,8 @@ from app.vehicles.mavlink.dialects import COMMON
 _MANUAL: Final = 1 | 16 | 64
 _AUTO: Final = 1 | 4 | 8 | 16
 _TAKEOFF: Final = "AUTO.TAKEOFF"
+_CLIMBED_WITHIN_M: Final = 0.8
+"""NAV_MC_ALT_RAD: a takeoff has arrived this far from its height."""
 _NO_POSITION: Final = 1 << 24 | 13835193
 """Event check_modes_local_pos of the autopilot."""
 _LOCAL_POSITION: Final = 17
@@ -128,7 +130,7 @@ class Px4(Copter):
             self._send_check_events()
         if was_armed and not self.armed and self.mode.behaviour is Behaviour.LAND:
             self.mode = self.find_mode(self.firmware.hold)
-        if self.mode.name == _TAKEOFF and self.flyer.phase is Phase.HOLDING:
+        if self.mode.name == _TAKEOFF and self.flyer.phase is Phase.HOLDING and self.flyer.left_m < _CLIMBED_WITHIN_M:
             self.mode = self.find_mode(self.firmware.hold)
         return messages
 

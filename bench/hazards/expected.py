@@ -178,13 +178,17 @@ class _Judgement:
         motorless_s = self.within(self.of("no-lift-off"), *AIR)
         if motorless_s > 0.0:
             yield Cause("F4/F6", "aborted", had_to=motorless_s > 3.0 + LIFT_OFF_S[self.case.autopilot])
-        unheard = any(covers(self.of(*DEAF), (at_s, at_s)) for at_s in self.stages.ordered(Order.TAKE_OFF))
-        if unheard or self.of(OTHER_MODE, OTHER_LANDING):
+        if self._may_have_stayed_down():
             yield Cause("F4", "aborted")
         if self.of(OTHER_MODE):
             yield Cause("F10", "invalid")
         if self.of(WILD_GAINS) and self.took_off_s is not None:
             yield Cause("F6", "aborted", had_to=True)
+
+    def _may_have_stayed_down(self) -> bool:
+        """Whether it may not have heard the command to take off, or may have been told otherwise before it climbed."""
+        unheard = any(covers(self.of(*DEAF), (at_s, at_s)) for at_s in self.stages.ordered(Order.TAKE_OFF))
+        return unheard or bool(self.of(OTHER_MODE, OTHER_LANDING))
 
     def _coming_down(self) -> Iterator[Cause]:
         """After a whole record: what still ends a landing early is told with it."""
@@ -278,6 +282,7 @@ class _Judgement:
         if first is Order.MOTORS_OFF:
             return
         may_be_suspect = any(each.kind in GAIN_FAILURES and each.begun_s <= max(left) for each in self.flown.struck)
+        may_be_suspect |= self.stages.first_s(Stage.RECORD) is None and self._may_have_stayed_down()
         if first is Order.GAIN and not may_be_suspect:
             yield "gains were sent before Land, though nothing spoke against them"
         is_aborted = self.flown.outcome == "aborted" and not self.of(MOTORS_OFF)

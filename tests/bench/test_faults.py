@@ -177,11 +177,17 @@ FOUND: Final = [
         "aborted",
         "safe",
     ),
+    # seed 20261168: over a gap in the climb its altitude seemed not to follow its climb rate
+    (case(Mishap("link-lost", Stage.TAKEOFF, 0.295, 0.446)), "completed", "safe"),
+    # seed 20261610: a PX4 that stood on the ground said that it holds its height there
+    (case(Mishap("no-lift-off", Stage.SET_GAINS, 0.1), autopilot="px4"), "aborted", "safe"),
+    # seed 20261320: switched back to its previous mode before a heartbeat could tell, it did not lift off
+    (case(Mishap("other-mode", Stage.TAKEOFF, 0.27), autopilot="px4"), "aborted", "safe"),
 ]
 
 
 @pytest.mark.parametrize(
-    ("found", "outcome", "vehicle"), FOUND, ids=[f"{each.autopilot}-{each.mishaps[0].kind}" for each, _, _ in FOUND]
+    ("found", "outcome", "vehicle"), FOUND, ids=[f"{each.autopilot}-{each.mishaps[0].kind}-{each.mishaps[0].stage}" for each, _, _ in FOUND]
 )
 def test_what_a_run_found_wrong_is_right_now(found: Case, outcome: str, vehicle: str) -> None:
     line = fly_case(found)

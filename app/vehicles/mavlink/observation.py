@@ -347,6 +347,6 @@ def _behind_m(watch: TrialObservation, position: Position) -> float:
     last = watch.last
     if last is None or watch.lifted or is_behind_climb_rate(watch):
         return watch.behind_m
-    climb_rate_m_s = position.climb_rate_m_s if abs(position.climb_rate_m_s) > RESTING_M_S else 0.0
-    climbed_m = climb_rate_m_s * (position.time_boot_s - last.time_boot_s)
+    mean_m_s = 0.5 * (last.climb_rate_m_s + position.climb_rate_m_s)
+    climbed_m = (mean_m_s if abs(mean_m_s) > RESTING_M_S else 0.0) * (position.time_boot_s - last.time_boot_s)
     return watch.behind_m + climbed_m - (position.altitude_m - last.altitude_m)
