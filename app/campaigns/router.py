@@ -70,30 +70,35 @@ def get_campaign(session: Reader, campaign_id: Id) -> Campaign:
 
 
 @router.patch("/{campaign_id}")
-def edit_campaign(session: Writer, campaign_id: Id, body: CampaignEdit) -> Campaign:
+def edit_campaign(session: Writer, asking: RequestContextDep, campaign_id: Id, body: CampaignEdit) -> Campaign:
     """Rename a campaign at any time; change its definition or vehicle before the first flight."""
-    return service.edit_campaign(session, campaign_id, body)
+    return service.edit_campaign(session, campaign_id, body, asking)
 
 
 @router.delete("/{campaign_id}", status_code=status.HTTP_204_NO_CONTENT)
 def delete_campaign(
-    session: Writer, campaign_id: Id, version: Annotated[int, Query(ge=1, description="version as last read")]
+    session: Writer,
+    asking: RequestContextDep,
+    campaign_id: Id,
+    version: Annotated[int, Query(ge=1, description="version as last read")],
 ) -> None:
     """Delete a campaign in which no flight was started."""
-    service.delete_campaign(session, campaign_id, version)
+    service.delete_campaign(session, campaign_id, version, asking)
 
 
 @router.post("/{campaign_id}/finish")
-def finish_campaign(act: IdempotentPost, campaign_id: Id, body: Finish | None = None) -> Campaign:
+def finish_campaign(
+    act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Finish | None = None
+) -> Campaign:
     """Finish a campaign between flights, on the operator's decision."""
     reason = (body or Finish()).reason
-    return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason))
+    return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason, asking))
 
 
 @router.post("/{campaign_id}/archive")
-def archive_campaign(act: IdempotentPost, campaign_id: Id) -> Campaign:
+def archive_campaign(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id) -> Campaign:
     """Archive a finished campaign."""
-    return act(Campaign, lambda session: service.archive_campaign(session, campaign_id))
+    return act(Campaign, lambda session: service.archive_campaign(session, campaign_id, asking))
 
 
 @router.post("/{campaign_id}/clone", status_code=status.HTTP_201_CREATED)

@@ -9,7 +9,7 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
-from app.accounts.permissions import RequestContext
+from app.accounts.permissions import Permission, RequestContext
 from app.campaigns import history, repository
 from app.campaigns.definitions import check_campaign, fill_in_donor, stored
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
@@ -41,6 +41,7 @@ from app.core.formatting import percent
 from app.core.tuning.confirmation import ComparisonState
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.fleet import service as fleet
+from app.fleet.control import require_may
 from app.fleet.registration import promote_gains
 from app.fleet.schemas import Vehicle, VehicleChoice
 from app.fleet.service import get_vehicle
@@ -147,10 +148,17 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     return campaign_view(session, row)
 
 
-def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Campaign:
-    """Change a campaign. Raises ConflictError when another client changed it first, or when its definition is
-    frozen."""
+def _get_permitted(session: Session, campaign_id: int, context: RequestContext) -> CampaignRow:
+    """The campaign, to be changed. Raises NotAllowedError for one on a real vehicle when the client lacks the key."""
     row = repository.get_campaign(session, campaign_id)
+    require_may(Permission.REVIEW, row.vehicle, context)
+    return row
+
+
+def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit, context: RequestContext) -> Campaign:
+    """Change a campaign. Raises ConflictError when another client changed it first, or when its definition is
+    frozen; NotAllowedError as `_get_permitted`."""
+    row = _get_permitted(session, campaign_id, context)
     definition = None if edit.definition is None else edit.definition.model_dump(mode="json")
     check_version(
         edit.version,
@@ -176,12 +184,12 @@ def edit_campaign(session: Session, campaign_id: int, edit: CampaignEdit) -> Cam
     return campaign_view(session, row)
 
 
-def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
+def delete_campaign(session: Session, campaign_id: int, version: int, context: RequestContext) -> None:
     """Delete a campaign.
 
     Raises ConflictError when a flight was begun in it, or another client has changed it meanwhile.
     """
-    row = repository.get_campaign(session, campaign_id)
+    row = _get_permitted(session, campaign_id, context)
     check_version(version, row.version, f"Campaign {row.id}", {})
     check_action(CAMPAIGN_ACTIONS, "delete", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
@@ -198,18 +206,18 @@ def delete_campaign(session: Session, campaign_id: int, version: int) -> None:
         session.delete(trajectory)
 
 
-def finish_campaign(session: Session, campaign_id: int, reason: str) -> Campaign:
+def finish_campaign(session: Session, campaign_id: int, reason: str, context: RequestContext) -> Campaign:
     """Finish a campaign on the operator's decision. Raises ConflictError unless it is between flights."""
-    row = repository.get_campaign(session, campaign_id)
+    row = _get_permitted(session, campaign_id, context)
     check_action(CAMPAIGN_ACTIONS, "finish", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     end_campaign(session, row, Outcome.STOPPED, reason)
     return campaign_view(session, row)
 
 
-def archive_campaign(session: Session, campaign_id: int) -> Campaign:
+def archive_campaign(session: Session, campaign_id: int, context: RequestContext) -> Campaign:
     """Archive a campaign. Raises ConflictError unless it is finished."""
-    row = repository.get_campaign(session, campaign_id)
+    row = _get_permitted(session, campaign_id, context)
     check_action(CAMPAIGN_ACTIONS, "archive", row.state, f"Campaign {row.id}")
     set_campaign_state(row, CampaignState.ARCHIVED)
     return campaign_view(session, row)

@@ -128,15 +128,11 @@ class VehicleProcess:
                 pass  # belongs to a flight that is over
 
     def _finish_order(self) -> None:
-        """Repeat a land or motors off command after the worker's end, for at most STANDING_ORDER_TIMEOUT_S, while the
-        vehicle was armed when it was last received."""
+        """Repeat a land or motors off command after the worker's end until telemetry confirms it, for at most
+        STANDING_ORDER_TIMEOUT_S."""
         until_s = self._call.clock.now_s() + STANDING_ORDER_TIMEOUT_S
-        while self._is_disobeyed() and self._call.clock.now_s() < until_s:
+        while self._vehicle.has_standing_order and self._call.clock.now_s() < until_s:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
-
-    def _is_disobeyed(self) -> bool:
-        status = self._status()
-        return self._vehicle.has_standing_order and status.armed is True
 
     def close(self) -> None:
         self._vehicle.close()

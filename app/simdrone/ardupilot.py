@@ -58,8 +58,6 @@ SCALE_4_7: Final = 0.1
 """Ratio of the newer acceleration gains to the older ones."""
 
 _COMMON: Final = (
-    Parameter("SYSID_THISMAV", Kind.INT16, 1),
-    Parameter("SYSID_MYGCS", Kind.INT16, 255),
     Parameter("ARMING_CHECK", Kind.INT32, 1),
     Parameter("DISARM_DELAY", Kind.INT8, 10),
     Parameter("FS_GCS_ENABLE", Kind.INT8, 0),
@@ -73,6 +71,14 @@ _COMMON: Final = (
 )
 
 
+_GROUND_STATION: Final = "SYSID_MYGCS"
+_GROUND_STATION_4_7: Final = "MAV_GCS_SYSID"
+
+
+def _ids(own: str, ground_station: str) -> tuple[Parameter, ...]:
+    return Parameter(own, Kind.INT16, 1), Parameter(ground_station, Kind.INT16, 255)
+
+
 def _gains(names: Mapping[str, str], scale: float) -> tuple[Parameter, ...]:
     scales = {gain: scale if gain.startswith("acceleration") else 1.0 for gain in names}
     return tuple(real(name, _DEFAULTS[gain] * scales[gain]) for gain, name in names.items())
@@ -82,7 +88,7 @@ _FIRMWARE: Final = FirmwareProfile(
     dialect=ARDUPILOTMEGA,
     autopilot=3,
     version=0x040600FF,
-    parameters=_COMMON + _gains(NAMES_4_6, 1.0),
+    parameters=_ids("SYSID_THISMAV", _GROUND_STATION) + _COMMON + _gains(NAMES_4_6, 1.0),
     coding=BY_VALUE,
     periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
     streams=(
@@ -125,6 +131,7 @@ class ArduPilot(Copter):
     firmware: ClassVar[FirmwareProfile] = _FIRMWARE
     names: ClassVar[Mapping[str, str]] = NAMES_4_6
     scale: ClassVar[float] = 1.0
+    ground_station: ClassVar[str] = _GROUND_STATION
 
     def __init__(self, body: Body, *, system: int) -> None:
         self._cascade = ThreeStage()
@@ -168,15 +175,18 @@ class ArduPilot(Copter):
         return self.parameters["DISARM_DELAY"]
 
     def counts_heartbeat(self, message: Message) -> bool:
-        """Count only heartbeats of its own ground station, SYSID_MYGCS."""
-        return message.get_srcSystem() == self.parameters["SYSID_MYGCS"]
+        """Count only heartbeats of its own ground station."""
+        return message.get_srcSystem() == self.parameters[self.ground_station]
 
 
 class ArduPilot47(ArduPilot):
     """ArduCopter from 4.7 on: other names, and acceleration gains of a tenth."""
 
     firmware: ClassVar[FirmwareProfile] = replace(
-        _FIRMWARE, version=0x040700FF, parameters=_COMMON + _gains(NAMES_4_7, SCALE_4_7)
+        _FIRMWARE,
+        version=0x040700FF,
+        parameters=_ids("MAV_SYSID", _GROUND_STATION_4_7) + _COMMON + _gains(NAMES_4_7, SCALE_4_7),
     )
     names: ClassVar[Mapping[str, str]] = NAMES_4_7
     scale: ClassVar[float] = SCALE_4_7
+    ground_station: ClassVar[str] = _GROUND_STATION_4_7

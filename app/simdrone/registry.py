@@ -13,7 +13,7 @@ from app.simdrone.paparazzi import Paparazzi
 from app.simdrone.paparazzi_plan import NEWER_KILL_SETTING
 from app.simdrone.px4 import Px4
 
-_ARDUPILOT_FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0}
+_ARDUPILOT_FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0, "FENCE_ALT_MAX": 10.0}
 """Land when the ground station is lost; stay inside the fence."""
 _LAND: Final = 3.0
 _RETURN: Final = 3.0

@@ -6,7 +6,7 @@ from itertools import product
 from typing import Final
 
 from bench.hazards.cases import ABORT
-from bench.hazards.hostility import SHIFTS_M, TWINS_S, UNREAL
+from bench.hazards.hostility import GAPS_S, SHIFTS_M, TWINS_S, UNREAL, UPLINKS_S
 from bench.hazards.stages import AIR, Stage
 
 
@@ -42,6 +42,19 @@ _BY_HAND: Final = (
 _BLIND: Final = Expected(told=(*_NO_POSITION, _NOT_LANDED), ends=AIR, quarantines=True)
 _UNVERIFIED: Final = Expected(told=_NO_GAINS, quarantines=True)
 _TWINS: Final = Expected(told=(*_DOUBLED, *_NO_POSITION, _MOVED), ends=AIR, quarantines=True)
+_LOST: Final = ("link was lost", "Heartbeat: ", "No heartbeat")
+_MISPLACED: Final = Expected(
+    told=(*_NO_POSITION, _MOVED, _NOT_LANDED, "did not lift off", "before it had climbed"),
+    ends=AIR,
+    aborts=True,
+    quarantines=True,
+)
+_SLOWER: Final = Expected(
+    told=(*_NO_POSITION, *_LOST, *_NO_GAINS, "could not be set up", "did not arm"), ends=AIR, quarantines=True
+)
+_UPLINK: Final = Expected(
+    told=(*_BY_HAND, *_NO_GAINS, "could not be set up", "not confirmed within"), aborts=True, quarantines=True
+)
 _UNSEEN: Final = Expected(told=("second source of altitude", "Second source of altitude: "), ends=AIR)
 _ONCE: Final = Expected(told=(_MOVED, "Vehicle clock: "))
 _SHIFTED: Final = Expected(told=(_MOVED, _NOT_LANDED), quarantines=True)
@@ -53,6 +66,13 @@ EXPECTED: Final[Mapping[str, Expected]] = {
     **dict.fromkeys(("parameters nan", "parameters wrong", "no PARAM_VALUE"), _UNVERIFIED),
     **dict.fromkeys(("companion", "companion as autopilot", "copies at once"), HARMLESS),
     **{f"twin {older_s:g} s older": _TWINS for older_s in TWINS_S},
+    "flying twin": replace(_TWINS, told=(*_TWINS.told, "The vehicle is armed")),
+    "replaced after 1.3 s": Expected(
+        told=(*_LOST, *_NO_GAINS, *_NO_POSITION, *_DOUBLED, *_BY_HAND), ends=AIR, quarantines=True
+    ),
+    **{f"on the ground after {gap_s:g} s": _MISPLACED for gap_s in GAPS_S},
+    **dict.fromkeys(("later and later, to 1 s", "later and later, to 2 s"), _SLOWER),
+    **dict.fromkeys(UPLINKS_S, _UPLINK),
     "late by 0.4 s": Expected(told=(*_DOUBLED, *_NO_POSITION)),
     "late by 2 s": Expected(told=(*_DOUBLED, *_NO_POSITION), ends=AIR, quarantines=True),
     "copies after 2 s": Expected(told=(*_DOUBLED, *_NO_POSITION), quarantines=True),

@@ -10,7 +10,15 @@ from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sampl
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, Mishap, tuned_gains
-from bench.hazards.hostility import HAZARDS, HOSTILITIES, MISFORTUNES, PILOTS, Hostility, Speaker
+from bench.hazards.hostility import (
+    HAZARDS,
+    HOSTILITIES,
+    MISFORTUNES,
+    PILOTS,
+    UPLINKS_S,
+    Hostility,
+    Speaker,
+)
 from bench.hazards.rig import Rig, Struck
 from bench.hazards.stages import Stage
 from bench.hazards.truth import Moment, ReportedOutcome, Truth, judge
@@ -72,8 +80,21 @@ class HostileRig(Rig):
         self._pilot_told_s: list[float] = []
         self._overruled_s = FOR_GOOD_S
         self._ticks = 0
+        self._late_s, self._late_until_s = 0.0, 0.0
+        self._under_way: list[tuple[float, bytes]] = []
         super().__init__(case)
         self._speaker = Speaker(case.autopilot, DIALECTS[case.autopilot], self.drone, random.Random(case.seed))
+
+    def write(self, data: bytes) -> bool:
+        """Deliver in the order of sending, late or not."""
+        late_s = self._late_s if self.drone.time_s < self._late_until_s else 0.0
+        self._under_way.append((self.drone.time_s + late_s, data))
+        self._deliver()
+        return True
+
+    def _deliver(self) -> None:
+        while self._under_way and self._under_way[0][0] <= self.drone.time_s:
+            super().write(self._under_way.pop(0)[1])
 
     def arriving(self, frames: list[bytes]) -> list[bytes]:
         now_s = self.drone.time_s
@@ -98,6 +119,7 @@ class HostileRig(Rig):
 
     def tick(self) -> None:
         super().tick()
+        self._deliver()
         self._ticks += 1
         if self._ticks % _MOMENT_TICKS == 0:
             now_s, body = self.drone.time_s, self.drone.body
@@ -128,7 +150,9 @@ class HostileRig(Rig):
         fault, most_s = MISFORTUNES.get(mishap.kind, ("", FOR_GOOD_S))
         lasts_s = min(mishap.duration_s, most_s)
         self.struck.append(Struck(mishap.kind, stage, now_s, now_s + lasts_s))
-        if fault:
+        if mishap.kind in UPLINKS_S:
+            self._late_s, self._late_until_s = UPLINKS_S[mishap.kind], now_s + lasts_s
+        elif fault:
             self.drone.inject_fault(fault, lasts_s)
         else:
             self.acting.append((HOSTILITIES[mishap.kind](self._speaker), now_s + lasts_s))

@@ -20,6 +20,7 @@ SIGHTING: Final = "VISION_POSITION_ESTIMATE"
 FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz")
 UNREAL: Final = (math.nan, math.inf, -math.inf)
 TWINS_S: Final = (0.0, 0.4, 5.0, 3600.0)
+GAPS_S: Final = (0.0, 0.3, 0.6, 1.0)
 SHIFTS_M: Final = (0.1, 0.2, -0.1, -0.2)
 MAKES: Final[Mapping[str, int]] = {"paparazzi": 9, "ardupilot": 3, "px4": 12}
 BY_HAND: Final[Mapping[str, tuple[int, int]]] = {"paparazzi": (64, 0), "ardupilot": (1, 0), "px4": (1, 3 << 16)}
@@ -168,11 +169,56 @@ class Late:
         return passed
 
 
-class Twin:
-    """Another vehicle with the same ids stands on the ground, disarmed, and tells so as often as this one."""
+@dataclass
+class Slower:
+    """Every packet comes later than the one before it, until all come `most_s` late."""
 
-    def __init__(self, speaker: Speaker, older_s: float) -> None:
-        self._speaker, self._older_s = speaker, older_s
+    growth: float
+    most_s: float
+    _since_s: float | None = None
+    _held: list[tuple[float, bytes]] = field(default_factory=list)
+
+    def arrive(self, frames: Sequence[bytes], now_s: float) -> list[bytes]:
+        self._since_s = now_s if self._since_s is None else self._since_s
+        due_s = now_s + min(self.growth * (now_s - self._since_s), self.most_s)
+        self._held += [(due_s, frame) for frame in frames]
+        passed = [frame for at_s, frame in self._held if at_s <= now_s]
+        self._held = [(at_s, frame) for at_s, frame in self._held if at_s > now_s]
+        return passed
+
+
+@dataclass
+class Misplaced:
+    """Its altitude is no number for a while, and then that of the ground."""
+
+    speaker: Speaker
+    gap_s: float
+    _since_s: float | None = None
+
+    def arrive(self, frames: Sequence[bytes], now_s: float) -> list[bytes]:
+        self._since_s = now_s if self._since_s is None else self._since_s
+        place = {"z": math.nan} if now_s - self._since_s < self.gap_s else {"z": -0.1, "vz": 0.0}
+        return [self.speaker.changed(frame, POSITION, lambda _: place) for frame in frames]
+
+
+class Replaced:
+    """This vehicle is not heard any more, and after `gap_s` another one with its ids is, which stands disarmed."""
+
+    def __init__(self, speaker: Speaker, gap_s: float) -> None:
+        self._twin, self._gap_s = Twin(speaker, 0.0), gap_s
+        self._since_s: float | None = None
+
+    def arrive(self, frames: Sequence[bytes], now_s: float) -> list[bytes]:
+        self._since_s = now_s if self._since_s is None else self._since_s
+        both = self._twin.arrive(frames, now_s)
+        return [] if now_s - self._since_s < self._gap_s else [frame for frame in both if frame not in frames]
+
+
+class Twin:
+    """Another vehicle with the same ids reports as often as this one: it stands disarmed, or flies at 2 m."""
+
+    def __init__(self, speaker: Speaker, older_s: float, *, flies: bool = False) -> None:
+        self._speaker, self._older_s, self._flies = speaker, older_s, flies
         self._codec = speaker.codec(speaker.own, speaker.chance.randrange(256))
 
     def arrive(self, frames: Sequence[bytes], now_s: float) -> list[bytes]:
@@ -182,10 +228,11 @@ class Twin:
             message = self._speaker.read(frame)
             if message is not None and message.get_type() == POSITION:
                 boot_s = now_s + self._older_s
-                both.append(self._speaker.position(self._codec, height_m=0.1, boot_s=boot_s))
+                height_m = 2.0 if self._flies else 0.1
+                both.append(self._speaker.position(self._codec, height_m=height_m, boot_s=boot_s))
             elif message is not None and message.get_type() == "HEARTBEAT":
                 mode = HOVERING[self._speaker.autopilot]
-                both.append(self._speaker.heartbeat(self._codec, armed=False, mode=mode))
+                both.append(self._speaker.heartbeat(self._codec, armed=self._flies, mode=mode))
         return both
 
 
@@ -202,6 +249,10 @@ def _higher(kind: str, by_m: float) -> Make:
 
 def _silence(kind: str) -> Make:
     return lambda speaker: Silent(speaker, kind)
+
+
+def _misplaced(gap_s: float) -> Make:
+    return lambda speaker: Misplaced(speaker, gap_s)
 
 
 def _twin(older_s: float) -> Make:
@@ -257,6 +308,11 @@ HOSTILITIES: Final[Mapping[str, Make]] = {
     "companion": _companion(poses=False),
     "companion as autopilot": _companion(poses=True),
     **{f"twin {older_s:g} s older": _twin(older_s) for older_s in TWINS_S},
+    "flying twin": lambda speaker: Twin(speaker, 5.0, flies=True),
+    "replaced after 1.3 s": lambda speaker: Replaced(speaker, 1.3),
+    **{f"on the ground after {gap_s:g} s": _misplaced(gap_s) for gap_s in GAPS_S},
+    "later and later, to 1 s": lambda _: Slower(0.8, 1.0),
+    "later and later, to 2 s": lambda _: Slower(1.5, 2.0),
     "late by 0.4 s": lambda _: Late(0.4, every=3, copies=False),
     "late by 2 s": lambda _: Late(2.0, every=7, copies=False),
     "copies after 2 s": lambda _: Late(2.0, every=2, copies=True),
@@ -290,7 +346,9 @@ MISFORTUNES: Final[Mapping[str, tuple[str, float]]] = {
 }
 """What befalls the vehicle itself, by name: a fault of the simulated drone, and how long it lasts at the most."""
 PILOTS: Final = frozenset(name for name, (fault, _) in MISFORTUNES.items() if fault == "taken-over")
-HAZARDS: Final = (*HOSTILITIES, *MISFORTUNES)
+UPLINKS_S: Final[Mapping[str, float]] = {f"commands {late_s:g} s late": late_s for late_s in (0.6, 1.2, 2.0)}
+"""How much later everything arrives that the ground sends, by name."""
+HAZARDS: Final = (*HOSTILITIES, *UPLINKS_S, *MISFORTUNES)
 
 
 def _boot_s(drone: Drone) -> float:

@@ -13,7 +13,7 @@ from bench.hazards.cases import ABORT, FOR_GOOD_S, Case
 from bench.hazards.expectations import EXPECTED, HARMLESS, LEADS
 from bench.hazards.hostility import PILOTS
 from bench.hazards.rig import Stopping, Struck
-from bench.hazards.stages import LIFTED_M, RECORDED_S, Stage, Stages
+from bench.hazards.stages import LIFTED_M, RECORDED_S, Stages
 from bench.hazards.wire import Order
 
 CEILING_M: Final = 5.5
@@ -182,7 +182,7 @@ def _verdict(truth: Truth, reported: ReportedOutcome) -> Iterator[str]:
 
 def _record(truth: Truth, reported: ReportedOutcome) -> Iterator[str]:
     """A record that counts is whole, of a flight, and where the vehicle truly was: compared where it hovers."""
-    took_off_s, record = truth.stages.first_s(Stage.TAKEOFF), reported.record
+    took_off_s, record = _took_off_s(truth), reported.record
     if reported.outcome != "completed" or record is None:
         return
     if took_off_s is None or not truth.rose:
@@ -200,3 +200,8 @@ def _record(truth: Truth, reported: ReportedOutcome) -> Iterator[str]:
     apart_m = np.abs(record["altitude_m"] - true_m - (record["altitude_m"][0] - true_m[0]))
     if apart_m[hovering].max() > RECORD_WITHIN_M:
         yield f"its record counts, and is {apart_m[hovering].max():.2f} m from where it was"
+
+
+def _took_off_s(truth: Truth) -> float | None:
+    """When the command to take off reached the vehicle."""
+    return next((at_s for at_s, order in truth.sent if order is Order.TAKE_OFF), None)

@@ -187,7 +187,9 @@ FOUND: Final = [
 
 
 @pytest.mark.parametrize(
-    ("found", "outcome", "vehicle"), FOUND, ids=[f"{each.autopilot}-{each.mishaps[0].kind}-{each.mishaps[0].stage}" for each, _, _ in FOUND]
+    ("found", "outcome", "vehicle"),
+    FOUND,
+    ids=[f"{each.autopilot}-{each.mishaps[0].kind}-{each.mishaps[0].stage}" for each, _, _ in FOUND],
 )
 def test_what_a_run_found_wrong_is_right_now(found: Case, outcome: str, vehicle: str) -> None:
     line = fly_case(found)

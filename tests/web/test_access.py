@@ -101,6 +101,23 @@ def test_a_spent_link_unlocks_nobody_else_and_says_how_to_get_another(
     assert not get(stranger, "/api/access")["may_command"]
 
 
+@pytest.mark.parametrize("what", ["rename", "finish", "archive", "delete"])
+def test_a_campaign_on_a_real_vehicle_is_changed_with_a_key_only(
+    what: str, client: TestClient, database: Database, stranger: TestClient, real: Json
+) -> None:
+    campaign = create_campaign_on(client, database, real)
+    path = f"/api/campaigns/{campaign['id']}"
+    refused = {
+        "rename": lambda: stranger.patch(path, json={"version": campaign["version"], "name": "Mine"}),
+        "finish": lambda: stranger.post(f"{path}/finish", json={}),
+        "archive": lambda: stranger.post(f"{path}/archive"),
+        "delete": lambda: stranger.delete(f"{path}?version={campaign['version']}"),
+    }[what]()
+    assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
+    assert get(client, path)["name"] == campaign["name"]
+    assert client.patch(path, json={"version": campaign["version"], "name": "Ours"}).status_code == 200
+
+
 def test_a_cookie_that_somebody_put_beside_ours_does_not_hide_it(client: TestClient, settings: Settings) -> None:
     keyring = Keyring.open(settings.data_dir)
     name, value = keyring.cookie, keyring.value(Key.BROWSER)

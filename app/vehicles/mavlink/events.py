@@ -271,6 +271,13 @@ class SendGain:
 
 
 @dataclass(frozen=True, slots=True)
+class RequestGain:
+    """Request a gain once, without waiting for the reply, which confirms that all earlier messages were received."""
+
+    parameter: str
+
+
+@dataclass(frozen=True, slots=True)
 class RestoreGains:
     """Write the safe gains and read them back, with repetitions."""
 
@@ -285,4 +292,4 @@ class RecordSample:
     second_m: float | None = None
 
 
-Command = PerformAction | SendGain | RestoreGains | RecordSample
+Command = PerformAction | SendGain | RequestGain | RestoreGains | RecordSample

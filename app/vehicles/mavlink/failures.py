@@ -197,9 +197,11 @@ class Limits:
 
     `set_point_m` is on the vehicle's own datum, like altitudes; `ceiling_m` is above the ground under the vehicle.
     Modes are named as in `Heartbeat`: `flying_modes` and `landing_modes` are empty if any mode is allowed, the vehicle
-    enters `hovering_modes` after the climb, in `manual_modes` a pilot flies, and `mode_names` are for display.
+    enters `hovering_modes` after the climb, in all modes except the `automatic_modes` a pilot flies, and `mode_names`
+    are for display.
     Heartbeats are sent every `heartbeat_s`. `blocks` are the names of the flight plan's blocks by number;
-    `arming_blocks`, `flying_blocks` and `landing_blocks` are those that the vehicle may be in, empty if it has none.
+    `arming_blocks`, `flying_blocks` and `landing_blocks` are those that the vehicle may be in, empty if it has none;
+    it enters `landed_blocks` once it has landed by its own judgement.
     """
 
     set_point_m: float
@@ -218,17 +220,22 @@ class Limits:
     flying_modes: frozenset[str] = frozenset()
     hovering_modes: frozenset[str] = frozenset()
     landing_modes: frozenset[str] = frozenset()
-    manual_modes: frozenset[str] = frozenset()
+    automatic_modes: frozenset[str] = frozenset()
     mode_names: Mapping[str, str] = field(default_factory=dict)
     blocks: Mapping[int, str] = field(default_factory=dict)
     arming_blocks: frozenset[str] = frozenset()
     flying_blocks: frozenset[str] = frozenset()
     landing_blocks: frozenset[str] = frozenset()
+    landed_blocks: frozenset[str] = frozenset()
 
     @property
     def confirmation_s(self) -> float:
         """Minimum time between two heartbeats that confirm each other."""
         return CONFIRMATION_PERIODS * self.heartbeat_s
+
+    def is_manual(self, mode: str) -> bool:
+        """Whether a pilot flies the vehicle in this mode. A mode that is not known is a pilot's."""
+        return bool(mode and self.automatic_modes) and mode not in self.automatic_modes
 
     def stretched(self, factor: float) -> "Limits":
         """Return the limits with all timeouts for packets multiplied by this factor."""

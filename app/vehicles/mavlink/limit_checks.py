@@ -5,6 +5,7 @@ from typing import Final
 from app.vehicles.mavlink import secondary_altitude
 from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding, Limits
 from app.vehicles.mavlink.observation import (
+    FRESH_S,
     TrialObservation,
     has_unreliable_position,
     is_behind_climb_rate,
@@ -39,7 +40,7 @@ def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Fin
 def find_taken_over(watch: TrialObservation, limits: Limits) -> Finding | None:
     """Find that a pilot flies the vehicle now."""
     mode = mode_of(watch, limits)
-    if not watch.armed or mode not in limits.manual_modes:
+    if not watch.armed or not limits.is_manual(mode):
         return None
     return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle entered mode {_named(mode, limits)}.")
 
@@ -47,10 +48,10 @@ def find_taken_over(watch: TrialObservation, limits: Limits) -> Finding | None:
 def find_interruption(before: TrialObservation, watch: TrialObservation, limits: Limits) -> Finding | None:
     """Find a manual mode that only the last heartbeat of the observation `before` reported and the next one did not,
     unless it arrived between two heartbeats of the vehicle."""
-    was_by_hand = before.armed and before.mode in limits.manual_modes
+    was_by_hand = before.armed and limits.is_manual(before.mode)
     in_turn_s = _IN_TURN * limits.heartbeat_s
     is_in_turn = min(before.heartbeat_gap_s, watch.heartbeat_gap_s) >= in_turn_s
-    if not (was_by_hand and is_in_turn) or watch.mode in limits.manual_modes:
+    if not (was_by_hand and is_in_turn) or limits.is_manual(watch.mode):
         return None
     return Finding(failure=Failure.INTERRUPTED, why=f"One heartbeat reported mode {_named(before.mode, limits)}.")
 
@@ -140,9 +141,18 @@ def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) ->
     why = ""
     if now_s - watch.accepted_s > limits.lost_s and watch.received_s - watch.accepted_s > limits.lost_s:
         why = f"None of its positions was plausible for {limits.lost_s:g} s."
+    elif watch.late_since_s is not None and watch.advanced_s - watch.late_since_s > limits.lost_s:
+        why = f"Its positions arrive more than {FRESH_S:g} s late, or its clock is slower than its clock_speed."
     elif has_unreliable_position(watch):
         why = "Its position jumps back and forth."
     return Finding(failure=Failure.LOST_POSITION, why=why) if why else None
+
+
+def find_jump(watch: TrialObservation) -> Finding | None:
+    """Find a jump of the altitude in flight: it, or the earlier altitude, is not the vehicle's."""
+    if not watch.jumped_m:
+        return None
+    return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude jumped by {watch.jumped_m:.1f} m.")
 
 
 def find_altitude_behind(watch: TrialObservation) -> Finding | None:
@@ -164,7 +174,7 @@ def find_battery(watch: TrialObservation, now_s: float) -> Finding | None:
 def find_fall(watch: TrialObservation, limits: Limits, ground_m: float) -> Finding | None:
     """Find ground contact at a speed above that of any landing."""
     last = watch.last
-    if last is None or watch.doubted is not None or watch.has_jumped:
+    if last is None or watch.doubted is not None or watch.jumped_m:
         return None
     near = last.altitude_m - ground_m < _IMPACT_BELOW_M
     if not near or last.climb_rate_m_s >= -limits.impact_m_s:

@@ -35,6 +35,8 @@ from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_tra
 
 __all__ = ["Link", "LinkError", "LinkHealth", "LossCounter", "Received"]
 
+GROUND_STATION: Final = 255
+"""System id of this program."""
 HEARTBEAT_EVERY_S: Final = 1.0
 UNATTENDED_AFTER_S: Final = 3.0
 """If `receive` has not been called for this long, the program hangs. No more heartbeats are sent then, so that the
@@ -121,7 +123,7 @@ class Link:
         clock: Clock,
         target_system: int | None = None,
         make: int | None = None,
-        system: int = 255,
+        system: int = GROUND_STATION,
         component: int = 190,
         tlog: Path | None = None,
         signing_key: bytes | None = None,
@@ -324,9 +326,9 @@ class Link:
         else:
             self._foreign += 1
             now_s = self._clock.now_s()
-            if peer[0] == remote[0] and now_s - self._checked_s >= UNKNOWN_PEER_INTERVAL_S:
+            if now_s - self._checked_s >= UNKNOWN_PEER_INTERVAL_S:
                 self._checked_s = now_s
-                self._check_other_peer(data, peer, now_s)
+                self._check_other_peer(data, peer, now_s, moved=peer[0] == remote[0])
 
     def _process_unknown_peer(self, data: bytes, peer: Peer) -> None:
         """Process a datagram with a separate codec, because data of an unknown peer must not interfere with the
@@ -338,13 +340,15 @@ class Link:
         else:
             self._foreign += 1
 
-    def _check_other_peer(self, data: bytes, peer: Peer, now_s: float) -> None:
-        """Find out whether the vehicle has moved to another port of its host, or another one uses its system id."""
+    def _check_other_peer(self, data: bytes, peer: Peer, now_s: float, *, moved: bool) -> None:
+        """Find out whether the vehicle has moved to another port of its host, if it may have, or another one uses its
+        system id."""
         if not any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
             return
         since_s = self._last_packet_s if self._last_packet_s is not None else self._opened_s
         if now_s - since_s > GONE_AFTER_S:
-            self._transport.adopt(peer)
+            if moved:
+                self._transport.adopt(peer)
         elif self._last_packet_s is not None:
             self._duplicate_s = now_s
 

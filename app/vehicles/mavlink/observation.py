@@ -24,7 +24,7 @@ from app.vehicles.mavlink.secondary_altitude import SecondaryAltitude
 
 RESTING_M_S: Final = 0.1
 FRESH_S: Final = 0.5
-"""Greatest age of a sample that counts as the current position."""
+"""Greatest age of a sample, since it was sent, that counts as the current position."""
 AGREED_S: Final = 1.0
 """Time for which every source must show the vehicle on the ground before its motors may be stopped."""
 
@@ -33,6 +33,12 @@ _ATTENDED_S: Final = 0.1
 _JUMP_M: Final = 0.3
 _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
+_ACCELERATING_S: Final = 0.3
+"""Longest time for which such an acceleration lasts in one direction."""
+_UNSEEN_M_S: Final = 1.5
+"""Further change of altitude per second of a longer gap, as in a landing. A faster one, unseen, is a jump."""
+_CLOCK_DRIFT: Final = 0.1
+"""Share by which the vehicle's clock may be slower than ours."""
 _MAX_GLITCHES: Final = 3
 _DOUBTED_LIMIT: Final = 10.0
 _DOUBT_DECAY_1_S: Final = 5.0
@@ -63,14 +69,16 @@ class TrialObservation:
     """State of a vehicle by its messages so far. Times are in s by the ground's clock, except inside a Position.
 
     Times of the last packet (`received_s`), of the last position with a new time stamp (`advanced_s`) and of the last
-    one that was not doubted (`accepted_s`). `armed` and `mode` are from the last heartbeat, `armed_since_s` and
-    `mode_since_s` since when all heartbeats agree with it. `has_jumped`: the altitude has continued from another value.
+    one that was not doubted (`accepted_s`), which was sent at `sent_s` if its latency above the least one is delay.
+    `armed` and `mode` are from the last heartbeat, `armed_since_s` and `mode_since_s` since when all heartbeats agree
+    with it. `jumped_m` is the greatest jump after which the altitude has continued from another value.
     """
 
     received_s: float
     heartbeat_s: float
     advanced_s: float
     accepted_s: float
+    sent_s: float
     battery_s: float
     heartbeat_gap_s: float = 0.0
     """Time between the last two heartbeats."""
@@ -83,7 +91,11 @@ class TrialObservation:
     other: OtherClock | None = None
     glitches: int = 0
     doubt_level: float = 0.0
-    has_jumped: bool = False
+    jumped_m: float = 0.0
+    least_offset_s: float | None = None
+    """Our clock less the vehicle's, by the position with the least latency."""
+    late_since_s: float | None = None
+    """Since when all positions have been too late to be fresh."""
     side: int = -1
     crossings: int = 0
     armed: bool = False
@@ -99,6 +111,8 @@ class TrialObservation:
     """Greatest altitude since the command."""
     lifted: bool = False
     """Whether it has been above the ground."""
+    unseen: bool = False
+    """Whether no position of it was received for a while since it was last above the ground."""
     behind_m: float = 0.0
     """How far its altitude is behind its integrated climb rate, until it is first above the ground."""
     second: SecondaryAltitude | None = None
@@ -118,6 +132,7 @@ def begin(
         heartbeat_s=now_s,
         advanced_s=now_s,
         accepted_s=now_s,
+        sent_s=now_s,
         battery_s=now_s,
         battery_v=battery_v,
         last=last,
@@ -129,7 +144,7 @@ def begin(
 def reset_altitude(watch: TrialObservation) -> TrialObservation:
     """Return the observation of a vehicle on the ground whose altitude was reset, without its earlier altitudes."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
-    return replace(watch, has_jumped=False, lifted=False, behind_m=0.0, side=-1, crossings=0, second=second)
+    return replace(watch, jumped_m=0.0, lifted=False, unseen=False, behind_m=0.0, side=-1, crossings=0, second=second)
 
 
 def update(
@@ -170,7 +185,8 @@ def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObser
     reports, and the second source of altitude. A single sample that jumps is ignored."""
     if watch.doubted is not None and is_fresh(watch, now_s):
         return watch
-    watch = replace(watch, lifted=watch.lifted or is_airborne(watch, now_s, ground_m))
+    airborne = is_airborne(watch, now_s, ground_m)
+    watch = replace(watch, lifted=watch.lifted or airborne, unseen=watch.unseen and not airborne)
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
     grounded = is_grounded(watch, now_s, ground_m) and not is_said_to_fly(watch, now_s, ground_m)
     return replace(watch, grounded_since_s=since_s if grounded else None)
@@ -188,7 +204,7 @@ def has_unreliable_position(watch: TrialObservation) -> bool:
 
 
 def is_fresh(watch: TrialObservation, now_s: float) -> bool:
-    return watch.last is not None and now_s - watch.accepted_s < FRESH_S
+    return watch.last is not None and now_s - watch.sent_s < FRESH_S
 
 
 def is_still(watch: TrialObservation, now_s: float, ground_m: float, *, within_m: float = _DRIFT_M) -> bool:
@@ -230,11 +246,6 @@ def mode_of(watch: TrialObservation, limits: Limits) -> str:
     return watch.mode if watch.heartbeat_s - watch.mode_since_s >= limits.confirmation_s else ""
 
 
-def may_stop_motors(watch: TrialObservation, now_s: float) -> bool:
-    """Whether its motors may be stopped without a request of a person."""
-    return not find_doubt_of_ground(watch, now_s)
-
-
 def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
     """Return why it may not be on the ground; empty once every source has shown it there for a second, if its altitude
     has never jumped."""
@@ -243,7 +254,7 @@ def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
         return "two vehicles may be using its system id"
     if watch.rebooted:
         return "it rebooted during the flight"
-    if watch.has_jumped:
+    if watch.jumped_m:
         return "its altitude jumped during the flight"
     if is_behind_climb_rate(watch):
         return "its altitude did not follow its climb rate"
@@ -276,6 +287,7 @@ def _add_position(
         gained_s = position.time_boot_s - newest.time_boot_s
         if gained_s <= 0.0 or gained_s > now_s - watch.advanced_s + _AHEAD_S:
             return _add_other_clock(watch, position, now_s, newest), ()
+    watch = _with_latency(watch, position, now_s)
     quiet_s = now_s - watch.advanced_s
     doubt_level = max(watch.doubt_level - _DOUBT_DECAY_1_S * quiet_s, 0.0)
     watch = replace(watch, advanced_s=now_s, stuck_s=0.0, doubt_level=doubt_level)
@@ -287,8 +299,9 @@ def _add_position(
     if doubted is None:
         return replace(watch, doubted=position), ()
     if _follows(doubted, position):
-        has_jumped = replace(watch, doubted=None, has_jumped=watch.has_jumped or _jumps(last, doubted))
-        return _accept(has_jumped, position, now_s, limits), (doubted, position)
+        jumped_m = abs(_off_m(last, doubted)) if _jumps(last, doubted) else 0.0
+        watch = replace(watch, doubted=None, jumped_m=max(watch.jumped_m, jumped_m))
+        return _accept(watch, position, now_s, limits), (doubted, position)
     return replace(watch, doubted=position, glitches=watch.glitches + 1), ()
 
 
@@ -305,7 +318,8 @@ def _add_other_clock(watch: TrialObservation, position: Position, now_s: float, 
         return watch
     if now_s - first_s < _REBOOTED_S:
         return replace(watch, stuck_s=0.0)
-    return replace(watch, rebooted=True, last=position, doubted=None, advanced_s=now_s, accepted_s=now_s)
+    watch = replace(watch, rebooted=True, last=position, doubted=None, least_offset_s=None)
+    return replace(watch, advanced_s=now_s, accepted_s=now_s, sent_s=now_s)
 
 
 def _is_same_clock(other: OtherClock, position: Position, now_s: float) -> bool:
@@ -320,10 +334,27 @@ def _follows(one: Position, other: Position) -> bool:
 
 
 def _jumps(one: Position, other: Position) -> bool:
-    """Whether the other altitude differs from the first one's extrapolation by more than possible accelerations."""
+    """Whether the altitudes differ by more than the climb rates and possible accelerations between them explain."""
     elapsed_s = other.time_boot_s - one.time_boot_s
-    off_m = other.altitude_m - (one.altitude_m + one.climb_rate_m_s * elapsed_s)
-    return abs(off_m) > _JUMP_M + 0.5 * _ACCELERATION_M_S2 * elapsed_s**2
+    brief_s = min(elapsed_s, _ACCELERATING_S)
+    possible_m = 0.5 * _ACCELERATION_M_S2 * brief_s**2 + _UNSEEN_M_S * (elapsed_s - brief_s)
+    return abs(_off_m(one, other)) > _JUMP_M + possible_m
+
+
+def _off_m(one: Position, other: Position) -> float:
+    """Return how far the other altitude is above the one that the mean of both climb rates leads to, m."""
+    elapsed_s = other.time_boot_s - one.time_boot_s
+    return other.altitude_m - one.altitude_m - 0.5 * (one.climb_rate_m_s + other.climb_rate_m_s) * elapsed_s
+
+
+def _with_latency(watch: TrialObservation, position: Position, now_s: float) -> TrialObservation:
+    """Update the least latency, and since when positions are late."""
+    offset_s, least_s = now_s - position.time_boot_s, watch.least_offset_s
+    if least_s is None:
+        return replace(watch, least_offset_s=offset_s, late_since_s=None)
+    least_s = min(offset_s, least_s + _CLOCK_DRIFT * (now_s - watch.advanced_s))
+    since_s = watch.late_since_s if watch.late_since_s is not None else now_s
+    return replace(watch, least_offset_s=least_s, late_since_s=since_s if offset_s - least_s >= FRESH_S else None)
 
 
 def _accept(watch: TrialObservation, position: Position, now_s: float, limits: Limits) -> TrialObservation:
@@ -333,8 +364,10 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
     return replace(
         watch,
         behind_m=_behind_m(watch, position),
+        unseen=watch.unseen or (watch.last is not None and position.time_boot_s - watch.last.time_boot_s > FRESH_S),
         highest_m=max(watch.highest_m, position.altitude_m),
         accepted_s=now_s,
+        sent_s=now_s if watch.least_offset_s is None else position.time_boot_s + watch.least_offset_s,
         last=position,
         origin=watch.origin or position,
         side=side,

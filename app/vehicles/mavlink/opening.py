@@ -82,12 +82,13 @@ def limits_of(options: Options, radio: AutopilotLink) -> Limits:
         flying_modes=profile.flying_modes,
         hovering_modes=profile.hovering_modes,
         landing_modes=profile.landing_modes,
-        manual_modes=profile.manual_modes,
+        automatic_modes=profile.automatic_modes,
         mode_names={**profile.mode_names, **_described(profile)},
         blocks={number: name for name, number in radio.target.blocks.items()},
         arming_blocks=profile.arming_blocks,
         flying_blocks=profile.flying_blocks,
         landing_blocks=profile.landing_blocks,
+        landed_blocks=profile.landed_blocks,
     ).stretched(timeout_factor_of(options))
 
 

@@ -35,6 +35,7 @@ _UID_ATTEMPTS: Final = 10
 _NAME_ATTEMPTS: Final = 2
 _CHECKS_ATTEMPTS: Final = 2
 _NO_POSITION: Final = "Wait until it has a position (GPS, cameras or its own sensors), then check again."
+_ONE_VEHICLE: Final = "Switch the other vehicle off, or give each its own id."
 _LAND_FIRST: Final = "Land it, check that its motors have stopped, then verify its gains and release it."
 
 
@@ -119,7 +120,12 @@ def read_vehicle_info(radio: AutopilotLink) -> str:
     radio.send(*radio.profile.conclude(radio.target))
     identify(radio)
     has = tuple(name for name in radio.profile.stop_settings if _has(radio, name))
-    radio.target = replace(radio.target, stop_settings=has)
+    newer = {
+        requirement.parameter: requirement.newer_name
+        for requirement in radio.profile.requirements
+        if requirement.newer_name and not _has(radio, requirement.parameter) and _has(radio, requirement.newer_name)
+    }
+    radio.target = replace(radio.target, stop_settings=has, newer_names=newer)
     return problem
 
 
@@ -183,9 +189,19 @@ def is_armed(radio: AutopilotLink) -> bool:
 
 
 def require_disarmed(radio: AutopilotLink) -> None:
-    """Raise SafeGainsError if the vehicle is armed: its state is unknown then, so only Land may be sent to it."""
+    """Wait until two heartbeats agree that the vehicle is disarmed. Raises SafeGainsError if it is armed, because only
+    Land may be sent to it then, or if they do not agree within 5 s or are of two vehicles."""
+    until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
+    while not radio.is_disarmed and not is_armed(radio) and radio.clock.now_s() < until_s:
+        radio.listen(_LISTEN_S)
     if is_armed(radio):
         raise SafeGainsError(ARMED, hint=_LAND_FIRST)
+    if not radio.is_disarmed:
+        raise SafeGainsError(
+            "Its heartbeats do not confirm that it is disarmed; nothing was written.", hint=_LAND_FIRST
+        )
+    if why := radio.link.duplicate_reason:
+        raise SafeGainsError(f"Two vehicles use its system id, so nothing was written. {why}", hint=_ONE_VEHICLE)
 
 
 def prepare(radio: AutopilotLink, telemetry_hz: float) -> None:
@@ -334,7 +350,7 @@ def _single_vehicle_item(radio: AutopilotLink) -> CheckItem:
         passed=not duplicate_reason,
         found=duplicate_reason.removesuffix(".") or f"one vehicle uses system id {radio.target.system}",
         needed="one vehicle per system id",
-        hint="Switch the other vehicle off, or give each its own id." if duplicate_reason else "",
+        hint=_ONE_VEHICLE if duplicate_reason else "",
     )
 
 
@@ -472,12 +488,13 @@ def _flight_plan(problem: str) -> CheckItem:
 
 
 def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
-    value = read_parameter(radio, requirement.parameter)
+    parameter = radio.target.newer_names.get(requirement.parameter, requirement.parameter)
+    value = read_parameter(radio, parameter)
     return CheckItem(
         name=f"failsafe {requirement.parameter}",
-        title=f"Failsafe {requirement.parameter}",
+        title=f"Failsafe {parameter}",
         passed=value is not None and requirement.is_met(value),
         found="not reported" if value is None else f"{value:g}" if value else "off",
         needed=requirement.what,
-        hint="Enable it in the autopilot: if the link is lost, only this failsafe lands the vehicle.",
+        hint="Set it in the autopilot: if the link is lost, only its own failsafe lands the vehicle.",
     )

@@ -19,6 +19,7 @@ from app.vehicles.mavlink.events import (
     PerformAction,
     Position,
     RecordSample,
+    RequestGain,
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
@@ -188,6 +189,8 @@ class TrialRunner:
                 case SendGain(setting):
                     radio = self._radio
                     radio.send(radio.profile.set_parameter(radio.target, setting.parameter, setting.value))
+                case RequestGain(parameter):
+                    self._radio.send(self._radio.profile.read_parameter(self._radio.target, parameter))
                 case RestoreGains():
                     self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
                 case RecordSample():

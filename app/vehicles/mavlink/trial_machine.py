@@ -21,6 +21,7 @@ from app.vehicles.mavlink.events import (
     Heartbeat,
     MotorsOffRequested,
     PacketReceived,
+    Parameter,
     PerformAction,
     RecordSample,
     RestoreGains,
@@ -39,9 +40,12 @@ from app.vehicles.mavlink.trial_transitions import (
     disarm,
     enter,
     fail,
+    find_doubt_of_descent,
+    find_doubt_of_ground,
     land,
     note,
     quarantine,
+    request_reply,
     send_gains,
     stop_motors,
 )
@@ -57,6 +61,10 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
+_REPLY_S: Final = 0.5
+"""Interval at which a reply after the take-off command is requested."""
+_OTHER_M: Final = 1.0
+"""After a greater jump of the altitude, another vehicle may be answering."""
 _ARMING_S: Final = 15.0
 """Longest time that arming may take, with all repetitions."""
 
@@ -79,8 +87,19 @@ def advance(trial: Trial, event: Event) -> Step:
     elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=replace(trial.watch, duplicate_reason=event.why))
     trial = replace(trial, watch=watching.settle(trial.watch, event.now_s, trial.plan.ground_m))
-    trial, commands = _react(_with_fall(trial), event)
-    return trial, (*kept, *commands)
+    trial, requests = _confirm_take_off(trial, event)
+    trial, commands = _react(_with_jump(_with_fall(trial)), event)
+    return trial, (*kept, *requests, *commands)
+
+
+def _confirm_take_off(trial: Trial, event: Event) -> Step:
+    """Note the first reply to a message sent after the take-off command, and request one until then."""
+    last = trial.watch.last
+    if not trial.may_take_off or last is None:
+        return trial, ()
+    if isinstance(event, PacketReceived) and isinstance(event.measurement, Parameter):
+        return replace(trial, confirmed_boot_s=last.time_boot_s, resting_since_s=None), ()
+    return request_reply(trial, event.now_s) if event.now_s - trial.requested_s >= _REPLY_S else (trial, ())
 
 
 def _process_packet(trial: Trial, event: PacketReceived) -> Step:
@@ -111,6 +130,13 @@ def _with_fall(trial: Trial) -> Trial:
     return trial if fall is None else note(trial, fall)
 
 
+def _with_jump(trial: Trial) -> Trial:
+    """Note in any state a jump after which the vehicle's identity is uncertain."""
+    if trial.commanded_s is None or trial.doubt or trial.watch.jumped_m <= _OTHER_M:
+        return trial
+    return replace(trial, doubt=f"Its altitude jumped by {trial.watch.jumped_m:.1f} m.")
+
+
 def _react(trial: Trial, event: Event) -> Step:
     if isinstance(event, MotorsOffRequested):
         return stop_motors(trial, event.reason, event.now_s)
@@ -139,7 +165,8 @@ def _arm(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     mode, watch = trial.watch.mode, replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S)
     trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=last.time_boot_s, commanded_in=mode)
-    return enter(trial, State.TAKEOFF, now_s), (PerformAction(Action.TAKE_OFF),)
+    trial, request = request_reply(enter(trial, State.TAKEOFF, now_s), now_s)
+    return trial, (PerformAction(Action.TAKE_OFF), *request)
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
@@ -161,11 +188,18 @@ def _take_off(trial: Trial, event: Event) -> Step:
     if finding := limit_checks.find_altitude_behind(trial.watch):
         return fail(trial, finding, now_s)
     if isinstance(event, ActionRefused):
-        return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
-    if now_s - trial.since_s > trial.plan.lift_off_s and watching.is_fresh(trial.watch, now_s):
+        refused = replace(trial, confirmed_boot_s=trial.commanded_boot_s)
+        return fail(refused, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
+    if _waited_s(trial) > trial.plan.lift_off_s and watching.is_fresh(trial.watch, now_s):
         why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
         return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why), now_s)
     return trial, ()
+
+
+def _waited_s(trial: Trial) -> float:
+    """Return by the vehicle's own time how long it has stood since the command, or since it certainly had it."""
+    last, since_s = trial.watch.last, trial.confirmed_boot_s or trial.commanded_boot_s
+    return 0.0 if last is None or since_s is None else last.time_boot_s - since_s
 
 
 def _record(trial: Trial, event: Event) -> Step:
@@ -227,7 +261,7 @@ def _is_land_due(trial: Trial, now_s: float) -> bool:
 def _may_be_by_hand(trial: Trial, now_s: float) -> bool:
     """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
     watch, limits = trial.watch, trial.plan.limits
-    is_pilots = bool(_modes(trial)) and watch.armed and watch.mode in limits.manual_modes
+    is_pilots = bool(_modes(trial)) and watch.armed and limits.is_manual(watch.mode)
     return is_pilots and now_s - watch.heartbeat_s < limits.confirmation_s
 
 
@@ -266,7 +300,7 @@ def _has_landed(trial: Trial, now_s: float) -> bool:
     is_high = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     near = watching.is_fresh(trial.watch, now_s) and not is_high
     disarmed = watching.is_disarmed(trial.watch, trial.plan.limits)
-    return _has_rested(trial, LANDED_S, now_s) or (near and disarmed)
+    return (_has_rested(trial, LANDED_S, now_s) and not find_doubt_of_descent(trial)) or (near and disarmed)
 
 
 def _link_lost(trial: Trial, event: Event) -> Step:
@@ -296,7 +330,7 @@ def _disarming(trial: Trial, event: Event) -> Step:
         return abort(replace(trial, doubt=trial.doubt or why), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
         return quarantine(trial, _why_not_stopped(trial, now_s), now_s)
-    may_stop = trial.stopped or watching.may_stop_motors(trial.watch, now_s)
+    may_stop = trial.stopped or not find_doubt_of_ground(trial, now_s)
     if may_stop and now_s - trial.repeated_s >= REPEAT_S:
         action = Action.KILL if trial.stopped else Action.MOTORS_OFF
         return replace(trial, repeated_s=now_s), (PerformAction(action),)
@@ -304,14 +338,17 @@ def _disarming(trial: Trial, event: Event) -> Step:
 
 
 def _why_not_stopped(trial: Trial, now_s: float) -> str:
-    doubt = "" if trial.stopped else watching.find_doubt_of_ground(trial.watch, now_s)
+    doubt = "" if trial.stopped else find_doubt_of_ground(trial, now_s)
     if doubt:
         return f"Its motors were not commanded to stop: {doubt}."
     return f"It has not confirmed within {DISARMED_WITHIN_S:g} s that its motors stopped."
 
 
 def _answered(trial: Trial, event: Event) -> Trial:
-    """Note a reply to the command to stop its motors, which together with one heartbeat confirms the stop."""
+    """Note a reply to the command to stop its motors, which together with one heartbeat confirms the stop. Before the
+    take-off command it may be the reply to arming, which some autopilots send for either."""
+    if trial.commanded_s is None:
+        return trial
     measurement = event.measurement if isinstance(event, PacketReceived) else None
     answered = confirms_motors_off(measurement, trial.plan.stop_settings) and trial.repeated_s >= trial.since_s
     return replace(trial, answered=trial.answered or answered)
@@ -321,6 +358,9 @@ def _is_stopped(trial: Trial, event: Event) -> bool:
     """Whether its motors have stopped, by two heartbeats, or by one and its reply to the command."""
     if not isinstance(event, PacketReceived) or not isinstance(event.measurement, Heartbeat) or event.measurement.armed:
         return False
+    if trial.commanded_s is None:  # a heartbeat may have been under way since before it armed
+        since_s = max(trial.watch.armed_since_s, trial.since_s)
+        return event.now_s - since_s >= trial.plan.limits.confirmation_s
     return trial.answered or watching.is_disarmed(trial.watch, trial.plan.limits)
 
 
@@ -357,6 +397,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
         or (limit_checks.find_interrupted_climb(watch, plan.limits) if _modes(trial) else None)
         or limit_checks.find_duplicate(watch)
         or limit_checks.find_link(watch, plan.limits, now_s)
+        or limit_checks.find_jump(watch)
         or limit_checks.find_envelope(watch, plan.limits, ground_m=plan.ground_m, settling=True)
         or limit_checks.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
         or limit_checks.find_frozen(watch, plan.limits, now_s)
@@ -413,7 +454,7 @@ def _blocks(trial: Trial) -> frozenset[str]:
 def _confirms_landing(trial: Trial, now_s: float) -> bool:
     """Whether telemetry confirms that the vehicle is landing: it descends, or is near the ground."""
     last = trial.watch.last
-    if last is None or not watching.is_fresh(trial.watch, now_s):
+    if last is None or trial.may_take_off or not watching.is_fresh(trial.watch, now_s):
         return False
     near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     return near or last.climb_rate_m_s < DESCENDING_M_S

@@ -17,6 +17,7 @@ from app.vehicles.mavlink.events import (
     Parameter,
     PerformAction,
     Position,
+    RequestGain,
     SendGain,
     Setting,
 )
@@ -122,10 +123,11 @@ class Trial:
     """State of a trial.
 
     `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command, `commanded_in` its mode
-    then. `failure` is the first failure. `stopped`: a person has requested motors off; `answered`: the vehicle has
-    replied to the command to stop them. `ground_samples` are its positions between arming and the take-off command,
-    `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is the reason why it will be
-    quarantined at the end, however it lands.
+    then. `confirmed_boot_s` is its own time when it first replied to a message sent after that command; until then the
+    command may still be under way to it. `failure` is the first failure. `stopped`: a person has requested motors off;
+    `answered`: the vehicle has replied to the command to stop them. `ground_samples` are its positions between arming
+    and the take-off command, `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is
+    the reason why it will be quarantined at the end, however it lands.
     """
 
     plan: Plan
@@ -139,6 +141,8 @@ class Trial:
     commanded_s: float | None = None
     commanded_boot_s: float | None = None
     commanded_in: str = ""
+    confirmed_boot_s: float | None = None
+    requested_s: float = 0.0
     ground_samples: tuple[Position, ...] = ()
     ground_shift_m: float = 0.0
     unsent: tuple[Setting, ...] = ()
@@ -154,6 +158,12 @@ class Trial:
     @property
     def is_over(self) -> bool:
         return self.state in OVER
+
+    @property
+    def may_take_off(self) -> bool:
+        """Whether the take-off command may yet reach the vehicle, which has not been seen in the air: its position may
+        be of the time before, and a command to stop its motors would arrive after it."""
+        return self.commanded_s is not None and self.confirmed_boot_s is None and not self.watch.lifted
 
     @property
     def outcome(self) -> Outcome | None:
@@ -191,8 +201,10 @@ def _lose_link(trial: Trial, now_s: float) -> Step:
 
 
 def _give_up_take_off(trial: Trial, now_s: float) -> Step:
-    """Stop the motors if every source shows it on the ground; in the air, abort, because its integrator is wound up."""
-    return disarm(trial, now_s) if trial.watch.grounded_since_s is not None else abort(trial, now_s)
+    """Stop the motors of a vehicle that has received the command and is on the ground by every source; otherwise abort,
+    because it may yet lift off, or has, with its integrator wound up. A flight plan ends the landing on the ground."""
+    stands = trial.watch.grounded_since_s is not None and not find_doubt_of_descent(trial)
+    return disarm(trial, now_s) if stands else abort(trial, now_s)
 
 
 def _abort_landing(trial: Trial, now_s: float) -> Step:
@@ -233,9 +245,30 @@ def land(trial: Trial, state: State, now_s: float) -> Step:
 def disarm(trial: Trial, now_s: float) -> Step:
     """Enter disarm; stop the motors now if every source has shown the vehicle on the ground for a second, or later."""
     trial = replace(enter(trial, State.DISARM, now_s), answered=False)
-    if not watching.may_stop_motors(trial.watch, now_s):
+    if find_doubt_of_ground(trial, now_s):
         return trial, ()
     return replace(trial, repeated_s=now_s), (PerformAction(Action.MOTORS_OFF),)
+
+
+def find_doubt_of_ground(trial: Trial, now_s: float) -> str:
+    """Return why its motors may not be stopped without a request of a person; empty if they may."""
+    return find_doubt_of_descent(trial) or watching.find_doubt_of_ground(trial.watch, now_s)
+
+
+def find_doubt_of_descent(trial: Trial) -> str:
+    """Return why a position on the ground does not show that the vehicle stayed or came down there: it may yet take
+    off, or it was not observed climbing or descending and does not report the landing itself either."""
+    watch, landed_blocks = trial.watch, trial.plan.limits.landed_blocks
+    if trial.may_take_off:
+        return "it has not replied since the take-off command, which may still be under way"
+    is_unseen = trial.commanded_s is not None and (watch.unseen or not watch.lifted)
+    may_fly = watch.block not in landed_blocks if landed_blocks else watch.landed is False
+    return "its descent was not observed, and it has not reported a landing" if is_unseen and may_fly else ""
+
+
+def request_reply(trial: Trial, now_s: float) -> Step:
+    """Request a reply that confirms the take-off command."""
+    return replace(trial, requested_s=now_s), (RequestGain(trial.plan.safe_gains[0].parameter),)
 
 
 def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:

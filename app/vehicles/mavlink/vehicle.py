@@ -127,6 +127,7 @@ class MavlinkVehicle:
         self._identify()
         self._require_not_quarantined()
         self._require_uid()
+        preflight.require_disarmed(self._radio)
         if self._state is State.IDLE:
             self._enter(State.SET_GAINS)
         try:
@@ -462,7 +463,9 @@ class MavlinkVehicle:
         if self._radio.profile.flying_blocks:
             radius_m, plan_radius_m = float(self._options["radius_m"]), float(self._options["plan_radius_m"])
             items = (*items, preflight.evaluate_distance(watched, radius_m=radius_m, plan_radius_m=plan_radius_m))
-        return watched, (*items, self._gains.check())
+        items = (*items, self._gains.check())
+        positions = tuple(position for _, position in self._radio.seen.positions)
+        return replace(watched, positions=positions), items
 
     def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> TrialResult:
         last = ground.last

@@ -46,7 +46,7 @@ _PATIENCE_S: Final = 0.5
 _SPEED: Final = 8.0
 _BYTEWISE: Final = 6
 _FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
-    "ardupilot": (("FS_GCS_ENABLE", 2, 5), ("FENCE_ENABLE", 2, 1)),
+    "ardupilot": (("FS_GCS_ENABLE", 2, 5), ("FENCE_ENABLE", 2, 1), ("FENCE_ALT_MAX", 9, 10)),
     "px4": (("NAV_DLL_ACT", _BYTEWISE, 3), ("GF_ACTION", _BYTEWISE, 3), ("GF_MAX_VER_DIST", 9, 10)),
 }
 """Name, MAVLink's type, value."""

@@ -29,7 +29,15 @@ WITH_BLOCKS = replace(
         landing_blocks=frozenset({"land here", "land", "flare", "landed"}),
     ),
 )
-COPTER = replace(PLAN, limits=replace(LIMITS, flying_modes=frozenset({"guided"}), landing_modes=frozenset({"land"})))
+COPTER = replace(
+    PLAN,
+    limits=replace(
+        LIMITS,
+        flying_modes=frozenset({"guided"}),
+        landing_modes=frozenset({"land"}),
+        automatic_modes=frozenset({"guided", "land"}),
+    ),
+)
 
 
 def slide(walk: TrialDriver, reason: str = "it flies towards people") -> TrialDriver:
@@ -297,7 +305,12 @@ def test_a_vehicle_whose_second_source_is_off_before_the_command_is_not_told_to_
 
 PX4 = replace(
     PLAN,
-    limits=replace(LIMITS, flying_modes=frozenset({"take-off", "hold"}), hovering_modes=frozenset({"hold"})),
+    limits=replace(
+        LIMITS,
+        flying_modes=frozenset({"take-off", "hold"}),
+        hovering_modes=frozenset({"hold"}),
+        automatic_modes=frozenset({"take-off", "hold"}),
+    ),
 )
 
 

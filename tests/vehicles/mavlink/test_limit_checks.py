@@ -61,7 +61,7 @@ def test_drifting_away_is_limited() -> None:
 
 
 def test_four_crossings_of_the_set_point_are_an_oscillation_and_three_are_not() -> None:
-    swing = [0.1, 3.4, 2.6, 3.4]
+    swing = [2.6, 3.4, 2.6, 3.4]
     assert envelope(watch_of(*swing, every_s=1.0)) is None
     assert envelope(watch_of(*swing, 2.6, every_s=1.0)) == "It crossed its set point 4 times, beyond ±0.3 m."
     assert envelope(watch_of(*swing, 2.6, every_s=1.0), settling=False) is None

@@ -434,10 +434,16 @@ def test_paparazzi_tells_every_change_of_block() -> None:
     ("profile", "parameter", "protects", "does_not"),
     [
         (ARDUPILOT, "FS_GCS_ENABLE", {5.0}, {0.0, 1.0, 2.0}),
+        (ARDUPILOT, "FS_GCS_TIMEOUT", {5.0, 15.0}, {0.0, 120.0}),
+        (ARDUPILOT, "SYSID_MYGCS", {255.0}, {0.0, 1.0, 254.0}),
         (ARDUPILOT, "FENCE_ENABLE", {1.0}, {0.0}),
+        (ARDUPILOT, "FENCE_TYPE", {1.0, 3.0, 7.0}, {0.0, 2.0, 6.0}),
+        (ARDUPILOT, "FENCE_ACTION", {1.0, 2.0, 3.0, 4.0, 5.0}, {0.0}),
+        (ARDUPILOT, "FENCE_ALT_MAX", {5.0, 10.0}, {0.0, 100.0}),
         (PX4, "NAV_DLL_ACT", {3.0}, {0.0, 1.0, 5.0, 6.0}),
+        (PX4, "COM_DL_LOSS_T", {5.0, 15.0}, {0.0, 300.0}),
         (PX4, "GF_ACTION", {2.0, 3.0, 5.0}, {0.0, 1.0, 4.0}),
-        (PX4, "GF_MAX_VER_DIST", {5.0, 10.0}, {0.0}),
+        (PX4, "GF_MAX_VER_DIST", {5.0, 10.0}, {0.0, 120.0}),
     ],
 )
 def test_only_a_failsafe_that_brings_the_vehicle_down_with_its_motors_running_will_do(
@@ -445,3 +451,35 @@ def test_only_a_failsafe_that_brings_the_vehicle_down_with_its_motors_running_wi
 ) -> None:
     requirement = next(each for each in profile.requirements if each.parameter == parameter)
     assert {value for value in protects | does_not if requirement.is_met(value)} == protects
+
+
+@pytest.mark.parametrize(
+    ("profile", "modes"),
+    [
+        (PAPARAZZI, {"64", "80", "16"}),
+        (ARDUPILOT, {"0", "1", "2", "5", "7", "11", "13", "14", "15", "16", "18", "22", "24", "25", "28", "42"}),
+        (PX4, {"1.0", "2.0", "3.0", "3.1", "3.2", "5.0", "7.0", "8.0", "11.0", "12.0"}),
+    ],
+)
+def test_a_pilot_flies_in_every_mode_that_is_not_automatic_also_in_those_of_later_releases(
+    profile: Profile, modes: set[str]
+) -> None:
+    """Seen: in AutoTune, FlowHold, Position slow and others Land was sent once a second against the pilot."""
+    assert not modes & profile.automatic_modes
+    assert profile.flying_modes | profile.landing_modes <= profile.automatic_modes
+
+
+@pytest.mark.parametrize(("base_mode", "mode"), [(4, "4"), (5, "4"), (133, "4"), (65, "64"), (209, "80")])
+def test_paparazzis_mode_is_read_with_and_without_the_bit_for_a_custom_mode(base_mode: int, mode: str) -> None:
+    beat = heard(
+        PAPARAZZI,
+        "HEARTBEAT",
+        type=2,
+        autopilot=9,
+        base_mode=base_mode,
+        custom_mode=0,
+        system_status=4,
+        mavlink_version=3,
+    )
+    assert isinstance(beat, Heartbeat)
+    assert beat.mode == mode

@@ -86,9 +86,9 @@ def test_land_is_not_sent_again_while_the_mode_says_so_and_again_once_it_is_anot
 def test_a_block_that_was_told_before_the_order_does_not_answer_it() -> None:
     ordered = Ordered(autopilot="paparazzi")
     ordered.radio.seen.block, ordered.radio.seen.block_s = LANDED_BLOCK, 0.0
-    assert sum(ordered.seconds(5, flying(mode="208"))) >= 4
+    assert sum(ordered.seconds(5, flying(mode="4"))) >= 4
     ordered.told(BlockEntered(LANDED_BLOCK))
-    assert sum(ordered.seconds(15, flying(mode="208"))) == 0
+    assert sum(ordered.seconds(15, flying(mode="4"))) == 0
 
 
 def test_a_person_who_takes_the_vehicle_over_is_not_disturbed_and_one_heartbeat_is_nobody() -> None:

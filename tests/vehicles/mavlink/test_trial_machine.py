@@ -7,10 +7,12 @@ from itertools import pairwise
 import pytest
 
 from app.vehicles.mavlink.events import (
+    DISARMING,
     AbortRequested,
     Action,
     ActionDone,
     ActionRefused,
+    CommandReply,
     DuplicateVehicleDetected,
     FenceBreach,
     Heartbeat,
@@ -317,9 +319,9 @@ def be_one_of_two(walk: TrialDriver) -> None:
 WALK: list[tuple[State, Callable[[TrialDriver], None], State, Failure | None]] = [
     (State.ARM, fall_silent, State.DISARM, Failure.LINK),
     (State.ARM, lose_heartbeats, State.DISARM, Failure.LINK),
-    (State.ARM, drain, State.RESTORE, Failure.BATTERY),
+    (State.ARM, drain, State.DISARM, Failure.BATTERY),
     (State.ARM, press_abort, State.DISARM, Failure.OPERATOR),
-    (State.ARM, freeze, State.RESTORE, Failure.FROZEN),
+    (State.ARM, freeze, State.DISARM, Failure.FROZEN),
     (State.ARM, reboot, State.DISARM, Failure.UNEXPECTED),
     (State.TAKEOFF, fall_silent, State.LINK_LOST, Failure.LINK),
     (State.TAKEOFF, cross_its_fence, State.ABORT_LAND, Failure.ENVELOPE),
@@ -650,9 +652,9 @@ def test_a_heartbeat_of_somebody_else_every_second_is_outvoted_by_the_vehicles_o
 
 
 def test_a_record_ends_by_the_grounds_clock_too() -> None:
-    walk = recording()
-    walk.tempo = 0.3
-    walk.pass_s(PLAN.record_s)
+    walk = TrialDriver(plan=replace(PLAN, record_s=33.0)).lift_off()
+    walk.tempo = 0.905
+    walk.pass_s(33.5)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.SLOW_CLOCK)
     assert walk.trial.why.startswith("Its clock advanced by ")
 
@@ -666,7 +668,87 @@ def test_an_altitude_that_leaps_to_the_ground_stops_no_motors() -> None:
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
-    assert walk.trial.why == f"{ABORT} Its motors were not commanded to stop: its altitude jumped during the flight."
+    assert walk.trial.why == (
+        f"{ABORT} Its altitude jumped by 2.9 m. Its motors were not commanded to stop: its altitude jumped during the "
+        "flight."
+    )
+
+
+def test_positions_that_fall_behind_are_no_positions() -> None:
+    """Its clock at a third of its speed looks the same: either way nobody knows where it is."""
+    walk = recording()
+    walk.tempo = 0.3
+    walk.pass_s(1.5)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
+    assert walk.trial.why == "Its positions arrive more than 0.5 s late, or its clock is slower than its clock_speed."
+
+
+@pytest.mark.parametrize("gap_s", [0.0, 0.3, 0.45, 0.52, 0.6, 1.0])
+def test_an_altitude_that_is_on_the_ground_after_a_gap_ends_the_record_and_stops_no_motors(gap_s: float) -> None:
+    """Seen: after 0.52 s without a position nothing counted as a jump, and the motors were stopped at 1.35 m."""
+    walk = recording()
+    walk.blind = True
+    walk.pass_s(gap_s)
+    walk.blind = False
+    walk.altitude_m = GROUND_M
+    walk.pass_s(0.2)
+    assert (walk.state, walk.trial.outcome) == (State.ABORT_LAND, "invalid")
+    walk.pass_s(60.0)
+    assert walk.state is State.QUARANTINE
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+
+
+def test_a_vehicle_whose_altitude_jumped_by_metres_is_not_said_to_be_safe_though_it_disarms_itself() -> None:
+    """Seen: another vehicle with its ids stood on the ground and answered in its stead."""
+    walk = recording()
+    walk.altitude_m = GROUND_M
+    walk.pass_s(0.5)
+    walk.armed = False
+    walk.pass_s(3.0).restore()
+    assert walk.state is State.QUARANTINE
+
+
+def test_a_late_lift_off_is_judged_by_the_vehicles_clock_not_by_late_packets() -> None:
+    """Seen: its packets came later and later, and the motors of a vehicle at 1.9 m were stopped: not lifted off."""
+    walk = taking_off()
+    walk.tempo = 0.2
+    walk.pass_s(1.5)
+    assert Action.MOTORS_OFF not in walk.actions
+    assert walk.trial.failure is not Failure.NO_LIFT_OFF
+
+
+def test_motors_are_not_stopped_while_the_take_off_command_may_still_be_under_way() -> None:
+    """Seen: what was sent arrived 1.2 s late; it took off, and 1.5 s later obeyed the command to stop its motors."""
+    walk = TrialDriver(deaf=True).arm().pass_s(1.6)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.NO_LIFT_OFF)
+    walk.pass_s(20.0)
+    assert Action.MOTORS_OFF not in walk.actions
+    assert len(walk.when(Action.LAND)) > 5
+    walk.deaf = False
+    walk.pass_s(1.0)
+    assert Action.MOTORS_OFF not in walk.actions
+    walk.pass_s(2.5)
+    assert walk.actions[-1] is Action.MOTORS_OFF
+
+
+def test_its_time_to_lift_off_begins_with_its_reply() -> None:
+    walk = TrialDriver(deaf=True).arm().pass_s(1.0)
+    walk.deaf = False
+    walk.pass_s(1.4)
+    assert (walk.state, walk.trial.failure) == (State.TAKEOFF, None)
+    walk.pass_s(0.2)
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NO_LIFT_OFF)
+    assert walk.actions[-1] is Action.MOTORS_OFF
+
+
+def test_the_reply_to_arming_does_not_confirm_that_its_motors_stopped() -> None:
+    """ArduPilot and PX4 reply to both with the same message; seen: the late reply and one old heartbeat."""
+    walk = arming()
+    press_abort(walk)
+    walk.hear(CommandReply(DISARMING, accepted=True)).hear(Heartbeat(9, False, "4"))
+    assert walk.states == [State.ARM, State.DISARM]
+    walk.pass_s(1.2)
+    assert walk.states == [State.ARM, State.DISARM, State.RESTORE]
 
 
 @pytest.mark.parametrize("says_so", [True, False])

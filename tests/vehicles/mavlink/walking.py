@@ -16,9 +16,11 @@ from app.vehicles.mavlink.events import (
     LandedState,
     Measurement,
     PacketReceived,
+    Parameter,
     PerformAction,
     Position,
     RecordSample,
+    RequestGain,
     SendGain,
     Setting,
     Tick,
@@ -36,7 +38,7 @@ LIMITS = Limits(
     min_battery_v=10.5,
     flying_modes=frozenset({"4"}),
     landing_modes=frozenset({"4"}),
-    manual_modes=frozenset({"64"}),
+    automatic_modes=frozenset({"0", "4", "8"}),
 )
 PLAN = Plan(safe_gains=SAFE_GAINS, limits=LIMITS, ground_m=GROUND_M, record_s=8.0)
 
@@ -60,12 +62,14 @@ class TrialDriver:
     tempo: float = 1.0
     landed: bool | None = None
     heartless: bool = False
+    deaf: bool = False
     told: list[tuple[float, Command]] = field(default_factory=list)
     states: list[State] = field(default_factory=list)
     steps: int = 0
 
     def __post_init__(self) -> None:
         here = Position(self.boot_s, self.altitude_m, 0.0)
+        self._asked: list[str] = []
         self.trial: Trial
         watch = watching.begin(self.now_s, last=here, battery_v=self.voltage_v, stood_s=1.0)
         self.trial, commands = begin(self.plan, watch, self.now_s)
@@ -107,6 +111,7 @@ class TrialDriver:
             self.altitude_m += self.climb_rate_m_s * STEP_S
             if not self.mute:
                 self._speak()
+                self._reply()
             self.give(Tick(self.now_s))
         return self
 
@@ -120,7 +125,14 @@ class TrialDriver:
         if self.steps % 50 == 0:
             self.hear(Battery(self.voltage_v))
 
+    def _reply(self) -> None:
+        """Reply to requests, which it has received unless it is deaf."""
+        asked, self._asked = self._asked, []
+        for parameter in () if self.deaf else asked:
+            self.hear(Parameter(parameter, 1600.0))
+
     def _note(self, commands: tuple[Command, ...]) -> None:
+        self._asked += [command.parameter for command in commands if isinstance(command, RequestGain)]
         self.told += [(self.now_s, command) for command in commands]
         if not self.states or self.states[-1] is not self.trial.state:
             self.states.append(self.trial.state)
@@ -163,10 +175,10 @@ class TrialDriver:
         return self
 
     def disarm(self) -> "TrialDriver":
-        """From the landed vehicle to its gains being restored: it answers, and its next heartbeat agrees."""
+        """From the landed vehicle to its gains being restored: it answers, and its next heartbeats agree."""
         self.hear(CommandReply(DISARMING, accepted=True))
         self.armed = False
-        return self.pass_s(0.6)
+        return self.pass_s(1.1)
 
     def restore(self, problem: str = "") -> "TrialDriver":
         return self.give(GainsRestored(self.now_s, problem))

@@ -6,6 +6,7 @@ from typing import Final
 
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
+from app.vehicles.mavlink.link import GROUND_STATION
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
 
@@ -44,14 +45,16 @@ class ArduPilot:
         {
             "0": "Stabilize", "1": "Acro", "2": "AltHold", "3": "Auto", "4": "Guided", "5": "Loiter", "6": "RTL",
             "7": "Circle", "9": "Land", "11": "Drift", "13": "Sport", "14": "Flip", "15": "AutoTune", "16": "PosHold",
-            "17": "Brake", "18": "Throw", "20": "Guided_NoGPS", "21": "SmartRTL",
+            "17": "Brake", "18": "Throw", "19": "Avoid_ADSB", "20": "Guided_NoGPS", "21": "SmartRTL", "22": "FlowHold",
+            "23": "Follow", "24": "ZigZag", "25": "SystemID", "26": "Autorotate", "27": "Auto RTL", "28": "Turtle",
         }
     )  # fmt: skip
-    manual_modes: Final = frozenset({"0", "1", "2", "5", "7", "11", "13", "14", "16", "18"})
+    automatic_modes: Final = frozenset({"3", "4", "6", "9", "17", "19", "20", "21", "23", "26", "27"})
     modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
+    landed_blocks: Final[frozenset[str]] = frozenset()
     gain_sets: Final = (
         (
             GainParameter("PSC_POSZ_P", "PSC_POSZ_P", 0.1, 4.0),
@@ -71,7 +74,17 @@ class ArduPilot:
     stop_settings: Final[tuple[str, ...]] = ()
     requirements: Final = (
         Requirement("FS_GCS_ENABLE", "land when the ground station is lost (5)", frozenset({5.0})),
+        Requirement("FS_GCS_TIMEOUT", "land within 15 s of losing it", most=15.0),
+        Requirement(
+            "SYSID_MYGCS",
+            f"have this program as its ground station ({GROUND_STATION})",
+            frozenset({float(GROUND_STATION)}),
+            newer_name="MAV_GCS_SYSID",
+        ),
         Requirement("FENCE_ENABLE", "keep inside its fence (1)"),
+        Requirement("FENCE_TYPE", "have a fence for altitude (bit 0)", bits=1),
+        Requirement("FENCE_ACTION", "land or return at its fence (1 to 5)", frozenset({1.0, 2.0, 3.0, 4.0, 5.0})),
+        Requirement("FENCE_ALT_MAX", "have its fence at 10 m or below", most=10.0),
     )
 
     def measure(self, message: Message) -> Measurement | None:

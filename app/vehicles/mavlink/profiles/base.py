@@ -113,14 +113,20 @@ def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A failsafe that must be enabled before a flight: a parameter with one of these values, or any except zero."""
+    """Part of a failsafe that must be enabled before a flight: a parameter with one of these values, or else above
+    zero, at most `most`, and with all of these `bits`. `newer_name`: the parameter's name in newer releases."""
 
     parameter: str
     what: str
     values: frozenset[float] = frozenset()
+    bits: int = 0
+    most: float = math.inf
+    newer_name: str = ""
 
     def is_met(self, value: float) -> bool:
-        return value in self.values if self.values else value != 0.0
+        if self.values:
+            return value in self.values
+        return 0.0 < value <= self.most and int(value) & self.bits == self.bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +152,8 @@ class Step:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
     """Recipient of messages. `component` is its autopilot's, 0 until it is known; `aircraft` is the id that Paparazzi
-    matches in most messages; `blocks` are the numbers of its flight plan's blocks by name; `stop_settings` are the
+    matches in most messages; `newer_names` are the parameters found on it that newer releases name differently, by
+    their older names; `blocks` are the numbers of its flight plan's blocks by name; `stop_settings` are the
     settings found on it that stop its motors, `stops_by_command`: it has accepted the command that stops them;
     `east_m` and `north_m` are its place on the ground."""
 
@@ -155,6 +162,7 @@ class Target:
     component: int = 0
     waypoint: int = 2
     blocks: Mapping[str, int] = field(default_factory=dict)
+    newer_names: Mapping[str, str] = field(default_factory=dict)
     stop_settings: tuple[str, ...] = ()
     stops_by_command: bool = False
     east_m: float = 0.0
@@ -213,8 +221,8 @@ class Profile(Protocol):
     @property
     def landing_modes(self) -> frozenset[str]: ...
     @property
-    def manual_modes(self) -> frozenset[str]:
-        """Modes in which a pilot flies it."""
+    def automatic_modes(self) -> frozenset[str]:
+        """Modes in which it flies by itself. In any other, known or not, a pilot flies it."""
         ...
 
     @property
@@ -236,6 +244,11 @@ class Profile(Protocol):
     def flying_blocks(self) -> frozenset[str]: ...
     @property
     def landing_blocks(self) -> frozenset[str]: ...
+    @property
+    def landed_blocks(self) -> frozenset[str]:
+        """Those of them that it enters once it has landed."""
+        ...
+
     @property
     def gain_sets(self) -> tuple[GainSet, ...]:
         """The gains by their names in the releases of the autopilot, newest last."""

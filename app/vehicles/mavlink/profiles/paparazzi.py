@@ -33,6 +33,7 @@ _WAYPOINT: Final = 16
 _SETTLE_S: Final = 0.5
 _NAV: Final = "4"
 _HOME: Final = "home"
+_CUSTOM_MODE_BIT: Final = 1
 _HOME_NUMBER: Final = 2
 """Number of the autopilot's mode HOME, in the heartbeats of releases that send it; its base mode is that of NAV."""
 
@@ -55,11 +56,13 @@ class Paparazzi:
     mode_names: Final = MappingProxyType(
         {_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "Manual", "80": "Manual"}
     )
-    manual_modes: Final = frozenset({"64", "80"})
+    automatic_modes: Final = frozenset({"0", _NAV, _HOME, "8"})
+    """Including the failsafe, base mode 0."""
     modes_without_land: Final = MappingProxyType({_HOME: "it flies back by itself and ignores Land"})
     arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
     flying_blocks: Final = frozenset({TAKE_OFF})
     landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
+    landed_blocks: Final = frozenset({AFTER_LAND[-1]})
     gain_sets: Final = (
         (
             GainParameter("kp", "gui_v_kp", 0.0, 4000.0, whole=True),
@@ -171,8 +174,9 @@ def _without_blocks(what: str) -> VehicleError:
 
 
 def _heartbeat(message: Message) -> Measurement | None:
-    """Read a HEARTBEAT; the mode is the base mode without the armed bit, except for HOME."""
-    mode = str(int(number(message, "base_mode")) & ~base.ARMED_BIT)
+    """Read a HEARTBEAT; the mode is the base mode, except for HOME, without the bits for armed and for a custom mode,
+    which newer releases set."""
+    mode = str(int(number(message, "base_mode")) & ~(base.ARMED_BIT | _CUSTOM_MODE_BIT))
     is_home = mode == _NAV and number(message, "custom_mode") == _HOME_NUMBER
     return base.heartbeat(message, _HOME if is_home else mode)
 

@@ -20,6 +20,8 @@ _AUTO: Final = 4
 _TAKE_OFF: Final = 2
 _LOITER: Final = 3
 _LAND: Final = 6
+_OFFBOARD: Final = 6
+_TERMINATION: Final = 10
 _INT32: Final = 6
 
 
@@ -41,14 +43,19 @@ class Px4:
     mode_names: Final = MappingProxyType(
         {
             "1.0": "Manual", "2.0": "Altitude", "3.0": "Position", "4.1": "Ready", "4.2": "Take-off", "4.3": "Hold",
-            "4.4": "Mission", "4.5": "Return", "4.6": "Land", "5.0": "Acro", "6.0": "Offboard", "7.0": "Stabilized",
+            "3.1": "Orbit", "3.2": "Position slow", "4.4": "Mission", "4.5": "Return", "4.6": "Land", "5.0": "Acro",
+            "6.0": "Offboard", "7.0": "Stabilized", "8.0": "Rattitude", "10.0": "Termination",
+            "11.0": "Altitude cruise",
         }
     )  # fmt: skip
-    manual_modes: Final = frozenset({"1.0", "2.0", "3.0", "5.0", "7.0"})
+    automatic_modes: Final = frozenset(
+        f"{main}.{sub}" for main in (_AUTO, _OFFBOARD, _TERMINATION) for sub in range(256)
+    )
     modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
+    landed_blocks: Final[frozenset[str]] = frozenset()
     gain_sets: Final = (
         (
             GainParameter("MPC_Z_P", "MPC_Z_P", 0.1, 1.5),
@@ -60,10 +67,11 @@ class Px4:
     stop_settings: Final[tuple[str, ...]] = ()
     requirements: Final = (
         Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)", frozenset({3.0})),
+        Requirement("COM_DL_LOSS_T", "land within 15 s of losing it", most=15.0),
         Requirement(
             "GF_ACTION", "hold, return or land when it leaves its fence (2, 3 or 5)", frozenset({2.0, 3.0, 5.0})
         ),
-        Requirement("GF_MAX_VER_DIST", "have a fence, in metres above home"),
+        Requirement("GF_MAX_VER_DIST", "have a fence at 10 m or less above home", most=10.0),
     )
 
     def measure(self, message: Message) -> Measurement | None:
