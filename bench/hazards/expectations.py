@@ -50,7 +50,9 @@ _MISPLACED: Final = Expected(
     quarantines=True,
 )
 _SLOWER: Final = Expected(
-    told=(*_NO_POSITION, *_LOST, *_NO_GAINS, "could not be set up", "did not arm"), ends=AIR, quarantines=True
+    told=(*_NO_POSITION, *_LOST, *_NO_GAINS, *_DOUBLED, "could not be set up", "did not arm"),
+    ends=AIR,
+    quarantines=True,
 )
 _UPLINK: Final = Expected(
     told=(*_BY_HAND, *_NO_GAINS, "could not be set up", "not confirmed within"), aborts=True, quarantines=True

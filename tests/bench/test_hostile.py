@@ -64,6 +64,36 @@ def test_what_was_seen_is_met_as_it_must_be(autopilot: str, what: str, stage: St
     assert (ended.outcome, reason in ended.reason) == (outcome, True)
 
 
+DROPPED = [
+    ("paparazzi", "later and later, to 1 s", Stage.ARM, 0.8),
+    ("paparazzi", "later and later, to 2 s", Stage.ARM, 1.2),
+    ("paparazzi", "commands 1.2 s late", Stage.ARM, 0.9),
+    ("paparazzi", "commands 2 s late", Stage.ARM, 0.9),
+    ("paparazzi", "on the ground after 0 s", Stage.ARM, 0.5),
+    ("paparazzi", "on the ground after 0.6 s", Stage.RECORD, 6.0),
+    ("paparazzi", "on the ground after 1 s", Stage.RECORD, 6.0),
+    ("paparazzi", "replaced after 1.3 s", Stage.RECORD, 6.0),
+    ("px4", "replaced after 1.3 s", Stage.RECORD, 6.0),
+    ("ardupilot", "replaced after 1.3 s", Stage.TAKEOFF, 0.5),
+]
+
+
+@pytest.mark.parametrize(("autopilot", "what", "stage", "delay_s"), DROPPED)
+def test_what_once_stopped_motors_in_the_air_does_not_any_more(
+    autopilot: str, what: str, stage: Stage, delay_s: float
+) -> None:
+    """Seen: told to stop at 0.7 to 2.3 m, several of them then reported safe."""
+    assert carry_out(case(autopilot, what, stage, delay_s=delay_s)).wrong == ()
+
+
+@pytest.mark.parametrize("autopilot", SAFE)
+def test_nothing_is_written_while_another_vehicle_with_its_ids_flies(autopilot: str) -> None:
+    """Seen: the safe gains, and then the trial's, went to the one that flew."""
+    ended = carry_out(case(autopilot, "flying twin", Stage.CONNECT, delay_s=0.0))
+    assert ended.wrong == ()
+    assert ended.outcome == "refused"
+
+
 def test_every_hazard_sets_in_in_every_state_under_every_autopilot_in_more_than_2000_runs() -> None:
     drawn = [(each.autopilot, each.mishaps[0].kind, each.mishaps[0].stage) for each in cases()]
     assert len(drawn) >= 2000
@@ -96,7 +126,7 @@ def happened(moments: Sequence[Moment] = DOWN, kind: str = "disarmed once", **mo
     known = {
         "case": case("paparazzi", kind, Stage.RECORD),
         "struck": [Struck(kind, Stage.RECORD, 16.0, float("inf"))],
-        "sent": [],
+        "sent": [(10.0, Order.TAKE_OFF)],
         "stops": [],
         "holds_safe": True,
     }

@@ -1,6 +1,7 @@
 """What the process of a session does with its vehicle, flown in lock-step in this one."""
 
 import math
+import random
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -35,9 +36,10 @@ from app.flights.vehicle_process import VehicleProcess
 from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.vehicles.base import Identity
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink.dialects import Message
+from app.vehicles.mavlink.dialects import PAPARAZZI, Message
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
+from bench.hazards.hostility import Speaker
 from tests.vehicles.flying import SAFE, TUNED
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.test_connected import START_ENGINE, TAKE_OFF
@@ -405,6 +407,26 @@ def test_a_vehicle_in_the_air_that_does_not_show_that_it_obeys_is_told_for_a_min
     for name, value in silenced.items():
         setattr(rig, name, value)
     assert left_alone(process, line, rig, LAND) == pytest.approx(60.0, abs=0.1)
+
+
+def test_one_heartbeat_that_reports_it_disarmed_does_not_end_land_after_the_worker_died(
+    rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seen: the process exited after 2.2 s, and the drone hovered on at 2.7 m."""
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    in_the_air(rig, process)
+    rig.deaf_until_s = math.inf
+    speaker = Speaker("paparazzi", PAPARAZZI, rig.drone, random.Random(1))
+    once = [speaker.heartbeat(speaker.codec(speaker.own, 200), armed=False, mode=(4, 0))]
+    since_s = rig.now_s()
+
+    def arriving(frames: list[bytes]) -> list[bytes]:
+        return [*frames, once.pop()] if once and rig.now_s() - since_s > 2.2 else frames
+
+    monkeypatch.setattr(rig, "arriving", arriving)
+    assert left_alone(process, line, rig, LAND) == pytest.approx(60.0, abs=0.1)
+    assert not once
 
 
 @pytest.mark.parametrize("ordered", [(), (LAND,), (MOTORS_OFF,)], ids=["nothing", "land", "motors off"])

@@ -300,7 +300,7 @@ def _has_landed(trial: Trial, now_s: float) -> bool:
     is_high = watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     near = watching.is_fresh(trial.watch, now_s) and not is_high
     disarmed = watching.is_disarmed(trial.watch, trial.plan.limits)
-    return (_has_rested(trial, LANDED_S, now_s) and not find_doubt_of_descent(trial)) or (near and disarmed)
+    return (_has_rested(trial, LANDED_S, now_s) and not find_doubt_of_descent(trial, now_s)) or (near and disarmed)
 
 
 def _link_lost(trial: Trial, event: Event) -> Step:

@@ -203,7 +203,7 @@ def _lose_link(trial: Trial, now_s: float) -> Step:
 def _give_up_take_off(trial: Trial, now_s: float) -> Step:
     """Stop the motors of a vehicle that has received the command and is on the ground by every source; otherwise abort,
     because it may yet lift off, or has, with its integrator wound up. A flight plan ends the landing on the ground."""
-    stands = trial.watch.grounded_since_s is not None and not find_doubt_of_descent(trial)
+    stands = trial.watch.grounded_since_s is not None and not find_doubt_of_descent(trial, now_s)
     return disarm(trial, now_s) if stands else abort(trial, now_s)
 
 
@@ -252,17 +252,17 @@ def disarm(trial: Trial, now_s: float) -> Step:
 
 def find_doubt_of_ground(trial: Trial, now_s: float) -> str:
     """Return why its motors may not be stopped without a request of a person; empty if they may."""
-    return find_doubt_of_descent(trial) or watching.find_doubt_of_ground(trial.watch, now_s)
+    return find_doubt_of_descent(trial, now_s) or watching.find_doubt_of_ground(trial.watch, now_s)
 
 
-def find_doubt_of_descent(trial: Trial) -> str:
+def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     """Return why a position on the ground does not show that the vehicle stayed or came down there: it may yet take
     off, or it was not observed climbing or descending and does not report the landing itself either."""
     watch, landed_blocks = trial.watch, trial.plan.limits.landed_blocks
     if trial.may_take_off:
         return "it has not replied since the take-off command, which may still be under way"
     is_unseen = trial.commanded_s is not None and (watch.unseen or not watch.lifted)
-    may_fly = watch.block not in landed_blocks if landed_blocks else watch.landed is False
+    may_fly = watch.block not in landed_blocks if landed_blocks else not watching.may_have_landed(watch, now_s)
     return "its descent was not observed, and it has not reported a landing" if is_unseen and may_fly else ""
 
 

@@ -18,11 +18,19 @@ SOON_S: Final = 5.0
 class FakeVehicleEndpoint:
     """A vehicle's end over UDP: says what it is told to, and keeps what it hears."""
 
-    def __init__(self, dialect: Dialect, *, system: int = 31, component: int = 1, key: bytes | None = None) -> None:
+    def __init__(
+        self,
+        dialect: Dialect,
+        *,
+        system: int = 31,
+        component: int = 1,
+        key: bytes | None = None,
+        host: str = LOOPBACK,
+    ) -> None:
         self.dialect = dialect
         self.codec = dialect.codec(system=system, component=component, signing_key=key)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind((LOOPBACK, 0))
+        self.socket.bind((host, 0))
         self.ground = (LOOPBACK, free_port())
         self.frames: list[bytes] = []
 

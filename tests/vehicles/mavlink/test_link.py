@@ -150,7 +150,18 @@ def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(
         assert link.duplicate_reason == ""
         other.send(heartbeat(other, autopilot=9))
         assert becomes(lambda: bool(link.duplicate_reason))
-    assert link.duplicate_reason == "Another vehicle with its system id sends from another port."
+    assert link.duplicate_reason == "Another vehicle with its system id sends from another address."
+
+
+def test_another_vehicle_with_its_system_id_on_another_host_makes_the_link_doubtful(
+    paparazzi: FakeVehicleEndpoint, link: Link
+) -> None:
+    with FakeVehicleEndpoint(PAPARAZZI, component=190, host="127.0.0.2") as other:
+        other.ground = paparazzi.ground
+        paparazzi.send(heartbeat(paparazzi, autopilot=9))
+        collect(link, 1)
+        other.send(heartbeat(other, autopilot=9))
+        assert becomes(lambda: bool(link.duplicate_reason))
 
 
 def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(paparazzi: FakeVehicleEndpoint) -> None:
