@@ -29,7 +29,6 @@ from app.core.control.paparazzi import (
     POSITION_ERROR_MAX,
     RATE_HZ,
     SPEED_ERROR_MAX,
-    STATE_SIZE,
     STEP_S,
 )
 from app.core.experiments.base import Check
@@ -46,7 +45,7 @@ from app.core.models.vertical_hazards import (
     SWING_MIDDLE_M_S,
     TOUCH_DOWN_M_S,
     find_wraps,
-    fly_all_with_aborts,
+    fly_with_aborts,
 )
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples
@@ -91,8 +90,9 @@ def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Cou
     """Simulate a takeoff to `target` (8 fractional bits) on each model, and its aborts to `safe_gains`."""
     reports = np.empty((len(models), REPORT_SIZE))
     aborts = np.empty((*aborts_at.shape, 2))
-    scratch, curves = np.empty((2, STATE_SIZE), dtype=np.int64), np.empty((4, steps))
-    fly_all_with_aborts(gains, models, target, safe_gains, aborts_at, scratch, curves, reports, aborts)
+    curves = np.empty((2, 2, steps))
+    for model, at, report, abort in zip(models, aborts_at, reports, aborts, strict=True):
+        fly_with_aborts(gains, model, target, safe_gains, at, curves, report, abort)
     return Runs(models, aborts_at, reports, aborts)
 
 
@@ -279,9 +279,9 @@ def _first_wraps(counts: Counts, model: Vector, target: int) -> Counts:
     found = np.empty((len(_STARTS), len(PRODUCTS), 2), dtype=np.int64)
     instantly = model.copy()
     instantly[MEASUREMENT_DELAY_S] = 0.0
-    steps, state = round(LONGEST_S * RATE_HZ), np.empty(STATE_SIZE, dtype=np.int64)
+    steps = round(LONGEST_S * RATE_HZ)
     for start, (_, frozen_after_s) in enumerate(_STARTS):
-        find_wraps(counts, instantly, target, round(frozen_after_s * RATE_HZ), steps, state, found[start])
+        find_wraps(counts, instantly, target, round(frozen_after_s * RATE_HZ), steps, found[start])
     return found
 
 
