@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from app.core import formatting
 from app.core.policy import Gain
 from app.figures import theme
 from app.figures.base import Card, Column, Table, plotly_json
@@ -151,7 +152,7 @@ class GainsFigure:
             return "No valid flight yet."
         return (
             f"Best gains, flight {best.number}: "
-            + ", ".join(f"{gain.name} {_read(best.gains[gain.name])}" for gain in self.history.gains)
+            + ", ".join(f"{gain.name} {formatting.gain(best.gains[gain.name])}" for gain in self.history.gains)
             + "."
         )
 
@@ -180,11 +181,6 @@ def _place(index: int, count: int) -> tuple[float, float]:
     """Bottom and height of a panel as shares of the whole; the first one is on top."""
     height = (1 - GAP * (count - 1)) / count
     return max(0.0, 1 - index * height - (index - 1) * GAP), height
-
-
-def _read(value: float) -> str:
-    """A gain with four significant digits; an integer in full."""
-    return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
 
 
 def _suffix(index: int) -> str:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
+from app.core.formatting import count
 from app.figures import theme
 from app.figures.annotations import band_traces, glitch_traces
 from app.figures.base import Card, Cell, Column, Table, plotly_json
@@ -215,8 +216,7 @@ class TrajectoriesFigure:
             else (f" Best: flight {history.best.number}, error {history.best.error:.3f} {history.error_unit}.")
         )
         off = f" {outside} off scale, marked at the top." if outside else ""
-        noun = "flight" if len(history.flights) == 1 else "flights"
-        return f"{history.output_title} over time: {len(history.flights)} {noun}.{best}{off}"
+        return f"{history.output_title} over time: {count(len(history.flights), 'flight')}.{best}{off}"
 
     def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:
         history, unit = self.history, self.history.output_unit

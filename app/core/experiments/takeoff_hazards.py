@@ -32,7 +32,7 @@ from app.core.control.paparazzi import (
     STEP_S,
 )
 from app.core.experiments.base import Check
-from app.core.formatting import percent
+from app.core.formatting import grouped, percent
 from app.core.models.vertical import MEASUREMENT_DELAY_S, START_LATENCY_S, Counts
 from app.core.models.vertical_hazards import (
     DISTANCE_LAST_M,
@@ -291,8 +291,8 @@ def _refusals(refused: list[int], gains: list[int], wraps: Counts) -> Iterator[C
         worst = abs(gains[place]) * product.largest_error
         case, explanation = _wrap_case(product, wraps[:, place])
         sentence = (
-            f"{product.gain}·({product.error}) can reach {_grouped(worst)} and overflow 32 bits "
-            f"({_grouped(INT32_MAX)}): full up becomes full down. {explanation} The largest {product.gain} that cannot "
+            f"{product.gain}·({product.error}) can reach {grouped(worst)} and overflow 32 bits "
+            f"({grouped(INT32_MAX)}): full up becomes full down. {explanation} The largest {product.gain} that cannot "
             f"overflow is {offered}."
         )
         offer = {product.gain: offered if gains[place] > 0 else -offered}
@@ -310,9 +310,5 @@ def _wrap_case(product: Product, wraps: Counts) -> tuple[str, str]:
         case = f"{product.error} at its limiter, {product.limiter}"
         return case, f"It overflows with the {case}."
     name, step, value = wrapped[0]
-    case = f"{name}, {step * STEP_S:.2f} s after the start: {product.gain}·({product.error}) = {_grouped(value)}"
+    case = f"{name}, {step * STEP_S:.2f} s after the start: {product.gain}·({product.error}) = {grouped(value)}"
     return case, f"Simulated {case}. It also overflows in {len(wrapped) - 1} of {len(_STARTS) - 1} other starts."
-
-
-def _grouped(value: int) -> str:
-    return f"{value:,}".replace(",", " ")

@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, best_flight, format_gains, was_flown
+from app.core.definition import Definition, Flight, best_flight, was_flown
 from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.experiments.takeoff import Takeoff
-from app.core.formatting import percent, short
+from app.core.formatting import format_gains, percent, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import Calibration, calibrate
 from app.core.tuning.gate import allows

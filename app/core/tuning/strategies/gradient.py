@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, Option, best_flight, format_gains, was_flown
+from app.core.definition import Definition, Flight, Option, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
-from app.core.formatting import short
+from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import known_distribution
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop

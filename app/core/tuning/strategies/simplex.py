@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, best_flight, format_gains, was_flown
+from app.core.definition import Definition, Flight, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
-from app.core.formatting import short
+from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace
 from app.core.tuning.corrected_model import model_optimum, uncorrected_model
 from app.core.tuning.strategy import ErrorsOf, Explanation, Proposal, Strategy
