@@ -28,7 +28,6 @@ def propose(
     is_flown = was_flown(space.mapping(target), flights)
     gains = space.nearest(space.vector(base.gains)) if is_flown else target
     trajectory, error = uncorrected_model(experiment).predict(gains)
-    stopped = tuple(name for name, is_stopped in zip(space.names, target != optimum.gains, strict=True) if is_stopped)
     found = (
         f"{optimum.evaluations} runs of the nominal model end at {format_gains(space.mapping(optimum.gains))}, "
         f"model error {short(optimum.error)} {experiment.error_unit}."
@@ -42,7 +41,7 @@ def propose(
         explanation=Explanation(
             summary=summary,
             base_flight=base.number,
-            clipped=stopped,
+            clipped=space.names_where(target != optimum.gains),
             notes=("Flights do not change this strategy's model.",),
         ),
     )
