@@ -6,7 +6,6 @@ Further physics (thrust that grows with the square of the command, ground effect
 battery) is off by default.
 """
 
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -15,11 +14,10 @@ from app.core.control.paparazzi import RATE_HZ, STEP_S
 from app.core.errors import Problem
 from app.core.experiments.takeoff import MODEL_PARAMETERS
 from app.core.formatting import percent
-from app.core.policy import Gains
-from app.vehicles.base import Vehicle, VehicleOption
+from app.vehicles.base import VehicleOption
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, PAST, Integers, Rows, fly_simple_model
 from app.vehicles.kinds import Hosts, Options, VehicleKind
-from app.vehicles.simulated import FLIGHT_S, MAX_STEPS, SimulatedVehicle, gusts, streams
+from app.vehicles.simulated import FLIGHT_S, HIGHEST_HOVER, MAX_STEPS, gusts, opener, streams
 
 _THRUST_SD: Final = 0.003
 _START_SD_S: Final = 0.060
@@ -27,7 +25,6 @@ _DATUM_SD_M: Final = 0.004
 _GUST_SD_M_S2: Final = 0.05
 _GUST_CORRELATION_S: Final = 0.5
 _BATTERY_V: Final = 11.1
-_HIGHEST_HOVER: Final = 0.95
 
 
 class TwinFlight:
@@ -83,26 +80,17 @@ def _hover_force(options: Options) -> float:
     return (1.0 - quadratic) * hover + quadratic * hover * hover
 
 
-def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> Vehicle:
-    numbers = {name: float(value) for name, value in options.items()}
-    return SimulatedVehicle("twin", safe_gains, options, lambda order: TwinFlight(numbers, order.seed))
-
-
 def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
     share = _hover_force(options) / (1.0 - float(options["battery_sag"]))
-    if share <= _HIGHEST_HOVER:
+    if share <= HIGHEST_HOVER:
         return ()
     return (
         Problem(
             "battery_sag",
             f"leaves too little thrust: at the end of a flight, hovering needs {percent(share)} of it, and control is "
-            f"possible up to {percent(_HIGHEST_HOVER)}",
+            f"possible up to {percent(HIGHEST_HOVER)}",
         ),
     )
-
-
-def _number(name: str, title: str, unit: str, default: float, upper: float, lower: float = 0.0) -> VehicleOption:
-    return VehicleOption(name=name, title=title, unit=unit, default=default, lower=lower, upper=upper)
 
 
 TWIN: Final = VehicleKind(
@@ -113,17 +101,21 @@ TWIN: Final = VehicleKind(
     can_fly=True,
     experiments=("takeoff",),
     options=(
-        _number("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", "×", 1.0, 5.0),
-        _number("hover_throttle", "Hover throttle", "of full", 0.61, 0.95, lower=0.3),
-        _number("motor_lag_s", "Motor lag", "s", 0.05, 0.3),
-        _number("start_latency_s", "Start latency", "s", 0.3, 2.0),
-        _number("drag_1_s", "Drag", "1/s", 0.0, 1.0),
-        _number("quadratic_share", "Share of the thrust that grows with the command's square", "of full", 0.0, 1.0),
-        _number("ground_effect", "Ground effect: extra thrust on the ground", "of thrust", 0.0, 0.5),
-        _number("ground_effect_height_m", "Height over which the ground effect fades", "m", 0.4, 2.0, lower=0.1),
-        _number("measurement_delay_s", "Age of the altitude and climb rate that the loop senses", "s", 0.0, 0.1),
-        _number("battery_sag", "Share of the thrust lost evenly over a flight", "of thrust", 0.0, 0.1),
+        VehicleOption("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", "×", 1.0, 0.0, 5.0),
+        VehicleOption("hover_throttle", "Hover throttle", "of full", 0.61, 0.3, 0.95),
+        VehicleOption("motor_lag_s", "Motor lag", "s", 0.05, 0.0, 0.3),
+        VehicleOption("start_latency_s", "Start latency", "s", 0.3, 0.0, 2.0),
+        VehicleOption("drag_1_s", "Drag", "1/s", 0.0, 0.0, 1.0),
+        VehicleOption(
+            "quadratic_share", "Share of the thrust that grows with the command's square", "of full", 0.0, 0.0, 1.0
+        ),
+        VehicleOption("ground_effect", "Ground effect: extra thrust on the ground", "of thrust", 0.0, 0.0, 0.5),
+        VehicleOption("ground_effect_height_m", "Height over which the ground effect fades", "m", 0.4, 0.1, 2.0),
+        VehicleOption(
+            "measurement_delay_s", "Age of the altitude and climb rate that the loop senses", "s", 0.0, 0.0, 0.1
+        ),
+        VehicleOption("battery_sag", "Share of the thrust lost evenly over a flight", "of thrust", 0.0, 0.0, 0.1),
     ),
-    open=_open,
+    open=opener("twin", TwinFlight),
     find_conflicts=_cannot_lift,
 )
