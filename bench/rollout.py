@@ -19,8 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.control.paparazzi import STATE_SIZE
-from app.core.models.vertical import CHANNELS, rollout
+from app.core.models.vertical import rollout
 
 SAMPLES: Final = 16_693
 ROUNDS: Final = 300
@@ -48,10 +47,9 @@ def in_c(library: Path) -> tuple[Callable[[], int], "np.ndarray[tuple[int], np.d
 
 
 def in_python() -> tuple[Callable[[], int], "np.ndarray[tuple[int], np.dtype[np.float64]]"]:
-    altitude, no_detail = np.empty(SAMPLES), np.empty((len(CHANNELS) - 1, 0))
+    altitude = np.empty((1, SAMPLES))
     gains, model = np.array(GAINS, dtype=np.int64), np.array([HOVER, 0.0, LAG, DRAG, 0.0, 0.0, 0.0, 0.0])
-    state = np.empty(STATE_SIZE, dtype=np.int64)
-    return lambda: rollout(gains, model, TARGET, state, altitude, no_detail), altitude
+    return lambda: rollout(gains, model, TARGET, None, altitude), altitude[0]
 
 
 def seconds(run: Callable[[], int]) -> float:

@@ -35,9 +35,8 @@ from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.common.transition_checks import check_action, check_version
 from app.core.definition import Definition as CoreDefinition
-from app.core.definition import format_gains
 from app.core.experiments import get_experiment
-from app.core.formatting import percent
+from app.core.formatting import format_gains, percent
 from app.core.tuning.confirmation import ComparisonState
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.fleet import service as fleet

@@ -17,10 +17,9 @@ from app.campaigns.schemas import (
     TrackRecord,
     Trend,
 )
-from app.core.definition import format_gains
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
-from app.core.formatting import percent, plus_minus, short
+from app.core.formatting import format_gains, percent, plus_minus, short
 from app.core.statistics.comparisons import Group, drift_of, optimism, pool_scatter, trend_of
 from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
 from app.core.tuning.predictions import TrackRecord as Record

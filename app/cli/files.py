@@ -18,10 +18,10 @@ from app.campaigns.trials.schemas import Trial
 from app.cli.console import console, write_json
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
+from app.core.formatting import count
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.logs.takeoffs import Takeoff
-from app.reports.formatting import count
 from app.reports.html import chart_library, file_name, render
 from app.reports.pdf import print_pdf
 from app.reports.service import report_of

@@ -24,6 +24,7 @@ from app.common.errors import InputError, Problem
 from app.core.definition import Definition
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
+from app.core.formatting import format_gains, number
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategy import Proposal
 from app.fleet.schemas import VehicleChoice
@@ -163,7 +164,7 @@ class _Display:
             self._task,
             completed=0.0,
             note="",
-            description=f"flight {number} of at most {self._limit}, {_gains(proposal.gains)}",
+            description=f"flight {number} of at most {self._limit}, {format_gains(proposal.gains)}",
         )
 
     def _sampled(self, sample: Sample) -> None:
@@ -174,7 +175,7 @@ class _Display:
     def _landed(self, trial: HeadlessTrial) -> None:
         self._trials.append(trial)
         self._progress.console.print(
-            f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} "
+            f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
             f"({_describe_outcome(trial)})",
             highlight=False,
         )
@@ -188,8 +189,8 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: H
     rows = [
         (
             f"run {trial.number}",
-            _number(trial.error),
-            _number(trial.predicted_error),
+            number(trial.error, 4),
+            number(trial.predicted_error, 4),
             *(f"{trial.gains[name]:g}" for name in names),
             trial.kind,
             "best"
@@ -205,7 +206,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: H
         out.print(f"Refused by the gate and flown with a reason: flight {', '.join(overruled)}.")
     out.print(f"Stopped: {campaign.stopped_because}")
     if best is not None:
-        out.print(f"Best: {_error(best.error, unit)} with {_gains(best.gains)}, flight {best.number}.")
+        out.print(f"Best: {_error(best.error, unit)} with {format_gains(best.gains)}, flight {best.number}.")
 
 
 def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
@@ -213,7 +214,7 @@ def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
     if not get_kind(file.vehicle.kind).is_real:
         return
     if display.held is not None:
-        out.print(f"The safe gains are restored and read back: {_gains(display.held)}.")
+        out.print(f"The safe gains are restored and read back: {format_gains(display.held)}.")
     elif display.touched:
         out.print("The gains on the vehicle are unknown. Read them back manually before it flies again.")
 
@@ -235,14 +236,6 @@ def _document(
 
 def _describe_outcome(trial: HeadlessTrial) -> str:
     return f"{trial.outcome}: {trial.reason}" if trial.reason else trial.outcome
-
-
-def _gains(gains: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4f}"
 
 
 def _error(value: float | None, unit: str) -> str:

@@ -15,10 +15,10 @@ from app.campaigns.definitions import definition_of
 from app.common.errors import InputError, Problem
 from app.common.schemas import OptionValue
 from app.compare.schemas import FlightDifference, FlightSetting
-from app.core.definition import Option, format_gains
+from app.core.definition import Option
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Experiment
-from app.core.formatting import plus_minus
+from app.core.formatting import count, format_gains, plus_minus
 from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import CampaignRow, FlightRow, TrialRow
@@ -49,13 +49,9 @@ def percent(confidence: float) -> str:
     return "more than 99 %" if confidence > 0.995 else f"{100.0 * confidence:.0f} %"
 
 
-def flights(count: int) -> str:
-    return "1 flight" if count == 1 else f"{count} flights"
-
-
 def named(group: Group, name: str) -> str:
     """`flight 3 (kp 400, ki 20, kd 100; 2 flights)`: a flight with its gains and their number of flights."""
-    return f"{name} ({format_gains(group.gains)}; {flights(group.size)})"
+    return f"{name} ({format_gains(group.gains)}; {count(group.size, 'flight')})"
 
 
 def capitalised(sentence: str) -> str:

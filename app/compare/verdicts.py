@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from app.campaigns.trials.views import CONFIDENCE
 from app.compare.compared_flights import ComparisonFlight, capitalised, measured, named, percent
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
-from app.core.definition import format_gains
+from app.core.formatting import count, format_gains
 from app.core.statistics.comparisons import Comparison, Group, Verdict, compare, drift_of
 from app.core.tuning.confirmation import SCATTER_NOT_KNOWN
 from app.fleet import service as fleet
@@ -211,6 +211,5 @@ def _deciding(side: ComparisonFlight, against: ComparisonFlight, comparison: Com
         for count, name in ((comparison.further.first, side.name), (comparison.further.second, against.name))
         if count
     ]
-    flights = "flight" if comparison.further.total == 1 else "flights"
-    needed = f"{comparison.further.total} more {flights}"
+    needed = count(comparison.further.total, "more flight")
     return f"If the difference persists, {needed} would resolve it: {' and '.join(parts)}."

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from app.core.errors import Problem
+from app.core.formatting import span
 from app.core.policy import Gains, is_finite, shortened
 from app.core.records.trajectory import Trajectory
 
@@ -151,7 +152,7 @@ class Option:
         if isinstance(self.default, int) and value != int(value):
             return f"must be a whole number, got {value:g}"
         if (self.lower is not None and value < self.lower) or (self.upper is not None and value > self.upper):
-            return f"must lie in {_edge(self.lower)} … {_edge(self.upper)} {self.unit}".rstrip() + f", got {value:g}"
+            return f"must lie in {span(self.lower, self.upper)} {self.unit}".rstrip() + f", got {value:g}"
         return None
 
 
@@ -172,10 +173,6 @@ def with_defaults(chosen: Mapping[str, OptionValue], offered: Sequence[Option]) 
     return {option.name: chosen.get(option.name, option.default) for option in offered}
 
 
-def _edge(limit: float | None) -> str:
-    return "any" if limit is None else f"{limit:g}"
-
-
 def best_flight(flights: Sequence[Flight]) -> Flight:
     """The valid flight with the lowest error, the earliest of equals. At least one flight must be valid."""
     return min(
@@ -189,8 +186,3 @@ def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
     return any(
         dict(flight.gains) == dict(gains) for flight in flights if flight.outcome == "valid" or flight.against_gains
     )
-
-
-def format_gains(gains: Gains) -> str:
-    """`kp 283, ki 13, kd 82`."""
-    return ", ".join(f"{name} {value:g}" for name, value in gains.items())

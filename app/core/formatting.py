@@ -1,7 +1,12 @@
-"""Formatting of numbers in sentences: significant digits that match the uncertainty, and one form for shares."""
+"""Numbers in sentences, tables and figures: significant digits that match the uncertainty, and one form for gains,
+shares and amounts. Sentences have a hyphen for a minus, tables and figures a true minus sign.
+"""
 
 import math
+from collections.abc import Mapping
 from typing import Final, Literal
+
+NOTHING: Final = "–"
 
 _MAX_DIGITS: Final = 6
 _SHORT_DIGITS: Final = 4
@@ -27,7 +32,7 @@ def plus_minus(value: float, standard_error: float, unit: str, *, sign: Literal[
 def short(value: float | None) -> str:
     """An error without a stated uncertainty: three significant digits, at most four decimals; a dash for None."""
     if value is None:
-        return "–"
+        return NOTHING
     power = math.floor(math.log10(abs(value))) if value else 0
     return f"{value:.{min(_SHORT_DIGITS, max(0, 2 - power))}f}"
 
@@ -35,3 +40,53 @@ def short(value: float | None) -> str:
 def percent(share: float, digits: int = 0) -> str:
     """`90 %`, with a non-breaking space."""
     return f"{100.0 * share:.{digits}f}\u00a0%"
+
+
+def short_percent(share: float) -> str:
+    """`12.5 %`, with up to three significant digits and a plain space."""
+    return f"{100 * share:.3g} %"
+
+
+def span(lower: float | None, upper: float | None) -> str:
+    """`0 … 409`; `any` where there is no limit."""
+    return " … ".join("any" if limit is None else f"{limit:g}" for limit in (lower, upper))
+
+
+def count(amount: int, noun: str) -> str:
+    """`1 flight`, `2 flights`."""
+    return f"{amount} {noun}{'' if amount == 1 else 's'}"
+
+
+def grouped(amount: int, separator: str = " ") -> str:
+    """`2 147 483 647`: digits in groups of three."""
+    return f"{amount:,}".replace(",", separator)
+
+
+def format_gains(gains: Mapping[str, float]) -> str:
+    """`kp 283, ki 13, kd 82`."""
+    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """`0.132`; with a true minus sign, and a dash for None."""
+    return NOTHING if value is None else f"{value:.{digits}f}".replace("-", "−")
+
+
+def measured(value: float | None, uncertainty: float | None, unit: str) -> str:
+    """`0.132 ± 0.007 m`, for tables; the value alone if its uncertainty is not known, and a dash for None."""
+    if value is None:
+        return NOTHING
+    digits = decimals(uncertainty)
+    margin = f" ± {number(uncertainty, digits)}" if uncertainty is not None and uncertainty > 0 else ""
+    return f"{number(value, digits)}{margin} {unit}".rstrip()
+
+
+def gain(value: float) -> str:
+    """A gain for tables: an integer in full, any other with four significant digits."""
+    text = f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
+    return text.replace("-", "−")
+
+
+def gains(values: Mapping[str, float]) -> str:
+    """`kp 283, ki 13, kd 82`, for tables."""
+    return ", ".join(f"{name} {gain(value)}" for name, value in values.items())

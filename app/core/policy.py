@@ -133,6 +133,14 @@ class PolicySpace:
         """The gains as a vector, shape (n,), in the order of `names`."""
         return np.array([gains[name] for name in self.names], dtype=np.float64)
 
+    def by_name(self, values: Vector) -> dict[str, float]:
+        """A value for each gain, shape (n,), by the gain's name."""
+        return dict(zip(self.names, values.tolist(), strict=True))
+
+    def names_where(self, chosen: NDArray[np.bool_]) -> tuple[str, ...]:
+        """Names of the gains that are chosen, shape (n,)."""
+        return tuple(name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen)
+
     def mapping(self, vector: Vector) -> dict[str, float]:
         """Named gains; integer gains are returned as int."""
         return {

@@ -3,9 +3,10 @@ error exceeds the scale, so that the others stay readable when one is an outlier
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Any, Final
 
 from app.figures import theme
+from app.figures.base import Trace, reading, scatter
 from app.figures.data import Band, Curve, FlightData, Range
 from app.figures.scale import thin_by_bends, thinned
 from app.figures.theme import Palette
@@ -13,43 +14,26 @@ from app.figures.theme import Palette
 GLITCH_POINTS: Final = 60
 
 
-def band_traces(palette: Palette, band: Band | None) -> list[dict[str, object]]:
+def band_traces(palette: Palette, band: Band | None) -> list[Trace]:
     """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
     if band is None:
         return []
-    quiet: dict[str, object] = {
-        "type": "scatter",
-        "mode": "lines",
+    quiet: dict[str, Any] = {
         "line": theme.line(theme.with_opacity(palette.prediction, 0.35), 0.75),
-        "hoverinfo": "skip",
         "legendgroup": "band",
         "legendrank": 900,
     }
     lower, upper = (thin_by_bends(curve.time_s, curve.values) for curve in (band.lower, band.upper))
+    fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.prediction, 0.14)}
     return [
-        {
-            **quiet,
-            "name": "Likely, lower edge",
-            "x": lower[0],
-            "y": lower[1],
-            "showlegend": False,
-            "meta": {"role": "band", "edge": "lower"},
-        },
-        {
-            **quiet,
-            "name": "Likely",
-            "x": upper[0],
-            "y": upper[1],
-            "fill": "tonexty",
-            "fillcolor": theme.with_opacity(palette.prediction, 0.14),
-            "meta": {"role": "band", "edge": "upper"},
-        },
+        scatter("Likely, lower edge", lower, role="band", about={"edge": "lower"}, showlegend=False, **quiet),
+        scatter("Likely", upper, role="band", about={"edge": "upper"}, **fill, **quiet),
     ]
 
 
 def glitch_traces(
     palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
-) -> list[dict[str, object]]:
+) -> list[Trace]:
     """The glitches of a flight's record, over its curve: one trace, or none."""
     if curve is None or not glitches:
         return []
@@ -59,19 +43,18 @@ def glitch_traces(
         time_s, values = _stretch(curve, glitch)
         x, y = [*x, *time_s, None], [*y, *values, None]
     return [
-        {
-            "type": "scatter",
-            "mode": "lines+markers",
-            "name": f"Flight {number}, glitch",
-            "x": x[:-1],
-            "y": y[:-1],
-            "line": theme.line(palette.bad, 5),
-            "marker": {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": palette.bad}},
-            "opacity": 0.85,
-            "showlegend": False,
-            "meta": {"role": "glitch", "trial": number},
-            "hovertemplate": f"<b>Flight {number}, glitch</b><br>%{{x:.2f}} s · %{{y:.3f}} {unit}<extra></extra>",
-        }
+        scatter(
+            f"Flight {number}, glitch",
+            (x[:-1], y[:-1]),
+            role="glitch",
+            about={"trial": number},
+            mode="lines+markers",
+            line=theme.line(palette.bad, 5),
+            marker={"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": palette.bad}},
+            opacity=0.85,
+            showlegend=False,
+            hovertemplate=reading(f"Flight {number}, glitch", unit),
+        )
     ]
 
 
@@ -87,7 +70,7 @@ PRINT: Final = 0.18
 
 def off_scale_traces(
     palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
-) -> list[dict[str, object]]:
+) -> list[Trace]:
     """Marks at height `top` of an axis that ends with flight `last`.
 
     If there are few flights, with the errors that have room.
@@ -107,36 +90,33 @@ def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
             yield number
 
 
-def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> dict[str, object]:
+def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> Trace:
     text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
-    return {
-        "type": "scatter",
-        "mode": "markers+text" if in_print else "markers",
-        "name": text,
-        "x": [flight.number],
-        "y": [top],
-        "text": [f"↑ {flight.error:.2f}" if in_print else ""],
-        "textposition": "bottom center",
-        "showlegend": False,
-        "marker": {"symbol": "triangle-up", "size": 12, "color": palette.bad},
-        "textfont": {"color": palette.bad},
-        "cliponaxis": False,
-        "meta": {"role": "off scale", "trial": flight.number},
-        "hovertemplate": f"{text}<extra></extra>",
-    }
+    return scatter(
+        text,
+        ([flight.number], [top]),
+        role="off scale",
+        about={"trial": flight.number},
+        mode="markers+text" if in_print else "markers",
+        text=[f"↑ {flight.error:.2f}" if in_print else ""],
+        textposition="bottom center",
+        showlegend=False,
+        marker={"symbol": "triangle-up", "size": 12, "color": palette.bad},
+        textfont={"color": palette.bad},
+        cliponaxis=False,
+        hovertemplate=f"{text}<extra></extra>",
+    )
 
 
-def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit: str) -> dict[str, object]:
+def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit: str) -> Trace:
     """Many flights in one trace, without printed errors."""
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "Off scale",
-        "x": [flight.number for flight in flights],
-        "y": [top] * len(flights),
-        "text": [f"{flight.error:.2f} {unit}" for flight in flights],
-        "marker": {"symbol": "triangle-up", "size": 8, "color": palette.bad},
-        "cliponaxis": False,
-        "meta": {"role": "off scale"},
-        "hovertemplate": "<b>Flight %{x}</b><br>error %{text}<extra></extra>",
-    }
+    return scatter(
+        "Off scale",
+        ([flight.number for flight in flights], [top] * len(flights)),
+        role="off scale",
+        mode="markers",
+        text=[f"{flight.error:.2f} {unit}" for flight in flights],
+        marker={"symbol": "triangle-up", "size": 8, "color": palette.bad},
+        cliponaxis=False,
+        hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
+    )

@@ -4,10 +4,14 @@ import html
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import ClassVar, Final, Literal, Protocol
+
+from app.figures.data import Curve
 
 Cell = str | int | float | None
 PlotlyJson = Mapping[str, object]
+Trace = dict[str, object]
 CardState = Literal["ready", "waiting", "failed"]
 
 CHECKED_ITEMS: Final = 20
@@ -83,6 +87,82 @@ def card_of(figure: Figure) -> Card:
             state="failed",
             reason="This figure could not be drawn. No data is lost; see the server's log.",
         )
+
+
+def ready(
+    figure: Figure, traces: Sequence[Mapping[str, object]], layout: Mapping[str, object], *, summary: str, table: Table
+) -> Card:
+    """The card of a figure that could be drawn."""
+    return Card(
+        name=figure.name,
+        title=figure.title,
+        state="ready",
+        summary=summary,
+        figure=plotly_json(traces, layout),
+        table=table,
+    )
+
+
+def scatter(
+    name: str,
+    points: tuple[Sequence[object], Sequence[object]],
+    *,
+    role: str,
+    about: Mapping[str, object] = MappingProxyType({}),
+    mode: str = "lines",
+    **more: object,
+) -> Trace:
+    """A line or marks at `points`, x and y, by default without hover text.
+
+    `role`, and what else the trace is `about`, are its `meta`.
+    """
+    return {
+        "type": "scatter",
+        "mode": mode,
+        "name": name,
+        "x": points[0],
+        "y": points[1],
+        "meta": {"role": role, **about},
+        **({} if "hovertemplate" in more else {"hoverinfo": "skip"}),
+        **more,
+    }
+
+
+def reading(title: str, unit: str, note: str = "", *, form: str = ".3f") -> str:
+    """Hover text of a curve over time: its title, time and value, and a note below them."""
+    values = f"%{{x:.2f}} s · %{{y:{form}}} {unit}".rstrip()
+    return f"<b>{title}</b><br>{values}{note}<extra></extra>"
+
+
+def off_scale(label: str, curve: Curve, low: float, high: float, colour: str, *, trial: int, text: str) -> Trace:
+    """A triangle at the edge where a flight leaves the scale `low` … `high`, labelled with its peak value."""
+    values = curve.values
+    up = bool(values.max() - high >= low - values.min())
+    peak = int(values.argmax() if up else values.argmin())
+    name = f"{text} reaches {values[peak]:.2f}"
+    return scatter(
+        name,
+        ([round(float(curve.time_s[peak]), 3)], [high if up else low]),
+        role="off scale",
+        about={"trial": trial},
+        mode="markers+text",
+        text=[f"{label} {'↑' if up else '↓'} {values[peak]:.1f}"],
+        textposition="bottom center" if up else "top center",
+        marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
+        textfont={"color": colour},
+        showlegend=False,
+        cliponaxis=False,
+        hovertemplate=f"{name}<extra></extra>",
+    )
+
+
+def table_of_curves(times_s: Sequence[float], digits: int, curves: Sequence[tuple[Column, Curve]]) -> Table:
+    """The curves' values at these times, of which `digits` decimals are shown."""
+    rows = []
+    for time_s in times_s:
+        values = [curve.at(time_s) for _, curve in curves]
+        rows.append((round(time_s, digits), *(None if value is None else round(value, 4) for value in values)))
+    return Table((Column("time_s", "Time", "s", digits), *(column for column, _ in curves)), tuple(rows))
 
 
 def literal(text: str) -> str:

@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, literal, plotly_json
+from app.figures.base import Card, Column, Table, Trace, literal, off_scale, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -67,15 +67,11 @@ class ComparisonFigure:
         traces += [
             self._difference(palette, index, flight, curve) for index, flight, curve in self._differences(recorded)
         ]
-        traces += [_off_scale(palette, recorded[place][1], recorded[place][2], low, high) for place in outside]
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
-            summary=self._summary(len(outside)),
-            figure=plotly_json(traces, self._layout(palette, low, high)),
-            table=self._table(recorded),
-        )
+        for _, flight, curve in [recorded[place] for place in outside]:
+            label = flight.label
+            traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.trial_id, text=label))
+        layout = self._layout(palette, low, high)
+        return ready(self, traces, layout, summary=self._summary(len(outside)), table=self._table(recorded))
 
     def _recorded(self) -> list[Drawn]:
         return [
@@ -118,55 +114,40 @@ class ComparisonFigure:
             uirevision="comparing",
         )
 
-    def _set_point(self, palette: Palette) -> dict[str, object]:
-        x, y = thin_by_bends(self.data.set_point.time_s, self.data.set_point.values)
-        return {
-            "type": "scatter",
-            "mode": "lines",
-            "name": "Set point",
-            "x": x,
-            "y": y,
-            "line": theme.line(palette.dim, 1, "dot"),
-            "meta": {"role": "set point"},
-            "hoverinfo": "skip",
-            "legendrank": 1100,
-        }
+    def _set_point(self, palette: Palette) -> Trace:
+        return scatter(
+            "Set point",
+            thin_by_bends(self.data.set_point.time_s, self.data.set_point.values),
+            role="set point",
+            line=theme.line(palette.dim, 1, "dot"),
+            legendrank=1100,
+        )
 
-    def _flight(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> dict[str, object]:
-        x, y = thinned(curve.time_s, curve.values, POINTS)
+    def _flight(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
         error = "" if flight.error is None else f"<br>error {flight.error:.3f} {self.data.error_unit}"
-        return {
-            **self._line(palette, index, flight, "flight"),
-            "name": literal(_shortened(f"{flight.label} · {flight.name}")),
-            "x": x,
-            "y": y,
-            "hovertemplate": f"<b>{flight.label} · {literal(flight.name)}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
-            f"{self.data.output_unit}{error}<extra></extra>",
-        }
+        return scatter(
+            literal(_shortened(f"{flight.label} · {flight.name}")),
+            thinned(curve.time_s, curve.values, POINTS),
+            role="flight",
+            about={"trial": flight.trial_id},
+            line=_pen(palette, index),
+            legendgroup=flight.label,
+            hovertemplate=reading(f"{flight.label} · {literal(flight.name)}", self.data.output_unit, error),
+        )
 
-    def _difference(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> dict[str, object]:
-        x, y = thinned(curve.time_s, curve.values, POINTS)
-        first = self.data.flights[0].label
-        return {
-            **self._line(palette, index, flight, "difference"),
-            "name": f"{flight.label} less {first}",
-            "x": x,
-            "y": y,
-            "yaxis": "y2",
-            "showlegend": False,
-            "hovertemplate": f"<b>{flight.label} less {first}</b><br>%{{x:.2f}} s · %{{y:+.3f}} "
-            f"{self.data.output_unit}<extra></extra>",
-        }
-
-    def _line(self, palette: Palette, index: int, flight: ComparedCurve, role: str) -> dict[str, object]:
-        colour, dash = line_style(palette, index)
-        return {
-            "type": "scatter",
-            "mode": "lines",
-            "line": theme.line(colour, 2, dash),
-            "legendgroup": flight.label,
-            "meta": {"role": role, "trial": flight.trial_id},
-        }
+    def _difference(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
+        name = f"{flight.label} less {self.data.flights[0].label}"
+        return scatter(
+            name,
+            thinned(curve.time_s, curve.values, POINTS),
+            role="difference",
+            about={"trial": flight.trial_id},
+            line=_pen(palette, index),
+            legendgroup=flight.label,
+            yaxis="y2",
+            showlegend=False,
+            hovertemplate=reading(name, self.data.output_unit, form="+.3f"),
+        )
 
     def _summary(self, outside: int) -> str:
         data = self.data
@@ -196,12 +177,8 @@ class ComparisonFigure:
             )
             for _, flight, curve in self._differences(recorded)
         ]  # fmt: skip
-        end = float(data.set_point.time_s[-1])
-        rows = tuple(
-            (round(float(second), 2), *(_cell(curve, float(second)) for _, curve in named))
-            for second in np.linspace(0.0, end, TABLE_ROWS)
-        )
-        return Table((Column("time_s", "Time", "s", 2), *(column for column, _ in named)), rows)
+        seconds = np.linspace(0.0, float(data.set_point.time_s[-1]), TABLE_ROWS)
+        return table_of_curves(seconds.tolist(), 2, named)
 
 
 def line_style(palette: Palette, index: int) -> tuple[str, str]:
@@ -211,38 +188,16 @@ def line_style(palette: Palette, index: int) -> tuple[str, str]:
     return colours[index % len(colours)], DASHES[(index + index // len(colours)) % len(DASHES)]
 
 
+def _pen(palette: Palette, index: int) -> dict[str, object]:
+    colour, dash = line_style(palette, index)
+    return theme.line(colour, 2, dash)
+
+
 def _less(curve: Curve, first: Curve) -> Curve:
     shared = (first.time_s >= curve.time_s[0]) & (first.time_s <= curve.time_s[-1])
     time_s = first.time_s[shared]
     return Curve(time_s, np.interp(time_s, curve.time_s, curve.values) - first.values[shared])
 
 
-def _cell(curve: Curve, time_s: float) -> Cell:
-    value = curve.at(time_s)
-    return None if value is None else round(value, 4)
-
-
 def _shortened(text: str) -> str:
     return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 1]}…"
-
-
-def _off_scale(palette: Palette, flight: ComparedCurve, curve: Curve, low: float, high: float) -> dict[str, object]:
-    """A triangle at the edge where a flight leaves the scale, labelled with its peak value."""
-    up = bool(curve.values.max() - high >= low - curve.values.min())
-    peak = int(curve.values.argmax() if up else curve.values.argmin())
-    text = f"{flight.label} reaches {curve.values[peak]:.2f}"
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "name": text,
-        "x": [round(float(curve.time_s[peak]), 3)],
-        "y": [high if up else low],
-        "text": [f"{flight.label} {'↑' if up else '↓'} {curve.values[peak]:.1f}"],
-        "textposition": "bottom center" if up else "top center",
-        "textfont": {"color": palette.bad},
-        "marker": {"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": palette.bad},
-        "showlegend": False,
-        "cliponaxis": False,
-        "meta": {"role": "off scale", "trial": flight.trial_id},
-        "hovertemplate": f"{text}<extra></extra>",
-    }

@@ -1,11 +1,11 @@
 """The error of each flight: measured, predicted, best so far, and the threshold for the next one."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from app.figures import theme
 from app.figures.annotations import off_scale_traces
-from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.data import History, Range, last_number
 from app.figures.many_flights import MANY
 from app.figures.scale import RobustRange, robust_range
@@ -66,14 +66,7 @@ class ErrorsFigure:
             annotations=self._labels(palette, span.high),
             uirevision="errors",
         )
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
-            summary=self._summary(),
-            figure=plotly_json(traces, layout),
-            table=self._table(),
-        )
+        return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
     def _span(self) -> RobustRange:
         """Range up to the first flight's error, every other one that is no outlier, and the next flight's interval."""
@@ -84,29 +77,27 @@ class ErrorsFigure:
         high = max(first, default=min(errors))
         return robust_range(errors, low=0.0, high=max([high, *(value for value in expected if value < 1.5 * high)]))
 
-    def _measured(self, palette: Palette) -> list[dict[str, object]]:
+    def _measured(self, palette: Palette) -> list[Trace]:
         flights, best = self.history.valid, self.history.best
         if not flights:
             return []
         colours = [palette.best if flight is best else palette.ink for flight in flights]
         size = 4 if self._is_crowded else 8
         return [
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": "Measured",
-                "x": [flight.number for flight in flights],
-                "y": [_rounded(flight.error) for flight in flights],
-                "cliponaxis": False,
+            scatter(
+                "Measured",
+                ([flight.number for flight in flights], [_rounded(flight.error) for flight in flights]),
+                role="measured",
+                mode="markers",
+                cliponaxis=False,
                 **self._error_bars(palette),
-                "marker": theme.solid(
+                marker=theme.solid(
                     colours,
                     size=[13 if flight is best else size for flight in flights],
                     symbol=["star" if flight is best else "circle" for flight in flights],
                 ),
-                "meta": {"role": "measured"},
-                "hovertemplate": f"<b>Flight %{{x}}</b><br>error {self._reading}{self._scatter}<extra></extra>",
-            }
+                hovertemplate=f"<b>Flight %{{x}}</b><br>error {self._reading}{self._scatter}<extra></extra>",
+            )
         ]
 
     @property
@@ -118,7 +109,7 @@ class ErrorsFigure:
         noise = self.history.noise
         return "" if noise is None else f" ± {noise.sd:.4f} (scatter of one flight)"
 
-    def _error_bars(self, palette: Palette) -> dict[str, object]:
+    def _error_bars(self, palette: Palette) -> dict[str, Any]:
         """One standard deviation of a single flight, up and down."""
         noise = self.history.noise
         if noise is None or self._is_crowded:
@@ -126,7 +117,7 @@ class ErrorsFigure:
         bar = {"type": "constant", "value": round(noise.sd, 6), "color": palette.ink, "thickness": 1.5, "width": 5}
         return {"error_y": bar}
 
-    def _noise(self, palette: Palette, last: int) -> list[dict[str, object]]:
+    def _noise(self, palette: Palette, last: int) -> list[Trace]:
         """Range in which another flight of the best gains would lie: a result inside it is not significant."""
         noise = self.history.noise
         if noise is None or noise.around_best is None:
@@ -134,53 +125,47 @@ class ErrorsFigure:
         low, high = round(max(0.0, noise.around_best.low), 6), round(noise.around_best.high, 6)
         right = last + 0.95
         return [
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": "Noise of best",
-                "x": [0.5, right, right, 0.5, 0.5],
-                "y": [low, low, high, high, low],
-                "line": theme.line(theme.with_opacity(palette.best, 0.3), 0.75),
-                "fill": "toself",
-                "fillcolor": theme.with_opacity(palette.best, 0.12),
-                "meta": {"role": "noise"},
-                "hoverinfo": "skip",
-            }
+            scatter(
+                "Noise of best",
+                ([0.5, right, right, 0.5, 0.5], [low, low, high, high, low]),
+                role="noise",
+                line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),
+                fill="toself",
+                fillcolor=theme.with_opacity(palette.best, 0.12),
+            )
         ]
 
-    def _repeats(self, palette: Palette) -> list[dict[str, object]]:
+    def _repeats(self, palette: Palette) -> list[Trace]:
         """Mean of flights with the same gains, with its standard error, beside the last of them."""
         repeats = () if self.history.noise is None else self.history.noise.repeats
         if not repeats:
             return []
         unit = self.history.error_unit
         return [
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": "Mean of repeats",
-                "x": [max(group.numbers) + 0.22 for group in repeats],
-                "y": [round(group.mean, 6) for group in repeats],
-                "text": [
+            scatter(
+                "Mean of repeats",
+                ([max(group.numbers) + 0.22 for group in repeats], [round(group.mean, 6) for group in repeats]),
+                role="repeats",
+                mode="markers",
+                text=[
                     f"Flights {', '.join(map(str, group.numbers))}<br>"
                     f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit} (standard error)"
                     for group in repeats
                 ],
-                "error_y": {
+                error_y={
                     "type": "data",
                     "array": [round(group.standard_error, 6) for group in repeats],
                     "color": palette.best,
                     "thickness": 3,
                     "width": 0,
                 },
-                "marker": theme.solid(palette.best, size=9, symbol="square"),
-                "meta": {"role": "repeats"},
-                "cliponaxis": False,
-                "hovertemplate": "<b>%{text}</b><extra></extra>",
-            }
+                marker=theme.solid(palette.best, size=9, symbol="square"),
+                cliponaxis=False,
+                hovertemplate="<b>%{text}</b><extra></extra>",
+            )
         ]
 
-    def _intervals(self, palette: Palette, top: float) -> list[dict[str, object]]:
+    def _intervals(self, palette: Palette, top: float) -> list[Trace]:
         """Predicted interval of each flight's error, or only the next one's if there are many.
 
         A bar behind the diamond of the prediction, cut at the edge.
@@ -194,18 +179,15 @@ class ErrorsFigure:
             y += [round(max(0.0, interval.low), 6), round(min(1.08 * top, interval.high), 6), None]
             text += 3 * [f"expected {interval.low:.4f} … {interval.high:.4f} {unit}"]
         return [
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": "90 % interval",
-                "x": x,
-                "y": y,
-                "text": text,
-                "line": theme.line(theme.with_opacity(palette.prediction, 0.4), 8),
-                "connectgaps": False,
-                "meta": {"role": "interval"},
-                "hovertemplate": "<b>Flight %{x}</b><br>%{text}<extra></extra>",
-            }
+            scatter(
+                "90 % interval",
+                (x, y),
+                role="interval",
+                text=text,
+                line=theme.line(theme.with_opacity(palette.prediction, 0.4), 8),
+                connectgaps=False,
+                hovertemplate="<b>Flight %{x}</b><br>%{text}<extra></extra>",
+            )
         ]
 
     def _expected(self) -> list[tuple[int, Range]]:
@@ -233,7 +215,7 @@ class ErrorsFigure:
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
 
-    def _without_error(self, palette: Palette, height: float) -> list[dict[str, object]]:
+    def _without_error(self, palette: Palette, height: float) -> list[Trace]:
         """Marks at the bottom, clear of the axis labels, for flights without a meaningful error or without a review."""
         flights = self.history.flights
         uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet judged"}]
@@ -243,56 +225,46 @@ class ErrorsFigure:
             "not yet judged": (unjudged, "circle-open", palette.dim),
         }
         return [
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": role.capitalize(),
-                "x": [flight.number for flight in marks],
-                "y": [round(height, 6)] * len(marks),
-                "text": [flight.outcome for flight in marks],
-                "marker": {"size": 10, "symbol": symbol, "color": colour, "line": {"width": 2, "color": colour}},
-                "meta": {"role": role},
-                "cliponaxis": False,
-                "hovertemplate": "<b>Flight %{x}, %{text}</b><extra></extra>",
-            }
+            scatter(
+                role.capitalize(),
+                ([flight.number for flight in marks], [round(height, 6)] * len(marks)),
+                role=role,
+                mode="markers",
+                text=[flight.outcome for flight in marks],
+                marker={"size": 10, "symbol": symbol, "color": colour, "line": {"width": 2, "color": colour}},
+                cliponaxis=False,
+                hovertemplate="<b>Flight %{x}, %{text}</b><extra></extra>",
+            )
             for role, (marks, symbol, colour) in marked.items()
             if marks
         ]
 
-    def _best_so_far(self, palette: Palette) -> dict[str, object]:
+    def _best_so_far(self, palette: Palette) -> Trace:
         best = best_so_far(self.history)
         numbers = [flight.number for flight in self.history.valid]
-        return {
-            "type": "scatter",
-            "mode": "lines",
-            "name": "Best so far",
-            "x": numbers,
-            "y": [round(value, 6) for value in best],
-            "line": {**theme.line(palette.best, 2), "shape": "hv"},
-            "meta": {"role": "best so far"},
-            "hoverinfo": "skip",
-        }
+        return scatter(
+            "Best so far",
+            (numbers, [round(value, 6) for value in best]),
+            role="best so far",
+            line={**theme.line(palette.best, 2), "shape": "hv"},
+        )
 
-    def _threshold(self, palette: Palette, last: int) -> list[dict[str, object]]:
+    def _threshold(self, palette: Palette, last: int) -> list[Trace]:
         """The error below which the stop rule counts a further flight as an improvement."""
         best, improvement = self.history.best, self.history.stop_improvement
         if best is None or best.error is None or improvement is None:
             return []
         value = round(best.error * (1 - improvement), 6)
         return [
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": f"To beat: {value:.3f}",
-                "x": [0.5, last + 0.95],
-                "y": [value, value],
-                "line": theme.line(palette.dim, 1.25, "dot"),
-                "meta": {"role": "threshold"},
-                "hoverinfo": "skip",
-            }
+            scatter(
+                f"To beat: {value:.3f}",
+                ([0.5, last + 0.95], [value, value]),
+                role="threshold",
+                line=theme.line(palette.dim, 1.25, "dot"),
+            )
         ]
 
-    def _predicted(self, palette: Palette) -> list[dict[str, object]]:
+    def _predicted(self, palette: Palette) -> list[Trace]:
         flights = () if self._is_crowded else self.history.flights
         pairs = [(flight.number, flight.predicted_error) for flight in flights]
         if self.history.proposal is not None:
@@ -301,17 +273,15 @@ class ErrorsFigure:
         if not known:
             return []
         return [
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": "Predicted",
-                "x": [number for number, _ in known],
-                "y": [value for _, value in known],
-                "marker": {"size": 13, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
-                "meta": {"role": "predicted"},
-                "cliponaxis": False,
-                "hovertemplate": f"<b>Flight %{{x}}, predicted</b><br>{self._reading}<extra></extra>",
-            }
+            scatter(
+                "Predicted",
+                ([number for number, _ in known], [value for _, value in known]),
+                role="predicted",
+                mode="markers",
+                marker={"size": 13, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
+                cliponaxis=False,
+                hovertemplate=f"<b>Flight %{{x}}, predicted</b><br>{self._reading}<extra></extra>",
+            )
         ]
 
     def _summary(self) -> str:

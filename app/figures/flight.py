@@ -8,7 +8,7 @@ import numpy as np
 
 from app.figures import theme
 from app.figures.annotations import band_traces, glitch_traces
-from app.figures.base import Card, Column, Table, plotly_json
+from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Band, Curve, Range
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -57,22 +57,16 @@ class FlightFigure:
         palette, curve = PALETTES[self.theme], self.record.curve
         assert curve is not None
         inputs = [self._input(palette, index, title) for index, title in enumerate(self.record.inputs)]
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
-            summary=self._summary(),
-            figure=plotly_json([*self._outputs(palette, curve), *inputs], self._layout(palette, curve)),
-            table=self._table(curve),
-        )
+        traces = [*self._outputs(palette, curve), *inputs]
+        return ready(self, traces, self._layout(palette, curve), summary=self._summary(), table=self._table(curve))
 
-    def _outputs(self, palette: Palette, curve: Curve) -> list[dict[str, object]]:
+    def _outputs(self, palette: Palette, curve: Curve) -> list[Trace]:
         """The flight with its context curves, and its glitches on top."""
-        record, reading = self.record, f"%{{x:.2f}} s · %{{y:.3f}} {self.record.output_unit}"
+        record = self.record
         return [
             *band_traces(palette, record.band),
             *self._context(palette),
-            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", reading),
+            _line(f"Flight {record.number}", curve, palette.ink, 2.5, "flight", record.output_unit),
             *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
         ]
 
@@ -96,22 +90,22 @@ class FlightFigure:
         )
         return theme.layout(palette, uirevision="flight", **axes)
 
-    def _context(self, palette: Palette) -> list[dict[str, object]]:
-        record, reading = self.record, f"%{{x:.2f}} s · %{{y:.3f}} {self.record.output_unit}"
+    def _context(self, palette: Palette) -> list[Trace]:
+        record, unit = self.record, self.record.output_unit
         drawn = [_line("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot")]
         if record.reference is not None:
             drawn.append(_line("Reference", record.reference, palette.dim, 1.5, "reference", None, "dashdot"))
         if record.best is not None:
-            drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", reading))
+            drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit))
         if record.predicted is not None:
-            drawn.append(_line("Predicted", record.predicted, palette.prediction, 2, "prediction", reading, "dash"))
+            drawn.append(_line("Predicted", record.predicted, palette.prediction, 2, "prediction", unit, "dash"))
         return drawn
 
-    def _input(self, palette: Palette, index: int, title: str) -> dict[str, object]:
+    def _input(self, palette: Palette, index: int, title: str) -> Trace:
         colour = (palette.ink, *palette.gains)[index % (1 + len(palette.gains))]
         dash = ("solid", "dash", "dot")[index % 3]
         return {
-            **_line(title, self.record.inputs[title], colour, 1.5, "input", "%{x:.2f} s · %{y:.3f}", dash),
+            **_line(title, self.record.inputs[title], colour, 1.5, "input", "", dash),
             "yaxis": "y2",
         }
 
@@ -136,27 +130,15 @@ class FlightFigure:
             (Column(title.lower().replace(" ", "_"), title, "", 3), inputs) for title, inputs in record.inputs.items()
         ]
         seconds = np.linspace(float(curve.time_s[0]), float(curve.time_s[-1]), TABLE_ROWS)
-        rows = []
-        for second in seconds:
-            values = [line.at(float(second)) for _, line in named]
-            rows.append((round(float(second), 2), *(None if value is None else round(value, 4) for value in values)))
-        return Table((Column("time_s", "Time", "s", 2), *(column for column, _ in named)), tuple(rows))
+        return table_of_curves(seconds.tolist(), 2, named)
 
 
 def _line(
-    name: str, curve: Curve, colour: str, width: float, role: str, hover: str | None, dash: str = "solid"
-) -> dict[str, object]:
-    x, y = thin_by_bends(curve.time_s, curve.values) if hover is None else thinned(curve.time_s, curve.values, POINTS)
-    reading: dict[str, object] = (
-        {"hoverinfo": "skip"} if hover is None else {"hovertemplate": f"<b>{name}</b><br>{hover}<extra></extra>"}
-    )
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": name,
-        "x": x,
-        "y": y,
-        "line": theme.line(colour, width, dash),
-        "meta": {"role": role},
-        **reading,
-    }
+    name: str, curve: Curve, colour: str, width: float, role: str, unit: str | None, dash: str = "solid"
+) -> Trace:
+    """A curve, with hover text in its `unit`, none if that is None."""
+    style = theme.line(colour, width, dash)
+    if unit is None:
+        return scatter(name, thin_by_bends(curve.time_s, curve.values), role=role, line=style)
+    hover = reading(name, unit)
+    return scatter(name, thinned(curve.time_s, curve.values, POINTS), role=role, line=style, hovertemplate=hover)

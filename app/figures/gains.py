@@ -1,11 +1,12 @@
 """The gains of each flight, one small panel per gain, with the proposed ones as open diamonds."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from app.core import formatting
 from app.core.policy import Gain
 from app.figures import theme
-from app.figures.base import Card, Column, Table, plotly_json
+from app.figures.base import Card, Column, Table, Trace, ready, scatter
 from app.figures.data import History, last_number
 from app.figures.many_flights import MANY
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -44,36 +45,30 @@ class GainsFigure:
             annotations=self._names(palette),
             **axes,
         )
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
-            summary=self._summary(),
-            figure=plotly_json(traces, layout),
-            table=self._table(),
-        )
+        return ready(self, traces, layout, summary=self._summary(), table=self._table())
 
-    def _panel(self, palette: Palette, index: int, gain: Gain) -> list[dict[str, object]]:
+    def _panel(self, palette: Palette, index: int, gain: Gain) -> list[Trace]:
         colour = palette.gains[(index - 1) % len(palette.gains)]
         flights, proposal, best = self.history.flights, self.history.proposal, self.history.best
-        common = {"type": "scatter", "xaxis": _axis("x", index), "yaxis": _axis("y", index), "cliponaxis": False}
+        suffix = theme.suffix(index)
+        axes: dict[str, Any] = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "cliponaxis": False}
         unit = f" {gain.unit}" if gain.unit else ""
         crowded = len(flights) > MANY
-        flown: dict[str, object] = {
-            **common,
-            "mode": "lines" if crowded else "lines+markers",
-            "name": gain.title,
-            "x": [flight.number for flight in flights],
-            "y": [flight.gains[gain.name] for flight in flights],
-            "line": {**theme.line(colour, 1 if crowded else 2), "shape": "hv"},
-            "marker": theme.solid(
+        flown = scatter(
+            gain.title,
+            ([flight.number for flight in flights], [flight.gains[gain.name] for flight in flights]),
+            role="flown",
+            about={"gain": gain.name},
+            mode="lines" if crowded else "lines+markers",
+            line={**theme.line(colour, 1 if crowded else 2), "shape": "hv"},
+            marker=theme.solid(
                 colour,
                 size=[13 if flight is best else 7 for flight in flights],
                 symbol=["star" if flight is best else "circle" for flight in flights],
             ),
-            "meta": {"role": "flown", "gain": gain.name},
-            "hovertemplate": f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
-        }
+            hovertemplate=f"<b>Flight %{{x}}</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+            **axes,
+        )
         drawn = [flown]
         if crowded:
             del flown["marker"]
@@ -86,43 +81,30 @@ class GainsFigure:
             drawn.append({**flown, **star, "mode": "markers", "meta": {"role": "best", "gain": gain.name}})
         if proposal is None:
             return drawn
-        return [
-            *drawn,
-            {
-                **common,
-                "mode": "markers",
-                "name": f"{gain.title}, proposed",
-                "x": [proposal.number],
-                "y": [proposal.gains[gain.name]],
-                "meta": {"role": "proposed", "gain": gain.name},
-                "marker": {"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
-                "hovertemplate": f"<b>Flight %{{x}}, proposed</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
-            },
-        ]
+        proposed = scatter(
+            f"{gain.title}, proposed",
+            ([proposal.number], [proposal.gains[gain.name]]),
+            role="proposed",
+            about={"gain": gain.name},
+            mode="markers",
+            marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
+            hovertemplate=f"<b>Flight %{{x}}, proposed</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+            **axes,
+        )
+        return [*drawn, proposed]
 
     def _axes(self, palette: Palette, index: int, gain: Gain, last: int) -> dict[str, object]:
-        count = len(self.history.gains)
-        bottom, height = _place(index, count)
+        count, suffix = len(self.history.gains), theme.suffix(index)
         values = [flight.gains[gain.name] for flight in self.history.flights]
         if self.history.proposal is not None:
             values.append(self.history.proposal.gains[gain.name])
-        low, high = padded(min(values), max(values), gain)
-        lowest = index == count
-        x = {
-            "range": [0.5, last + 0.6],
-            "dtick": max(1, -(-last // 12)),
-            "showgrid": False,
-            "showticklabels": lowest,
-            "anchor": _axis("y", index),
-            "matches": None if index == 1 else "x",
-        }
         return {
-            "xaxis" + _suffix(index): theme.titled(palette, "Flight", **x) if lowest else theme.axis(palette, **x),
-            "yaxis" + _suffix(index): theme.axis(
+            f"xaxis{suffix}": theme.shared_axis(palette, "Flight", index, count, **theme.flight_ticks(last)),
+            f"yaxis{suffix}": theme.axis(
                 palette,
-                domain=[bottom, bottom + height],
-                anchor=_axis("x", index),
-                range=[low, high],
+                domain=theme.stacked(index, count, GAP),
+                anchor=f"x{suffix}",
+                range=padded(min(values), max(values), gain),
                 nticks=4 if count <= 3 else 3,
             ),
         }
@@ -131,17 +113,11 @@ class GainsFigure:
         """Name and unit of each gain, above its panel."""
         count = len(self.history.gains)
         return [
-            {
-                "text": f"<b>{gain.name}</b> {gain.title}" + (f" ({gain.unit})" if gain.unit else ""),
-                "x": 0,
-                "y": sum(_place(index, count)),
-                "xref": "paper",
-                "yref": "paper",
-                "xanchor": "left",
-                "yanchor": "bottom",
-                "showarrow": False,
-                "font": {"size": 12, "color": palette.dim},
-            }
+            theme.note(
+                palette,
+                f"<b>{gain.name}</b> {gain.title}" + (f" ({gain.unit})" if gain.unit else ""),
+                y=theme.stacked(index, count, GAP)[1],
+            )
             for index, gain in enumerate(self.history.gains, start=1)
         ]
 
@@ -151,7 +127,7 @@ class GainsFigure:
             return "No valid flight yet."
         return (
             f"Best gains, flight {best.number}: "
-            + ", ".join(f"{gain.name} {_read(best.gains[gain.name])}" for gain in self.history.gains)
+            + ", ".join(f"{gain.name} {formatting.gain(best.gains[gain.name])}" for gain in self.history.gains)
             + "."
         )
 
@@ -169,27 +145,8 @@ class GainsFigure:
         return Table(columns, tuple(rows))
 
 
-def padded(low: float, high: float, gain: Gain) -> tuple[float, float]:
+def padded(low: float, high: float, gain: Gain) -> list[float]:
     """A range around `low` … `high`, at least half a scale wide, so that a change of one count looks small."""
     width = max(high - low, 0.5 * gain.scale)
     middle = (low + high) / 2
-    return max(gain.lower - 0.05 * width, middle - 0.65 * width), middle + 0.65 * width
-
-
-def _place(index: int, count: int) -> tuple[float, float]:
-    """Bottom and height of a panel as shares of the whole; the first one is on top."""
-    height = (1 - GAP * (count - 1)) / count
-    return max(0.0, 1 - index * height - (index - 1) * GAP), height
-
-
-def _read(value: float) -> str:
-    """A gain with four significant digits; an integer in full."""
-    return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
-
-
-def _suffix(index: int) -> str:
-    return "" if index == 1 else str(index)
-
-
-def _axis(letter: str, index: int) -> str:
-    return letter + _suffix(index)
+    return [max(gain.lower - 0.05 * width, middle - 0.65 * width), middle + 0.65 * width]

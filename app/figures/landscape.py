@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log10
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from app.core.policy import Gain, Gains
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.data import FlightData, History
 from app.figures.landscape_layout import holds, is_high, numbers, padded, to_edge
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -78,7 +78,7 @@ class LandscapeFigure:
     def compute(self) -> Card:
         palette, slices = PALETTES[self.theme], self.landscape.slices
         scale = scale_of(slices)
-        traces: list[dict[str, object]] = []
+        traces: list[Trace] = []
         axes: dict[str, object] = {}
         for index, one in enumerate(slices, start=1):
             named = {_GROUND, *(trace["legendgroup"] for trace in traces)}
@@ -92,16 +92,9 @@ class LandscapeFigure:
             annotations=[self._note(palette, scale)],
             **axes,
         )
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
-            summary=self._summary(scale),
-            figure=plotly_json(traces, layout),
-            table=self._table(),
-        )
+        return ready(self, traces, layout, summary=self._summary(scale), table=self._table())
 
-    def _slice(self, palette: Palette, index: int, one: Slice, scale: Scale) -> list[dict[str, object]]:
+    def _slice(self, palette: Palette, index: int, one: Slice, scale: Scale) -> list[Trace]:
         return [
             *_ground(palette, index, one, scale, self.history.error_unit),
             *self._line(palette, index, one),
@@ -116,102 +109,120 @@ class LandscapeFigure:
         kept = [flight for flight in earlier if flight is earlier[0] or flight is self.history.best]
         return [*kept, *self.history.flights[-LONGEST_PATH:]]
 
-    def _path(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+    def _path(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
         flights, best = self._shown(), self.history.best
         if not flights:
             return []
         unit, proposal = self.history.error_unit, self.history.proposal
         stars = [flight is best for flight in flights]
-        path = _marks(index, one, [flight.gains for flight in flights], "path") | {
-            "name": "Flights in order" if len(flights) == len(self.history.flights) else f"Last {LONGEST_PATH} flights",
-            "mode": "lines+markers+text",
-            "line": theme.line(palette.ink, 1.5),
-            "marker": {
+        path = _marks(
+            index,
+            one,
+            [flight.gains for flight in flights],
+            "path",
+            "Flights in order" if len(flights) == len(self.history.flights) else f"Last {LONGEST_PATH} flights",
+            "lines+markers+text",
+            line=theme.line(palette.ink, 1.5),
+            marker={
                 "size": [_STAR_PX if star else 7 for star in stars],
                 "opacity": [0 if star else 1 for star in stars],
                 "color": palette.surface,
                 "line": {"width": 1.5, "color": palette.ink},
             },
-            "text": numbers(flights, best, one, aside=None if proposal is None else proposal.gains),
-            "textposition": ["bottom center" if is_high(one, flight.gains) else "top center" for flight in flights],
-            "textfont": {"size": 12, "color": palette.ink, "weight": 700},
-            "hovertext": [_hover_text(flight, unit) for flight in flights],
-        }
+            text=numbers(flights, best, one, aside=None if proposal is None else proposal.gains),
+            textposition=["bottom center" if is_high(one, flight.gains) else "top center" for flight in flights],
+            textfont={"size": 12, "color": palette.ink, "weight": 700},
+            hovertext=[_hover_text(flight, unit) for flight in flights],
+        )
         if best is None:
             return [path]
-        star = _marks(index, one, [best.gains], "best") | {
-            "name": f"Best, flight {best.number}",
-            "mode": "markers",
-            "marker": {
+        star = _marks(
+            index,
+            one,
+            [best.gains],
+            "best",
+            f"Best, flight {best.number}",
+            "markers",
+            marker={
                 "size": _STAR_PX,
                 "symbol": "star",
                 "color": palette.best,
                 "opacity": 1,
                 "line": {"width": 1.5, "color": palette.surface},
             },
-            "hovertext": [_hover_text(best, unit)],
-        }
+            hovertext=[_hover_text(best, unit)],
+        )
         return [path, star]
 
-    def _line(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+    def _line(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
         """From the centre along the search direction to the edge of the slice."""
         ends = to_edge(one, self.landscape.centre, self.search.direction)
         if ends is None:
             return []
         is_gradient = bool(self.search.tried)
-        line = _marks(index, one, ends, "line") | {
-            "name": "Along gradient" if is_gradient else "To the optimum",
-            "mode": "lines",
-            "line": theme.line(palette.prediction, 2, "dot"),
-            "hoverinfo": "skip",
-        }
-        del line["hovertemplate"]
+        line = _marks(
+            index,
+            one,
+            ends,
+            "line",
+            "Along gradient" if is_gradient else "To the optimum",
+            "lines",
+            line=theme.line(palette.prediction, 2, "dot"),
+        )
         return [line]
 
-    def _tried(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+    def _tried(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
         inside = [step for step in self.search.tried if holds(one, step.gains)]
         if not inside:
             return []
         unit = self.history.error_unit
-        steps = _marks(index, one, [step.gains for step in inside], "tried") | {
-            "name": "Tried on model",
-            "mode": "markers",
-            "marker": {
+        steps = _marks(
+            index,
+            one,
+            [step.gains for step in inside],
+            "tried",
+            "Tried on model",
+            "markers",
+            marker={
                 "size": 6,
                 "symbol": "circle-open",
                 "color": palette.prediction,
                 "opacity": 1,
                 "line": {"width": 1.5},
             },
-            "hovertext": [f"Tried: the model predicts {step.predicted_error:.4f} {unit}" for step in inside],
-        }
+            hovertext=[f"Tried: the model predicts {step.predicted_error:.4f} {unit}" for step in inside],
+        )
         return [steps]
 
-    def _proposed(self, palette: Palette, index: int, one: Slice) -> list[dict[str, object]]:
+    def _proposed(self, palette: Palette, index: int, one: Slice) -> list[Trace]:
         proposal = self.history.proposal
         if proposal is None:
             return []
         prediction = "" if proposal.predicted_error is None else f", predicted {proposal.predicted_error:.4f}"
-        mark = _marks(index, one, [proposal.gains], "proposed") | {
-            "name": f"Next, flight {proposal.number}",
-            "mode": "markers",
-            "marker": {
+        mark = _marks(
+            index,
+            one,
+            [proposal.gains],
+            "proposed",
+            f"Next, flight {proposal.number}",
+            "markers",
+            marker={
                 "size": 13,
                 "symbol": "diamond",
                 "color": palette.prediction,
                 "opacity": 1,
                 "line": {"width": 1.5, "color": palette.surface},
             },
-            "hovertext": [
+            hovertext=[
                 f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
             ],
-        }
+        )
         return [mark]
 
     def _axes(self, palette: Palette, index: int, one: Slice) -> dict[str, object]:
         across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
         named = {gain.name: gain for gain in self.history.gains}
-        suffix = _suffix(index)
+        suffix = theme.suffix(index)
         return {
             f"xaxis{suffix}": theme.titled(
                 palette,
@@ -237,19 +248,8 @@ class LandscapeFigure:
         """Text below the slices: where they lie, and the contour interval."""
         held = ", ".join(f"{name} {value:.4g}" for name, value in self.landscape.centre.items())
         between = "<br>" if self.stacked else " · "
-        return {
-            "text": f"Slices through {held}{between}contours every {scale.step:g} {self.history.error_unit}",
-            "x": 0,
-            "y": 0,
-            "yshift": -52,
-            "xref": "paper",
-            "yref": "paper",
-            "xanchor": "left",
-            "yanchor": "top",
-            "align": "left",
-            "showarrow": False,
-            "font": {"size": 12, "color": palette.dim},
-        }
+        text = f"Slices through {held}{between}contours every {scale.step:g} {self.history.error_unit}"
+        return theme.note(palette, text, y=0, yshift=-52, yanchor="top", align="left")
 
     def _summary(self, scale: Scale) -> str:
         pairs = ", ".join(f"{one.y} over {one.x}" for one in self.landscape.slices)
@@ -307,9 +307,9 @@ def lowest(one: Slice, centre: Gains) -> tuple[dict[str, float], float]:
     return {**centre, one.x: one.x_values[column], one.y: one.y_values[row]}, float(errors[row, column])
 
 
-def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -> list[dict[str, object]]:
+def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -> list[Trace]:
     """The contours, and a shade over errors above the scale."""
-    suffix = _suffix(index)
+    suffix = theme.suffix(index)
     common: dict[str, object] = {
         "type": "contour",
         "x": list(one.x_values),
@@ -351,20 +351,23 @@ def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -
     return [ground, beyond]
 
 
-def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str) -> dict[str, object]:
-    """A trace through these gains, projected onto the slice."""
-    suffix = _suffix(index)
-    return {
-        "type": "scatter",
-        "xaxis": f"x{suffix}",
-        "yaxis": f"y{suffix}",
-        "x": [each[one.x] for each in gains],
-        "y": [each[one.y] for each in gains],
-        "legendgroup": role,
-        "cliponaxis": True,
-        "meta": {"role": role, "slice": index},
-        "hovertemplate": f"<b>%{{hovertext}}</b><br>{one.x} %{{x:g}}, {one.y} %{{y:g}}<extra></extra>",
-    }
+def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str, name: str, mode: str, **more: Any) -> Trace:
+    """A trace through these gains, projected onto the slice; a `hovertext` is shown with the two gains."""
+    suffix = theme.suffix(index)
+    if "hovertext" in more:
+        more["hovertemplate"] = f"<b>%{{hovertext}}</b><br>{one.x} %{{x:g}}, {one.y} %{{y:g}}<extra></extra>"
+    return scatter(
+        name,
+        ([each[one.x] for each in gains], [each[one.y] for each in gains]),
+        role=role,
+        about={"slice": index},
+        mode=mode,
+        xaxis=f"x{suffix}",
+        yaxis=f"y{suffix}",
+        legendgroup=role,
+        cliponaxis=True,
+        **more,
+    )
 
 
 def _hover_text(flight: FlightData, unit: str) -> str:
@@ -390,7 +393,3 @@ def _nice(width: float) -> float:
 
 def _title(gain: Gain) -> str:
     return f"{gain.name} ({gain.unit})" if gain.unit else gain.name
-
-
-def _suffix(index: int) -> str:
-    return "" if index == 1 else str(index)

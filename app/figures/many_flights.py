@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.core.records.trajectory import Samples
 from app.figures import theme
+from app.figures.base import Trace, reading, scatter
 from app.figures.data import Band, Curve, FlightData, History
 from app.figures.theme import Palette
 
@@ -62,35 +63,27 @@ def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | Non
     return Envelope(band=band, median=Curve(instants, middle), flights=len(curves))
 
 
-def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> list[dict[str, object]]:
+def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> list[Trace]:
     """Two edges with the band between them, and the median (`meta` role envelope, edge lower, upper and middle)."""
     if envelope is None:
         return []
-    quiet: dict[str, object] = {"type": "scatter", "mode": "lines", "legendgroup": "envelope", "legendrank": 800}
-    edge = quiet | {"line": theme.line(palette.earlier, 0.75), "hoverinfo": "skip"}
+    edge: dict[str, Any] = {"line": theme.line(palette.earlier, 0.75), "legendgroup": "envelope", "legendrank": 800}
+    fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.earlier, 0.3)}
     name = f"80\u00a0% of {envelope.flights} flights"
+    lower, upper, median = map(_points, (envelope.band.lower, envelope.band.upper, envelope.median))
     return [
-        edge
-        | _points(envelope.band.lower)
-        | {"name": "Lower edge", "showlegend": False, "meta": {"role": "envelope", "edge": "lower"}},
-        edge
-        | _points(envelope.band.upper)
-        | {
-            "name": name,
-            "fill": "tonexty",
-            "fillcolor": theme.with_opacity(palette.earlier, 0.3),
-            "meta": {"role": "envelope", "edge": "upper"},
-        },
-        quiet
-        | _points(envelope.median)
-        | {
-            "name": "Median",
-            "line": theme.line(palette.earlier, 1.5, "longdash"),
-            "meta": {"role": "envelope", "edge": "middle"},
-            "legendgroup": "median",
-            "hovertemplate": f"<b>Median of {envelope.flights} flights</b><br>%{{x:.2f}} s · %{{y:.3f}} {unit}"
-            "<extra></extra>",
-        },
+        scatter("Lower edge", lower, role="envelope", about={"edge": "lower"}, showlegend=False, **edge),
+        scatter(name, upper, role="envelope", about={"edge": "upper"}, **fill, **edge),
+        scatter(
+            "Median",
+            median,
+            role="envelope",
+            about={"edge": "middle"},
+            line=theme.line(palette.earlier, 1.5, "longdash"),
+            legendgroup="median",
+            legendrank=800,
+            hovertemplate=reading(f"Median of {envelope.flights} flights", unit),
+        ),
     ]
 
 
@@ -99,8 +92,5 @@ def _instants(until_s: float) -> Samples:
     return np.concatenate([early, np.linspace(_EARLY_SHARE * until_s, until_s, _EVENLY)])
 
 
-def _points(curve: Curve) -> dict[str, object]:
-    return {
-        "x": [round(at, 3) for at in curve.time_s.tolist()],
-        "y": [round(value, 4) for value in curve.values.tolist()],
-    }
+def _points(curve: Curve) -> tuple[list[float], list[float]]:
+    return [round(at, 3) for at in curve.time_s.tolist()], [round(value, 4) for value in curve.values.tolist()]

@@ -9,7 +9,7 @@ from typing import ClassVar, Final, Literal
 import numpy as np
 
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 Style = Literal[
@@ -68,7 +68,10 @@ class PanelsFigure:
     plot: Plot
     theme: ThemeName = "light"
     name: ClassVar[str] = "panels"
-    title: ClassVar[str] = "Panels"
+
+    @property
+    def title(self) -> str:
+        return self.plot.title
 
     def not_ready(self) -> str | None:
         return None if any(panel.lines for panel in self.plot.panels) else "Nothing to draw."
@@ -76,7 +79,7 @@ class PanelsFigure:
     def compute(self) -> Card:
         palette, plot = PALETTES[self.theme], self.plot
         axes: dict[str, object] = {}
-        traces: list[dict[str, object]] = []
+        traces: list[Trace] = []
         named: set[str] = set()
         for number, panel in enumerate(plot.panels, start=1):
             axes |= self._axes(palette, number, panel)
@@ -84,59 +87,39 @@ class PanelsFigure:
                 traces.append(self._trace(palette, number, panel, line, in_legend=line.name not in named))
                 named.add(line.name)
         layout = theme.layout(palette, uirevision=plot.title, showlegend=len(named) > 1, **axes)
-        return Card(
-            name=self.name,
-            title=plot.title,
-            state="ready",
-            summary=plot.summary,
-            figure=plotly_json(traces, layout),
-            table=self._table(),
-        )
+        return ready(self, traces, layout, summary=plot.summary, table=self._table())
 
-    def _trace(self, palette: Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> dict[str, object]:
+    def _trace(self, palette: Palette, number: int, panel: Panel, line: Line, *, in_legend: bool) -> Trace:
         colour, width, dash = _pen(palette, line.style)
         drawn: dict[str, object] = (
             {"mode": "markers", "marker": theme.solid(colour, size=7), "cliponaxis": False}
             if line.marks
             else {"mode": "lines", "line": theme.line(colour, width, dash)}
         )
-        note = f"<br>{line.note}" if line.note else ""
-        return {
-            "type": "scatter",
-            "name": line.name,
-            "x": list(line.x),
-            "y": list(line.y),
-            "xaxis": "x" + _suffix(number),
-            "yaxis": "y" + _suffix(number),
-            "legendgroup": line.name,
-            "showlegend": in_legend,
-            "meta": {"role": line.style, "panel": number, "line": line.name},
-            "hovertemplate": f"<b>{line.name}</b><br>%{{x}} · %{{y:.{panel.digits}f}}{note}<extra></extra>",
-            **drawn,
-        }
+        note, suffix = f"<br>{line.note}" if line.note else "", theme.suffix(number)
+        trace = scatter(
+            line.name,
+            (list(line.x), list(line.y)),
+            role=line.style,
+            about={"panel": number, "line": line.name},
+            xaxis=f"x{suffix}",
+            yaxis=f"y{suffix}",
+            legendgroup=line.name,
+            showlegend=in_legend,
+            hovertemplate=f"<b>{line.name}</b><br>%{{x}} · %{{y:.{panel.digits}f}}{note}<extra></extra>",
+        )
+        return trace | drawn
 
     def _axes(self, palette: Palette, number: int, panel: Panel) -> dict[str, object]:
-        count = len(self.plot.panels)
-        height = (1 - GAP * (count - 1)) / count
-        top = 1 - (number - 1) * (height + GAP)
-        lowest = number == count
-        x: dict[str, object] = {"anchor": "y" + _suffix(number), "showticklabels": lowest}
-        if self.plot.x_range is not None:
-            x["range"] = list(self.plot.x_range)
-        if number > 1:
-            x["matches"] = "x"
-        y: dict[str, object] = {
-            "anchor": "x" + _suffix(number),
-            "domain": [max(0.0, top - height), top],
-            "nticks": 7 if count == 1 else 4,
-        }
-        if panel.y_range is not None:
-            y["range"] = list(panel.y_range)
+        count, suffix = len(self.plot.panels), theme.suffix(number)
+        x = {} if self.plot.x_range is None else {"range": list(self.plot.x_range)}
+        y = {} if panel.y_range is None else {"range": list(panel.y_range)}
+        place = theme.stacked(number, count, GAP)
         return {
-            "xaxis" + _suffix(number): theme.titled(palette, self.plot.x_title, **x)
-            if lowest
-            else theme.axis(palette, **x),
-            "yaxis" + _suffix(number): theme.titled(palette, panel.y_title, **y),
+            f"xaxis{suffix}": theme.shared_axis(palette, self.plot.x_title, number, count, **x),
+            f"yaxis{suffix}": theme.titled(
+                palette, panel.y_title, anchor=f"x{suffix}", domain=place, nticks=7 if count == 1 else 4, **y
+            ),
         }
 
     def _table(self) -> Table:
@@ -193,10 +176,6 @@ def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
         "run 6": (palette.bad, 2, "longdash"),
     }
     return pens[style]
-
-
-def _suffix(number: int) -> str:
-    return "" if number == 1 else str(number)
 
 
 Curve = tuple[float, ...]

@@ -1,11 +1,13 @@
 """All flights over set point and reference trajectory: the best emphasised, the next one's prediction dashed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
+from app.core.formatting import count
 from app.figures import theme
 from app.figures.annotations import band_traces, glitch_traces
-from app.figures.base import Card, Cell, Column, Table, plotly_json
+from app.figures.base import Card, Column, Table, Trace, off_scale, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, History
 from app.figures.many_flights import PERCENTILES, Envelope, envelope_of, envelope_traces, select_individual_flights
 from app.figures.scale import robust_span, thin_by_bends, thinned
@@ -55,16 +57,18 @@ class TrajectoriesFigure:
         traces = [
             *envelope_traces(palette, envelope, history.output_unit),
             *band_traces(palette, band),
-            self._set_point(palette),
-            *self._reference(palette),
+            *self._goals(palette),
         ]
+        curves = [flight.curve for flight in drawn if flight.curve is not None]
         traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
         for flight in drawn:
             traces += glitch_traces(palette, flight.number, flight.curve, flight.glitches, history.output_unit)
         traces += [*self._legend(palette, drawn), *self._prediction(palette)]
         traces += [self._empty(palette, "live", "Flying now"), self._empty(palette, "pointed", "Pointed at")]
         low, high, outside = self._span(drawn)
-        traces += [_off_scale(palette, drawn[index], low, high) for index in outside if index < len(drawn)]
+        for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
+            label, text = str(flight.number), f"Flight {flight.number}"
+            traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.number, text=text))
         unit = history.output_unit
         layout = theme.layout(
             palette,
@@ -72,14 +76,8 @@ class TrajectoriesFigure:
             yaxis=theme.titled(palette, f"{history.output_title} ({unit})", range=[low, high], nticks=7),
             uirevision="takeoffs",
         )
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
-            summary=self._summary(sum(index < len(drawn) for index in outside)),
-            figure=plotly_json(traces, layout),
-            table=self._table(drawn, envelope),
-        )
+        summary = self._summary(sum(index < len(drawn) for index in outside))
+        return ready(self, traces, layout, summary=summary, table=self._table(drawn, envelope))
 
     @property
     def _lasts_s(self) -> float:
@@ -112,7 +110,7 @@ class TrajectoriesFigure:
         """Drawing order: the most important flights last, on top."""
         return ("invalid", "earlier", "latest", "unjudged", "best").index(self._standing(flight)), flight.number
 
-    def _flight(self, palette: Palette, flight: FlightData, points: int) -> dict[str, object]:
+    def _flight(self, palette: Palette, flight: FlightData, points: int) -> Trace:
         assert flight.curve is not None
         standing = self._standing(flight)
         label = {
@@ -127,96 +125,93 @@ class TrajectoriesFigure:
             f"Flight {label}",
             flight.curve,
             points,
+            role="flight",
+            about={"trial": flight.number, "standing": standing},
             uid=f"flight-{flight.number}",
             line=_style(palette, standing),
             legendrank=500 + flight.number,
             legendgroup=standing,
             showlegend=standing not in SHARED_LEGEND,
-            meta={"role": "flight", "trial": flight.number, "standing": standing},
-            hovertemplate=f"<b>Flight {label}</b><br>%{{x:.2f}} s · %{{y:.3f}} "
-            f"{self.history.output_unit}{error}<extra></extra>",
+            hovertemplate=reading(f"Flight {label}", self.history.output_unit, error),
         )
 
-    def _legend(self, palette: Palette, drawn: list[FlightData]) -> list[dict[str, object]]:
+    def _legend(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
         """One entry for all flights that look alike, so that the legend does not grow with every flight."""
         standings = {self._standing(flight) for flight in drawn}
         return [
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": name,
-                "x": [None],
-                "y": [None],
-                "line": _style(palette, standing),
-                "meta": {"role": "legend", "standing": standing},
-                "legendgroup": standing,
-                "legendrank": 800,
-                "hoverinfo": "skip",
-            }
+            scatter(
+                name,
+                ([None], [None]),
+                role="legend",
+                about={"standing": standing},
+                line=_style(palette, standing),
+                legendgroup=standing,
+                legendrank=800,
+            )
             for standing, name in SHARED_LEGEND.items()
             if standing in standings
         ]
 
-    def _set_point(self, palette: Palette) -> dict[str, object]:
-        style = theme.line(palette.dim, 1.5, "dot")
-        return _goal("Set point", self.history.set_point, line=style, meta={"role": "set point"}, legendrank=900)
+    def _goals(self, palette: Palette) -> list[Trace]:
+        """Set point, and reference if it is known."""
+        goals = (("Set point", self.history.set_point, "dot"), ("Reference", self.history.reference, "dashdot"))
+        return [
+            scatter(
+                name,
+                thin_by_bends(curve.time_s, curve.values),
+                role=name.lower(),
+                line=theme.line(palette.dim, 1.5, dash),
+                legendrank=900 + place,
+            )
+            for place, (name, curve, dash) in enumerate(goals)
+            if curve is not None
+        ]
 
-    def _reference(self, palette: Palette) -> list[dict[str, object]]:
-        if self.history.reference is None:
-            return []
-        style = theme.line(palette.dim, 1.5, "dashdot")
-        return [_goal("Reference", self.history.reference, line=style, meta={"role": "reference"}, legendrank=901)]
-
-    def _prediction(self, palette: Palette) -> list[dict[str, object]]:
+    def _prediction(self, palette: Palette) -> list[Trace]:
         proposal = self.history.proposal
         if proposal is None or proposal.curve is None:
             return []
-        text = f"Flight {proposal.number}, predicted"
         return [
             self._trace(
                 "Predicted",
                 proposal.curve,
                 CURVE_POINTS,
+                role="prediction",
+                about={"trial": proposal.number},
                 line=theme.line(palette.prediction, 2.25, "dash"),
-                meta={"role": "prediction", "trial": proposal.number},
                 legendrank=899,
-                hovertemplate=f"<b>{text}</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}<extra></extra>",
+                hovertemplate=reading(f"Flight {proposal.number}, predicted", self.history.output_unit),
             )
         ]
 
-    def _empty(self, palette: Palette, role: str, name: str) -> dict[str, object]:
+    def _empty(self, palette: Palette, role: str, name: str) -> Trace:
         """An empty curve that the page fills."""
-        return {
-            "type": "scatter",
-            "mode": "lines",
-            "name": name,
-            "x": [],
-            "y": [],
-            "showlegend": False,
-            "line": theme.line(palette.ink, 3.5),
-            "meta": {"role": role},
-            "uid": role,
-            "legendrank": 1,
-            "cliponaxis": True,
-            "hovertemplate": f"<b>{name}</b><br>%{{x:.2f}} s · %{{y:.3f}} {self.history.output_unit}<extra></extra>",
-        }
+        return scatter(
+            name,
+            ([], []),
+            role=role,
+            showlegend=False,
+            line=theme.line(palette.ink, 3.5),
+            uid=role,
+            legendrank=1,
+            cliponaxis=True,
+            hovertemplate=reading(name, self.history.output_unit),
+        )
 
-    def _trace(self, name: str, curve: Curve, points: int, **style: object) -> dict[str, object]:
-        x, y = thinned(curve.time_s, curve.values, points, self.history.window)
-        return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, **style}
+    def _trace(
+        self, name: str, curve: Curve, points: int, *, role: str, about: Mapping[str, object], **style: Any
+    ) -> Trace:
+        drawn = thinned(curve.time_s, curve.values, points, self.history.window)
+        return scatter(name, drawn, role=role, about=about, **style)
 
     def _summary(self, outside: int) -> str:
         history = self.history
         if not history.flights:
             return f"{history.output_title} over time: no flight yet, set point and reference only."
-        best = (
-            ""
-            if history.best is None
-            else (f" Best: flight {history.best.number}, error {history.best.error:.3f} {history.error_unit}.")
-        )
+        best = history.best
+        found = "" if best is None else f" Best: flight {best.number}, error {best.error:.3f} {history.error_unit}."
         off = f" {outside} off scale, marked at the top." if outside else ""
-        noun = "flight" if len(history.flights) == 1 else "flights"
-        return f"{history.output_title} over time: {len(history.flights)} {noun}.{best}{off}"
+        return f"{history.output_title} over time: {count(len(history.flights), 'flight')}.{found}{off}"
 
     def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:
         history, unit = self.history, self.history.output_unit
@@ -244,19 +239,7 @@ class TrajectoriesFigure:
                 named.append((Column("prediction_lower", f"{title}, at least", unit, 3), history.proposal.band.lower))
                 named.append((Column("prediction_upper", f"{title}, at most", unit, 3), history.proposal.band.upper))
         lasts = float(history.set_point.time_s[-1])
-        times = [time_s for time_s in TABLE_TIMES_S if time_s <= lasts]
-        rows = tuple((time_s, *_rounded(time_s, [curve for _, curve in named])) for time_s in times)
-        return Table((Column("time_s", "Time", "s", 1), *(column for column, _ in named)), rows)
-
-
-def _rounded(time_s: float, curves: list[Curve]) -> list[Cell]:
-    values = [curve.at(time_s) for curve in curves]
-    return [None if value is None else round(value, 4) for value in values]
-
-
-def _goal(name: str, curve: Curve, **style: object) -> dict[str, object]:
-    x, y = thin_by_bends(curve.time_s, curve.values)
-    return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "hoverinfo": "skip", **style}
+        return table_of_curves([time_s for time_s in TABLE_TIMES_S if time_s <= lasts], 1, named)
 
 
 def _style(palette: Palette, standing: str) -> dict[str, object]:
@@ -267,27 +250,3 @@ def _style(palette: Palette, standing: str) -> dict[str, object]:
         "invalid": theme.line(palette.bad, 1.25, "dot"),
         "unjudged": theme.line(palette.ink, 2, "longdash"),
     }[standing]
-
-
-def _off_scale(palette: Palette, flight: FlightData, low: float, high: float) -> dict[str, object]:
-    """A triangle at the edge where a flight leaves the scale, labelled with its peak value."""
-    assert flight.curve is not None
-    values = flight.curve.values
-    up = bool(values.max() - high >= low - values.min())
-    peak = int(values.argmax() if up else values.argmin())
-    text = f"Flight {flight.number} reaches {values[peak]:.2f}"
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "name": text,
-        "x": [round(float(flight.curve.time_s[peak]), 3)],
-        "y": [high if up else low],
-        "text": [f"{flight.number} {'↑' if up else '↓'} {values[peak]:.1f}"],
-        "textposition": "bottom center" if up else "top center",
-        "marker": {"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": palette.bad},
-        "textfont": {"color": palette.bad},
-        "showlegend": False,
-        "cliponaxis": False,
-        "meta": {"role": "off scale", "trial": flight.number},
-        "hovertemplate": f"{text}<extra></extra>",
-    }

@@ -126,3 +126,43 @@ def solid(colour: str | list[str], **more: object) -> dict[str, object]:
 
 def line(colour: str, width: float, dash: str = "solid") -> dict[str, object]:
     return {"color": colour, "width": width, "dash": dash, "simplify": False}
+
+
+def suffix(index: int) -> str:
+    """What follows `x`, `y`, `xaxis` or `yaxis` in the name of the axis at an index from 1."""
+    return "" if index == 1 else str(index)
+
+
+def stacked(index: int, count: int, gap: float) -> list[float]:
+    """Bottom and top of one of `count` panels as shares of the whole; the first one, 1, is on top."""
+    height = (1 - gap * (count - 1)) / count
+    top = 1 - (index - 1) * (height + gap)
+    return [max(0.0, top - height), top]
+
+
+def shared_axis(palette: Palette, title: str, index: int, count: int, **more: object) -> dict[str, object]:
+    """The abscissa of one of `count` stacked panels: only the lowest has labels, the others follow the first."""
+    own = {"showticklabels": index == count, "anchor": f"y{suffix(index)}", **more}
+    if index > 1:
+        own["matches"] = "x"
+    return titled(palette, title, **own) if index == count else axis(palette, **own)
+
+
+def flight_ticks(last: int) -> dict[str, object]:
+    """An axis of flight numbers up to `last`: a dozen ticks at most, no grid."""
+    return {"range": [0.5, last + 0.6], "dtick": max(1, -(-last // 12)), "showgrid": False}
+
+
+def note(palette: Palette, text: str, **more: object) -> dict[str, object]:
+    """A text at the left edge."""
+    return {
+        "text": text,
+        "x": 0,
+        "xref": "paper",
+        "yref": "paper",
+        "xanchor": "left",
+        "yanchor": "bottom",
+        "showarrow": False,
+        "font": {"size": 12, "color": palette.dim},
+        **more,
+    }

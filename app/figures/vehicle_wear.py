@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
+from app.core.formatting import count
 from app.core.statistics.drift import MONITORED_PARAMETERS, Fitted
 from app.figures import theme
-from app.figures.base import Card, Cell, Column, Table, literal, plotly_json
+from app.figures.base import Card, Cell, Column, Table, Trace, literal, ready, scatter
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 REACH: Final = 1.96
@@ -59,86 +60,62 @@ class CalibrationFigure:
             shapes=self._tuned(palette, len(names)),
             **axes,
         )
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
+        return ready(
+            self,
+            [self._panel(palette, index, name) for index, name in enumerate(names, start=1)],
+            layout,
             summary=f"Bars are 95 % intervals. {self.verdict}",
-            figure=plotly_json(
-                [self._panel(palette, index, name) for index, name in enumerate(names, start=1)], layout
-            ),
             table=self._table(names),
         )
 
     def _names(self) -> list[str]:
         return [name for name in MONITORED_PARAMETERS if any(name in point.fitted for point in self.points)]
 
-    def _panel(self, palette: Palette, index: int, name: str) -> dict[str, object]:
+    def _panel(self, palette: Palette, index: int, name: str) -> Trace:
         shown = [point for point in self.points if name in point.fitted]
-        unit, suffix = shown[0].fitted[name].unit, _suffix(index)
-        return {
-            "type": "scatter",
-            "mode": "markers",
-            "name": shown[0].fitted[name].title,
-            "xaxis": f"x{suffix}",
-            "yaxis": f"y{suffix}",
-            "x": [point.flight for point in shown],
-            "y": [point.fitted[name].value for point in shown],
-            "error_y": {
+        first, suffix = shown[0].fitted[name], theme.suffix(index)
+        return scatter(
+            first.title,
+            ([point.flight for point in shown], [point.fitted[name].value for point in shown]),
+            role="fitted",
+            about={"parameter": name},
+            mode="markers",
+            xaxis=f"x{suffix}",
+            yaxis=f"y{suffix}",
+            error_y={
                 "type": "data",
                 "array": [REACH * point.fitted[name].standard_error for point in shown],
                 "color": palette.dim,
                 "thickness": 1.5,
                 "width": 4,
             },
-            "marker": theme.solid(palette.best, size=8),
-            "text": [f"campaign {point.campaign_id}, flight {point.trial_number}" for point in shown],
-            "meta": {"role": "fitted", "parameter": name},
-            "hovertemplate": f"<b>Flight %{{x}} of the vehicle</b> (%{{text}})<br>%{{y:.4g}} ± %{{error_y.array:.2g}} "
-            f"{unit}<extra></extra>",
-        }
+            marker=theme.solid(palette.best, size=8),
+            text=[f"campaign {point.campaign_id}, flight {point.trial_number}" for point in shown],
+            hovertemplate=f"<b>Flight %{{x}} of the vehicle</b> (%{{text}})<br>%{{y:.4g}} ± %{{error_y.array:.2g}} "
+            f"{first.unit}<extra></extra>",
+        )
 
-    def _axes(self, palette: Palette, index: int, count: int) -> dict[str, object]:
-        bottom, height = _place(index, count)
-        suffix, last = _suffix(index), max(point.flight for point in self.points)
-        x = {
-            "range": [0.5, last + 0.6],
-            "dtick": max(1, -(-last // 12)),
-            "showgrid": False,
-            "showticklabels": index == count,
-            "anchor": f"y{suffix}",
-            "matches": None if index == 1 else "x",
-        }
-        axis_title = "Flight of this vehicle"
+    def _axes(self, palette: Palette, index: int, panels: int) -> dict[str, object]:
+        suffix, ticks = theme.suffix(index), theme.flight_ticks(max(point.flight for point in self.points))
+        place = theme.stacked(index, panels, _GAP)
         return {
-            f"xaxis{suffix}": theme.titled(palette, axis_title, **x) if index == count else theme.axis(palette, **x),
-            f"yaxis{suffix}": theme.axis(
-                palette, domain=[bottom, bottom + height], anchor=f"x{suffix}", nticks=4, rangemode="normal"
-            ),
+            f"xaxis{suffix}": theme.shared_axis(palette, "Flight of this vehicle", index, panels, **ticks),
+            f"yaxis{suffix}": theme.axis(palette, domain=place, anchor=f"x{suffix}", nticks=4, rangemode="normal"),
         }
 
-    def _title(self, palette: Palette, index: int, name: str, count: int) -> dict[str, object]:
+    def _title(self, palette: Palette, index: int, name: str, panels: int) -> dict[str, object]:
         fitted = next(point.fitted[name] for point in self.points if name in point.fitted)
-        return {
-            "text": f"<b>{fitted.title}</b> ({fitted.unit})",
-            "x": 0,
-            "y": sum(_place(index, count)),
-            "xref": "paper",
-            "yref": "paper",
-            "xanchor": "left",
-            "yanchor": "bottom",
-            "showarrow": False,
-            "font": {"size": 12, "color": palette.dim},
-        }
+        place = theme.stacked(index, panels, _GAP)
+        return theme.note(palette, f"<b>{fitted.title}</b> ({fitted.unit})", y=place[1])
 
-    def _tuned(self, palette: Palette, count: int) -> list[dict[str, object]]:
+    def _tuned(self, palette: Palette, panels: int) -> list[dict[str, object]]:
         if self.since is None:
             return []
         return [
             {
                 "type": "line",
-                "xref": f"x{_suffix(index)}",
-                "yref": f"y{_suffix(index)} domain",
+                "xref": f"x{theme.suffix(index)}",
+                "yref": f"y{theme.suffix(index)} domain",
                 "x0": self.since,
                 "x1": self.since,
                 "y0": 0,
@@ -146,7 +123,7 @@ class CalibrationFigure:
                 "layer": "below",
                 "line": {"color": palette.prediction, "width": 1.5, "dash": "dot"},
             }
-            for index in range(1, count + 1)
+            for index in range(1, panels + 1)
         ]
 
     def _table(self, names: list[str]) -> Table:
@@ -164,16 +141,6 @@ class CalibrationFigure:
                 cells += [None, None] if fitted is None else [fitted.value, fitted.standard_error]
             rows.append(tuple(cells))
         return Table(tuple(columns), tuple(rows))
-
-
-def _place(index: int, count: int) -> tuple[float, float]:
-    """Bottom and height of a panel as shares of the whole; the first one is on top."""
-    height = (1 - _GAP * (count - 1)) / count
-    return max(0.0, 1 - index * height - (index - 1) * _GAP), height
-
-
-def _suffix(index: int) -> str:
-    return "" if index == 1 else str(index)
 
 
 _BEFORE_PX: Final = 14
@@ -220,49 +187,49 @@ class BatteriesFigure:
             ),
             yaxis=theme.titled(palette, "Voltage (V)"),
         )
-        return Card(
-            name=self.name,
-            title=self.title,
-            state="ready",
+        columns = (
+            Column("flight", "Flight of the vehicle", digits=0),
+            Column("battery", "Battery"),
+            Column("before", "Before", "V", 2),
+            Column("after", "After", "V", 2),
+        )
+        rows = tuple((one.flight, one.battery or "no label", one.before_v, one.after_v) for one in self.flights)
+        return ready(
+            self,
+            [self._battery(palette, place, label) for place, label in enumerate(labels)],
+            layout,
             summary=self._summary(labels),
-            figure=plotly_json([self._battery(palette, place, label) for place, label in enumerate(labels)], layout),
-            table=Table(
-                (
-                    Column("flight", "Flight of the vehicle", digits=0),
-                    Column("battery", "Battery"),
-                    Column("before", "Before", "V", 2),
-                    Column("after", "After", "V", 2),
-                ),
-                tuple((one.flight, one.battery or "no label", one.before_v, one.after_v) for one in self.flights),
-            ),
+            table=Table(columns, rows),
         )
 
-    def _battery(self, palette: Palette, place: int, label: str) -> dict[str, object]:
+    def _battery(self, palette: Palette, place: int, label: str) -> Trace:
         colour = palette.gains[place % len(palette.gains)]
         own = [flight for flight in self.flights if flight.battery == label]
         symbols = (("circle-open", "circle"), ("square-open", "square"), ("diamond-open", "diamond"))
         before, after = symbols[(place // len(palette.gains) + place) % len(symbols)]
-        return {
-            "type": "scatter",
-            "mode": "lines+markers",
-            "name": literal(label or "no label"),
-            "x": [x for flight in own for x in (flight.flight, flight.flight, None)],
-            "y": [y for flight in own for y in (flight.before_v, flight.after_v, None)],
-            "line": theme.line(colour, 2),
-            "marker": {
+        return scatter(
+            literal(label or "no label"),
+            (
+                [x for flight in own for x in (flight.flight, flight.flight, None)],
+                [y for flight in own for y in (flight.before_v, flight.after_v, None)],
+            ),
+            role="battery",
+            about={"battery": label},
+            mode="lines+markers",
+            line=theme.line(colour, 2),
+            marker={
                 "color": colour,
                 "size": [_BEFORE_PX, _AFTER_PX, _AFTER_PX] * len(own),
                 "opacity": 1,
                 "symbol": [before, after, after] * len(own),
                 "line": {"width": [2, 0, 0] * len(own), "color": colour},
             },
-            "meta": {"role": "battery", "battery": label},
-            "hovertemplate": f"<b>Flight %{{x}}</b>, {literal(label or 'no label')}<br>%{{y:.2f}} V<extra></extra>",
-        }
+            hovertemplate=f"<b>Flight %{{x}}</b>, {literal(label or 'no label')}<br>%{{y:.2f}} V<extra></extra>",
+        )
 
     def _summary(self, labels: list[str]) -> str:
-        counted = [(label, sum(flight.battery == label for flight in self.flights)) for label in labels]
         counts = ", ".join(
-            f"{label or 'no label'}: {count} flight{'s' if count > 1 else ''}" for label, count in counted
+            f"{label or 'no label'}: {count(sum(flight.battery == label for flight in self.flights), 'flight')}"
+            for label in labels
         )
         return f"Open marks: before a flight; smaller filled marks: after it. {counts}."

@@ -14,6 +14,7 @@ from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
 from app.common.transition_checks import check_action, check_version
 from app.core.experiments import get_experiment
+from app.core.formatting import format_gains
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow
 from app.fleet import repository
@@ -177,10 +178,9 @@ def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
     if not new.statement.strip():
         problems.append(Problem("statement", "must name the reviewer"))
     if problems:
-        listed = ", ".join(f"{name} {value:g}" for name, value in gains.items())
         raise UnconfirmedError(
-            f"{new.name} is a real vehicle, and every flight of it ends with {listed}. A person must review these "
-            "gains first.",
+            f"{new.name} is a real vehicle, and every flight of it ends with {format_gains(gains)}. A person must "
+            "review these gains first.",
             hint="Compare them with gains that fly well on this vehicle, then confirm them and give your name.",
             problems=tuple(problems),
         )

@@ -2,14 +2,21 @@
 
 import io
 import mmap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import BinaryIO, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.core.control.loop_log import GAINS
 from app.core.errors import Problem, TrajectoryError
+from app.core.records.trajectory import Samples
 
 MAX_BYTES: Final = 512 * 2**20
+
+Table = Mapping[str, NDArray[np.generic]]
+"""Columns of one message type or topic, each of shape (n,)."""
 
 Contents = bytes | mmap.mmap
 """Both support slicing, searching and indexing."""
@@ -36,6 +43,21 @@ def contents(stream: BinaryIO) -> Contents:
 def refused(reason: str, hint: str) -> TrajectoryError:
     """The error for a file that cannot be read as the expected kind of log."""
     return TrajectoryError("This file cannot be read as a flight.", hint=hint, problems=(Problem("file", reason),))
+
+
+def numbers(column: NDArray[np.generic]) -> Samples:
+    """The column as floats; NaN if a damaged description made it a text."""
+    if column.ndim != 1 or column.dtype.kind not in "iuf":
+        return np.full(len(column), np.nan)
+    with np.errstate(invalid="ignore"):  # a damaged number may be a signalling NaN
+        return column.astype(np.float64)
+
+
+def rows_of(table: Table, clock: str, *names: str) -> Iterator[tuple[float, ...]]:
+    """Time, in s, and columns of a table, row by row; none if a column is missing. `clock` is the one in µs."""
+    if {clock, *names} <= table.keys():
+        columns = [numbers(table[clock]) / 1e6, *(numbers(table[name]) for name in names)]
+        yield from zip(*(column.tolist() for column in columns), strict=True)
 
 
 PAPARAZZI: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})

@@ -13,10 +13,9 @@ from types import MappingProxyType
 from typing import BinaryIO, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.core.records.trajectory import Samples
-from app.logs.base import ARDUPILOT_SETS, Contents, contents, names_in, refused
+from app.logs.base import ARDUPILOT_SETS, Contents, Table, contents, names_in, numbers, refused, rows_of
 from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 _SYNC: Final = b"\xa3\x95"
@@ -43,9 +42,6 @@ _MODES: Final[Mapping[float, str]] = MappingProxyType(
 _WANTED: Final = frozenset({"PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT"})
 _HINT: Final = "Give ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN)."
 
-Table = Mapping[str, NDArray[np.generic]]
-"""Columns of one message type, each of shape (n,)."""
-
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
@@ -69,7 +65,7 @@ def read_dataflash(stream: BinaryIO) -> FlightLog:
     if "BAT" in tables and {"TimeUS", "Volt"} <= tables["BAT"].keys():
         battery = _first_instance(tables["BAT"])
         if len(battery["TimeUS"]):
-            channels["battery_v"] = np.interp(time_s, _seconds(battery), _numbers(battery["Volt"]))
+            channels["battery_v"] = np.interp(time_s, _seconds(battery), numbers(battery["Volt"]))
     starts, ends, landings = _moments(tables)
     return FlightLog(
         title=f"ArduPilot's on-board log, {title}",
@@ -149,17 +145,17 @@ def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples],
     if {"TimeUS", "PD"} <= loop.keys():
         time_s = _seconds(loop)
         down = {"altitude_m": "PD", "reference_m": "TPD", "climb_rate_m_s": "VD"}
-        channels = {channel: -_numbers(loop[name]) for channel, name in down.items() if name in loop}
+        channels = {channel: -numbers(loop[name]) for channel, name in down.items() if name in loop}
         title = "altitude from PSCD.PD"
     elif {"TimeUS", "Alt"} <= tuning.keys():
         time_s = _seconds(tuning)
         up = {"altitude_m": "Alt", "reference_m": "DAlt"}
-        channels = {channel: _numbers(tuning[name]) for channel, name in up.items() if name in tuning}
+        channels = {channel: numbers(tuning[name]) for channel, name in up.items() if name in tuning}
         title = "altitude from CTUN.Alt"
     else:
         raise refused("contains neither PSCD.PD nor CTUN.Alt, the altitude", _HINT)
     if {"TimeUS", "ThO"} <= tuning.keys() and len(tuning["TimeUS"]):
-        channels["thrust"] = np.interp(time_s, _seconds(tuning), _numbers(tuning["ThO"]))
+        channels["thrust"] = np.interp(time_s, _seconds(tuning), numbers(tuning["ThO"]))
     return time_s, channels, title
 
 
@@ -169,7 +165,7 @@ def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
     names = names_in(ARDUPILOT_SETS)
     if not {"TimeUS", "Name", "Value"} <= table.keys():
         return
-    for time_s, raw, value in zip(_seconds(table), table["Name"], _numbers(table["Value"]), strict=True):
+    for time_s, raw, value in zip(_seconds(table), table["Name"], numbers(table["Value"]), strict=True):
         name = _text(bytes(raw))
         if name in names and np.isfinite(value):
             yield Setting(float(time_s), name, float(value))
@@ -178,40 +174,31 @@ def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
 def _moments(tables: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
     """Takeoff commands, events that end the flight, and landings."""
     accepted = [
-        (time_s, command) for time_s, command, result in _rows(tables, "MAVC", "Cmd", "Res") if result in _ACCEPTED
+        (time_s, command)
+        for time_s, command, result in rows_of(tables.get("MAVC", {}), "TimeUS", "Cmd", "Res")
+        if result in _ACCEPTED
     ]
     starts = [LogEvent(time_s, "the command NAV_TAKEOFF") for time_s, command in accepted if command == _TAKEOFF]
     ends = [LogEvent(time_s, "the command NAV_LAND") for time_s, command in accepted if command == _LAND]
-    modes = list(_rows(tables, "MODE", "ModeNum"))
+    modes = list(rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"))
     ends += [
         LogEvent(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}")
         for (_, before), (time_s, mode) in pairwise(modes)
         if mode != before
     ]
-    landings = [LogEvent(time_s, _LANDINGS[event]) for time_s, event in _rows(tables, "EV", "Id") if event in _LANDINGS]
+    landings = [
+        LogEvent(time_s, _LANDINGS[event])
+        for time_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id")
+        if event in _LANDINGS
+    ]
     return starts, ends, landings
-
-
-def _rows(tables: Mapping[str, Table], kind: str, *names: str) -> Iterator[tuple[float, ...]]:
-    """Time and columns of one message type, row by row; none if a column is missing."""
-    table = tables.get(kind, {})
-    if {"TimeUS", *names} <= table.keys():
-        yield from zip(_seconds(table).tolist(), *(_numbers(table[name]).tolist() for name in names), strict=True)
 
 
 def _first_instance(table: Table) -> Table:
     """The first battery, if there are several."""
     instance = next((table[name] for name in ("Inst", "Instance") if name in table), None)
-    return table if instance is None else {name: values[_numbers(instance) == 0] for name, values in table.items()}
-
-
-def _numbers(column: NDArray[np.generic]) -> Samples:
-    """The column as floats; NaN if a damaged description made it a text."""
-    if column.ndim != 1 or column.dtype.kind not in "iuf":
-        return np.full(len(column), np.nan)
-    with np.errstate(invalid="ignore"):  # a damaged number may be a signalling NaN
-        return column.astype(np.float64)
+    return table if instance is None else {name: values[numbers(instance) == 0] for name, values in table.items()}
 
 
 def _seconds(table: Table) -> Samples:
-    return _numbers(table["TimeUS"]) / 1e6
+    return numbers(table["TimeUS"]) / 1e6

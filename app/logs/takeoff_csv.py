@@ -16,6 +16,7 @@ from typing import BinaryIO, Final
 import numpy as np
 
 from app.core.errors import Problem, TrajectoryError
+from app.core.formatting import count
 from app.core.records.trajectory import CHANNEL_UNITS, Samples, Trajectory
 
 MAX_ROWS: Final = 200_000
@@ -182,7 +183,7 @@ def _number(text: str, line: int, column: str) -> float:
 def _require_rows(rows: int) -> None:
     if rows < MIN_ROWS:
         raise TrajectoryError(
-            f"The file has {rows} {'sample' if rows == 1 else 'samples'}; a flight needs at least {MIN_ROWS}.",
+            f"The file has {count(rows, 'sample')}; a flight needs at least {MIN_ROWS}.",
             hint="Upload the whole takeoff, from the command to 32.6 s after it.",
             problems=(Problem("time_s", "has too few rows"),),
         )

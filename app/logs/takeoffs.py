@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from app.core.errors import Problem, TrajectoryError
+from app.core.formatting import format_gains
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
 
@@ -104,7 +105,7 @@ class Takeoff:
     @property
     def summary(self) -> str:
         """Description for a list to choose from."""
-        held = ", ".join(f"{name} {value:g}" for name, value in self.gains.items()) or "gains not in the log"
+        held = format_gains(self.gains) or "gains not in the log"
         return (
             f"{self.start_s:.1f} s into the log, from {self.begins_with}, {self.trajectory.time_s[-1]:.1f} s long, "
             f"up to {self.trajectory['altitude_m'].max():.2f} m, {held}"

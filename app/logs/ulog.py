@@ -15,10 +15,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.core.records.trajectory import Samples
-from app.logs.base import PX4_SETS, Contents, contents, names_in, refused
+from app.logs.base import PX4_SETS, Contents, Table, contents, names_in, numbers, refused, rows_of
 from app.logs.takeoffs import FlightLog, LogEvent, Setting, Span
 
 if TYPE_CHECKING:
@@ -52,8 +51,6 @@ _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position",
 
 _HINT: Final = "Give PX4's .ulg log of the flight, with vehicle_local_position in it."
 
-Topic = Mapping[str, NDArray[np.generic]]
-
 
 def is_ulog(head: bytes) -> bool:
     """Whether a file with this head is a ULog."""
@@ -74,7 +71,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
         log = ULog(io.BytesIO(sieve.kept))
     except (ULogException, ValueError, KeyError, IndexError, TypeError) as error:
         raise refused(f"is damaged: {error}", _HINT) from error
-    topics: dict[str, Topic] = {each.name: each.data for each in log.data_list}
+    topics: dict[str, Table] = {each.name: each.data for each in log.data_list}
     position = topics.get(_POSITION, {})
     if not {"timestamp", "z"} <= position.keys():
         raise refused("contains no vehicle_local_position.z, the altitude", _HINT)
@@ -195,14 +192,14 @@ def _settings(log: "ULog") -> Iterator[Setting]:
             yield Setting(time_us / 1e6, name, float(value))
 
 
-def _channels(position: Topic, topics: Mapping[str, Topic]) -> dict[str, Samples]:
+def _channels(position: Table, topics: Mapping[str, Table]) -> dict[str, Samples]:
     """Altitude where the estimator reports it as valid, and the other channels, at the times of the position."""
-    time_s, altitude_m = _seconds(position), -_numbers(position["z"])
+    time_s, altitude_m = _seconds(position), -numbers(position["z"])
     if "z_valid" in position:
-        altitude_m = np.where(_numbers(position["z_valid"]) != 0.0, altitude_m, np.nan)
+        altitude_m = np.where(numbers(position["z_valid"]) != 0.0, altitude_m, np.nan)
     channels = {"altitude_m": altitude_m}
     if "vz" in position:
-        channels["climb_rate_m_s"] = -_numbers(position["vz"])
+        channels["climb_rate_m_s"] = -numbers(position["vz"])
     for channel, topic, name, sign in (
         ("reference_m", _SET_POINT, "z", -1.0),
         ("thrust", _THRUST, "xyz[2]", -1.0),
@@ -210,25 +207,29 @@ def _channels(position: Topic, topics: Mapping[str, Topic]) -> dict[str, Samples
     ):
         table = topics.get(topic, {})
         if {"timestamp", name} <= table.keys():
-            channels[channel] = np.interp(time_s, _seconds(table), sign * _numbers(table[name]))
+            channels[channel] = np.interp(time_s, _seconds(table), sign * numbers(table[name]))
     return channels
 
 
-def _moments(topics: Mapping[str, Topic]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
+def _moments(topics: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
     """Takeoff commands and modes, those that end a flight, and landings."""
     starts: list[LogEvent] = []
     ends: list[LogEvent] = []
     landings: list[LogEvent] = []
-    refusals = [(time_s, command) for time_s, command, result in _rows(topics, _ANSWER, "command", "result") if result]
-    for time_s, command in _rows(topics, _COMMAND, "command"):
+    refusals = [
+        (time_s, command)
+        for time_s, command, result in rows_of(topics.get(_ANSWER, {}), "timestamp", "command", "result")
+        if result
+    ]
+    for time_s, command in rows_of(topics.get(_COMMAND, {}), "timestamp", "command"):
         refused_at = [at for at, what in refusals if what == command and 0.0 <= at - time_s <= _ANSWERED_WITHIN_S]
         if command in {_TAKEOFF, _LAND} and not refused_at:
             moments, name = (starts, "NAV_TAKEOFF") if command == _TAKEOFF else (ends, "NAV_LAND")
             moments.append(LogEvent(time_s, f"the command {name}"))
     before: float | None = None
-    is_armed = _at(_rows(topics, _STATUS, "arming_state"))
+    is_armed = _at(rows_of(topics.get(_STATUS, {}), "timestamp", "arming_state"))
     was_taking_off = False
-    for time_s, mode in _rows(topics, _STATUS, "nav_state"):
+    for time_s, mode in rows_of(topics.get(_STATUS, {}), "timestamp", "nav_state"):
         takes_off = mode == _TAKEOFF_MODE and is_armed(time_s) in {_ARMED, None}
         if takes_off and not was_taking_off:
             starts.append(LogEvent(time_s, "the takeoff mode"))
@@ -236,24 +237,24 @@ def _moments(topics: Mapping[str, Topic]) -> tuple[list[LogEvent], list[LogEvent
             ends.append(LogEvent(time_s, f"the mode {_MODES.get(mode, f'{mode:g}')}"))
         before, was_taking_off = mode, takes_off
     before = None
-    for time_s, landed in _rows(topics, _LANDED, "landed"):
+    for time_s, landed in rows_of(topics.get(_LANDED, {}), "timestamp", "landed"):
         if landed and before == 0.0:
             landings.append(LogEvent(time_s, "the landing"))
         before = landed
     return starts, ends, landings
 
 
-def _in_air(topics: Mapping[str, Topic]) -> list[Span] | None:
+def _in_air(topics: Mapping[str, Table]) -> list[Span] | None:
     """Intervals from each lift-off to the touchdown, from the land detector, with the motors armed if that is known.
 
     A lift-off in a descending mode, or within two seconds of a touchdown (a bounce), is not counted. None without the
     land detector.
     """
-    landed = list(_rows(topics, _LANDED, "landed"))
+    landed = list(rows_of(topics.get(_LANDED, {}), "timestamp", "landed"))
     if not landed:
         return None
-    arming = list(_rows(topics, _STATUS, "arming_state"))
-    mode = _at(_rows(topics, _STATUS, "nav_state"))
+    arming = list(rows_of(topics.get(_STATUS, {}), "timestamp", "arming_state"))
+    mode = _at(rows_of(topics.get(_STATUS, {}), "timestamp", "nav_state"))
     is_landed, is_armed = _at(landed), _at(arming)
     times = sorted({time_s for time_s, _ in (*landed, *arming)})
     spans = _spans((time_s, is_landed(time_s) == 0.0 and is_armed(time_s) in {_ARMED, None}) for time_s in times)
@@ -265,9 +266,9 @@ def _in_air(topics: Mapping[str, Topic]) -> list[Span] | None:
     ]
 
 
-def _armed(topics: Mapping[str, Topic]) -> list[Span] | None:
+def _armed(topics: Mapping[str, Table]) -> list[Span] | None:
     """Intervals with the motors armed; None if the log does not report them."""
-    arming = list(_rows(topics, _STATUS, "arming_state"))
+    arming = list(rows_of(topics.get(_STATUS, {}), "timestamp", "arming_state"))
     return _spans((time_s, state == _ARMED) for time_s, state in arming) if arming else None
 
 
@@ -296,10 +297,10 @@ def _at(rows: Iterable[tuple[float, ...]]) -> Callable[[float], float | None]:
     return value_at
 
 
-def _missing(topics: Mapping[str, Topic]) -> Iterator[str]:
+def _missing(topics: Mapping[str, Table]) -> Iterator[str]:
     """Notes on missing topics, needed to tell a takeoff from a jump of the altitude, and on the method used instead."""
-    has_status = any(True for _ in _rows(topics, _STATUS, "arming_state", "nav_state"))
-    if not any(True for _ in _rows(topics, _LANDED, "landed")):
+    has_status = any(True for _ in rows_of(topics.get(_STATUS, {}), "timestamp", "arming_state", "nav_state"))
+    if not any(True for _ in rows_of(topics.get(_LANDED, {}), "timestamp", "landed")):
         how = "while it was armed" if has_status else "armed or not"
         yield (
             f"no {_LANDED} in the log, so the takeoff is found from a rise of the altitude, {how}: check that "
@@ -320,17 +321,5 @@ def _notes(sieve: _LogFilter, log: "ULog") -> Iterator[str]:
         yield f"the logger dropped data {len(log.dropouts)} times, {lost_s:.2f} s in total"
 
 
-def _rows(topics: Mapping[str, Topic], topic: str, *names: str) -> Iterator[tuple[float, ...]]:
-    """Time and columns of a topic, row by row; none if a column is missing."""
-    table = topics.get(topic, {})
-    if {"timestamp", *names} <= table.keys():
-        yield from zip(_seconds(table).tolist(), *(_numbers(table[name]).tolist() for name in names), strict=True)
-
-
-def _numbers(column: NDArray[np.generic]) -> Samples:
-    with np.errstate(invalid="ignore"):  # a damaged number may be a signalling NaN
-        return column.astype(np.float64)
-
-
-def _seconds(table: Topic) -> Samples:
-    return _numbers(table["timestamp"]) / 1e6
+def _seconds(table: Table) -> Samples:
+    return numbers(table["timestamp"]) / 1e6

@@ -5,7 +5,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, tzinfo
+from datetime import UTC, datetime, tzinfo
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Final
 from markupsafe import Markup
 
 from app.campaigns.schemas import Campaign
+from app.common.schemas import Interval
+from app.core import formatting
 from app.figures.base import Card, Cell, Column
-from app.reports import formatting
 from app.reports.sections import Photo, Report
 
 if TYPE_CHECKING:
@@ -132,10 +133,10 @@ def _environment(zone: tzinfo | None) -> "Environment":
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
     environment.filters |= {
-        "instant": lambda at: formatting.instant(at, zone or _here(at)),
-        "plus_minus": formatting.plus_minus,
+        "instant": lambda at: _instant(at, zone or _here(at)),
+        "plus_minus": formatting.measured,
         "number": formatting.number,
-        "interval": formatting.interval,
+        "interval": _interval,
         "gain": formatting.gain,
         "gains": formatting.gains,
         "signed_gain": _signed_gain,
@@ -147,6 +148,23 @@ def _environment(zone: tzinfo | None) -> "Environment":
         "mebibytes": lambda size: f"{size / 2**20:g} MiB",
     }
     return environment
+
+
+def _interval(span: Interval | None) -> str:
+    return formatting.NOTHING if span is None else f"{formatting.number(span.lower)} … {formatting.number(span.upper)}"
+
+
+def _instant(at: datetime | None, zone: tzinfo) -> str:
+    """`22 Nov 2026, 14:03 CET (13:03 UTC)`; UTC alone if the zone is at UTC."""
+    if at is None:
+        return formatting.NOTHING
+    here = at.astimezone(zone)
+    there = at.astimezone(UTC)
+    local = f"{here.day} {here:%b %Y, %H:%M}"
+    if not here.utcoffset():
+        return f"{local} UTC"
+    utc = f"{there:%H:%M}" if there.date() == here.date() else f"{there.day} {there:%b, %H:%M}"
+    return f"{local} {here.tzname()} ({utc} UTC)"
 
 
 def _here(at: datetime) -> tzinfo:

@@ -16,12 +16,12 @@ from app.common.states import AbortCause
 from app.core.definition import OptionValue
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
+from app.core.formatting import count, gain, gains, number, short_percent
 from app.core.policy import Gain
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow, TrialRow
 from app.figures.base import Card
 from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct
-from app.reports.formatting import count, gain, gains, number, option, percent
 from app.vehicles.registry import VEHICLE_KINDS
 
 
@@ -158,7 +158,7 @@ def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, .
     facts += [
         Fact(f"Bounds of {name}", f"{gain(low)} … {gain(high)}") for name, (low, high) in definition.bounds.items()
     ]
-    first, later = percent(definition.first_step_fraction), percent(definition.step_fraction)
+    first, later = short_percent(definition.first_step_fraction), short_percent(definition.step_fraction)
     facts.append(Fact("Largest step", f"{first} of each gain's range until a flight is valid, then {later}"))
     if experiment.output == "altitude_m":
         facts.append(Fact("Gate ceiling", f"{definition.ceiling_m:g} m"))
@@ -177,7 +177,15 @@ def _options(chosen: Mapping[str, OptionValue], known: Iterable[_Described]) -> 
     for name, value in chosen.items():
         found = described.get(name)
         if value != "":
-            yield Fact(name, option(value)) if found is None else Fact(found.title, option(value, found.unit))
+            yield Fact(name, _setting(value)) if found is None else Fact(found.title, _setting(value, found.unit))
+
+
+def _setting(value: OptionValue, unit: str = "") -> str:
+    """Yes or no for switches, numbers in short form, texts unmodified."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    text = f"{value:g}".replace("-", "−") if isinstance(value, int | float) else value
+    return f"{text} {unit}" if unit else text
 
 
 def _start(start: Start) -> str:
@@ -191,9 +199,9 @@ def _stop(stop: StopRule) -> str:
     most = f"at most {count(stop.max_flights, 'flight')}"
     match stop.kind:
         case "paper":
-            rule = f"two consecutive flights less than {percent(stop.improvement)} better than the best; {most}"
+            rule = f"two consecutive flights less than {short_percent(stop.improvement)} better than the best; {most}"
         case "noise":
-            sure = percent(stop.confidence)
+            sure = short_percent(stop.confidence)
             rule = f"no resolvable improvement at {sure} confidence; {most}"
         case _:
             rule = most

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from app.core.experiments.pitch_tracking import OUTPUT, PitchTracking
+from app.core.formatting import short_percent
 from app.core.policy import Vector
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import model_optimum
@@ -155,10 +156,10 @@ def _starts(on_progress: Progress) -> Iterator[Row]:
         for seed in range(SEEDS):
             errors.append(_true_error(start(perturbation, seed).gains))
             done += 1
-            on_progress(_FROM_SHOWCASE + share * done, f"models' optima at {_percent(perturbation)}, seed {seed}")
+            on_progress(_FROM_SHOWCASE + share * done, f"models' optima at ±{short_percent(perturbation)}, seed {seed}")
         yield Row(
             group=f"The model's optimum flown on the truth, median of {SEEDS} models",
-            label=f"error over the optimum's at {_percent(perturbation)}",
+            label=f"error over the optimum's at ±{short_percent(perturbation)}",
             unit="×",
             measured=float(np.median(errors)) / BEST_ERROR,
             reference=expected,
@@ -191,7 +192,7 @@ def _methods(comparisons: Sequence[_Comparison], seeds: Sequence[int], on_progre
 
 def _method(found: MethodResult) -> Iterator[Row]:
     share, flights = (EXPECTED | EXPECTED_NOISY)[found.method]
-    group = f"Methods over {len(found.campaigns)} models at {_percent(found.perturbation)}"
+    group = f"Methods over {len(found.campaigns)} models at ±{short_percent(found.perturbation)}"
     yield Row(
         group=group,
         label=f"{found.title}: near the optimum",
@@ -216,17 +217,13 @@ def _method(found: MethodResult) -> Iterator[Row]:
 def _by_the_second(found: MethodResult) -> Iterator[Row]:
     yield Row(
         group=f"{METHODS['identified'].title}: near the optimum by the second flight",
-        label=f"{len(found.campaigns)} models at {_percent(found.perturbation)}",
+        label=f"{len(found.campaigns)} models at ±{short_percent(found.perturbation)}",
         unit="of models",
         measured=found.share_by(2),
         reference=AT_LEAST_SECOND,
         digits=2,
         note="should be at least the reference",
     )
-
-
-def _percent(perturbation: float) -> str:
-    return f"±{100 * perturbation:.0f} %"
 
 
 _BRIEF: Final = (_Comparison(PERTURBATION, tuple(EXPECTED), MAX_FLIGHTS, _method),)

@@ -13,6 +13,7 @@ import numpy as np
 from app.core.definition import flight_seed
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Matrix, Scatter
+from app.core.formatting import number, short_percent
 from app.core.policy import Vector
 from app.core.statistics.comparisons import Group, pool_scatter, trend_of
 from app.figures.panels import Line, Panel, Plot, Style
@@ -86,9 +87,9 @@ def run_variability(on_progress: Progress, *, groups: int = GROUPS, fading_group
             ),
             (
                 f"A trend is the slope of the error over the {REPEATS} flights of a battery; it counts as resolved "
-                f"if its {_percent(CONFIDENCE)} interval excludes zero, which happens by chance on "
-                f"{_percent(1 - CONFIDENCE)} of steady batteries. The fading battery is {_percent(FADE)} weaker in "
-                "its last flight than in its first."
+                f"if its {short_percent(CONFIDENCE)} interval excludes zero, which happens by chance on "
+                f"{short_percent(1 - CONFIDENCE)} of steady batteries. The fading battery is {short_percent(FADE)} "
+                "weaker in its last flight than in its first."
             ),
             (
                 "Both gain sets are checked by a campaign's gate first. ki = 1356 can overflow and is flown by "
@@ -168,7 +169,7 @@ def _rows(policy: RepeatedPolicy, flown: Repeats) -> Iterator[Row]:
     )
     yield Row(
         group=policy.title,
-        label=f"batteries fading by {_percent(FADE)} that show one",
+        label=f"batteries fading by {short_percent(FADE)} that show one",
         unit="share",
         measured=share_with_trend(flown.fading),
         digits=3,
@@ -204,17 +205,10 @@ def _trend_row(policy: RepeatedPolicy, errors: Matrix) -> Row:
         measured=1000.0 * trend.slope,
         reference=0.0,
         digits=3,
-        note=f"{_percent(CONFIDENCE)} interval {_mm(trend.lower)} … {_mm(trend.upper)}; published: none",
+        note=f"{short_percent(CONFIDENCE)} interval {number(1000.0 * trend.lower)} … {number(1000.0 * trend.upper)}; "
+        "published: none",
         numbers={"lower_mm": 1000.0 * trend.lower, "upper_mm": 1000.0 * trend.upper},
     )
-
-
-def _mm(metres: float) -> str:
-    return f"{1000.0 * metres:.3f}".replace("-", "−")
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %"
 
 
 def _plot(batteries: list[Vector]) -> Plot:

@@ -21,7 +21,7 @@ Ending = Literal["completed", "aborted", "invalid"]
 """aborted: ended early by a safety limit or a person; invalid: the measurement is unusable for any gains."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class VehicleOption:
     """One setting of a vehicle kind, with its unit, range and default."""
 

@@ -32,11 +32,10 @@ from app.vehicles.base import (
     ShouldStop,
     StopRequest,
     Vehicle,
-    VehicleError,
     VehicleOption,
 )
 from app.vehicles.kinds import Options, VehicleKind
-from app.vehicles.simulated import Pacer, accept_gains
+from app.vehicles.simulated import GainHolder, Pacer, accept_gains
 
 GAIN_NAMES: Final = PitchTracking.space.names
 LOG_NOISE: Final = np.array([3.0, math.radians(0.1), 0.5, math.radians(0.2), math.radians(0.1)])
@@ -50,29 +49,13 @@ _NO_BIAS: Final = np.empty((0, STATES))
 _LARGEST_GAIN: Final = float(np.finfo(np.float32).max)
 
 
-class LinearAircraft:
+class LinearAircraft(GainHolder):
     """Simulated aircraft that holds the controller's six gains and starts every flight from trim."""
 
-    kind: Final = "lti"
-    is_real: Final = False
-
     def __init__(self, safe_gains: Gains, settings: Mapping[str, OptionValue]) -> None:
-        self.safe_gains: Final[Gains] = _numbers(safe_gains)
+        super().__init__("lti", safe_gains, _numbers)
         self._settings = dict(settings)
         self._log_noise = float(settings["log_noise"])
-        self._held: dict[str, float] = dict(self.safe_gains)
-        self._staged = False
-
-    def stage(self, gains: Gains) -> dict[str, float]:
-        """Write every gain and return the gains now held. Raises GainsError, and changes nothing, for a value that is
-        not finite or exceeds the range of single precision."""
-        self._held = _numbers(gains)
-        self._staged = True
-        return self.read_gains()
-
-    def read_gains(self) -> dict[str, float]:
-        """Return the gains that the aircraft holds now."""
-        return dict(self._held)
 
     def fly(
         self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
@@ -83,11 +66,7 @@ class LinearAircraft:
         safe gains and lets the pitch return to trim for ten seconds, which are part of the record. Once the pitch error
         has reached 10 rad the state is frozen. Raises VehicleError if no gains were staged.
         """
-        if not self._staged:
-            raise VehicleError(
-                "No gains were staged for this flight, so it was not started.",
-                hint="Stage the gains, compare what is read back, then fly.",
-            )
+        self._require_staged()
         tracking, noise = _TrackingRun(self._held, AMPLITUDE_RAD, _STEPS), _noise(self._log_noise, order.seed)
         try:
             detail = _flown(noise, tracking)
@@ -103,13 +82,6 @@ class LinearAircraft:
             reason="" if stop is None else stop.reason,
             settings=self._settings,
         )
-
-    def close(self) -> None:
-        """Do nothing: no resource is open between flights."""
-
-    def _restore(self) -> None:
-        self._held = dict(self.safe_gains)
-        self._staged = False
 
 
 def whole_flight(gains: Gains, *, log_noise: float, seed: int) -> Trajectory:
@@ -160,7 +132,7 @@ def _channels(detail: Samples) -> dict[str, Samples]:
 
 def _trajectory(detail: Samples) -> Trajectory:
     time_s = np.arange(len(detail), dtype=np.float64) * STEP_S
-    return Trajectory(time_s, _channels(detail), LinearAircraft.kind, "simulation")
+    return Trajectory(time_s, _channels(detail), "lti", "simulation")
 
 
 def _sample(step: int, row: Samples) -> Sample:
@@ -192,12 +164,12 @@ LTI: Final = VehicleKind(
     experiments=("pitch-tracking",),
     options=(
         VehicleOption(
-            name="log_noise",
-            title="Noise of the recorded states, as a multiple of 3 ft, 0.1°, 0.5 ft/s, 0.2°, 0.1 °/s at 50 Hz",
-            unit="×",
-            default=0.0,
-            lower=0.0,
-            upper=10.0,
+            "log_noise",
+            "Noise of the recorded states, as a multiple of 3 ft, 0.1°, 0.5 ft/s, 0.2°, 0.1 °/s at 50 Hz",
+            "×",
+            0.0,
+            0.0,
+            10.0,
         ),
     ),
     open=_open,

@@ -13,11 +13,11 @@ import numpy as np
 from app.core.control.paparazzi import RATE_HZ, STEP_S
 from app.core.errors import Problem
 from app.core.formatting import percent
-from app.core.policy import Gains
-from app.vehicles.base import Vehicle, VehicleError, VehicleOption
+from app.core.models.vertical import GRAVITY_M_S2
+from app.vehicles.base import VehicleError, VehicleOption
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, COMMAND_SIZE, Integers, Rows, control
 from app.vehicles.kinds import Hosts, Options, VehicleKind
-from app.vehicles.simulated import MAX_STEPS, SimulatedVehicle, gusts, streams
+from app.vehicles.simulated import HIGHEST_HOVER, MAX_STEPS, gusts, opener, streams
 
 if TYPE_CHECKING:
     import jsbsim
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 MASS_KG: Final = 0.4
 FULL_THRUST_N: Final = 4 * 0.35 * 4.4482216
-GRAVITY_M_S2: Final = 9.81
 
 _ROOT: Final = Path(__file__).parent
 _AIRCRAFT: Final = "ardrone2"
@@ -162,14 +161,6 @@ class JsbsimFlight:
         row[BATTERY] = _FULL_BATTERY_V * self._fdm["battery/voltage-norm"]
 
 
-_HIGHEST_HOVER: Final = 0.95
-
-
-def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> Vehicle:
-    numbers = {name: float(value) for name, value in options.items()}
-    return SimulatedVehicle("jsbsim", safe_gains, options, lambda order: JsbsimFlight(numbers, order.seed))
-
-
 def prepare() -> None:
     """Load JSBSim, its aircraft and the compiled autopilot, so that the first flight need not wait for them."""
     options = {option.name: float(option.default) for option in JSBSIM.options}
@@ -177,19 +168,19 @@ def prepare() -> None:
 
 
 def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
-    """Report a mass that needs more than `_HIGHEST_HOVER` of full thrust to hover.
+    """Report a mass that needs more than `HIGHEST_HOVER` of full thrust to hover.
 
     A sagging battery at hover throttle h leaves (1 − sag·h)² of the thrust; at full command (1 − sag)².
     """
     strength = float(options["thrust_scale"]) * (1.0 - float(options["battery_sag"])) ** 2
     share = float(options["mass_kg"]) * GRAVITY_M_S2 / (FULL_THRUST_N * strength)
-    if share <= _HIGHEST_HOVER:
+    if share <= HIGHEST_HOVER:
         return ()
     return (
         Problem(
             "mass_kg",
             f"is too much for these motors and this battery: hovering needs {percent(share)} of full thrust, and "
-            f"control is possible up to {percent(_HIGHEST_HOVER)}",
+            f"control is possible up to {percent(HIGHEST_HOVER)}",
         ),
     )
 
@@ -202,51 +193,16 @@ JSBSIM: Final = VehicleKind(
     can_fly=True,
     experiments=("takeoff",),
     options=(
-        VehicleOption(
-            name="thrust_scale",
-            title="Thrust, as a multiple of the data sheet's",
-            unit="×",
-            default=1.0,
-            lower=0.7,
-            upper=1.5,
-        ),
-        VehicleOption(name="mass_kg", title="Mass", unit="kg", default=MASS_KG, lower=0.3, upper=0.6),
-        VehicleOption(name="motor_lag_s", title="Motor lag", unit="s", default=0.0, lower=0.0, upper=0.15),
-        VehicleOption(name="start_latency_s", title="Start latency", unit="s", default=0.0, lower=0.0, upper=2.0),
-        VehicleOption(name="wind_m_s", title="Steady wind", unit="m/s", default=0.0, lower=0.0, upper=10.0),
-        VehicleOption(
-            name="wind_from_deg",
-            title="Direction the wind comes from, clockwise from north",
-            unit="°",
-            default=0.0,
-            lower=0.0,
-            upper=360.0,
-        ),
-        VehicleOption(
-            name="gust_m_s",
-            title="Gusts in each direction, root mean square",
-            unit="m/s",
-            default=0.0,
-            lower=0.0,
-            upper=3.0,
-        ),
-        VehicleOption(
-            name="altitude_noise_m",
-            title="Noise of the measured altitude, standard deviation",
-            unit="m",
-            default=0.0,
-            lower=0.0,
-            upper=0.1,
-        ),
-        VehicleOption(
-            name="battery_sag",
-            title="Share of the voltage lost under full load",
-            unit="of full",
-            default=0.0,
-            lower=0.0,
-            upper=0.2,
-        ),
+        VehicleOption("thrust_scale", "Thrust, as a multiple of the data sheet's", "×", 1.0, 0.7, 1.5),
+        VehicleOption("mass_kg", "Mass", "kg", MASS_KG, 0.3, 0.6),
+        VehicleOption("motor_lag_s", "Motor lag", "s", 0.0, 0.0, 0.15),
+        VehicleOption("start_latency_s", "Start latency", "s", 0.0, 0.0, 2.0),
+        VehicleOption("wind_m_s", "Steady wind", "m/s", 0.0, 0.0, 10.0),
+        VehicleOption("wind_from_deg", "Direction the wind comes from, clockwise from north", "°", 0.0, 0.0, 360.0),
+        VehicleOption("gust_m_s", "Gusts in each direction, root mean square", "m/s", 0.0, 0.0, 3.0),
+        VehicleOption("altitude_noise_m", "Noise of the measured altitude, standard deviation", "m", 0.0, 0.0, 0.1),
+        VehicleOption("battery_sag", "Share of the voltage lost under full load", "of full", 0.0, 0.0, 0.2),
     ),
-    open=_open,
+    open=opener("jsbsim", JsbsimFlight),
     find_conflicts=_cannot_lift,
 )

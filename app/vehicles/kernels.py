@@ -22,7 +22,19 @@ from app.core.control.paparazzi import (
     step,
 )
 from app.core.kernels import kernel
-from app.core.models.vertical import GRAVITY_M_S2
+from app.core.models.vertical import (
+    BATTERY_SAG,
+    DRAG_1_S,
+    GRAVITY_M_S2,
+    GROUND_EFFECT,
+    MEASUREMENT_DELAY_S,
+    MOTOR_LAG_S,
+    QUADRATIC_SHARE,
+    advance,
+    lift_of,
+    response_of,
+    sensed,
+)
 
 Rows = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -105,19 +117,8 @@ def control(
     return thrust / FULL_THRUST
 
 
-HOVER_SHARE: Final = 0
-MOTOR_LAG_S: Final = 1
-DRAG_1_S: Final = 2
-QUADRATIC_SHARE: Final = 3
-GROUND_EFFECT: Final = 4
-GROUND_EFFECT_HEIGHT_M: Final = 5
-MEASUREMENT_DELAY_S: Final = 6
-SAG_1_S: Final = 7
-MODEL_SIZE: Final = 8
-"""Indices into the simple model's parameters."""
-
 PAST: Final = 64
-"""Steps of altitude and climb rate that are kept, a power of two; a delay of 0.1 s needs 51.2."""
+"""Steps of altitude and climb rate that are kept; a delay of 0.1 s needs 51.2."""
 
 
 @kernel
@@ -127,54 +128,42 @@ def fly_simple_model(
     plant: Rows,
     past: Rows,
     model: Rows,
+    hover_force: float,
+    ground_effect_height_m: float,
     datum_m: float,
     gusts_m_s2: Rows,
     resting_steps: int,
     first: int,
     rows: Rows,
 ) -> None:
-    """Advance the simple vertical model by one step per row of `rows`, writing each row before its step.
+    """Advance the simple model of app.core.models.vertical by a step per row of `rows`, writing each before its step.
 
     `plant` is altitude (m), climb rate (m/s) and thrust command after the lag (share of full); `past`, shape (2, 64),
-    are the last altitudes and climb rates, for delayed measurement. A command u gives a lift of
-    ((1 − q)·u + q·u²) / `HOVER_SHARE` of the weight, q the quadratic share, times 1 + e·exp(−altitude / height) near
-    the ground, less `SAG_1_S` of it per second since the command. Explicit Euler at 512 Hz, the ground at 0.
-    `gusts_m_s2` has shape (n,) as `rows`, and `first` is the number of the first step. The loop may be entered from
-    step `resting_steps` on. The measured altitude is `datum_m` too high.
+    are the last altitudes and climb rates, for delayed measurement. `hover_force`, a share of full force, replaces that
+    at the model's hover throttle. `gusts_m_s2` has shape (n,) as `rows`, and `first` is the number of the first step.
+    The loop may be entered from step `resting_steps` on. The measured altitude is `datum_m` too high.
     """
-    lag, drag, quadratic, ground_effect = (
-        model[MOTOR_LAG_S],
-        model[DRAG_1_S],
-        model[QUADRATIC_SHARE],
-        model[GROUND_EFFECT],
-    )
-    response = STEP_S / lag if lag > STEP_S else 1.0
-    delay = model[MEASUREMENT_DELAY_S] * RATE_HZ
-    whole = int(delay)
-    part = delay - whole
+    response, delay = response_of(model[MOTOR_LAG_S]), model[MEASUREMENT_DELAY_S] * RATE_HZ
     height, climb, thrust = plant[0], plant[1], plant[2]
-    sensed_m, sensed_m_s = height, climb
     for i in range(len(rows)):
+        now = first + i
+        sensed_m, sensed_m_s = height, climb
         if delay > 0.0:
-            now = first + i
             past[0, now % PAST], past[1, now % PAST] = height, climb
-            late, later = (now - whole) % PAST, (now - whole - 1) % PAST
-            sensed_m = (1.0 - part) * past[0, late] + part * past[0, later]
-            sensed_m_s = (1.0 - part) * past[1, late] + part * past[1, later]
-        else:
-            sensed_m, sensed_m_s = height, climb
-        may_enter = first + i >= resting_steps
-        share = control(autopilot, command, sensed_m + datum_m, sensed_m_s, 1.0, may_enter, rows[i])
+            sensed_m, sensed_m_s = sensed(past[0], now, delay), sensed(past[1], now, delay)
+        share = control(autopilot, command, sensed_m + datum_m, sensed_m_s, 1.0, now >= resting_steps, rows[i])
         thrust += response * (share - thrust)
-        lift = ((1.0 - quadratic) * thrust + quadratic * thrust * thrust) / model[HOVER_SHARE]
-        if ground_effect > 0.0:
-            lift *= 1.0 + ground_effect * np.exp(-height / model[GROUND_EFFECT_HEIGHT_M])
-        lift *= 1.0 - model[SAG_1_S] * ((first + i) * STEP_S)
-        acceleration = GRAVITY_M_S2 * (lift - 1.0) - drag * climb + gusts_m_s2[i]
-        height += climb * STEP_S
-        climb += acceleration * STEP_S
-        if height <= 0.0:
-            height, climb = 0.0, max(climb, 0.0)
+        lift = lift_of(
+            thrust,
+            height,
+            now * STEP_S,
+            model[QUADRATIC_SHARE],
+            model[GROUND_EFFECT],
+            ground_effect_height_m,
+            model[BATTERY_SAG],
+            hover_force,
+        )
+        height, climb = advance(height, climb, GRAVITY_M_S2 * (lift - 1.0) - model[DRAG_1_S] * climb + gusts_m_s2[i])
     plant[0], plant[1], plant[2] = height, climb, thrust
 
 

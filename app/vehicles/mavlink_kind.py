@@ -134,10 +134,6 @@ def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
     return ()
 
 
-def _number(name: str, title: str, unit: str, default: float, lower: float, upper: float) -> VehicleOption:
-    return VehicleOption(name=name, title=title, unit=unit, default=default, lower=lower, upper=upper)
-
-
 MAVLINK: Final = VehicleKind(
     name="mavlink",
     title="Vehicle over MAVLink",
@@ -146,40 +142,42 @@ MAVLINK: Final = VehicleKind(
     can_fly=True,
     experiments=tuple(profile.experiment for profile in PROFILES.values()),
     options=(
-        VehicleOption(name="autopilot", title="Autopilot: paparazzi, ardupilot or px4", unit="", default="paparazzi"),
+        VehicleOption("autopilot", "Autopilot: paparazzi, ardupilot or px4", "", "paparazzi"),
         VehicleOption(
-            name="address",
-            title="Address of the vehicle: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
-            unit="",
-            default="udp:127.0.0.1:4245@4244",
+            "address",
+            "Address of the vehicle: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
+            "",
+            "udp:127.0.0.1:4245@4244",
         ),
-        VehicleOption(name="simulated", title="Simulated vehicle on this computer", unit="", default=False),
-        _number("system_id", "MAVLink system id; 0: the first autopilot received", "", 0.0, 0.0, 255.0),
-        _number("aircraft_id", "Paparazzi's aircraft id (AC_ID); 0: the same as the system id", "", 0.0, 0.0, 255.0),
-        _number("telemetry_hz", "Requested rate of positions", "Hz", 50.0, 40.0, 200.0),
-        _number("climb_waypoint", "Paparazzi: number of the waypoint that the take-off climbs to", "", 2.0, 1.0, 254.0),
-        _number("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
-        _number("radius_m", "Maximum distance from the start", "m", 5.0, 0.5, 100.0),
-        _number("plan_radius_m", "Paparazzi: maximum distance from HOME in the flight plan", "m", 8.0, 0.5, 1000.0),
-        _number("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
+        VehicleOption("simulated", "Simulated vehicle on this computer", "", False),
+        VehicleOption("system_id", "MAVLink system id; 0: the first autopilot received", "", 0.0, 0.0, 255.0),
         VehicleOption(
-            name="second_source",
-            title="Second source of altitude: natnet:HOST?body=ID, odometry or mavlink:ADDRESS; empty: none",
-            unit="",
-            default="",
+            "aircraft_id", "Paparazzi's aircraft id (AC_ID); 0: the same as the system id", "", 0.0, 0.0, 255.0
         ),
+        VehicleOption("telemetry_hz", "Requested rate of positions", "Hz", 50.0, 40.0, 200.0),
         VehicleOption(
-            name="scored_source", title="Scored source of altitude: vehicle or mocap", unit="", default="vehicle"
+            "climb_waypoint", "Paparazzi: number of the waypoint that the take-off climbs to", "", 2.0, 1.0, 254.0
         ),
+        VehicleOption("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
+        VehicleOption("radius_m", "Maximum distance from the start", "m", 5.0, 0.5, 100.0),
         VehicleOption(
-            name="signing_key_file",
-            title="ArduCopter, PX4: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",
-            unit="",
-            default="",
+            "plan_radius_m", "Paparazzi: maximum distance from HOME in the flight plan", "m", 8.0, 0.5, 1000.0
         ),
+        VehicleOption("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
-            name="log_folder", title="Folder for the telemetry logs of all flights; empty: none", unit="", default=""
+            "second_source",
+            "Second source of altitude: natnet:HOST?body=ID, odometry or mavlink:ADDRESS; empty: none",
+            "",
+            "",
         ),
+        VehicleOption("scored_source", "Scored source of altitude: vehicle or mocap", "", "vehicle"),
+        VehicleOption(
+            "signing_key_file",
+            "ArduCopter, PX4: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",
+            "",
+            "",
+        ),
+        VehicleOption("log_folder", "Folder for the telemetry logs of all flights; empty: none", "", ""),
     ),
     open=_open,
     connect=_connect,

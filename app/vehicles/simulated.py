@@ -4,6 +4,7 @@ disturbances, aborts.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Final, Protocol
 
 import numpy as np
@@ -39,6 +40,7 @@ from app.vehicles.kernels import (
     Rows,
     correlate,
 )
+from app.vehicles.kinds import Options
 
 
 def accept_gains(
@@ -107,6 +109,8 @@ TAKEOFF_ALTITUDE_M: Final = 3.0
 FLIGHT_S: Final = 33.0
 """Time recorded after the command, a little more than the 32.6 s that are scored."""
 TELEMETRY_HZ: Final = 50
+HIGHEST_HOVER: Final = 0.95
+"""Share of full thrust up to which a vehicle that hovers with it can be controlled."""
 _WATCHED: Final = ("altitude_m", "climb_rate_m_s", "set_point_m", "reference_m", "thrust", "battery_v")
 
 _LANDING_RATE_M_S: Final = 0.5
@@ -128,13 +132,49 @@ class Simulation(Protocol):
         ...
 
 
-class SimulatedVehicle:
+class GainHolder:
+    """The gains of a simulated vehicle between its flights; `accept` completes and checks them."""
+
+    is_real: Final = False
+
+    def __init__(self, kind: str, safe_gains: Gains, accept: Callable[[Gains], dict[str, float]]) -> None:
+        self.kind: Final = kind
+        self.safe_gains: Final[Gains] = accept(safe_gains)
+        self._accept = accept
+        self._held: dict[str, float] = dict(self.safe_gains)
+        self._staged = False
+
+    def stage(self, gains: Gains) -> dict[str, float]:
+        """Write every gain and return the gains now held. Raises GainsError, and changes nothing, for a value that the
+        controller cannot hold."""
+        self._held = self._accept(gains)
+        self._staged = True
+        return self.read_gains()
+
+    def read_gains(self) -> dict[str, float]:
+        """Return the gains that the vehicle holds now."""
+        return dict(self._held)
+
+    def close(self) -> None:
+        """Do nothing: no resource is open between flights."""
+
+    def _require_staged(self) -> None:
+        if not self._staged:
+            raise VehicleError(
+                "No gains were staged for this flight, so it was not started.",
+                hint="Stage the gains, compare what is read back, then fly.",
+            )
+
+    def _restore(self) -> None:
+        self._held = dict(self.safe_gains)
+        self._staged = False
+
+
+class SimulatedVehicle(GainHolder):
     """Simulated vehicle that holds the loop's three integer gains and starts every flight from rest on the ground.
 
     `launch(order)` returns the simulation of one flight; `settings` describe the vehicle in its records.
     """
-
-    is_real: Final = False
 
     def __init__(
         self,
@@ -143,23 +183,9 @@ class SimulatedVehicle:
         settings: Mapping[str, OptionValue],
         launch: Callable[[FlightOptions], Simulation],
     ) -> None:
-        self.kind: Final = kind
-        self.safe_gains: Final[Gains] = _counts(safe_gains)
+        super().__init__(kind, safe_gains, _counts)
         self._settings = dict(settings)
         self._launch = launch
-        self._held: dict[str, float] = dict(self.safe_gains)
-        self._staged = False
-
-    def stage(self, gains: Gains) -> dict[str, float]:
-        """Write every gain and return the gains now held. Raises GainsError, and changes nothing, for a value that is
-        not a 32-bit integer."""
-        self._held = _counts(gains)
-        self._staged = True
-        return self.read_gains()
-
-    def read_gains(self) -> dict[str, float]:
-        """Return the gains that the vehicle holds now."""
-        return dict(self._held)
 
     def fly(
         self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
@@ -171,11 +197,7 @@ class SimulatedVehicle:
         set point is the ground. Afterwards the vehicle holds its safe gains. Raises VehicleError if no gains were
         staged or the simulation diverged.
         """
-        if not self._staged:
-            raise VehicleError(
-                "No gains were staged for this flight, so it was not started.",
-                hint="Stage the gains, compare what is read back, then fly.",
-            )
+        self._require_staged()
         try:
             simulation = self._launch(order)
             rows: list[Rows] = []
@@ -191,13 +213,6 @@ class SimulatedVehicle:
             reason="" if stop is None else stop.reason,
             settings=self._settings,
         )
-
-    def close(self) -> None:
-        """Do nothing: no resource is open between flights."""
-
-    def _restore(self) -> None:
-        self._held = dict(self.safe_gains)
-        self._staged = False
 
     def _take_off(
         self,
@@ -231,6 +246,18 @@ class SimulatedVehicle:
 
     def _command(self, mode: int, target: int) -> Integers:
         return _command(mode, target, self._held)
+
+
+def opener(
+    kind: str, launch: Callable[[dict[str, float], int], Simulation]
+) -> Callable[[Options, Gains, Path | None], SimulatedVehicle]:
+    """The function that opens a vehicle of this kind; `launch` begins a flight with its options and a seed."""
+
+    def open_vehicle(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> SimulatedVehicle:
+        numbers = {name: float(value) for name, value in options.items()}
+        return SimulatedVehicle(kind, safe_gains, options, lambda order: launch(numbers, order.seed))
+
+    return open_vehicle
 
 
 def simulate_takeoff(simulation: Simulation, gains: Gains) -> Rows:

@@ -6,36 +6,18 @@ Further physics (thrust that grows with the square of the command, ground effect
 battery) is off by default.
 """
 
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from app.core.control.paparazzi import RATE_HZ, STEP_S
 from app.core.errors import Problem
+from app.core.experiments.takeoff import MODEL_PARAMETERS
 from app.core.formatting import percent
-from app.core.policy import Gains
-from app.vehicles.base import Vehicle, VehicleOption
-from app.vehicles.kernels import (
-    AUTOPILOT_SIZE,
-    BATTERY,
-    CHANNELS,
-    DRAG_1_S,
-    GROUND_EFFECT,
-    GROUND_EFFECT_HEIGHT_M,
-    HOVER_SHARE,
-    MEASUREMENT_DELAY_S,
-    MODEL_SIZE,
-    MOTOR_LAG_S,
-    PAST,
-    QUADRATIC_SHARE,
-    SAG_1_S,
-    Integers,
-    Rows,
-    fly_simple_model,
-)
+from app.vehicles.base import VehicleOption
+from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, PAST, Integers, Rows, fly_simple_model
 from app.vehicles.kinds import Hosts, Options, VehicleKind
-from app.vehicles.simulated import FLIGHT_S, MAX_STEPS, SimulatedVehicle, gusts, streams
+from app.vehicles.simulated import FLIGHT_S, HIGHEST_HOVER, MAX_STEPS, gusts, opener, streams
 
 _THRUST_SD: Final = 0.003
 _START_SD_S: Final = 0.060
@@ -43,16 +25,6 @@ _DATUM_SD_M: Final = 0.004
 _GUST_SD_M_S2: Final = 0.05
 _GUST_CORRELATION_S: Final = 0.5
 _BATTERY_V: Final = 11.1
-_HIGHEST_HOVER: Final = 0.95
-
-_PLACES: Final = {
-    "motor_lag_s": MOTOR_LAG_S,
-    "drag_1_s": DRAG_1_S,
-    "quadratic_share": QUADRATIC_SHARE,
-    "ground_effect": GROUND_EFFECT,
-    "ground_effect_height_m": GROUND_EFFECT_HEIGHT_M,
-    "measurement_delay_s": MEASUREMENT_DELAY_S,
-}
 
 
 class TwinFlight:
@@ -67,11 +39,9 @@ class TwinFlight:
         flight, gust = streams(seed, 2)
         thrust, start, datum = flight.standard_normal(3) * options["scatter"]
         self._sag_1_s = options["battery_sag"] / FLIGHT_S
-        self._model = np.empty(MODEL_SIZE)
-        self._model[HOVER_SHARE] = _hover_share(options) / (1.0 + _THRUST_SD * thrust)
-        self._model[SAG_1_S] = self._sag_1_s
-        for name, place in _PLACES.items():
-            self._model[place] = options[name]
+        self._model = np.array([options[parameter.name] for parameter in MODEL_PARAMETERS])
+        self._hover_force = _hover_force(options) / (1.0 + _THRUST_SD * thrust)
+        self._ground_effect_height_m = options["ground_effect_height_m"]
         self._datum_m = float(_DATUM_SD_M * datum)
         self._gusts = gusts(gust, MAX_STEPS, sd=_GUST_SD_M_S2 * options["scatter"], correlation_s=_GUST_CORRELATION_S)
         self._resting = round(max(options["start_latency_s"] + _START_SD_S * start, 0.0) * RATE_HZ)
@@ -92,6 +62,8 @@ class TwinFlight:
             self._plant,
             self._past,
             self._model,
+            self._hover_force,
+            self._ground_effect_height_m,
             self._datum_m,
             np.take(self._gusts, np.arange(self._done, self._done + steps), mode="wrap"),
             self._resting,
@@ -102,32 +74,23 @@ class TwinFlight:
         return rows
 
 
-def _hover_share(options: Options) -> float:
-    """Return the lift at hover throttle h as a share of that at full command: (1 − q)·h + q·h²."""
+def _hover_force(options: Options) -> float:
+    """`force_at_hover` of the options, without numba: the web process checks options and computes nothing else."""
     hover, quadratic = float(options["hover_throttle"]), float(options["quadratic_share"])
     return (1.0 - quadratic) * hover + quadratic * hover * hover
 
 
-def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -> Vehicle:
-    numbers = {name: float(value) for name, value in options.items()}
-    return SimulatedVehicle("twin", safe_gains, options, lambda order: TwinFlight(numbers, order.seed))
-
-
 def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, ...]:
-    share = _hover_share(options) / (1.0 - float(options["battery_sag"]))
-    if share <= _HIGHEST_HOVER:
+    share = _hover_force(options) / (1.0 - float(options["battery_sag"]))
+    if share <= HIGHEST_HOVER:
         return ()
     return (
         Problem(
             "battery_sag",
             f"leaves too little thrust: at the end of a flight, hovering needs {percent(share)} of it, and control is "
-            f"possible up to {percent(_HIGHEST_HOVER)}",
+            f"possible up to {percent(HIGHEST_HOVER)}",
         ),
     )
-
-
-def _number(name: str, title: str, unit: str, default: float, upper: float, lower: float = 0.0) -> VehicleOption:
-    return VehicleOption(name=name, title=title, unit=unit, default=default, lower=lower, upper=upper)
 
 
 TWIN: Final = VehicleKind(
@@ -138,17 +101,21 @@ TWIN: Final = VehicleKind(
     can_fly=True,
     experiments=("takeoff",),
     options=(
-        _number("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", "×", 1.0, 5.0),
-        _number("hover_throttle", "Hover throttle", "of full", 0.61, 0.95, lower=0.3),
-        _number("motor_lag_s", "Motor lag", "s", 0.05, 0.3),
-        _number("start_latency_s", "Start latency", "s", 0.3, 2.0),
-        _number("drag_1_s", "Drag", "1/s", 0.0, 1.0),
-        _number("quadratic_share", "Share of the thrust that grows with the command's square", "of full", 0.0, 1.0),
-        _number("ground_effect", "Ground effect: extra thrust on the ground", "of thrust", 0.0, 0.5),
-        _number("ground_effect_height_m", "Height over which the ground effect fades", "m", 0.4, 2.0, lower=0.1),
-        _number("measurement_delay_s", "Age of the altitude and climb rate that the loop senses", "s", 0.0, 0.1),
-        _number("battery_sag", "Share of the thrust lost evenly over a flight", "of thrust", 0.0, 0.1),
+        VehicleOption("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", "×", 1.0, 0.0, 5.0),
+        VehicleOption("hover_throttle", "Hover throttle", "of full", 0.61, 0.3, 0.95),
+        VehicleOption("motor_lag_s", "Motor lag", "s", 0.05, 0.0, 0.3),
+        VehicleOption("start_latency_s", "Start latency", "s", 0.3, 0.0, 2.0),
+        VehicleOption("drag_1_s", "Drag", "1/s", 0.0, 0.0, 1.0),
+        VehicleOption(
+            "quadratic_share", "Share of the thrust that grows with the command's square", "of full", 0.0, 0.0, 1.0
+        ),
+        VehicleOption("ground_effect", "Ground effect: extra thrust on the ground", "of thrust", 0.0, 0.0, 0.5),
+        VehicleOption("ground_effect_height_m", "Height over which the ground effect fades", "m", 0.4, 0.1, 2.0),
+        VehicleOption(
+            "measurement_delay_s", "Age of the altitude and climb rate that the loop senses", "s", 0.0, 0.0, 0.1
+        ),
+        VehicleOption("battery_sag", "Share of the thrust lost evenly over a flight", "of thrust", 0.0, 0.0, 0.1),
     ),
-    open=_open,
+    open=opener("twin", TwinFlight),
     find_conflicts=_cannot_lift,
 )

@@ -11,11 +11,12 @@ from scipy.stats import qmc
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import Matrix
 from app.core.experiments.takeoff import Takeoff
+from app.core.models.vertical import GRAVITY_M_S2
 from app.core.policy import Gains, Vector
 from app.core.records.trajectory import Samples, Trajectory
 from app.core.tuning.trust_region import minimise_in_box
 from app.vehicles.base import OptionValue
-from app.vehicles.jsbsim import FULL_THRUST_N, GRAVITY_M_S2, JsbsimFlight
+from app.vehicles.jsbsim import FULL_THRUST_N, JsbsimFlight
 from app.vehicles.kernels import ALTITUDE, Rows
 from app.vehicles.registry import check_options
 from app.vehicles.simulated import Simulation, simulate_takeoff, trajectory_of

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from app.core.errors import InputError
+from app.core.models.vertical import GRAVITY_M_S2
 from app.core.records.trajectory import Trajectory
-from app.vehicles.jsbsim import FULL_THRUST_N, GRAVITY_M_S2
+from app.vehicles.jsbsim import FULL_THRUST_N
 from bench.targets.vehicles import SampledVehicle, fly, is_unsafe, noise_free_error, own_optimum, population
 from tests.vehicles.flying import SAFE, TAKEOFF, TUNED, flown
 

@@ -1,6 +1,19 @@
 import pytest
 
-from app.core.formatting import percent, plus_minus, short
+from app.core.formatting import (
+    count,
+    decimals,
+    gain,
+    gains,
+    grouped,
+    measured,
+    number,
+    percent,
+    plus_minus,
+    short,
+    short_percent,
+    span,
+)
 
 
 @pytest.mark.parametrize(
@@ -30,3 +43,26 @@ def test_without_an_uncertainty_three_digits_are_enough() -> None:
 
 def test_a_share_is_held_together_by_a_space_that_does_not_break() -> None:
     assert [percent(0.9), percent(0.9995, 1), percent(1.0)] == ["90\u00a0%", "100.0\u00a0%", "100\u00a0%"]
+
+
+def test_a_share_may_have_three_significant_digits() -> None:
+    assert [short_percent(0.125), short_percent(0.9)] == ["12.5 %", "90 %"]
+
+
+def test_a_range_names_the_side_without_a_limit() -> None:
+    assert [span(0.0, 409.0), span(None, 0.5)] == ["0 … 409", "any … 0.5"]
+
+
+def test_amounts_have_their_nouns_and_groups_of_digits() -> None:
+    assert [count(1, "flight"), count(0, "flight"), grouped(2147483647)] == ["1 flight", "0 flights", "2 147 483 647"]
+
+
+def test_a_table_has_true_minus_signs_and_dashes() -> None:
+    assert [number(-0.1316), number(None), measured(None, 0.1, "m")] == ["−0.132", "–", "–"]
+    assert [measured(-0.13189, 0.00702, "m"), measured(0.4115, None, "")] == ["−0.132 ± 0.007 m", "0.411"]
+    assert decimals(float("nan")) == 3
+
+
+def test_a_whole_gain_is_in_full_and_any_other_has_four_digits() -> None:
+    assert [gain(12345.0), gain(-0.123456)] == ["12345", "−0.1235"]
+    assert gains({"kp": 283.0, "ki": 1.5}) == "kp 283, ki 1.5"

@@ -45,20 +45,19 @@ class Flight:
 def data_of(flight: Flight, *, start_s: float = 12.0) -> str:
     """The lines of the .data file."""
     kp, ki, kd = (flight.gains[name] for name in ("kp", "ki", "kd"))
-    replica = loop.VerticalLoop()
     up_m, climb_m_s, thrust = GROUND_M, 0.0, 0
     lines = [f"{start_s:.3f} 31 ALIVE 153,27,52"]
     if flight.setting:
         lines += [f"{start_s:.3f} 31 DL_VALUE {n} {v}.000000" for n, v in ((1, kp), (2, kd), (3, ki))]
-    replica.start(*_state(up_m, climb_m_s))
+    state = loop.new_state(*_state(up_m, climb_m_s))
     for step in range(round((flight.wait_s + flight.fly_s) * loop.RATE_HZ)):
         z, zd = _state(up_m, climb_m_s)
         flying = step >= flight.wait_s * loop.RATE_HZ
-        in_flight = replica.detect_flight()
+        in_flight = loop.detect_flight(state, thrust)
         if flying:
-            thrust = replica.step(loop.ALT, 768, kp, ki, kd, z, zd, flight.tilt, in_flight)
+            thrust = loop.step(state, loop.ALT, 768, kp, ki, kd, z, zd, flight.tilt, in_flight)
         else:
-            thrust = replica.step(loop.THROTTLE, 0, kp, ki, kd, z, zd, flight.tilt, False)
+            thrust = loop.step(state, loop.THROTTLE, 0, kp, ki, kd, z, zd, flight.tilt, False)
         acceleration = GRAVITY_M_S2 * (thrust / loop.FULL_THRUST / HOVER_THROTTLE - 1.0)
         climb_m_s += acceleration / loop.RATE_HZ
         up_m += climb_m_s / loop.RATE_HZ
@@ -67,7 +66,7 @@ def data_of(flight: Flight, *, start_s: float = 12.0) -> str:
         if step % flight.every == 0:
             now_s = start_s + step / loop.RATE_HZ
             seen = _state(up_m, climb_m_s) if flight.stale else (z, zd)
-            lines += _messages(flight, replica, now_s, flying, *seen, round(-acceleration * 2**10), thrust)
+            lines += _messages(flight, state, now_s, flying, *seen, round(-acceleration * 2**10), thrust)
     return "\n".join(lines) + "\n"
 
 
@@ -84,13 +83,13 @@ def _state(up_m: float, climb_m_s: float) -> tuple[int, int]:
 
 
 def _messages(
-    flight: Flight, replica: loop.VerticalLoop, now_s: float, flying: bool, z: int, zd: int, zdd: int, thrust: int
+    flight: Flight, state: loop.State, now_s: float, flying: bool, z: int, zd: int, zdd: int, thrust: int
 ) -> list[str]:
     lines = [f"{now_s:.3f} 31 ROTORCRAFT_FP 0 1280 {-z} 0 0 {-zd} 0 0 0 0 1280 768 0 {thrust} 7"]
     if flight.loop_log:
         loop_fields = (
-            -768 if flying else 0, 0, z, zd, zdd, replica.z_ref, replica.zd_ref, replica.zdd_ref,
-            0, 0, 0, replica.z_sum_err, replica.ff_cmd, replica.fb_cmd, thrust,
+            -768 if flying else 0, 0, z, zd, zdd, *state[[loop.Z_REF, loop.ZD_REF, loop.ZDD_REF]],
+            0, 0, 0, *state[[loop.Z_SUM_ERR, loop.FF_CMD, loop.FB_CMD]], thrust,
         )  # fmt: skip
         lines.append(f"{now_s:.3f} 31 VERT_LOOP {' '.join(map(str, loop_fields))}")
     return lines

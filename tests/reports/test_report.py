@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from app.core.formatting import measured
 from app.db.session import Database
 from app.reports import pdf, router, sections
-from app.reports.formatting import plus_minus
 from tests.builders import Json, create_ready_campaign, get
 from tests.campaigns.test_landscapes import card_of, run_landscapes
 from tests.campaigns.trials.test_photos import JPEG, add, png
@@ -76,7 +76,7 @@ def test_the_report_says_what_the_api_says(client: TestClient, campaign: Json) -
     page = read(client, campaign)
     statistics = get(client, f"/api/campaigns/{campaign['id']}/statistics")
     best = campaign["best"]
-    assert plus_minus(best["mean"], best["standard_error"], "m") in page.said
+    assert measured(best["mean"], best["standard_error"], "m") in page.said
     assert statistics["comparison"]["sentence"] in page.said
     assert statistics["track_record"]["sentence"] in page.said
     assert campaign["definition_digest"] in page.said
@@ -88,7 +88,7 @@ def test_the_report_says_what_the_api_says(client: TestClient, campaign: Json) -
         assert trial["record"]["checksum"] in cells
         assert trial["verdict"] in page.said
         if trial["error"] is not None:
-            assert plus_minus(trial["error"], statistics["sigma"], "") in cells
+            assert measured(trial["error"], statistics["sigma"], "") in cells
 
 
 def test_what_people_wrote_is_text_and_never_markup(client: TestClient, campaign: Json) -> None:
@@ -194,7 +194,7 @@ def test_the_pdf_is_one_and_its_text_can_be_read(client: TestClient, campaign: J
     file = tmp_path / "report.pdf"
     file.write_bytes(answer.content)
     text = subprocess.run(["pdftotext", "-layout", file, "-"], capture_output=True, text=True, check=True).stdout
-    assert plus_minus(campaign["best"]["mean"], campaign["best"]["standard_error"], "m") in text
+    assert measured(campaign["best"]["mean"], campaign["best"]["standard_error"], "m") in text
     assert "Takeoff curves" in text
     assert "Time since the command (s)" in text, "the charts are not drawn"
 

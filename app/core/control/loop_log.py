@@ -299,14 +299,13 @@ def _first_command(log: LoopLog) -> tuple[int, int] | None:
 
 def _simulated_reference(part: LoopLog) -> Counts:
     """z_ref, zd_ref and zdd_ref of every step from the command on, at rest before it: shape (steps, 3)."""
-    replica = loop.VerticalLoop()
-    replica.start(int(part["z"][0]), int(part["zd"][0]))
     target, z, zd = -int(part["z_sp"][1]), int(part["z"][0]), int(part["zd"][0])
+    state = loop.new_state(z, zd)
     rest = round((part.time_s[1] - part.time_s[0] + 2 * TIME_TOLERANCE_S) * loop.RATE_HZ)
     rows = [(z, zd, 0)] * rest
     for _ in range(round((part.time_s[-1] - part.time_s[0] + 2 * TIME_TOLERANCE_S) * loop.RATE_HZ)):
-        replica.step(loop.ALT, target, 0, 0, 0, z, zd, loop.LEVEL, False)
-        rows.append((replica.z_ref, replica.zd_ref, replica.zdd_ref))
+        loop.step(state, loop.ALT, target, 0, 0, 0, z, zd, loop.LEVEL, False)
+        rows.append((state[loop.Z_REF], state[loop.ZD_REF], state[loop.ZDD_REF]))
     return np.array(rows, dtype=np.int64)
 
 

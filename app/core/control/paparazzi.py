@@ -3,8 +3,7 @@ run through it.
 
 The loop runs at 512 Hz. z points down; fractions are binary: positions 8 bits, speeds 19, accelerations 10, the cosine
 of the tilt (r33) 14. Every operation is 32-bit two's complement and wraps, identically in compiled and interpreted
-code; only the reference altitude is 64-bit. `step` is the kernel, on a state array that compiled rollouts own;
-`VerticalLoop` is the same loop for callers in Python.
+code; only the reference altitude is 64-bit. `step` is the kernel, on a state array that its caller owns.
 """
 
 import math
@@ -121,6 +120,13 @@ def start(state: State, z: int, zd: int) -> None:
     state[V] = zd >> 2
 
 
+def new_state(z: int, zd: int) -> State:
+    """State of a loop that is entered at position `z` and speed `zd`, for callers in Python."""
+    state = np.zeros(STATE_SIZE, dtype=np.int64)
+    start(state, z, zd)
+    return state
+
+
 @kernel
 def detect_flight(state: State, thrust: int) -> bool:
     """Whether the vehicle counts as flying; call once before each step, with the thrust of the previous step.
@@ -191,75 +197,17 @@ def step(
     return limit(wrap32(state[FF_CMD] + state[FB_CMD]), 0, FULL_THRUST)
 
 
-class VerticalLoop:
-    """The loop for callers in Python: `start` once, then `step` 512 times a second.
-
-    Inputs and outputs are the autopilot's own 32-bit integers (units above); they are not checked here, because a
-    caller steps 512 times a second of flight.
-    """
-
-    __slots__ = ("_state", "_thrust")
-
-    def __init__(self) -> None:
-        self._state: State = np.zeros(STATE_SIZE, dtype=np.int64)
-        self._thrust = 0
-
-    def start(self, z: int, zd: int) -> None:
-        """Enter the loop at position `z` (8 bits, down) and speed `zd` (19 bits, down), not in flight."""
-        start(self._state, z, zd)
-        self._thrust = 0
-
-    def detect_flight(self) -> bool:
-        """Whether the vehicle counts as flying; call exactly once before each step."""
-        return detect_flight(self._state, self._thrust)
-
-    def step(
-        self, mode: int, target: int, kp: int, ki: int, kd: int, z: int, zd: int, r33: int, in_flight: bool
-    ) -> int:
-        """Take one step of 1/512 s in one of `MODES`; returns the thrust command, 0 … 9600."""
-        self._thrust = step(self._state, mode, target, kp, ki, kd, z, zd, r33, in_flight)
-        return self._thrust
-
-    @property
-    def z_ref(self) -> int:
-        """Reference position, 8 bits, down."""
-        return int(self._state[Z_REF])
-
-    @property
-    def zd_ref(self) -> int:
-        """Reference speed, 19 bits, down."""
-        return int(self._state[ZD_REF])
-
-    @property
-    def zdd_ref(self) -> int:
-        """Reference acceleration, 10 bits, down."""
-        return int(self._state[ZDD_REF])
-
-    @property
-    def z_sum_err(self) -> int:
-        """Summed position error, within ±2 000 000."""
-        return int(self._state[Z_SUM_ERR])
-
-    @property
-    def ff_cmd(self) -> int:
-        """Feed-forward part of the thrust command, 0 … 8640."""
-        return int(self._state[FF_CMD])
-
-    @property
-    def fb_cmd(self) -> int:
-        """Feedback part of the thrust command."""
-        return int(self._state[FB_CMD])
-
-
 INPUTS: Final = ("mode", "target", "kp", "ki", "kd", "z", "zd", "r33", "in_flight")
 OUTPUTS: Final = ("z_ref", "zd_ref", "zdd_ref", "z_sum_err", "ff_cmd", "fb_cmd", "thrust")
+_IN_STATE: Final = [Z_REF, ZD_REF, ZDD_REF, Z_SUM_ERR, FF_CMD, FB_CMD]
+"""Places of all outputs but the thrust in the state array."""
 
 
 @dataclass(frozen=True, slots=True)
 class LoopTrace:
     """Recorded inputs and outputs of the loop, one row per step, all 32-bit integers.
 
-    `inputs` has shape (n, 9) in the order of `INPUTS`, modes as in `vertical_loop.MODES`; `outputs` has shape (n, 7) in
+    `inputs` has shape (n, 9) in the order of `INPUTS`, modes as in `MODES`; `outputs` has shape (n, 7) in
     the order of `OUTPUTS`; n ≥ 1.
     """
 
@@ -285,13 +233,11 @@ class Replay:
 
 def replayed(trace: LoopTrace) -> NDArray[np.int64]:
     """The replica's own outputs, shape (n, 7), started at the first row's z and zd and stepped once per row."""
-    loop = VerticalLoop()
-    computed = np.empty_like(trace.outputs)
-    rows = trace.inputs.tolist()
-    loop.start(rows[0][INPUTS.index("z")], rows[0][INPUTS.index("zd")])
+    computed, rows = np.empty_like(trace.outputs), trace.inputs.tolist()
+    state = new_state(rows[0][INPUTS.index("z")], rows[0][INPUTS.index("zd")])
     for row, (mode, target, kp, ki, kd, z, zd, r33, in_flight) in enumerate(rows):
-        thrust = loop.step(mode, target, kp, ki, kd, z, zd, r33, bool(in_flight))
-        computed[row] = (loop.z_ref, loop.zd_ref, loop.zdd_ref, loop.z_sum_err, loop.ff_cmd, loop.fb_cmd, thrust)
+        computed[row, -1] = step(state, mode, target, kp, ki, kd, z, zd, r33, bool(in_flight))
+        computed[row, :-1] = state[_IN_STATE]
     return computed
 
 

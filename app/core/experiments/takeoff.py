@@ -25,8 +25,7 @@ from app.core.experiments.base import (
     informed_parameters,
 )
 from app.core.experiments.takeoff_hazards import MODELS, check_flights, check_wrapping
-from app.core.models.vertical import CHANNELS, Counts, fly, observe
-from app.core.models.vertical import fly_batch as fly_disturbed
+from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, observe
 from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.records.metrics import mean_absolute_error, require_scorable

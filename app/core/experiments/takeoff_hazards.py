@@ -29,11 +29,10 @@ from app.core.control.paparazzi import (
     POSITION_ERROR_MAX,
     RATE_HZ,
     SPEED_ERROR_MAX,
-    STATE_SIZE,
     STEP_S,
 )
 from app.core.experiments.base import Check
-from app.core.formatting import percent
+from app.core.formatting import grouped, percent
 from app.core.models.vertical import MEASUREMENT_DELAY_S, START_LATENCY_S, Counts
 from app.core.models.vertical_hazards import (
     DISTANCE_LAST_M,
@@ -46,7 +45,7 @@ from app.core.models.vertical_hazards import (
     SWING_MIDDLE_M_S,
     TOUCH_DOWN_M_S,
     find_wraps,
-    fly_all_with_aborts,
+    fly_with_aborts,
 )
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples
@@ -91,8 +90,9 @@ def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Cou
     """Simulate a takeoff to `target` (8 fractional bits) on each model, and its aborts to `safe_gains`."""
     reports = np.empty((len(models), REPORT_SIZE))
     aborts = np.empty((*aborts_at.shape, 2))
-    scratch, curves = np.empty((2, STATE_SIZE), dtype=np.int64), np.empty((4, steps))
-    fly_all_with_aborts(gains, models, target, safe_gains, aborts_at, scratch, curves, reports, aborts)
+    curves = np.empty((2, 2, steps))
+    for model, at, report, abort in zip(models, aborts_at, reports, aborts, strict=True):
+        fly_with_aborts(gains, model, target, safe_gains, at, curves, report, abort)
     return Runs(models, aborts_at, reports, aborts)
 
 
@@ -279,9 +279,9 @@ def _first_wraps(counts: Counts, model: Vector, target: int) -> Counts:
     found = np.empty((len(_STARTS), len(PRODUCTS), 2), dtype=np.int64)
     instantly = model.copy()
     instantly[MEASUREMENT_DELAY_S] = 0.0
-    steps, state = round(LONGEST_S * RATE_HZ), np.empty(STATE_SIZE, dtype=np.int64)
+    steps = round(LONGEST_S * RATE_HZ)
     for start, (_, frozen_after_s) in enumerate(_STARTS):
-        find_wraps(counts, instantly, target, round(frozen_after_s * RATE_HZ), steps, state, found[start])
+        find_wraps(counts, instantly, target, round(frozen_after_s * RATE_HZ), steps, found[start])
     return found
 
 
@@ -291,8 +291,8 @@ def _refusals(refused: list[int], gains: list[int], wraps: Counts) -> Iterator[C
         worst = abs(gains[place]) * product.largest_error
         case, explanation = _wrap_case(product, wraps[:, place])
         sentence = (
-            f"{product.gain}·({product.error}) can reach {_grouped(worst)} and overflow 32 bits "
-            f"({_grouped(INT32_MAX)}): full up becomes full down. {explanation} The largest {product.gain} that cannot "
+            f"{product.gain}·({product.error}) can reach {grouped(worst)} and overflow 32 bits "
+            f"({grouped(INT32_MAX)}): full up becomes full down. {explanation} The largest {product.gain} that cannot "
             f"overflow is {offered}."
         )
         offer = {product.gain: offered if gains[place] > 0 else -offered}
@@ -310,9 +310,5 @@ def _wrap_case(product: Product, wraps: Counts) -> tuple[str, str]:
         case = f"{product.error} at its limiter, {product.limiter}"
         return case, f"It overflows with the {case}."
     name, step, value = wrapped[0]
-    case = f"{name}, {step * STEP_S:.2f} s after the start: {product.gain}·({product.error}) = {_grouped(value)}"
+    case = f"{name}, {step * STEP_S:.2f} s after the start: {product.gain}·({product.error}) = {grouped(value)}"
     return case, f"Simulated {case}. It also overflows in {len(wrapped) - 1} of {len(_STARTS) - 1} other starts."
-
-
-def _grouped(value: int) -> str:
-    return f"{value:,}".replace(",", " ")

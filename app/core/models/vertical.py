@@ -59,7 +59,23 @@ GROUND_EFFECT_HEIGHT_M: Final = 0.4
 BATTERY_SAG_S: Final = 33.0
 """Time in which a flight reaches the full sag."""
 
+ALTITUDE: Final = 0
+CLIMB_RATE: Final = 1
+"""The first two rows of the channels, columns of the disturbances and entries of a vehicle's state array."""
+
 CHANNELS: Final = ("altitude_m", "climb_rate_m_s", "reference_m", "thrust", "feed_forward", "feedback")
+
+ENTERED: Final = 2
+COLUMNS: Final = 3
+"""Columns of the disturbances: of altitude (m) and climb rate (m/s) in the next step, and whether the loop is
+entered."""
+
+THRUST: Final = 2
+COMMAND: Final = 3
+STEPS_FLOWN: Final = 4
+VEHICLE_SIZE: Final = 5
+"""The other entries of a vehicle's state array: the thrust after the lag (share of full), the last command (counts),
+and the steps since the loop was entered."""
 
 Counts = NDArray[np.int64]
 
@@ -108,12 +124,19 @@ def decay(x: float) -> float:
 
 @kernel
 def lift_of(
-    thrust: float, altitude: float, seconds: float, share: float, ground: float, sag: float, hover_force: float
+    thrust: float,
+    altitude: float,
+    seconds: float,
+    share: float,
+    ground: float,
+    ground_height: float,
+    sag: float,
+    hover_force: float,
 ) -> float:
     """Thrust of the rotors in units of weight; `hover_force` is the force at hover throttle, a share of full force."""
     ratio = ((1.0 - share) * thrust + share * thrust * thrust) / hover_force
     if ground > 0.0:
-        ratio *= 1.0 + ground * decay(altitude * (1.0 / GROUND_EFFECT_HEIGHT_M))
+        ratio *= 1.0 + ground * decay(altitude * (1.0 / ground_height))
     return ratio * (1.0 - sag * (1.0 / BATTERY_SAG_S) * seconds)
 
 
@@ -121,14 +144,32 @@ def lift_of(
 def thrust_to_weight(thrust: float, altitude: float, seconds: float, model: Samples, hover_force: float) -> float:
     """The same with a model vector, shape (8,)."""
     return lift_of(
-        thrust, altitude, seconds, model[QUADRATIC_SHARE], model[GROUND_EFFECT], model[BATTERY_SAG], hover_force
+        thrust,
+        altitude,
+        seconds,
+        model[QUADRATIC_SHARE],
+        model[GROUND_EFFECT],
+        GROUND_EFFECT_HEIGHT_M,
+        model[BATTERY_SAG],
+        hover_force,
     )
 
 
 @kernel
-def advance(altitude: float, climb: float, thrust_to_weight: float, drag: float) -> tuple[float, float]:
+def force_at_hover(hover_throttle: float, quadratic_share: float) -> float:
+    """Force at hover throttle as a share of full force."""
+    return (1.0 - quadratic_share) * hover_throttle + quadratic_share * hover_throttle * hover_throttle
+
+
+@kernel
+def response_of(lag_s: float) -> float:
+    """Share of the difference from the commanded thrust that the motors make up in one step."""
+    return STEP_S / lag_s if lag_s > STEP_S else 1.0
+
+
+@kernel
+def advance(altitude: float, climb: float, acceleration: float) -> tuple[float, float]:
     """One explicit Euler step; the ground at 0 stops a descent."""
-    acceleration = GRAVITY_M_S2 * (thrust_to_weight - 1.0) - drag * climb
     altitude += climb * STEP_S
     climb += acceleration * STEP_S
     if altitude <= 0.0:
@@ -137,91 +178,133 @@ def advance(altitude: float, climb: float, thrust_to_weight: float, drag: float)
 
 
 @kernel
-def _write_detail(detail: Samples, i: int, climb: float, command: int, state: State) -> None:
-    detail[0, i] = climb
-    detail[1, i] = -state[Z_REF] / (1 << POSITION_BITS)
-    detail[2, i] = command / FULL_THRUST
-    detail[3, i] = state[FF_CMD] / FULL_THRUST
-    detail[4, i] = state[FB_CMD] / FULL_THRUST
+def new_past(model: Samples) -> Samples:
+    """Buffer for the latest altitudes and climb rates, shape (2, d); d = 0 if the loop senses them without delay."""
+    delay = model[MEASUREMENT_DELAY_S] * RATE_HZ
+    return np.zeros((2, int(delay) + 2 if delay > 0.0 else 0))
 
 
 @kernel
-def rollout(gains: Counts, model: Samples, target: int, state: State, altitude: Samples, detail: Samples) -> int:
+def _write_detail(channels: Samples, i: int, climb: float, command: int, state: State) -> None:
+    channels[CLIMB_RATE, i] = climb
+    channels[2, i] = -state[Z_REF] / (1 << POSITION_BITS)
+    channels[3, i] = command / FULL_THRUST
+    channels[4, i] = state[FF_CMD] / FULL_THRUST
+    channels[5, i] = state[FB_CMD] / FULL_THRUST
+
+
+@kernel
+def fly_steps(
+    state: State,
+    vehicle: Samples,
+    past: Samples,
+    model: Samples,
+    mode: int,
+    target: int,
+    gains: Counts,
+    disturbances: Samples | None,
+    records_sensed: bool,
+    ceiling_m: float,
+    lands: bool,
+    channels: Samples,
+) -> int:
+    """Fly or continue a takeoff for up to n steps, and return the steps flown.
+
+    The loop runs in `mode` with `target` and `gains` (kp, ki, kd). With `disturbances`, shape (n, 3), it is entered
+    where they say so, otherwise the caller has entered it. Writes `channels` before each step: what the loop senses if
+    `records_sensed`, shape (1, n) or (6, n), else the vehicle's own altitude and climb rate, shape (2, n). Stops early
+    above `ceiling_m`, or when a vehicle that `lands` has touched down. `state`, `vehicle` and `past` then hold the
+    values after the last step.
+    """
+    kp, ki, kd, drag = gains[0], gains[1], gains[2], model[DRAG_1_S]
+    hover_force = force_at_hover(model[HOVER_THROTTLE], model[QUADRATIC_SHARE])
+    response = response_of(model[MOTOR_LAG_S])
+    delay, latency, size = model[MEASUREMENT_DELAY_S] * RATE_HZ, model[START_LATENCY_S], past.shape[1]
+    altitude, climb, thrust = vehicle[ALTITUDE], vehicle[CLIMB_RATE], vehicle[THRUST]
+    command, before, flown = int(vehicle[COMMAND]), int(vehicle[STEPS_FLOWN]), 0
+    entered = disturbances is None
+    for i in range(channels.shape[1]):
+        now = before + i
+        sensed_altitude, sensed_climb = altitude, climb
+        if size > 0:
+            past[0, now % size], past[1, now % size] = altitude, climb
+            sensed_altitude, sensed_climb = sensed(past[0], now, delay), sensed(past[1], now, delay)
+        z, zd = measured(-sensed_altitude, POSITION_BITS), measured(-sensed_climb, SPEED_BITS)
+        if disturbances is not None and not entered and disturbances[i, ENTERED] > 0.0:
+            start(state, z, zd)
+            entered = True
+        if entered:
+            in_flight = detect_flight(state, command)
+            command = step(state, mode, target, kp, ki, kd, z, zd, LEVEL, in_flight)
+        if records_sensed:
+            channels[ALTITUDE, i] = sensed_altitude
+            if channels.shape[0] > 1:
+                _write_detail(channels, i, sensed_climb, command, state)
+        else:
+            channels[ALTITUDE, i], channels[CLIMB_RATE, i] = altitude, climb
+        thrust += response * (command / FULL_THRUST - thrust)
+        lift = thrust_to_weight(thrust, altitude, now * STEP_S + latency, model, hover_force)
+        altitude, climb = advance(altitude, climb, GRAVITY_M_S2 * (lift - 1.0) - drag * climb)
+        if disturbances is not None:
+            altitude += disturbances[i, ALTITUDE]
+            climb += disturbances[i, CLIMB_RATE]
+        flown = i + 1
+        if altitude > ceiling_m or (lands and altitude <= 0.0):
+            break
+    vehicle[ALTITUDE], vehicle[CLIMB_RATE], vehicle[THRUST] = altitude, climb, thrust
+    vehicle[COMMAND], vehicle[STEPS_FLOWN] = command, before + flown
+    return flown
+
+
+@kernel
+def rollout(gains: Counts, model: Samples, target: int, disturbances: Samples | None, channels: Samples) -> int:
     """Fly one takeoff to `target` (8 fractional bits) and return the largest |product| in the loop.
 
-    `gains` holds kp, ki, kd; `model` the eight parameters. Writes `altitude`, shape (n,), every 1/512 s from the
-    command on, and the other `CHANNELS` to `detail`, shape (5, n), or (5, 0) to omit them. `state` is scratch.
+    `gains` holds kp, ki, kd; `model` the eight parameters; `disturbances` have shape (n, 3). Writes `channels` every
+    1/512 s from the command on, in the order of `CHANNELS`: shape (6, n), or (1, n) for the altitude alone.
     """
-    kp, ki, kd = gains[0], gains[1], gains[2]
-    share, hover, lag, latency = (
-        model[QUADRATIC_SHARE],
-        model[HOVER_THROTTLE],
-        model[MOTOR_LAG_S],
-        model[START_LATENCY_S],
-    )
-    hover_force = (1.0 - share) * hover + share * hover * hover
-    response = STEP_S / lag if lag > STEP_S else 1.0
-    delay = model[MEASUREMENT_DELAY_S] * RATE_HZ
-    heights = np.zeros(int(delay) + 2 if delay > 0.0 else 0)
-    climbs = np.zeros_like(heights)
-    height, climb, thrust, command = 0.0, 0.0, 0.0, 0
+    state, vehicle = np.zeros(STATE_SIZE, dtype=np.int64), np.zeros(VEHICLE_SIZE)
     start(state, 0, 0)
-    for i in range(len(altitude)):
-        sensed_height, sensed_climb = height, climb
-        if delay > 0.0:
-            heights[i % len(heights)], climbs[i % len(heights)] = height, climb
-            sensed_height, sensed_climb = sensed(heights, i, delay), sensed(climbs, i, delay)
-        in_flight = detect_flight(state, command)
-        z, zd = measured(-sensed_height, POSITION_BITS), measured(-sensed_climb, SPEED_BITS)
-        command = step(state, ALT, target, kp, ki, kd, z, zd, LEVEL, in_flight)
-        altitude[i] = sensed_height
-        if detail.shape[1] > 0:
-            _write_detail(detail, i, sensed_climb, command, state)
-        thrust += response * (command / FULL_THRUST - thrust)
-        lift = thrust_to_weight(thrust, height, i * STEP_S + latency, model, hover_force)
-        height, climb = advance(height, climb, lift, model[DRAG_1_S])
-    if latency > 0.0:
-        delay_by(altitude, latency * RATE_HZ)
-        for channel in range(detail.shape[0] if detail.shape[1] > 0 else 0):
-            delay_by(detail[channel], latency * RATE_HZ)
+    fly_steps(state, vehicle, new_past(model), model, ALT, target, gains, disturbances, True, np.inf, False, channels)
+    if model[START_LATENCY_S] > 0.0:
+        for channel in range(channels.shape[0]):
+            delay_by(channels[channel], model[START_LATENCY_S] * RATE_HZ)
     return int(state[LARGEST_PRODUCT])
-
-
-@kernel
-def rollouts(gains: Counts, models: Samples, target: int, state: State, altitude: Samples, no_detail: Samples) -> None:
-    """Fly k takeoffs: gains (k, 3), models (k, 8), altitude out (k, n); `no_detail` has shape (5, 0)."""
-    for run in range(len(gains)):
-        rollout(gains[run], models[run], target, state, altitude[run], no_detail)
 
 
 def fly(gains: Counts, model: Samples, target: int, samples: int) -> tuple[Samples, int]:
     """One takeoff with every channel: shape (6, samples) in the order of `CHANNELS`, and the largest |product|."""
     channels = np.empty((len(CHANNELS), samples))
-    largest = rollout(gains, model, target, np.empty(STATE_SIZE, dtype=np.int64), channels[0], channels[1:])
-    return channels, largest
+    return channels, rollout(gains, model, target, None, channels)
 
 
-ALTITUDE: Final = 0
-CLIMB_RATE: Final = 1
-ENTERED: Final = 2
-COLUMNS: Final = 3
-"""Columns of the disturbances: of altitude (m) and climb rate (m/s) in the next step, and whether the loop is
-entered."""
+def fly_each(gains: Counts, models: Samples, target: int, samples: int, disturbances: Samples | None = None) -> Samples:
+    """Many takeoffs one after another: gains (k, 3), models (k, 8) → altitude (k, samples)."""
+    altitude = np.empty((len(gains), 1, samples))
+    for run in range(len(gains)):
+        rollout(gains[run], models[run], target, disturbances, altitude[run])
+    return altitude[:, 0]
 
-_NEVER: Final = 1 << 30
+
+def fly_disturbed(gains: Counts, models: Samples, target: int, disturbances: Samples) -> Samples:
+    """Many disturbed takeoffs: gains (k, 3), models (k, 8), disturbances (n, 3) → altitude (k, n).
+
+    As in `observe`, the model's latency and measurement delay are ignored.
+    """
+    prompt = models.copy()
+    prompt[:, [START_LATENCY_S, MEASUREMENT_DELAY_S]] = 0.0
+    return fly_each(gains, prompt, target, len(disturbances), disturbances)
 
 
 @kernel
-def _hover_force(model: Samples) -> float:
-    share, hover = model[QUADRATIC_SHARE], model[HOVER_THROTTLE]
-    force: float = (1.0 - share) * hover + share * hover * hover
-    return force
+def observe(altitude: Samples, climb: Samples, thrust: Samples, model: Samples) -> Samples:
+    """Disturbances of a flight recorded at 512 Hz, channels of shape (n,): (n, 3), see `COLUMNS`.
 
-
-@kernel
-def _observe(altitude: Samples, climb: Samples, thrust: Samples, model: Samples, found: Samples) -> None:
-    hover_force, lag = _hover_force(model), model[MOTOR_LAG_S]
-    response = STEP_S / lag if lag > STEP_S else 1.0
+    The model's latency and measurement delay are ignored: the recorded values are taken as the state.
+    """
+    found = np.zeros((len(altitude), COLUMNS))
+    hover_force = force_at_hover(model[HOVER_THROTTLE], model[QUADRATIC_SHARE])
+    response = response_of(model[MOTOR_LAG_S])
     lagged, entered = 0.0, 0.0
     for i in range(len(altitude)):
         if thrust[i] > 0.0:
@@ -231,50 +314,7 @@ def _observe(altitude: Samples, climb: Samples, thrust: Samples, model: Samples,
             break
         lagged += response * (thrust[i] - lagged)
         lift = thrust_to_weight(lagged, altitude[i], i * STEP_S, model, hover_force)
-        height, speed = advance(altitude[i], climb[i], lift, model[DRAG_1_S])
+        acceleration = GRAVITY_M_S2 * (lift - 1.0) - model[DRAG_1_S] * climb[i]
+        height, speed = advance(altitude[i], climb[i], acceleration)
         found[i, ALTITUDE], found[i, CLIMB_RATE] = altitude[i + 1] - height, climb[i + 1] - speed
-
-
-@kernel
-def _rollout(gains: Counts, model: Samples, target: int, state: State, added: Samples, altitude: Samples) -> None:
-    hover_force, lag = _hover_force(model), model[MOTOR_LAG_S]
-    response = STEP_S / lag if lag > STEP_S else 1.0
-    height, climb, thrust, command = 0.0, 0.0, 0.0, 0
-    entered_at = _NEVER
-    for i in range(len(altitude)):
-        z, zd = measured(-height, POSITION_BITS), measured(-climb, SPEED_BITS)
-        if entered_at == _NEVER and added[i, ENTERED] > 0.0:
-            start(state, z, zd)
-            entered_at = i
-        if i >= entered_at:
-            in_flight = detect_flight(state, command)
-            command = step(state, ALT, target, gains[0], gains[1], gains[2], z, zd, LEVEL, in_flight)
-        altitude[i] = height
-        thrust += response * (command / FULL_THRUST - thrust)
-        lift = thrust_to_weight(thrust, height, i * STEP_S, model, hover_force)
-        height, climb = advance(height, climb, lift, model[DRAG_1_S])
-        height += added[i, ALTITUDE]
-        climb += added[i, CLIMB_RATE]
-
-
-@kernel
-def _rollouts(gains: Counts, models: Samples, target: int, state: State, added: Samples, altitude: Samples) -> None:
-    for run in range(len(gains)):
-        _rollout(gains[run], models[run], target, state, added, altitude[run])
-
-
-def observe(altitude_m: Samples, climb_rate_m_s: Samples, thrust: Samples, model: Samples) -> Samples:
-    """Disturbances of a flight recorded at 512 Hz, channels of shape (n,): (n, 3), see `COLUMNS`.
-
-    The model's latency and measurement delay are ignored: the recorded values are taken as the state.
-    """
-    found = np.zeros((len(altitude_m), COLUMNS))
-    _observe(altitude_m, climb_rate_m_s, thrust, model, found)
     return found
-
-
-def fly_batch(gains: Counts, models: Samples, target: int, disturbances: Samples) -> Samples:
-    """Many disturbed takeoffs in one call: gains (k, 3), models (k, 8), disturbances (n, 3) → altitude (k, n)."""
-    altitude = np.empty((len(gains), len(disturbances)))
-    _rollouts(gains, models, target, np.empty(STATE_SIZE, dtype=np.int64), disturbances, altitude)
-    return altitude

@@ -37,9 +37,10 @@ from app.core.control.paparazzi import (
 from app.core.kernels import kernel
 from app.core.models.vertical import (
     BATTERY_SAG,
-    CHANNELS,
     DRAG_1_S,
+    GRAVITY_M_S2,
     GROUND_EFFECT,
+    GROUND_EFFECT_HEIGHT_M,
     HOVER_THROTTLE,
     MEASUREMENT_DELAY_S,
     MOTOR_LAG_S,
@@ -48,8 +49,10 @@ from app.core.models.vertical import (
     Counts,
     advance,
     delay_by,
+    fly_each,
+    force_at_hover,
     lift_of,
-    rollouts,
+    response_of,
 )
 from app.core.records.trajectory import Samples
 
@@ -122,9 +125,7 @@ def fly_batch(gains: Counts, models: Samples, target: int, samples: int) -> Samp
             altitude[runs] = flown
             alone = np.concatenate((alone, runs[~(fastest_m_s < FASTEST_M_S)]))
     if alone.size:
-        flown, no_detail = np.empty((alone.size, samples)), np.empty((len(CHANNELS) - 1, 0))
-        rollouts(gains[alone], models[alone], target, np.empty(STATE_SIZE, dtype=np.int64), flown, no_detail)
-        altitude[alone] = flown
+        altitude[alone] = fly_each(gains[alone], models[alone], target, samples)
     return altitude
 
 
@@ -138,35 +139,30 @@ def _fly(gains: Counts, models: Samples, guide: Samples) -> tuple[Samples, Sampl
 
 
 @lru_cache(maxsize=16)
-def _guide(target: int, samples: int) -> Samples:
-    guide = np.empty((_GUIDE_SIZE, samples))
-    _write_guide(target, np.empty(STATE_SIZE, dtype=np.int64), guide)
-    return guide
-
-
 @kernel
-def _write_guide(target: int, state: Counts, guide: Samples) -> None:
+def _guide(target: int, samples: int) -> Samples:
     """The part of the loop that does not depend on what is sensed, for every step, shape (4, n)."""
+    guide, state = np.empty((_GUIDE_SIZE, samples)), np.zeros(STATE_SIZE, dtype=np.int64)
     start(state, 0, 0)
-    for i in range(guide.shape[1]):
+    for i in range(samples):
         guide[_CHECK, i] = 1.0 if state[CHECK_PHASE] >= RATE_HZ else 0.0
         in_flight = detect_flight(state, 0)
         step(state, ALT, target, 0, 0, 0, 0, 0, LEVEL, in_flight)
         guide[_POSITION, i], guide[_SPEED, i], guide[_FEED_FORWARD, i] = state[Z_REF], state[ZD_REF], state[FF_CMD]
+    return guide
 
 
 @kernel
 def _set_up(gains: Counts, models: Samples, runs: Samples, whole: Counts) -> None:
     for lane in range(len(gains)):
         model = models[lane]
-        share, hover, lag = model[QUADRATIC_SHARE], model[HOVER_THROTTLE], model[MOTOR_LAG_S]
         delay = model[MEASUREMENT_DELAY_S] * RATE_HZ
         runs[_KP + lane] = -gains[lane, 0] / (1 << 7)
         runs[_KI + lane] = -gains[lane, 1] / (1 << 16)
         runs[_KD + lane] = -gains[lane, 2] / (1 << 16)
-        runs[_SHARE + lane] = share
-        runs[_HOVER_FORCE + lane] = (1.0 - share) * hover + share * hover * hover
-        runs[_RESPONSE + lane] = STEP_S / lag if lag > STEP_S else 1.0
+        runs[_SHARE + lane] = model[QUADRATIC_SHARE]
+        runs[_HOVER_FORCE + lane] = force_at_hover(model[HOVER_THROTTLE], model[QUADRATIC_SHARE])
+        runs[_RESPONSE + lane] = response_of(model[MOTOR_LAG_S])
         runs[_GROUND + lane] = model[GROUND_EFFECT]
         runs[_SAG + lane] = model[BATTERY_SAG]
         runs[_LATENCY + lane] = model[START_LATENCY_S]
@@ -203,10 +199,11 @@ def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, gui
             seconds + runs[_LATENCY + lane],
             runs[_SHARE + lane],
             runs[_GROUND + lane],
+            GROUND_EFFECT_HEIGHT_M,
             runs[_SAG + lane],
             runs[_HOVER_FORCE + lane],
         )
-        height, climb = advance(height, climb, lift, runs[_DRAG + lane])
+        height, climb = advance(height, climb, GRAVITY_M_S2 * (lift - 1.0) - runs[_DRAG + lane] * climb)
         runs[_ERROR_SUM + lane], runs[_COMMAND + lane], runs[_THRUST + lane] = total, command, thrust
         runs[_HEIGHT + lane], runs[_CLIMB + lane] = height, climb
         runs[_FASTEST + lane] = max(runs[_FASTEST + lane], abs(climb))

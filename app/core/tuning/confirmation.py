@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from app.core.definition import Definition, Flight, format_gains
+from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
-from app.core.formatting import percent, plus_minus, short
+from app.core.formatting import count, format_gains, percent, plus_minus, short
 from app.core.statistics.comparisons import (
     Comparison,
     Group,
@@ -215,7 +215,7 @@ def _describe_improvement(
     relation = "at least" if improvement >= detectable else "below"
     return (
         f"The next step is predicted to reduce the error by {short(improvement)} {unit}, {relation} the "
-        f"{short(detectable)} {unit} that {_flights(left)} can resolve at {percent(definition.stop.confidence)} "
+        f"{short(detectable)} {unit} that {count(left, 'flight')} can resolve at {percent(definition.stop.confidence)} "
         "confidence."
     )
 
@@ -232,10 +232,6 @@ def _deciding(comparison: Comparison) -> str:
     if comparison.further is None:
         return "Even 100 more flights would not resolve it."
     return (
-        f"If the difference persists, {_flights(comparison.further.total)} more would resolve it: "
+        f"If the difference persists, {count(comparison.further.total, 'more flight')} would resolve it: "
         f"{comparison.further.first} of the winner, {comparison.further.second} of the first gains."
     )
-
-
-def _flights(count: int) -> str:
-    return f"{count} flight" if count == 1 else f"{count} flights"

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from app.core.definition import Definition, Flight, format_gains
+from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, ModelledExperiment
-from app.core.formatting import short
+from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace
 from app.core.statistics.comparisons import Group, groups_of, pool_scatter
 from app.core.tuning.calibration import known_distribution

@@ -6,15 +6,23 @@ import numpy as np
 import pytest
 
 from app.core.control.paparazzi import (
+    FB_CMD,
+    FF_CMD,
     FULL_THRUST,
     INPUTS,
     INT32_MAX,
     LARGEST_PRODUCT,
     OUTPUTS,
+    Z_REF,
+    Z_SUM_ERR,
+    ZD_REF,
+    ZDD_REF,
     LoopTrace,
-    VerticalLoop,
     compared,
+    detect_flight,
+    new_state,
     replayed,
+    step,
 )
 from app.logs.loop_trace import read_loop_trace
 
@@ -57,12 +65,11 @@ def test_in_flight_is_detected_when_the_recorded_autopilot_detected_it(path: Pat
     """Within one step: the recorder summed 0.05 s in floating point, the detector here counts exactly."""
     trace = read_loop_trace(path)
     thrusts = column(trace, "thrust")
-    loop = VerticalLoop()
-    loop.start(0, 0)
-    detected = []
+    state, detected, before = new_state(0, 0), [], 0
     for row, thrust in zip(trace.inputs.tolist(), thrusts, strict=True):
-        detected.append(loop.detect_flight())
-        assert loop.step(*row) == thrust
+        detected.append(detect_flight(state, before))
+        before = step(state, *row)
+        assert before == thrust
     assert abs(detected.index(True) - column(trace, "in_flight").index(1)) <= 1
     assert all(detected[detected.index(True) :])
 
@@ -71,23 +78,21 @@ def test_gains_that_wrap_the_integrator_turn_full_up_into_full_down_and_are_repo
     """ki·sum wraps once ki > 2³¹ / 2 000 000 ≈ 1073."""
     thrusts, products = [], []
     for ki in (1073, 1074):
-        loop = VerticalLoop()
-        loop.start(0, 0)
-        thrusts.append([loop.step(1, 3 << 8, 0, ki, 0, 0, 0, 16384, True) for _ in range(4000)][-1])
-        products.append(int(loop._state[LARGEST_PRODUCT]))
+        state = new_state(0, 0)
+        thrusts.append([step(state, 1, 3 << 8, 0, ki, 0, 0, 0, 16384, True) for _ in range(4000)][-1])
+        products.append(int(state[LARGEST_PRODUCT]))
     assert thrusts == [FULL_THRUST, 0]
     assert products == [1073 * 2_000_000, 1074 * 2_000_000]
     assert products[0] <= INT32_MAX < products[1]
 
 
 def test_throttle_mode_passes_the_thrust_through_and_keeps_the_last_commands() -> None:
-    loop = VerticalLoop()
-    loop.start(0, 0)
-    loop.step(1, 768, 283, 13, 82, 0, 0, 16384, False)
-    commands = (loop.ff_cmd, loop.fb_cmd)
-    assert loop.step(0, 4321, 283, 13, 82, -100, 5, 16384, False) == 4321
-    assert (loop.ff_cmd, loop.fb_cmd) == commands
-    assert (loop.z_ref, loop.zd_ref, loop.zdd_ref, loop.z_sum_err) == (-100, 5, 0, 0)
+    state = new_state(0, 0)
+    step(state, 1, 768, 283, 13, 82, 0, 0, 16384, False)
+    commands = state[[FF_CMD, FB_CMD]].tolist()
+    assert step(state, 0, 4321, 283, 13, 82, -100, 5, 16384, False) == 4321
+    assert state[[FF_CMD, FB_CMD]].tolist() == commands
+    assert state[[Z_REF, ZD_REF, ZDD_REF, Z_SUM_ERR]].tolist() == [-100, 5, 0, 0]
 
 
 def test_a_trace_knows_its_length() -> None:

@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from app.core.control.paparazzi import ALT, ERROR_SUM_MAX, INT32_MAX, LEVEL, VerticalLoop, wrap32
+from app.core.control.paparazzi import (
+    ALT,
+    ERROR_SUM_MAX,
+    FB_CMD,
+    INT32_MAX,
+    LEVEL,
+    detect_flight,
+    new_state,
+    step,
+    wrap32,
+)
 from app.core.experiments import takeoff_hazards
 from app.core.experiments.base import Check
 from app.core.experiments.takeoff_hazards import PRODUCTS, check_wrapping
@@ -49,13 +59,11 @@ def test_stuck_on_the_ground_names_the_instant_and_the_number_at_which_the_paper
 @compiled_only
 def test_the_loop_itself_turns_its_thrust_over_at_the_step_that_is_named() -> None:
     """The replica in Python, held on the ground: full feedback up one step, far down the next."""
-    loop = VerticalLoop()
-    loop.start(0, 0)
-    feedback = []
+    state, thrust, feedback = new_state(0, 0), 0, []
     for _ in range(round(5.25 * 512) + 4):
-        in_flight = loop.detect_flight()
-        loop.step(ALT, TARGET, 1624, 1356, 195, 0, 0, LEVEL, in_flight)
-        feedback.append(loop.fb_cmd)
+        in_flight = detect_flight(state, thrust)
+        thrust = step(state, ALT, TARGET, 1624, 1356, 195, 0, 0, LEVEL, in_flight)
+        feedback.append(int(state[FB_CMD]))
     turned = int(np.argmin(np.diff(feedback))) + 1
     assert turned / 512 == pytest.approx(5.25, abs=0.005)
     assert feedback[turned] - feedback[turned - 1] < -60_000

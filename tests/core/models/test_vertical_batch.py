@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from app.core.control.paparazzi import POSITION_BITS, STATE_SIZE, fix
+from app.core.control.paparazzi import POSITION_BITS, fix
 from app.core.experiments.base import Matrix, ParameterDistribution
 from app.core.experiments.takeoff import Takeoff
-from app.core.models.vertical import HOVER_THROTTLE, MEASUREMENT_DELAY_S, Counts, decay, rollouts
+from app.core.models.vertical import HOVER_THROTTLE, MEASUREMENT_DELAY_S, Counts, decay, fly_each
 from app.core.models.vertical_batch import BATCH_WIDTH, are_exact, fly_batch
 
 TARGET = fix(3.0, POSITION_BITS)
@@ -30,9 +30,7 @@ def gain_sets(count: int) -> Counts:
 
 
 def one_by_one(gains: Counts, each: Matrix) -> Matrix:
-    altitude = np.empty((len(gains), SAMPLES))
-    rollouts(gains, each, TARGET, np.empty(STATE_SIZE, dtype=np.int64), altitude, np.empty((5, 0)))
-    return altitude
+    return fly_each(gains, each, TARGET, SAMPLES)
 
 
 def test_side_by_side_is_bit_for_bit_one_by_one() -> None:

@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, best_flight, format_gains, was_flown
+from app.core.definition import Definition, Flight, best_flight, was_flown
 from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.experiments.takeoff import Takeoff
-from app.core.formatting import percent, short
+from app.core.formatting import count, format_gains, percent, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import Calibration, calibrate
 from app.core.tuning.gate import allows
@@ -60,12 +60,12 @@ def propose(
     box = Box(*space.reachable(space.vector(base.gains), fraction))
     choice = _choose(definition, experiment, space, flights, calibration, base, models, box)
     prediction = predict_flight(calibration, base, choice.gains)
-    clipped = _at_an_edge(space, box, choice.optimum)
+    clipped = space.names_where((choice.optimum <= box.low) | (choice.optimum >= box.high))
     explanation = Explanation(
         summary=_summary(experiment, base, choice, prediction, len(calibration.numbers)),
         base_flight=base.number,
         gradient=_gradient(experiment, space, space.nearest(space.vector(base.gains)), models),
-        direction=_named(space, choice.gains - space.vector(base.gains)),
+        direction=space.by_name(choice.gains - space.vector(base.gains)),
         clipped=clipped,
         notes=(*choice.notes, *_notes(fraction, clipped)),
         lesson=_describe_lesson(calibration, prediction),
@@ -130,23 +130,14 @@ def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix
     errors = merit(takeoff, np.concatenate((above, below)), models)
     run = np.diag(above - below)
     rise = errors[: len(base)] - errors[len(base) :]
-    return _named(space, np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
-
-
-def _named(space: PolicySpace, values: Vector) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(space.names, values, strict=True)}
-
-
-def _at_an_edge(space: PolicySpace, box: Box, gains: Vector) -> tuple[str, ...]:
-    at_edge = (gains <= box.low) | (gains >= box.high)
-    return tuple(name for name, is_there in zip(space.names, at_edge, strict=True) if is_there)
+    return space.by_name(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
 
 
 def _summary(
     experiment: ModelledExperiment, base: Flight, choice: _ChosenGains, prediction: FlightPrediction, flights: int
 ) -> str:
     unit = experiment.error_unit
-    subject = f"The model, calibrated on {flights} flight{'s' if flights > 1 else ''},"
+    subject = f"The model, calibrated on {count(flights, 'flight')},"
     best = f"flight {base.number} ({format_gains(base.gains)}, error {short(base.error)} {unit})"
     if choice.kind == "none":
         return f"{subject} predicts no allowed gains that are better than {best} by {percent(MIN_IMPROVEMENT, 1)}."

@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, Option, best_flight, format_gains, was_flown
+from app.core.definition import Definition, Flight, Option, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
-from app.core.formatting import short
+from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import known_distribution
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop
@@ -42,8 +42,7 @@ class SearchLine:
         """Gains that are limited by a bound or the step limit at this length."""
         wanted = self.base + length * self.direction
         wanted = np.where([gain.integer for gain in self.space.gains], np.rint(wanted), wanted)
-        stopped = (wanted < self.low) | (wanted > self.high)
-        return tuple(name for name, is_stopped in zip(self.space.names, stopped, strict=True) if is_stopped)
+        return self.space.names_where((wanted < self.low) | (wanted > self.high))
 
 
 def evaluate_lengths(line: SearchLine, lengths: Sequence[float], model: CorrectedModel) -> tuple[LadderStep, ...]:
@@ -123,8 +122,8 @@ def propose(
     explanation = Explanation(
         summary=_summary(experiment, base, best, chosen, len(ladder), refused),
         base_flight=base.number,
-        gradient=_named(space, slopes),
-        direction=_named(space, direction),
+        gradient=space.by_name(slopes),
+        direction=space.by_name(direction),
         ladder=ladder,
         chosen_length=chosen.length if chosen else None,
         clipped=chosen.clipped if chosen else (),
@@ -175,10 +174,6 @@ def _first_allowed_step(
 
 def _halvings(length: float) -> Iterator[float]:
     return (length / 2**halvings for halvings in range(_HALVINGS))
-
-
-def _named(space: PolicySpace, values: Vector) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(space.names, values, strict=True)}
 
 
 def _summary(

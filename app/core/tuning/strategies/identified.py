@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, Option, best_flight, format_gains, was_flown
+from app.core.definition import Definition, Flight, Option, best_flight, was_flown
 from app.core.experiments.base import Matrix, ModelledExperiment, ParameterDistribution, fitted_parameters, halton
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.formatting import short
+from app.core.formatting import format_gains, short
 from app.core.models.f16 import STEP_S
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory

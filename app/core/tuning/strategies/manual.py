@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Final
 
-from app.core.definition import Definition, Flight, best_flight, format_gains
+from app.core.definition import Definition, Flight, best_flight
 from app.core.experiments.base import Experiment, ModelledExperiment
-from app.core.formatting import short
+from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace
 from app.core.tuning.corrected_model import correct_by_bias
 from app.core.tuning.strategy import ErrorsOf, Explanation, Proposal, Strategy

@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, best_flight, format_gains, was_flown
+from app.core.definition import Definition, Flight, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
-from app.core.formatting import short
+from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace
 from app.core.tuning.corrected_model import model_optimum, uncorrected_model
 from app.core.tuning.strategy import ErrorsOf, Explanation, Proposal, Strategy
@@ -28,7 +28,6 @@ def propose(
     is_flown = was_flown(space.mapping(target), flights)
     gains = space.nearest(space.vector(base.gains)) if is_flown else target
     trajectory, error = uncorrected_model(experiment).predict(gains)
-    stopped = tuple(name for name, is_stopped in zip(space.names, target != optimum.gains, strict=True) if is_stopped)
     found = (
         f"{optimum.evaluations} runs of the nominal model end at {format_gains(space.mapping(optimum.gains))}, "
         f"model error {short(optimum.error)} {experiment.error_unit}."
@@ -42,7 +41,7 @@ def propose(
         explanation=Explanation(
             summary=summary,
             base_flight=base.number,
-            clipped=stopped,
+            clipped=space.names_where(target != optimum.gains),
             notes=("Flights do not change this strategy's model.",),
         ),
     )
