@@ -77,12 +77,11 @@ def _number(value: float | None, digits: int) -> str:
 
 def _document(result: Result) -> dict[str, object]:
     """The result as JSON; each row includes its own figures beside the common ones."""
-    rows = [{**_plain(row), **row.numbers} for row in result.rows]
+    rows = [
+        {**{name: value for name, value in asdict(row).items() if name != "numbers"}, **row.numbers}
+        for row in result.rows
+    ]
     return {**result.as_json(), "rows": rows}
-
-
-def _plain(row: Row) -> dict[str, object]:
-    return {name: value for name, value in asdict(row).items() if name != "numbers"}
 
 
 _UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}

@@ -1,7 +1,7 @@
 """`gainline run`: a whole campaign without the dashboard, by the same services on a temporary database."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -68,7 +68,7 @@ def run_campaign(
     the folder cannot be used.
     """
     file = override(
-        _read(source),
+        read_preset(source) if source in preset_names() else read_campaign_file(Path(source)),
         vehicle=vehicle,
         strategy=strategy,
         start=start,
@@ -105,10 +105,6 @@ def run_campaign(
     report(stopped_because)
 
 
-def _read(source: str) -> CampaignFile:
-    return read_preset(source) if source in preset_names() else read_campaign_file(Path(source))
-
-
 def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue]) -> None:
     if vehicle.id is not None:
         raise InputError(
@@ -131,11 +127,8 @@ def _temporary_database() -> Iterator[Database]:
     with TemporaryDirectory(prefix="gainline-") as folder:
         file = Path(folder) / "gainline.sqlite3"
         migrate(file)
-        database = Database(file)
-        try:
+        with closing(Database(file)) as database:
             yield database
-        finally:
-            database.close()
 
 
 class _Campaign:
