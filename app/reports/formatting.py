@@ -1,7 +1,7 @@
 """Numbers, gains and times as printed in a report: with digits that match the uncertainty, and with units."""
 
 from collections.abc import Mapping
-from datetime import UTC, datetime, tzinfo
+from datetime import UTC, datetime
 from typing import Final
 
 from app.common.schemas import Interval
@@ -55,11 +55,11 @@ def option(value: OptionValue, unit: str = "") -> str:
     return f"{text} {unit}" if unit else text
 
 
-def instant(at: datetime | None, zone: tzinfo) -> str:
-    """`22 Nov 2026, 14:03 CET (13:03 UTC)`; UTC alone if the zone is at UTC."""
+def instant(at: datetime | None) -> str:
+    """`22 Nov 2026, 14:03 CET (13:03 UTC)` in this machine's time zone; UTC alone if the zone is at UTC."""
     if at is None:
         return NOTHING
-    here = at.astimezone(zone)
+    here = at.astimezone()
     there = at.astimezone(UTC)
     local = f"{here.day} {here:%b %Y, %H:%M}"
     if not here.utcoffset():

@@ -5,7 +5,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, tzinfo
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -48,17 +47,14 @@ class Document:
     policy: str
 
 
-def render(report: Report, plotly: str, zone: tzinfo | None = None) -> Document:
-    """Render a report.
-
-    `plotly` is the source of the chart library; `zone` is the time zone of printed times, None for this machine's.
-    """
+def render(report: Report, plotly: str) -> Document:
+    """Render a report. `plotly` is the source of the chart library."""
     draw = _script((_TEMPLATES / "draw.js").read_text(encoding="utf-8"))
     library = _script(plotly)
     own = _policy(library, draw)
     groups = report.statistics.groups
     html = (
-        _environment(zone)
+        _environment()
         .get_template("report.html.j2")
         .render(
             report=report,
@@ -125,14 +121,14 @@ def _policy(*scripts: Markup) -> str:
     )
 
 
-def _environment(zone: tzinfo | None) -> "Environment":
+def _environment() -> "Environment":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
     environment.filters |= {
-        "instant": lambda at: formatting.instant(at, zone or _here(at)),
+        "instant": formatting.instant,
         "plus_minus": formatting.plus_minus,
         "number": formatting.number,
         "interval": formatting.interval,
@@ -147,13 +143,6 @@ def _environment(zone: tzinfo | None) -> "Environment":
         "mebibytes": lambda size: f"{size / 2**20:g} MiB",
     }
     return environment
-
-
-def _here(at: datetime) -> tzinfo:
-    """This machine's time zone at that time."""
-    zone = at.astimezone().tzinfo
-    assert zone is not None
-    return zone
 
 
 def _signed_gain(change: float) -> str:
