@@ -39,7 +39,11 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     flights = history.flown_gains(trials)
     now = compare_winner(definition, experiment, flights)
     scatter = pool_scatter((), experiment.scatter) if now is None else now.scatter
-    expected = 0.0 if now is None or not scatter.known else _optimism(now)
+    expected = 0.0
+    if now is not None and scatter.known:
+        expected = optimism(
+            [group.mean for group in now.groups], [group.standard_error(scatter) for group in now.groups]
+        )
     record = predictions.track_record(flights)
     drift = None if now is None else _drift(experiment, now)
     return CampaignStatistics(
@@ -111,10 +115,6 @@ def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | No
         else FlightsToDecide(best=comparison.further.first, baseline=comparison.further.second),
         sentence=verdict_sentence(experiment, now),
     )
-
-
-def _optimism(now: ComparisonState) -> float:
-    return optimism([group.mean for group in now.groups], [group.standard_error(now.scatter) for group in now.groups])
 
 
 def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:

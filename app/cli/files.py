@@ -19,6 +19,7 @@ from app.campaigns.trials.schemas import Trial
 from app.cli.console import console, unwritable_error, write_json
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
+from app.core.definition import format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.logs.takeoffs import Takeoff
@@ -105,7 +106,7 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
 
 
 def _print(out: Console, trial: Trial) -> None:
-    gains = ", ".join(f"{name} {value:g}" for name, value in trial.gains.items())
+    gains = format_gains(trial.gains)
     error = "no error" if trial.error is None else f"error {trial.error:.4f}"
     out.print(f"Trial {trial.number} of campaign {trial.campaign_id}, {gains}: {trial.state}, {error}.")
     if trial.reason:

@@ -29,7 +29,7 @@ from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem
 from app.common.states import HISTORY_TRIAL_STATES, CampaignState, TrialState, VehicleState
 from app.core.clock import REAL_TIME
-from app.core.definition import Definition
+from app.core.definition import Definition, format_gains
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.policy import Gains
@@ -286,7 +286,7 @@ class _Display:
             self._task,
             completed=0.0,
             note="",
-            description=f"flight {number} of at most {self._limit}, {_gains(gains)}",
+            description=f"flight {number} of at most {self._limit}, {format_gains(gains)}",
         )
 
     def sampled(self, sample: Sample) -> None:
@@ -298,7 +298,7 @@ class _Display:
         self.trials.append(trial)
         self.kinds.append(kind)
         self._progress.console.print(
-            f"flight {trial.number}: {_gains(trial.gains)} → {_error(trial.error, self._unit)} "
+            f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
             f"({_describe_outcome(trial)})",
             highlight=False,
         )
@@ -329,7 +329,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
         out.print(f"Refused by the gate and flown with a reason: flight {', '.join(overruled)}.")
     out.print(f"Stopped: {stopped_because}")
     if best is not None:
-        out.print(f"Best: {_error(best.error, unit)} with {_gains(best.gains)}, flight {best.number}.")
+        out.print(f"Best: {_error(best.error, unit)} with {format_gains(best.gains)}, flight {best.number}.")
 
 
 def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
@@ -337,7 +337,7 @@ def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
     if not get_kind(file.vehicle.kind).is_real:
         return
     if display.held is not None:
-        out.print(f"The safe gains are restored and read back: {_gains(display.held)}.")
+        out.print(f"The safe gains are restored and read back: {format_gains(display.held)}.")
     elif display.touched:
         out.print("The gains on the vehicle are unknown. Read them back manually before it flies again.")
 
@@ -376,10 +376,6 @@ def _document(
 
 def _describe_outcome(trial: TrialRow) -> str:
     return f"{trial.state}: {trial.reason}" if trial.reason else trial.state.value
-
-
-def _gains(gains: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
 
 
 def _number(value: float | None) -> str:

@@ -5,7 +5,6 @@ trial.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -25,6 +24,7 @@ from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
 from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, Ending, TrialState
 from app.common.transition_checks import check_action
+from app.core.definition import format_gains
 from app.core.errors import TrajectoryError
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
@@ -59,11 +59,11 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
         return
     if not confirmed:
         raise UnconfirmedError(
-            f"The log was flown with {_format_gains(flown.gains)}; trial {row.number} was planned with "
-            f"{_format_gains(row.gains)}.",
+            f"The log was flown with {format_gains(flown.gains)}; trial {row.number} was planned with "
+            f"{format_gains(row.gains)}.",
             hint=f"Choose the log of this trial, or confirm that {_consequence(row.gains, flown.gains)}.",
             problems=(
-                Problem("confirm", f"the gains in the log, {_format_gains(flown.gains)}, differ from the trial's"),
+                Problem("confirm", f"the gains in the log, {format_gains(flown.gains)}, differ from the trial's"),
             ),
         )
     row.read_back = dict(flown.gains)
@@ -89,10 +89,6 @@ def _consequence(planned: Gains, flown: Gains) -> str:
     if _alike(planned, flown):
         return "the trial takes the gains in the log"
     return "the flight counts for the planned gains, which are not in this log"
-
-
-def _format_gains(gains: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
 
 
 CURVE_POINTS: Final = 48
