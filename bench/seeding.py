@@ -24,7 +24,7 @@ from app.core.tuning.gate import check_policy
 from app.core.tuning.strategy import Explanation, Interval, band_channels
 from app.db import trajectories
 from app.db.migrate import migrate
-from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, TrajectoryRow, TrialRow
+from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, TrialRow
 from app.db.session import Database
 from app.db.trajectories import pack
 from app.fleet.schemas import VehicleChoice
@@ -172,12 +172,12 @@ def _copies(database: Database, campaign_id: int, count: int) -> None:
     with database.write() as session:
         campaign = _columns(session.get_one(CampaignRow, campaign_id))
         trials = history.trials_of(session, campaign_id)
-        thin = [pack(_thinned(history.record_of(session, row))) for row in trials]
+        thin = [_thinned(history.record_of(session, row)) for row in trials]
         columns = [_columns(row) for row in trials]
         for number in range(2, count + 2):
             copy = CampaignRow(**campaign | {"name": f"Small {number}"})
             session.add(copy)
-            records = [TrajectoryRow(**asdict(packed)) for packed in thin]
+            records = [pack(record) for record in thin]
             session.add_all(records)
             session.flush()
             session.execute(

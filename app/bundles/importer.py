@@ -8,8 +8,8 @@ from typing import Any, Final
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
-from app.bundles.contents import CONTENTS, Campaign, Photo, Proposal, Record, Trial
-from app.bundles.reader import Bundle
+from app.bundles.contents import CONTENTS, Campaign, Proposal, Record, Trial
+from app.bundles.reader import Bundle, trajectory_row
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import core_definition
@@ -54,7 +54,8 @@ def store(session: Session, bundle: Bundle) -> ImportedCampaigns:
         arrived.telemetry |= {
             new.id: trial.telemetry for new, trial in zip(made, campaign.trials, strict=True) if trial.telemetry
         }
-        _propose(session, row, proposals)
+        if not proposals or is_stale(session, row, proposals[-1], history.trials_of(session, row.id)):
+            request_proposal(session, row)  # stale under the new ids; the result has the same gains
         arrived.rows.append(row)
     return arrived
 
@@ -139,7 +140,10 @@ def _trials(
     size = 0
     for each in sources:
         row = _trial(bundle, campaign, each, proposals)
-        photos = [_photo(bundle, row, photo) for photo in each.photos]
+        photos = [
+            TrialPhotoRow(trial=row, media_type=one.media_type, data=bundle.part(one.part), added_at=one.added_at)
+            for one in each.photos
+        ]
         session.add_all((row, *photos))
         made.append(row)
         held: list[TrajectoryRow | TrialPhotoRow] = [*photos, *filter(None, (row.trajectory,))]
@@ -171,21 +175,8 @@ def _trial(bundle: Bundle, campaign: CampaignRow, source: Trial, proposals: Sequ
     )
 
 
-def _photo(bundle: Bundle, trial: TrialRow, source: Photo) -> TrialPhotoRow:
-    return TrialPhotoRow(
-        trial=trial, media_type=source.media_type, data=bundle.part(source.part), added_at=source.added_at
-    )
-
-
 def _record(bundle: Bundle, source: Record | None) -> TrajectoryRow | None:
-    return None if source is None else TrajectoryRow(data=bundle.part(source.part), **_fields(source, {"part"}))
-
-
-def _propose(session: Session, campaign: CampaignRow, proposals: Sequence[ProposalRow]) -> None:
-    """Request a proposal if the last one is stale under the new ids; the result has the same gains."""
-    trials = history.trials_of(session, campaign.id)
-    if not proposals or is_stale(session, campaign, proposals[-1], trials):
-        request_proposal(session, campaign)
+    return None if source is None else trajectory_row(source, bundle.part(source.part))
 
 
 def _fields(source: BaseModel, without: set[str]) -> JsonObject:

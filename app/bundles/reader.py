@@ -23,7 +23,8 @@ from app.campaigns.trials.photos import MAX_BYTES as PHOTO_BYTES
 from app.campaigns.trials.photos import media_type_of
 from app.common.errors import GainlineError, InputError, Problem
 from app.core.experiments import EXPERIMENTS
-from app.db.trajectories import Packed, unpack
+from app.db.models import TrajectoryRow
+from app.db.trajectories import unpack
 
 MAX_PARTS: Final = 20_000
 MAX_DIRECTORY_BYTES: Final = 4 * 2**20
@@ -188,7 +189,7 @@ class Bundle:
         if plain != _WIDTH * size:  # otherwise the library would allocate the size that the frame states
             _refuse(f"{field}.part", f"would unpack to {plain} bytes, not the {_WIDTH * size} of its samples")
         try:
-            trajectory = unpack(packed(record, data))
+            trajectory = unpack(trajectory_row(record, data))
         except GainlineError:
             _refuse(f"{field}.checksum", "does not match the samples")
         values = (trajectory.time_s, *trajectory.channels.values())
@@ -200,18 +201,9 @@ class Bundle:
             _refuse(f"{field}.media_type", f"differs from the content of {photo.part}")
 
 
-def packed(record: Record, data: bytes) -> Packed:
-    """Convert a record to the codec's type."""
-    return Packed(
-        codec=record.codec,
-        columns=record.columns,
-        samples=record.samples,
-        duration_s=record.duration_s,
-        source=record.source,
-        clock=record.clock,
-        checksum=record.checksum,
-        data=data,
-    )
+def trajectory_row(record: Record, data: bytes) -> TrajectoryRow:
+    """The record as a row; every field as it came, because a dump would change the types of stored numbers."""
+    return TrajectoryRow(data=data, **{name: getattr(record, name) for name in Record.model_fields.keys() - {"part"}})
 
 
 def _output_of(field: str, campaign: Campaign) -> str:

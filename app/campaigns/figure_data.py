@@ -158,7 +158,7 @@ def _curves(session: Session, flown: Sequence[TrialRow], whole: Collection[int],
     records = trajectories.readable_of(
         session, [row.trajectory_id for row in recorded if row.trajectory_id is not None and row.number in whole]
     )
-    coarse = history.curves_of(session, [row for row in recorded if row.trajectory_id not in records])
+    coarse = repository.curves(session, [row.id for row in recorded if row.trajectory_id not in records])
     return {
         row.number: _curve(records[row.trajectory_id], output) if row.trajectory_id in records else _coarse(coarse, row)
         for row in recorded

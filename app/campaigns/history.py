@@ -30,7 +30,7 @@ from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory
 from app.db import trajectories
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
-from app.db.trajectories import trajectory_of, unpacked
+from app.db.trajectories import trajectory_of, unpack
 from app.db.types import utc_now
 
 _NOTHING: Final = Trajectory(np.empty(0), {}, "none", "none")
@@ -44,16 +44,6 @@ FLOWN: Final = frozenset(
 def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
     """The trials of one or more campaigns, by campaign and number."""
     return repository.of_campaigns(session, campaign_ids)
-
-
-def list_gate_results(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:
-    """Number, state, and whether the gate passed the gains, of each trial; by number."""
-    return repository.gated(session, campaign_id)
-
-
-def curves_of(session: Session, trials: Sequence[TrialRow]) -> Mapping[int, list[list[float]]]:
-    """Coarse curves of those of the trials that have one, as [time_s, value] pairs by trial id."""
-    return repository.curves(session, [row.id for row in trials])
 
 
 def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
@@ -153,16 +143,6 @@ def latest_flights(session: Session, trial_ids: Collection[int]) -> Mapping[int,
     return repository.latest_flights(session, trial_ids)
 
 
-def has_begun_flight(session: Session, campaign_id: int) -> bool:
-    """Whether a worker has claimed any flight of the campaign; its vehicle's ledger then refers to it."""
-    return repository.has_claimed_flight(session, campaign_id)
-
-
-def drop_unbegun_flights(session: Session, campaign_id: int) -> None:
-    """Delete flights that were requested and withdrawn; nothing was ever sent to a vehicle for them."""
-    repository.delete_unclaimed_flights(session, campaign_id)
-
-
 def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:
     """The valid trial with the lowest error; the earliest one of equal errors."""
     valid = [(row.error, row.number, row) for row in trials if row.state == TrialState.VALID and row.error is not None]
@@ -184,7 +164,7 @@ def record_of(session: Session, row: TrialRow) -> Trajectory:
 def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
     """Unpack a trial's record. Raises StorageError that names the trial when the record is damaged."""
     try:
-        return unpacked(record)
+        return unpack(record)
     except StorageError as error:
         raise StorageError(
             f"The record of trial {row.number} of campaign {row.campaign_id} cannot be read: {error.message}",
@@ -222,14 +202,9 @@ def set_campaign_state(row: CampaignRow, to: CampaignState) -> None:
     row.state = check_transition(CAMPAIGN_TRANSITIONS, row.state, to, f"Campaign {row.id}")
 
 
-def rehearsed_by(session: Session, rehearsal: CampaignRow) -> int | None:
-    """The campaign that this one rehearses; None if it is not a rehearsal."""
-    return repository.rehearsed_id(session, rehearsal.id)
-
-
 def notify_rehearsed_campaign(session: Session, rehearsal: CampaignRow) -> None:
     """Mark the campaign that this one rehearses as updated, so that its clients load it again."""
-    if (campaign_id := rehearsed_by(session, rehearsal)) is not None:
+    if (campaign_id := repository.rehearsed_id(session, rehearsal.id)) is not None:
         repository.get_campaign(session, campaign_id).updated_at = utc_now()
 
 

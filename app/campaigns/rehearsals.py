@@ -59,7 +59,7 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     row = next(flown, None)
     if row is not None:
         state, reason = rehearsal_result(
-            [RehearsalTrial(*trial) for trial in history.list_gate_results(session, row.id)], row.outcome
+            [RehearsalTrial(*trial) for trial in repository.gated(session, row.id)], row.outcome
         )
         return Rehearsal(state=state, campaign_id=row.id, reason=reason)
     if campaign.definition_digest is not None:

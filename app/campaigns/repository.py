@@ -101,11 +101,13 @@ def scored(session: Session, campaign_id: int) -> Sequence[tuple[int, GainsJson,
 
 
 def has_claimed_flight(session: Session, campaign_id: int) -> bool:
+    """Whether a worker has claimed any flight of the campaign; its vehicle's ledger then refers to it."""
     wanted = select(FlightRow.id).where(FlightRow.campaign_id == campaign_id, FlightRow.claimed_at.is_not(None))
     return session.scalar(wanted.limit(1)) is not None
 
 
 def delete_unclaimed_flights(session: Session, campaign_id: int) -> None:
+    """Delete flights that were requested and withdrawn; nothing was ever sent to a vehicle for them."""
     session.execute(delete(FlightRow).where(FlightRow.campaign_id == campaign_id, FlightRow.claimed_at.is_(None)))
 
 
@@ -247,6 +249,7 @@ def rehearsals(session: Session, campaign_id: int) -> Sequence[CampaignRow]:
 
 
 def rehearsed_id(session: Session, rehearsal_id: int) -> int | None:
+    """The campaign that this one rehearses; None if it is not a rehearsal."""
     return session.scalar(select(RehearsalRow.campaign_id).where(RehearsalRow.rehearsal_id == rehearsal_id))
 
 

@@ -192,12 +192,12 @@ def delete_campaign(session: Session, campaign_id: int, version: int, context: R
     check_version(version, row.version, f"Campaign {row.id}", {})
     check_action(CAMPAIGN_ACTIONS, "delete", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
-    if history.has_begun_flight(session, row.id):
+    if repository.has_claimed_flight(session, row.id):
         raise ConflictError(
             f"Campaign {row.id} is in the ledger of {row.vehicle.title}, because one of its flights was started.",
             hint="It cannot be deleted: the ledger keeps every gain set that was written to a vehicle.",
         )
-    history.drop_unbegun_flights(session, row.id)
+    repository.delete_unclaimed_flights(session, row.id)
     predicted = [proposal.predicted for proposal in repository.proposals(session, row.id) if proposal.predicted]
     session.delete(row)
     session.flush()

@@ -21,9 +21,8 @@ from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, percent, plus_minus, short
 from app.core.statistics.comparisons import Group, drift_of, optimism, pool_scatter, trend_of
+from app.core.tuning import predictions
 from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
-from app.core.tuning.predictions import TrackRecord as Record
-from app.core.tuning.predictions import track_record
 from app.db.models import CampaignRow, TrialRow
 
 _SURE: Final = 0.9
@@ -39,8 +38,12 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     flights = history.flown_gains(trials)
     now = compare_winner(definition, experiment, flights)
     scatter = pool_scatter((), experiment.scatter) if now is None else now.scatter
-    expected = 0.0 if now is None or not scatter.known else _optimism(now)
-    record = track_record(flights)
+    expected = 0.0
+    if now is not None and scatter.known:
+        expected = optimism(
+            [group.mean for group in now.groups], [group.standard_error(scatter) for group in now.groups]
+        )
+    record = predictions.track_record(flights)
     drift = None if now is None else _drift(experiment, now)
     return CampaignStatistics(
         error_unit=experiment.error_unit,
@@ -53,7 +56,7 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
         trends=[] if now is None else _trends(experiment, max(now.groups, key=lambda group: group.size), trials),
         optimism=expected,
         shrunk_error=None if now is None or not scatter.known else now.winner.mean + expected,
-        track_record=_track_record(record),
+        track_record=TrackRecord.model_validate(record, from_attributes=True),
         notes=[] if now is None else _notes(experiment, now, expected, drift, record),
     )
 
@@ -111,10 +114,6 @@ def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | No
         else FlightsToDecide(best=comparison.further.first, baseline=comparison.further.second),
         sentence=verdict_sentence(experiment, now),
     )
-
-
-def _optimism(now: ComparisonState) -> float:
-    return optimism([group.mean for group in now.groups], [group.standard_error(now.scatter) for group in now.groups])
 
 
 def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
@@ -179,20 +178,8 @@ def _trend(
     )
 
 
-def _track_record(record: Record) -> TrackRecord:
-    return TrackRecord(
-        inside=record.inside,
-        of=record.of,
-        share=record.share,
-        agreeing=record.agreeing,
-        disagreeing=record.disagreeing,
-        trustworthy=record.trustworthy,
-        sentence=record.sentence,
-    )
-
-
 def _notes(
-    experiment: Experiment, now: ComparisonState, expected: float, drift: Drift | None, record: Record
+    experiment: Experiment, now: ComparisonState, expected: float, drift: Drift | None, record: predictions.TrackRecord
 ) -> list[str]:
     unit = experiment.error_unit
     notes = [verdict_sentence(experiment, now)]

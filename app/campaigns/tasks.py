@@ -1,5 +1,6 @@
 """Execution of a campaign's jobs: read flights, compute in the pool, store a proposal or a landscape."""
 
+from dataclasses import KW_ONLY, dataclass
 from time import monotonic
 from typing import Final
 
@@ -20,13 +21,14 @@ POINTS_PER_BATCH: Final = 48
 _log = structlog.get_logger(__name__)
 
 
+@dataclass(frozen=True, slots=True)
 class ProposalJob:
     """Carries out proposal jobs for a job runner."""
 
-    def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
-        self._database = database
-        self._pool = pool
-        self._worker = worker
+    database: Database
+    pool: ComputePool
+    _: KW_ONLY
+    worker: str
 
     def __call__(self, job: ClaimedJob) -> None:
         """Compute a proposal from the stored flights and store it.
@@ -36,22 +38,23 @@ class ProposalJob:
         if job.campaign_id is None:
             raise GainlineError("The job names no campaign.", hint="")
         started_s = monotonic()
-        with self._database.read() as session:
+        with self.database.read() as session:
             past = proposals.read_history(session, job.campaign_id)
-        computed = self._pool.run(computation.compute, past)
-        with self._database.write() as session:
-            if jobs.finish_job(session, job.id, worker=self._worker):
+        computed = self.pool.run(computation.compute, past)
+        with self.database.write() as session:
+            if jobs.finish_job(session, job.id, worker=self.worker):
                 proposals.store_proposal(session, job.campaign_id, computed)
         _log.info("proposal stored", kind=computed.proposal.kind, seconds=round(monotonic() - started_s, 3))
 
 
+@dataclass(frozen=True, slots=True)
 class LandscapeJob:
     """Carries out landscape jobs for a job runner."""
 
-    def __init__(self, database: Database, pool: ComputePool, *, worker: str) -> None:
-        self._database = database
-        self._pool = pool
-        self._worker = worker
+    database: Database
+    pool: ComputePool
+    _: KW_ONLY
+    worker: str
 
     def __call__(self, job: ClaimedJob) -> None:
         """Compute the landscape of the stored proposal in batches and store it.
@@ -61,15 +64,15 @@ class LandscapeJob:
         if job.campaign_id is None:
             raise GainlineError("The job names no campaign.", hint="")
         started_s = monotonic()
-        with self._database.read() as session:
+        with self.database.read() as session:
             plan = landscapes.read_plan(session, job.campaign_id, job.order)
-        survey = self._pool.run(plan_grid, plan)
+        survey = self.pool.run(plan_grid, plan)
         if survey is None:
             raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
         points = survey.points()
         parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
-        errors = np.concatenate([self._pool.run(predict_points, survey.predict_errors, part) for part in parts])
+        errors = np.concatenate([self.pool.run(predict_points, survey.predict_errors, part) for part in parts])
         result = landscapes.as_json(survey.landscape(errors), job.order)
-        with self._database.write() as session:
-            jobs.finish_job(session, job.id, worker=self._worker, result=result)
+        with self.database.write() as session:
+            jobs.finish_job(session, job.id, worker=self.worker, result=result)
         _log.info("landscape stored", points=len(points), seconds=round(monotonic() - started_s, 3))

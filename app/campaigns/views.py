@@ -8,7 +8,6 @@ from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
-from app.campaigns.history import rehearsed_by
 from app.campaigns.proposals import PROPOSAL_JOB, is_stale
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.schemas import (
@@ -65,7 +64,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         vehicle=fleet.campaign_vehicle(row),
         parent_id=row.parent_id,
         rehearsal=rehearsal,
-        rehearses=rehearsed_by(session, row),
+        rehearses=repository.rehearsed_id(session, row.id),
         best=best_trial(trials, now),
         verdict=_verdict(now),
         trials=_counts(trials),
@@ -163,17 +162,13 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         changes=_changes(now, row.gains),
         predicted_error=row.predicted_error,
         interval=None if row.interval is None else Interval.model_validate(row.interval),
-        explanation=_explanation(row),
+        explanation=_EXPLANATION.validate_python(row.explanation),
         gate=Gate.model_validate(row.gate),
         stop_verdict=verdict,
         history_digest=row.history_digest,
         stale=is_stale(session, campaign, row, trials),
         computed_at=row.computed_at,
     )
-
-
-def _explanation(row: ProposalRow) -> Explanation:
-    return _EXPLANATION.validate_python(row.explanation)
 
 
 def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:
@@ -229,7 +224,7 @@ def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> li
     """Allowed actions: those of the state table, less what an active flight rules out, and deletion once a flight was
     begun."""
     impossible = {"plan", "define", "delete", "finish"} if flight is not None else set()
-    if history.has_begun_flight(session, row.id):
+    if repository.has_claimed_flight(session, row.id):
         impossible.add("delete")
     return [action for action in allowed(CAMPAIGN_ACTIONS, row.state) if action not in impossible]
 
@@ -238,7 +233,7 @@ def _sparks(session: Session, by_campaign: Mapping[int, Sequence[TrialRow]]) -> 
     """Curves of the first flight, the best and the latest of each campaign, in their order; none for a campaign without
     any."""
     chosen = {campaign: _sparking(trials) for campaign, trials in by_campaign.items()}
-    curves = history.curves_of(session, [trial for trials in chosen.values() for trial in trials])
+    curves = repository.curves(session, [trial.id for trials in chosen.values() for trial in trials])
     found: Mapping[int, list[SparkCurve]] = defaultdict(list)
     for campaign, trials in chosen.items():
         best = history.best_of(trials)

@@ -76,12 +76,7 @@ def vehicle_figure(session: Session, vehicle_id: int, name: str, theme: ThemeNam
             flight=one.flight,
             campaign_id=one.campaign_id,
             trial_number=one.trial_number,
-            fitted={
-                each.name: Fitted(
-                    title=each.title, unit=each.unit, value=each.value, standard_error=each.standard_error
-                )
-                for each in one.fitted
-            },
+            fitted=_by_name(one),
         )
         for one in found.estimates
     )
@@ -102,17 +97,14 @@ def _estimates(session: Session, vehicle_id: int) -> tuple[list[Estimate], list[
     found = list(_fits(session, campaigns, counts))
     found.sort(key=lambda one: (one.flight, one.proposal_id))
     over = {row.id for row in campaigns if row.outcome is not None}
-    ends = [one.flight for one in found if one.campaign_id in over and _is_last(one, found)]
+    last = {one.campaign_id: one.flight for one in found}
+    ends = [one.flight for one in found if one.campaign_id in over and one.flight == last[one.campaign_id]]
     ends += [
         max(before)
         for at in fleet.safe_gains_changes(session, vehicle_id)
         if (before := [one.flight for one in found if one.at <= at])
     ]
     return found, ends
-
-
-def _is_last(one: Estimate, found: Sequence[Estimate]) -> bool:
-    return all(other.flight <= one.flight for other in found if other.campaign_id == one.campaign_id)
 
 
 def _fits(session: Session, campaigns: Sequence[CampaignRow], counts: dict[tuple[int, int], int]) -> Iterator[Estimate]:

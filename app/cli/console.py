@@ -55,8 +55,13 @@ def write_json(target: Path | None, document: Mapping[str, object]) -> None:
     try:
         target.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(
-            f"{target} could not be written: {error.strerror or error}.",
-            problems=(Problem("--json", "cannot be written"),),
-            hint="Choose a file in an existing folder with enough free space.",
-        ) from error
+        raise unwritable_error("--json", target, error) from error
+
+
+def unwritable_error(option: str, target: Path, error: OSError) -> InputError:
+    """Error for an output file, given with `option`, that cannot be written."""
+    return InputError(
+        f"{target} could not be written: {error.strerror or error}.",
+        problems=(Problem(option, "cannot be written"),),
+        hint="Choose a file in an existing folder with enough free space.",
+    )

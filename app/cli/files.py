@@ -1,7 +1,8 @@
 """`gainline import`, `report`, `bundle`, `unbundle`: flight logs in, reports out, and whole campaigns in and out."""
 
 import sys
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Literal
 
@@ -15,10 +16,10 @@ from app.bundles.reader import Bundle
 from app.campaigns import service as campaigns
 from app.campaigns.trials import records
 from app.campaigns.trials.schemas import Trial
-from app.cli.console import console, write_json
+from app.cli.console import console, unwritable_error, write_json
 from app.common.errors import InputError, Problem, UnconfirmedError
 from app.common.settings import Settings
-from app.core.formatting import count
+from app.core.formatting import count, format_gains
 from app.db.migrate import require_current
 from app.db.session import Database
 from app.logs.takeoffs import Takeoff
@@ -47,14 +48,26 @@ def import_log(
     out.print(f"{escape(file.name)}: {escape(flown.summary)}.")
     for note in flown.notes:
         out.print(f"  {escape(note)}", style="dim")
-    require_current(settings.database_file)
-    database = Database(settings.database_file)
-    try:
+    with _open_database(settings) as database:
         stored = _store(database, campaign, trial, flown, yes=yes)
-    finally:
-        database.close()
     _print(out, stored)
     write_json(json_out, stored.model_dump(mode="json"))
+
+
+@contextmanager
+def _open_database(settings: Settings) -> Iterator[Database]:
+    """The data folder's database. Raises SchemaError unless it is at the program's revision."""
+    require_current(settings.database_file)
+    with closing(Database(settings.database_file)) as database:
+        yield database
+
+
+def _unreadable_error(file: Path, error: OSError, needed: str) -> InputError:
+    return InputError(
+        f"{file} could not be read: {error.strerror or error}.",
+        problems=(Problem("FILE", "cannot be read"),),
+        hint=f"Give a {needed} that this user can read.",
+    )
 
 
 def can_ask() -> bool:
@@ -72,11 +85,7 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
             )
             return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
     except OSError as error:
-        raise InputError(
-            f"{file} could not be read: {error.strerror or error}.",
-            problems=(Problem("FILE", "cannot be read"),),
-            hint="Give a log that this user can read.",
-        ) from error
+        raise _unreadable_error(file, error, "log") from error
 
 
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
@@ -96,7 +105,7 @@ def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff,
 
 
 def _print(out: Console, trial: Trial) -> None:
-    gains = ", ".join(f"{name} {value:g}" for name, value in trial.gains.items())
+    gains = format_gains(trial.gains)
     error = "no error" if trial.error is None else f"error {trial.error:.4f}"
     out.print(f"Trial {trial.number} of campaign {trial.campaign_id}, {gains}: {trial.state}, {error}.")
     if trial.reason:
@@ -107,27 +116,18 @@ def _print(out: Console, trial: Trial) -> None:
 
 def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
     """Write the campaign's bundle; a server may run meanwhile. Raises InputError when the file cannot be written."""
-    require_current(settings.database_file)
-    database = Database(settings.database_file)
-    try:
-        with database.read() as session:
-            campaign_id = campaigns.find_by_id_or_name(session, campaign)
-            target = out or Path(f"campaign-{campaign_id}.gainline.zip")
-            arriving = target.with_name(f".{target.name}.part")
-            try:
-                with arriving.open("w+b") as file:
-                    write_bundle(session, campaign_id, settings.data_dir, file)
-                arriving.replace(target)
-            except OSError as error:
-                raise InputError(
-                    f"{target} could not be written: {error.strerror or error}.",
-                    problems=(Problem("--out", "cannot be written"),),
-                    hint="Choose a file in an existing folder with enough free space.",
-                ) from error
-            finally:
-                arriving.unlink(missing_ok=True)
-    finally:
-        database.close()
+    with _open_database(settings) as database, database.read() as session:
+        campaign_id = campaigns.find_by_id_or_name(session, campaign)
+        target = out or Path(f"campaign-{campaign_id}.gainline.zip")
+        arriving = target.with_name(f".{target.name}.part")
+        try:
+            with arriving.open("w+b") as file:
+                write_bundle(session, campaign_id, settings.data_dir, file)
+            arriving.replace(target)
+        except OSError as error:
+            raise unwritable_error("--out", target, error) from error
+        finally:
+            arriving.unlink(missing_ok=True)
     console().print(
         f"Campaign {campaign_id} was written to {escape(str(target))} ({target.stat().st_size / 1e6:.1f} MB)."
     )
@@ -135,21 +135,13 @@ def bundle(campaign: str, settings: Settings, *, out: Path | None) -> None:
 
 def unbundle(file: Path, settings: Settings) -> None:
     """Import the campaign and print a summary. Raises InputError that names what is wrong with the file."""
-    require_current(settings.database_file)
-    database = Database(settings.database_file)
     try:
-        with file.open("rb") as stream, Bundle(stream) as opened:
+        with _open_database(settings) as database, file.open("rb") as stream, Bundle(stream) as opened:
             opened.check()
             with database.write() as session:
                 made = store_bundle(session, opened, settings.data_dir)
     except OSError as error:
-        raise InputError(
-            f"{file} could not be read: {error.strerror or error}.",
-            problems=(Problem("FILE", "cannot be read"),),
-            hint="Give a bundle that this user can read.",
-        ) from error
-    finally:
-        database.close()
+        raise _unreadable_error(file, error, "bundle") from error
     out = console()
     out.print(
         f"Campaign {made.id}, {escape(made.name)}: {count(made.trials.flown, 'flight')} on {escape(made.vehicle.name)}."
@@ -168,22 +160,13 @@ def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format 
     Raises InputError when the file cannot be written, UnavailableError when no program to print a PDF is installed.
     """
     chosen: Format = kind or ("pdf" if out is not None and out.suffix.lower() == ".pdf" else "html")
-    require_current(settings.database_file)
-    database = Database(settings.database_file)
-    try:
-        with database.read() as session:
-            found = report_of(session, campaigns.find_by_id_or_name(session, campaign))
-    finally:
-        database.close()
+    with _open_database(settings) as database, database.read() as session:
+        found = report_of(session, campaigns.find_by_id_or_name(session, campaign))
     html = render(found, chart_library(settings.ui_dir)).html
     content = print_pdf(lambda: html) if chosen == "pdf" else html.encode()
     target = out or Path(file_name(found.campaign.id, chosen))
     try:
         target.write_bytes(content)
     except OSError as error:
-        raise InputError(
-            f"{target} could not be written: {error.strerror or error}.",
-            problems=(Problem("--out", "cannot be written"),),
-            hint="Choose a file in an existing folder with enough free space.",
-        ) from error
+        raise unwritable_error("--out", target, error) from error
     console().print(f"The report of campaign {found.campaign.id} was written to {escape(str(target))}.")

@@ -18,6 +18,7 @@ from app.common.errors import InputError
 from app.controller_checks.check import LogCheck, check_log, check_trace, parse_gains
 from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
 from app.core.control.paparazzi import OUTPUTS, Replay
+from app.core.formatting import format_gains
 from app.logs.loop_trace import read_loop_trace
 from app.reproductions.controller import run_controller
 from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction
@@ -77,12 +78,11 @@ def _number(value: float | None, digits: int) -> str:
 
 def _document(result: Result) -> dict[str, object]:
     """The result as JSON; each row includes its own figures beside the common ones."""
-    rows = [{**_plain(row), **row.numbers} for row in result.rows]
+    rows = [
+        {**{name: value for name, value in asdict(row).items() if name != "numbers"}, **row.numbers}
+        for row in result.rows
+    ]
     return {**result.as_json(), "rows": rows}
-
-
-def _plain(row: Row) -> dict[str, object]:
-    return {name: value for name, value in asdict(row).items() if name != "numbers"}
 
 
 _UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
@@ -155,7 +155,6 @@ def _check(file: Path, given: Mapping[str, float] | None) -> LogCheck:
 
 def _print(out: Console, file: Path, checked: LogCheck) -> None:
     commands, simulation = checked.commands, checked.simulation
-    gain_list = ", ".join(f"{name} {value:g}" for name, value in checked.gains.items())
     tilted = f" ({commands.tilted} of them tilted by up to {commands.largest_tilt_deg:.1f}°)" if commands.tilted else ""
     rows = [
         ("bit-exact commands", f"{commands.exact} of {commands.rows}{tilted}"),
@@ -175,10 +174,9 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
             )
             for name, value in simulation.largest_difference.items()
         ]
-    out.print(table(("", ""), rows, title=f"{file.name}, {gain_list} ({checked.gains_from})"))
+    out.print(table(("", ""), rows, title=f"{file.name}, {format_gains(checked.gains)} ({checked.gains_from})"))
     if checked.better_gains is not None:
-        better = ", ".join(f"{name} {value:g}" for name, value in checked.better_gains.items())
-        out.print(f"More commands match with {better}: were other gains flown?")
+        out.print(f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?")
     out.print("The replica agrees." if checked.passed else "[bold]The replica differs.[/]")
 
 

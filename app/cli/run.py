@@ -1,13 +1,17 @@
-"""`gainline run`: a whole campaign without the dashboard."""
+"""`gainline run`: a whole campaign without the dashboard, by the same services on a temporary database."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
+from app.accounts.permissions import LOCAL_CLI
+from app.campaigns import history, proposals
+from app.campaigns import service as campaigns
 from app.campaigns.campaign_files import (
     CampaignFile,
     gains_by_hand,
@@ -16,20 +20,32 @@ from app.campaigns.campaign_files import (
     read_campaign_file,
     read_preset,
 )
+from app.campaigns.computation import compute
 from app.campaigns.definitions import check_campaign, stored
-from app.campaigns.headless import CampaignListener, HeadlessCampaign, HeadlessTrial, fly_campaign
+from app.campaigns.trials.reviews import classify_trial
+from app.campaigns.trials.schemas import Classification, FlightOrder, NewTrial
 from app.cli.console import console, table, write_json
 from app.common.data_folder import prepare_data_dir, trial_parameters_folder
 from app.common.errors import InputError, Problem
+from app.common.states import HISTORY_TRIAL_STATES, CampaignState, TrialState, VehicleState
+from app.core.clock import REAL_TIME
 from app.core.definition import Definition
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, number
+from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS
-from app.core.tuning.strategy import Proposal
-from app.fleet.schemas import VehicleChoice
-from app.vehicles.base import OptionValue, Sample
-from app.vehicles.registry import get_kind
+from app.db.migrate import migrate
+from app.db.models import ProposalRow, TrialRow
+from app.db.session import Database
+from app.fleet import service as fleet
+from app.fleet.registration import register_vehicle
+from app.fleet.schemas import NewVehicle, VehicleChoice
+from app.flights import queue
+from app.flights.process_messages import FlightRequest
+from app.flights.service import plan_trial
+from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError
+from app.vehicles.registry import get_kind, open_vehicle
 
 
 def run_campaign(
@@ -53,7 +69,7 @@ def run_campaign(
     the folder cannot be used.
     """
     file = override(
-        _read(source),
+        read_preset(source) if source in preset_names() else read_campaign_file(Path(source)),
         vehicle=vehicle,
         strategy=strategy,
         start=start,
@@ -72,31 +88,22 @@ def run_campaign(
         folder = trial_parameters_folder(data_dir)
     out = console(json_out)
     display = _Display(definition, experiment)
+
+    def report(stopped_because: str) -> None:
+        _print(out, file, experiment, display, stopped_because)
+        _print_held(out, file, display)
+        write_json(json_out, _document(file, definition, options, display, stopped_because))
+
     try:
-        with display:
-            campaign = fly_campaign(
-                definition,
-                file.vehicle.kind,
-                options,
-                display.watcher,
-                gains=given,
-                overrule=overrule,
-                trial_parameters=folder,
+        with display, _temporary_database() as database:
+            stopped_because = _Campaign(database, file, experiment, display, folder).fly(
+                given, overrule, max_flights=definition.stop.max_flights
             )
     except BaseException as error:
-        campaign = display.broken_off(error)
-        if campaign.trials or display.touched:
-            _print(out, file, experiment, campaign)
-            _print_held(out, file, display)
-            write_json(json_out, _document(file, definition, options, campaign))
+        if display.trials or display.touched:
+            report(f"After an error: {str(error) or type(error).__name__}")
         raise
-    _print(out, file, experiment, campaign)
-    _print_held(out, file, display)
-    write_json(json_out, _document(file, definition, options, campaign))
-
-
-def _read(source: str) -> CampaignFile:
-    return read_preset(source) if source in preset_names() else read_campaign_file(Path(source))
+    report(stopped_because)
 
 
 def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue]) -> None:
@@ -116,9 +123,132 @@ def _require_flyable(vehicle: VehicleChoice, options: Mapping[str, OptionValue])
         )
 
 
+@contextmanager
+def _temporary_database() -> Iterator[Database]:
+    with TemporaryDirectory(prefix="gainline-") as folder:
+        file = Path(folder) / "gainline.sqlite3"
+        migrate(file)
+        with closing(Database(file)) as database:
+            yield database
+
+
+class _Campaign:
+    """The campaign in the database, computed and flown in this process as the worker does it in its own.
+
+    `trial_parameters` is as in `open_vehicle`.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        file: CampaignFile,
+        experiment: Experiment,
+        display: "_Display",
+        trial_parameters: Path | None,
+    ) -> None:
+        self._database = database
+        self._display = display
+        self._trial_parameters = trial_parameters
+        kind = get_kind(file.vehicle.kind)
+        with database.write() as session:
+            if kind.connect is None:
+                self._id = campaigns.create_campaign(session, file).id
+                return
+            safe_gains = experiment.space.mapping(experiment.space.default)
+            new = NewVehicle(name=kind.name, kind=kind.name, options=file.vehicle.options, safe_gains=safe_gains)
+            choice = VehicleChoice(kind=kind.name, id=register_vehicle(session, new, LOCAL_CLI).id)
+            self._id = campaigns.create_campaign(session, file.model_copy(update={"vehicle": choice})).id
+            # Ready without a connection: the link is opened for each flight.
+            fleet.set_vehicle_state(campaigns.get_row(session, self._id).vehicle, VehicleState.READY)
+
+    def fly(self, given: Sequence[Gains], overrule: str, *, max_flights: int) -> str:
+        """Fly proposals until the campaign is finished, or the given gain sets until all are flown; return why it ends.
+
+        Raises GainsError when the gate refuses the gains, unless `overrule` is a reason, and VehicleError when the
+        vehicle cannot fly.
+        """
+        while True:
+            proposal, finished = self._propose()
+            trials = self._display.trials
+            if finished is not None:
+                return finished
+            if len(trials) >= max_flights:
+                unscored = sum(trial.state not in HISTORY_TRIAL_STATES for trial in trials)
+                return f"All {len(trials)} flights have been flown; {unscored} of them could not be scored."
+            if given and len(trials) == len(given):
+                return f"All {len(given)} given gain sets have been flown."
+            # Built without the API's limits on text: a reason on the command line may be of any length.
+            new = NewTrial.model_construct(
+                proposal_id=None if given else proposal.id,
+                gains=dict(given[len(trials)]) if given else None,
+                overrule=overrule or None,
+                fly=FlightOrder(speed=None),
+            )
+            flown = self._fly_trial(new)
+            self._display.landed(flown, flown.kind if given else proposal.kind)
+
+    def _propose(self) -> tuple[ProposalRow, str | None]:
+        """Compute and store the next proposal; return it, and why the campaign is finished if it is."""
+        with self._database.read() as session:
+            past = proposals.read_history(session, self._id)
+        computed = compute(past)
+        with self._database.write() as session:
+            proposal = proposals.store_proposal(session, self._id, computed)
+            campaign = campaigns.get_row(session, self._id)
+            return proposal, campaign.stop_reason if campaign.state == CampaignState.FINISHED else None
+
+    def _fly_trial(self, new: NewTrial) -> TrialRow:
+        """Fly one trial and classify it. A flight with glitches does not count, because no person reviews it."""
+        with self._database.write() as session:
+            planned = plan_trial(session, self._id, new)
+            request = queue.claim_flight(session, "gainline run")
+            assert request is not None
+        self._display.planned(planned.number, request.gains)
+        record = self._fly(request)
+        with self._database.write() as session:
+            queue.record_landing(session, request.flight_id, record)
+            trial = history.trial_row(session, request.trial_id)
+            if trial.state == TrialState.CAPTURED:
+                reason = " ".join(glitch["sentence"] for glitch in trial.glitches or ())
+                invalid = Classification.model_construct(version=trial.version, outcome="invalid", reason=reason)
+                classify_trial(session, trial.id, invalid)
+        return trial
+
+    def _fly(self, request: FlightRequest) -> FlightRecord:
+        opened = False
+        try:
+            with open_vehicle(
+                request.vehicle_kind,
+                request.vehicle_options,
+                safe_gains=request.safe_gains,
+                trial_parameters=self._trial_parameters,
+            ) as vehicle:
+                opened = True
+                self._display.hold(None)
+                held = vehicle.stage(request.gains)
+                if held != request.gains:
+                    raise VehicleError(
+                        f"The vehicle has the gains {held} instead of {request.gains}; nothing was flown.",
+                        hint="Read its gains back manually before it flies again.",
+                    )
+                with self._database.write() as session:
+                    queue.record_staged(session, request.flight_id, held)
+                    queue.record_lift_off(session, request.flight_id)
+                return vehicle.fly(
+                    request.options(REAL_TIME), on_sample=self._display.sampled, should_stop=lambda: None
+                )
+        except SafeGainsError:
+            opened = False
+            raise
+        finally:
+            if opened:
+                self._display.hold(request.safe_gains)
+
+
 class _Display:
     """Progress line of the running flight, on standard error; finished flights are printed above it.
 
+    `kinds` are those of the flights' proposals, which can be `none`: the strategy proposed no further step.
     `touched`: whether any gains were written to the vehicle. `held`: the gains last read back, None while unknown.
     """
 
@@ -135,20 +265,10 @@ class _Display:
         self._limit = definition.stop.max_flights
         self._unit = experiment.error_unit
         self._output, self._output_unit = experiment.output, CHANNEL_UNITS[experiment.output]
-        self._trials: list[HeadlessTrial] = []
+        self.trials: list[TrialRow] = []
+        self.kinds: list[str] = []
         self.touched = False
         self.held: Mapping[str, float] | None = None
-        self.watcher = CampaignListener(
-            proposed=self._proposed, sampled=self._sampled, landed=self._landed, holding=self._holding
-        )
-
-    def broken_off(self, error: BaseException) -> HeadlessCampaign:
-        """The campaign with the flights until the error."""
-        message = str(error) or type(error).__name__
-        return HeadlessCampaign(trials=tuple(self._trials), stopped_because=f"After an error: {message}")
-
-    def _holding(self, gains: Mapping[str, float] | None) -> None:
-        self.touched, self.held = True, gains
 
     def __enter__(self) -> "_Display":
         self._progress.start()
@@ -159,21 +279,25 @@ class _Display:
     ) -> None:
         self._progress.stop()
 
-    def _proposed(self, number: int, proposal: Proposal) -> None:
+    def hold(self, gains: Mapping[str, float] | None) -> None:
+        self.touched, self.held = True, gains
+
+    def planned(self, number: int, gains: Gains) -> None:
         self._progress.update(
             self._task,
             completed=0.0,
             note="",
-            description=f"flight {number} of at most {self._limit}, {format_gains(proposal.gains)}",
+            description=f"flight {number} of at most {self._limit}, {format_gains(gains)}",
         )
 
-    def _sampled(self, sample: Sample) -> None:
+    def sampled(self, sample: Sample) -> None:
         self._progress.update(
             self._task, completed=sample.time_s, note=f"{sample[self._output]:.2f} {self._output_unit}"
         )
 
-    def _landed(self, trial: HeadlessTrial) -> None:
-        self._trials.append(trial)
+    def landed(self, trial: TrialRow, kind: str) -> None:
+        self.trials.append(trial)
+        self.kinds.append(kind)
         self._progress.console.print(
             f"flight {trial.number}: {format_gains(trial.gains)} → {_error(trial.error, self._unit)} "
             f"({_describe_outcome(trial)})",
@@ -182,29 +306,29 @@ class _Display:
         self._progress.update(self._task, description="computing the next gains", completed=0.0, note="")
 
 
-def _print(out: Console, file: CampaignFile, experiment: Experiment, campaign: HeadlessCampaign) -> None:
+def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _Display, stopped_because: str) -> None:
     names = experiment.space.names
     unit = experiment.error_unit
-    best = campaign.best
+    best = history.best_of(display.trials)
     rows = [
         (
             f"run {trial.number}",
             number(trial.error, 4),
             number(trial.predicted_error, 4),
             *(f"{trial.gains[name]:g}" for name in names),
-            trial.kind,
+            kind,
             "best"
             if best is not None and trial.number == best.number
             else ""
-            if trial.outcome == "valid"
-            else trial.outcome,
+            if trial.state == TrialState.VALID
+            else trial.state.value,
         )
-        for trial in campaign.trials
+        for trial, kind in zip(display.trials, display.kinds, strict=True)
     ]
     out.print(table(("run #", f"error ({unit})", f"predicted ({unit})", *names, "step", ""), rows, title=file.name))
-    if overruled := [str(trial.number) for trial in campaign.trials if trial.overrule_reason]:
+    if overruled := [str(trial.number) for trial in display.trials if trial.overrule_reason]:
         out.print(f"Refused by the gate and flown with a reason: flight {', '.join(overruled)}.")
-    out.print(f"Stopped: {campaign.stopped_because}")
+    out.print(f"Stopped: {stopped_because}")
     if best is not None:
         out.print(f"Best: {_error(best.error, unit)} with {format_gains(best.gains)}, flight {best.number}.")
 
@@ -220,22 +344,39 @@ def _print_held(out: Console, file: CampaignFile, display: _Display) -> None:
 
 
 def _document(
-    file: CampaignFile, definition: Definition, options: Mapping[str, OptionValue], campaign: HeadlessCampaign
+    file: CampaignFile,
+    definition: Definition,
+    options: Mapping[str, OptionValue],
+    display: _Display,
+    stopped_because: str,
 ) -> dict[str, object]:
-    best = campaign.best
+    best = history.best_of(display.trials)
     return {
         "name": file.name,
         "vehicle": {"kind": file.vehicle.kind, "options": dict(options)},
         "definition": stored(definition),
         "definition_digest": definition.digest(),
-        "trials": [{**asdict(trial), "gains": dict(trial.gains)} for trial in campaign.trials],
+        "trials": [
+            {
+                "number": trial.number,
+                "kind": kind,
+                "gains": trial.gains,
+                "outcome": trial.state.value,
+                "error": trial.error,
+                "predicted_error": trial.predicted_error,
+                "reason": trial.reason,
+                "predicted_interval": trial.predicted_interval,
+                "overrule_reason": trial.overrule_reason,
+            }
+            for trial, kind in zip(display.trials, display.kinds, strict=True)
+        ],
         "best": None if best is None else best.number,
-        "stopped_because": campaign.stopped_because,
+        "stopped_because": stopped_because,
     }
 
 
-def _describe_outcome(trial: HeadlessTrial) -> str:
-    return f"{trial.outcome}: {trial.reason}" if trial.reason else trial.outcome
+def _describe_outcome(trial: TrialRow) -> str:
+    return f"{trial.state}: {trial.reason}" if trial.reason else trial.state.value
 
 
 def _error(value: float | None, unit: str) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.campaigns import history
@@ -21,7 +21,7 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import count, format_gains, plus_minus
 from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter
 from app.core.tuning.strategies import STRATEGIES
-from app.db.models import CampaignRow, FlightRow, TrialRow
+from app.db.models import CampaignRow, TrialRow
 from app.fleet import service as fleet
 from app.vehicles.base import VehicleOption
 from app.vehicles.registry import VEHICLE_KINDS
@@ -30,13 +30,6 @@ from app.vehicles.registry import VEHICLE_KINDS
 def trials_by_id(session: Session, trial_ids: Collection[int]) -> Mapping[int, TrialRow]:
     """The existing trials among these ids."""
     return {row.id: row for row in session.scalars(select(TrialRow).where(TrialRow.id.in_(trial_ids)))}
-
-
-def batteries_of(session: Session, trial_ids: Collection[int]) -> Mapping[int, str]:
-    """Battery label of each trial's last flight, if one was entered."""
-    last = select(func.max(FlightRow.id)).where(FlightRow.trial_id.in_(trial_ids)).group_by(FlightRow.trial_id)
-    labelled = select(FlightRow).where(FlightRow.id.in_(last), FlightRow.battery != "")
-    return {row.trial_id: row.battery for row in session.scalars(labelled)}
 
 
 def measured(value: float, standard_error: float | None, unit: str) -> str:

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from sqlalchemy.orm import Session
 
+from app.campaigns import history
 from app.campaigns.trials.schemas import GroupBrief
-from app.compare import compared_flights
 from app.compare.compared_flights import (
     ComparisonFlight,
     file_stem,
@@ -41,8 +41,8 @@ class CurvesExport:
 def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightComparison:
     """Compare the flights. Raises InputError naming those that cannot be compared."""
     sides = sides_of(session, trial_ids)
-    batteries = compared_flights.batteries_of(session, trial_ids)
-    settings = [settings_of(side, batteries.get(side.row.id, "")) for side in sides]
+    flown = history.latest_flights(session, trial_ids)
+    settings = [settings_of(side, flown[side.row.id].battery if side.row.id in flown else "") for side in sides]
     verdict, sentence = overall_verdict(sides)
     return FlightComparison(
         error_unit=sides[0].experiment.error_unit,

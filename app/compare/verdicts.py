@@ -34,18 +34,17 @@ def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidate
         if same
         else _comparison_sentence(side, side.group, against, against.group, comparison)
     )
-    return FlightPair(
-        trial_id=side.row.id,
-        against_id=against.row.id,
-        basis="repeats" if same else "gains",
+    further = comparison.further
+    return _pair(
+        side,
+        against,
+        "repeats" if same else "gains",
+        sentence,
         verdict=comparison.verdict,
         confidence=comparison.confidence,
         difference=comparison.difference,
         standard_error=comparison.standard_error,
-        further=None
-        if comparison.further is None
-        else FurtherFlights(trial=comparison.further.first, against=comparison.further.second),
-        sentence=sentence,
+        further=None if further is None else FurtherFlights(trial=further.first, against=further.second),
     )
 
 
@@ -94,16 +93,27 @@ def _among(best: ComparisonFlight, policies: int) -> str:
     return f"{capitalised(best.name)} is the lowest of {policies} gain sets. " if policies > 2 else ""
 
 
-def _pair(side: ComparisonFlight, against: ComparisonFlight, basis: Basis, sentence: str) -> FlightPair:
+def _pair(
+    side: ComparisonFlight,
+    against: ComparisonFlight,
+    basis: Basis,
+    sentence: str,
+    *,
+    verdict: Verdict | None = None,
+    confidence: float | None = None,
+    difference: float | None = None,
+    standard_error: float | None = None,
+    further: FurtherFlights | None = None,
+) -> FlightPair:
     return FlightPair(
         trial_id=side.row.id,
         against_id=against.row.id,
         basis=basis,
-        verdict=None,
-        confidence=None,
-        difference=None,
-        standard_error=None,
-        further=None,
+        verdict=verdict,
+        confidence=confidence,
+        difference=difference,
+        standard_error=standard_error,
+        further=further,
         sentence=sentence,
     )
 
@@ -118,8 +128,7 @@ def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other:
     direction = "lower" if difference < 0.0 else "higher"
     how, _ = _why_apart(side, against)
     sentence = f"No verdict on the gains: {side.name}, {how}, is {amount} {direction} than {against.name}."
-    pair = _pair(side, against, "apart", sentence)
-    return pair.model_copy(update={"difference": difference, "standard_error": standard_error})
+    return _pair(side, against, "apart", sentence, difference=difference, standard_error=standard_error)
 
 
 def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, str]:
@@ -157,13 +166,14 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
         f"The same gains ({format_gains(group.gains)}): {side.name} and {against.name} are {amount} apart, {relation} "
         f"({percent(found.confidence)} confidence that something has changed)."
     )
-    pair = _pair(side, against, "repeats", sentence)
-    return pair.model_copy(
-        update={
-            "difference": found.difference,
-            "standard_error": found.standard_error,
-            "confidence": found.confidence,
-        }
+    return _pair(
+        side,
+        against,
+        "repeats",
+        sentence,
+        difference=found.difference,
+        standard_error=found.standard_error,
+        confidence=found.confidence,
     )
 
 

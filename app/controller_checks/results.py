@@ -13,6 +13,7 @@ from app.controller_checks.check import LogCheck, TraceCheck, check_recording
 from app.core.control.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE_S, TOLERANCES, CommandCheck, Overlay
 from app.core.control.loop_log import UNITS as REFERENCE_UNITS
 from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ
+from app.core.formatting import format_gains
 from app.core.records.trajectory import Samples
 from app.figures.panels import Overlaid
 from app.figures.scale import thinned
@@ -211,8 +212,7 @@ def _log_sentence(checked: LogCheck) -> str:
 
 def _notes(checked: LogCheck) -> Iterable[str]:
     if checked.better_gains is not None:
-        better = ", ".join(f"{name} {value:g}" for name, value in checked.better_gains.items())
-        yield f"More commands match with {better}: were other gains flown?"
+        yield f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?"
     yield from _notes_on(checked.commands)
     if checked.simulation is None:
         yield "Reference and integrator were not simulated: no command in the log, or another command within 2 s."

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, Final, Literal
+from typing import Any, ClassVar, Final, Literal
 
 from sqlalchemy import (
     JSON,
@@ -84,11 +84,14 @@ def _state_type(states: type[StrEnum]) -> Enum:
 
 
 class Reported:
-    """A row whose changes are published to the browsers."""
+    """A row whose changes are published to the browsers, under its `topic`."""
+
+    topic: ClassVar[Topic]
+    id: Any
 
     def reported_as(self) -> tuple[Topic, int, int | None]:
         """Topic, the row's id, and the campaign that it belongs to."""
-        raise NotImplementedError
+        return self.topic, self.id, getattr(self, "campaign_id", None)
 
 
 class VehicleRow(Base, Reported):
@@ -100,6 +103,7 @@ class VehicleRow(Base, Reported):
     digest of the lease token. `version` counts people's edits.
     """
 
+    topic = "vehicle"
     __tablename__ = "vehicle"
     __table_args__ = (_state_check(VehicleState), _NEVER_REUSE_IDS)
 
@@ -125,9 +129,6 @@ class VehicleRow(Base, Reported):
     operator_token_hash: Mapped[str | None]
     operator_until: Mapped[datetime | None]
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
-
-    def reported_as(self) -> tuple[Topic, int, int | None]:
-        return "vehicle", self.id, None
 
 
 _ACT_UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_ACT_STATES))
@@ -247,6 +248,7 @@ class TrialRow(Base, Reported):
     record ends, whatever the trial's class; `abort_cause` why the flight was aborted.
     """
 
+    topic = "trial"
     __tablename__ = "trial"
     __table_args__ = (
         _state_check(TrialState),
@@ -287,9 +289,6 @@ class TrialRow(Base, Reported):
 
     trajectory: Mapped[TrajectoryRow | None] = relationship()
 
-    def reported_as(self) -> tuple[Topic, int, int | None]:
-        return "trial", self.id, self.campaign_id
-
 
 class TrialPhotoRow(Base, Reported):
     """A picture of a flight, as uploaded."""
@@ -312,6 +311,7 @@ class TrialPhotoRow(Base, Reported):
 class ControllerCheckRow(Base, Reported):
     """A recorded controller compared with the replica, with all data of its page."""
 
+    topic = "check"
     __tablename__ = "controller_check"
     __table_args__ = (_NEVER_REUSE_IDS,)
 
@@ -321,9 +321,6 @@ class ControllerCheckRow(Base, Reported):
     passed: Mapped[bool]
     result: Mapped[JsonObject] = mapped_column(deferred=True)
     checked_at: Mapped[datetime] = mapped_column(default=utc_now)
-
-    def reported_as(self) -> tuple[Topic, int, int | None]:
-        return "check", self.id, None
 
 
 _UNDER_WAY_SQL: Final = _is_one_of("state", sorted(ACTIVE_FLIGHT_STATES))
@@ -339,6 +336,7 @@ class FlightRow(Base, Reported):
     A line of the vehicle's ledger: while it exists, neither its trial nor its campaign can be deleted.
     """
 
+    topic = "flight"
     __tablename__ = "flight"
     __table_args__ = (
         _state_check(FlightState),
@@ -378,13 +376,11 @@ class FlightRow(Base, Reported):
     trial: Mapped[TrialRow] = relationship()
     vehicle: Mapped[VehicleRow] = relationship()
 
-    def reported_as(self) -> tuple[Topic, int, int | None]:
-        return "flight", self.id, self.campaign_id
-
 
 class ProposalRow(Base, Reported):
     """A strategy's proposal from one history; stale as soon as the campaign's history has another digest."""
 
+    topic = "proposal"
     __tablename__ = "proposal"
     __table_args__ = (_NEVER_REUSE_IDS,)
 
@@ -405,9 +401,6 @@ class ProposalRow(Base, Reported):
 
     predicted: Mapped[TrajectoryRow | None] = relationship()
 
-    def reported_as(self) -> tuple[Topic, int, int | None]:
-        return "proposal", self.id, self.campaign_id
-
 
 class JobRow(Base, Reported):
     """Numeric work: queued, running or done.
@@ -416,6 +409,7 @@ class JobRow(Base, Reported):
     access. `lease_until` passes when the worker stops renewing it.
     """
 
+    topic = "job"
     __tablename__ = "job"
     __table_args__ = (_state_check(JobState), Index("ix_job_state_id", "state", "id"), _NEVER_REUSE_IDS)
 
@@ -434,9 +428,6 @@ class JobRow(Base, Reported):
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
-
-    def reported_as(self) -> tuple[Topic, int, int | None]:
-        return "job", self.id, self.campaign_id
 
 
 class EventRow(Base):

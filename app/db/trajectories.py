@@ -9,7 +9,6 @@ The checksum is the SHA-256 of the column names, a NUL, and the plain float32 by
 import hashlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -33,22 +32,8 @@ _WIDTH: Final = 4
 Table = NDArray[np.float32]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Packed:
-    """A trajectory as stored in the database."""
-
-    codec: int
-    columns: list[str]
-    samples: int
-    duration_s: float
-    source: str
-    clock: str
-    checksum: str
-    data: bytes
-
-
-def pack(trajectory: Trajectory) -> Packed:
-    """Pack a trajectory for storage.
+def pack(trajectory: Trajectory) -> TrajectoryRow:
+    """Pack a trajectory as a row to be stored.
 
     Raises TrajectoryError when single precision cannot hold it: a number is too large, or time stamps collapse.
     """
@@ -58,7 +43,7 @@ def pack(trajectory: Trajectory) -> Packed:
     _require_storable(columns, table)
     plain = table.tobytes()
     planes = table.view(np.uint8).reshape(len(columns), -1, _WIDTH).transpose(0, 2, 1)
-    return Packed(
+    return TrajectoryRow(
         codec=VERSION,
         columns=columns,
         samples=table.shape[1],
@@ -70,8 +55,8 @@ def pack(trajectory: Trajectory) -> Packed:
     )
 
 
-def unpack(packed: Packed) -> Trajectory:
-    """Unpack a stored trajectory in single precision. Raises StorageError when the record is damaged."""
+def unpack(packed: TrajectoryRow) -> Trajectory:
+    """Unpack a record, verified against its checksum, in single precision. Raises StorageError when it is damaged."""
     if packed.codec != VERSION:
         raise StorageError(
             f"A flight record has the unknown version {packed.codec}.",
@@ -146,12 +131,12 @@ def samples_of(session: Session, trajectory_ids: Collection[int]) -> Mapping[int
 
 def trajectory_of(session: Session, trajectory_id: int) -> Trajectory:
     """A stored trajectory, verified against its checksum."""
-    return unpacked(samples_of(session, [trajectory_id])[trajectory_id])
+    return unpack(samples_of(session, [trajectory_id])[trajectory_id])
 
 
 def trajectories_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
     """Several stored trajectories, by id."""
-    return {identity: unpacked(row) for identity, row in samples_of(session, trajectory_ids).items()}
+    return {identity: unpack(row) for identity, row in samples_of(session, trajectory_ids).items()}
 
 
 def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, Trajectory]:
@@ -159,7 +144,7 @@ def readable_of(session: Session, trajectory_ids: Collection[int]) -> dict[int, 
     found: dict[int, Trajectory] = {}
     for identity, row in samples_of(session, trajectory_ids).items():
         with suppress(StorageError):
-            found[identity] = unpacked(row)
+            found[identity] = unpack(row)
     return found
 
 
@@ -168,36 +153,10 @@ def store_trajectory(session: Session, trajectory: Trajectory) -> TrajectoryRow:
 
     Raises TrajectoryError when single precision cannot hold it.
     """
-    packed = pack(trajectory)
-    row = TrajectoryRow(
-        codec=packed.codec,
-        columns=packed.columns,
-        samples=packed.samples,
-        duration_s=packed.duration_s,
-        source=packed.source,
-        clock=packed.clock,
-        checksum=packed.checksum,
-        data=packed.data,
-    )
+    row = pack(trajectory)
     session.add(row)
     session.flush()
     return row
-
-
-def unpacked(row: TrajectoryRow) -> Trajectory:
-    """A stored record, verified against its checksum. Raises StorageError when it is damaged."""
-    return unpack(
-        Packed(
-            codec=row.codec,
-            columns=row.columns,
-            samples=row.samples,
-            duration_s=row.duration_s,
-            source=row.source,
-            clock=row.clock,
-            checksum=row.checksum,
-            data=row.data,
-        )
-    )
 
 
 _NAMED: Final = 5
@@ -207,7 +166,7 @@ _AT_ONCE: Final = 20
 def is_intact(row: TrajectoryRow) -> bool:
     """Whether the record's samples match its checksum."""
     try:
-        unpacked(row)
+        unpack(row)
     except StorageError:
         return False
     return True

@@ -5,7 +5,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, tzinfo
+from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -49,17 +49,14 @@ class Document:
     policy: str
 
 
-def render(report: Report, plotly: str, zone: tzinfo | None = None) -> Document:
-    """Render a report.
-
-    `plotly` is the source of the chart library; `zone` is the time zone of printed times, None for this machine's.
-    """
+def render(report: Report, plotly: str) -> Document:
+    """Render a report. `plotly` is the source of the chart library."""
     draw = _script((_TEMPLATES / "draw.js").read_text(encoding="utf-8"))
     library = _script(plotly)
     own = _policy(library, draw)
     groups = report.statistics.groups
     html = (
-        _environment(zone)
+        _environment()
         .get_template("report.html.j2")
         .render(
             report=report,
@@ -126,14 +123,14 @@ def _policy(*scripts: Markup) -> str:
     )
 
 
-def _environment(zone: tzinfo | None) -> "Environment":
+def _environment() -> "Environment":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
     environment.filters |= {
-        "instant": lambda at: _instant(at, zone or _here(at)),
+        "instant": _instant,
         "plus_minus": formatting.measured,
         "number": formatting.number,
         "interval": _interval,
@@ -154,24 +151,17 @@ def _interval(span: Interval | None) -> str:
     return formatting.NOTHING if span is None else f"{formatting.number(span.lower)} … {formatting.number(span.upper)}"
 
 
-def _instant(at: datetime | None, zone: tzinfo) -> str:
-    """`22 Nov 2026, 14:03 CET (13:03 UTC)`; UTC alone if the zone is at UTC."""
+def _instant(at: datetime | None) -> str:
+    """`22 Nov 2026, 14:03 CET (13:03 UTC)` in this machine's time zone; UTC alone if the zone is at UTC."""
     if at is None:
         return formatting.NOTHING
-    here = at.astimezone(zone)
+    here = at.astimezone()
     there = at.astimezone(UTC)
     local = f"{here.day} {here:%b %Y, %H:%M}"
     if not here.utcoffset():
         return f"{local} UTC"
     utc = f"{there:%H:%M}" if there.date() == here.date() else f"{there.day} {there:%b, %H:%M}"
     return f"{local} {here.tzname()} ({utc} UTC)"
-
-
-def _here(at: datetime) -> tzinfo:
-    """This machine's time zone at that time."""
-    zone = at.astimezone().tzinfo
-    assert zone is not None
-    return zone
 
 
 def _signed_gain(change: float) -> str:

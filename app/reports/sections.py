@@ -10,6 +10,7 @@ from typing import Final, Protocol
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from app.campaigns.history import FLOWN
 from app.campaigns.schemas import Campaign, CampaignStatistics, Start, StopRule
 from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
@@ -99,9 +100,6 @@ class Report:
     def flown(self) -> tuple[Trial, ...]:
         """Trials that left the ground: those in the table of runs."""
         return tuple(trial for trial in self.trials if trial.state in FLOWN)
-
-
-FLOWN = frozenset({"captured", "valid", "aborted", "invalid", "lost"})
 
 
 _STARTS: Final = {

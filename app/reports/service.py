@@ -17,7 +17,7 @@ from app.common.schemas import Page
 from app.db.trajectories import damaged_trials
 from app.db.types import utc_now
 from app.figures import CAMPAIGN_FIGURES
-from app.figures.base import Card, card_of
+from app.figures.base import card_of
 from app.fleet import service as fleet
 from app.fleet.views import acts_view, ledger_view
 from app.reports import sections
@@ -35,6 +35,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
     experiment = experiment_of(campaign)
     vehicle = fleet.get_vehicle(session, campaign.vehicle.id)
     past = figure_data.history_of(session, campaign_id, curves=True)
+    landscape = landscape_card(session, campaign_id, "light", stacked=True).card
     return Report(
         campaign=campaign,
         statistics=statistics,
@@ -44,7 +45,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
         how=describe_method(campaign, experiment),
         cards=(
             *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),
-            *_landscape(session, campaign),
+            *((landscape,) if landscape.state == "ready" else ()),  # only if it has been computed already
         ),
         remarks=tuple(sections.remarks_on(session, campaign_id, trials)),
         photo_bytes=sections.MAX_BYTES,
@@ -52,13 +53,6 @@ def report_of(session: Session, campaign_id: int) -> Report:
         version=__version__,
         made_at=utc_now(),
     )
-
-
-def _landscape(session: Session, campaign: Campaign) -> Iterator[Card]:
-    """The landscape card, if one was computed: a report uses only existing results."""
-    card = landscape_card(session, campaign.id, "light", stacked=True).card
-    if card.state == "ready":
-        yield card
 
 
 def _anomalies(session: Session, campaign: Campaign, trials: tuple[Trial, ...], unit: str) -> Iterator[Anomaly]:

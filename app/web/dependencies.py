@@ -222,12 +222,8 @@ class Upload:
         return self.companion.read()
 
 
-@dataclass(frozen=True, slots=True)
-class _ReceivedUpload:
-    file: BinaryIO
-    name: str
-    companion: BinaryIO | None
-    digest: str
+_Received = tuple[BinaryIO, str, BinaryIO | None, str]
+"""File, file name, companion file, and the digest of both."""
 
 
 async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> AsyncIterator[Upload]:
@@ -238,23 +234,23 @@ async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyK
             f"A record of type {kind or 'unknown'} is not accepted here.",
             hint=f"Send the file as `Content-Type: {_ANY}`, or as the form field `file`.",
         )
-    async with arriving(request) as arrived:
-        once = IdempotentRequest(database, key, fingerprint(request, f"{request.url.query} {arrived.digest}"))
-        yield Upload(arrived.file, arrived.name, arrived.companion, once)
+    async with arriving(request) as (file, name, companion, digest):
+        once = IdempotentRequest(database, key, fingerprint(request, f"{request.url.query} {digest}"))
+        yield Upload(file, name, companion, once)
 
 
 @asynccontextmanager
-async def _raw(request: Request) -> AsyncIterator[_ReceivedUpload]:
+async def _raw(request: Request) -> AsyncIterator[_Received]:
     digest = hashlib.sha256()
     with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as spool:
         async for chunk in request.stream():
             digest.update(chunk)
             await run_in_threadpool(spool.write, chunk)
-        yield _ReceivedUpload(spool, "", None, digest.hexdigest())  # type: ignore[arg-type]  # it reads and seeks as BinaryIO does
+        yield spool, "", None, digest.hexdigest()  # type: ignore[misc]  # it reads and seeks as BinaryIO does
 
 
 @asynccontextmanager
-async def _form(request: Request) -> AsyncIterator[_ReceivedUpload]:
+async def _form(request: Request) -> AsyncIterator[_Received]:
     digest = hashlib.sha256()
     async with request.form(max_files=2, max_fields=4) as form:
         part, companion = _part(form, "file"), _part(form, "companion")
@@ -268,7 +264,7 @@ async def _form(request: Request) -> AsyncIterator[_ReceivedUpload]:
             while each is not None and (chunk := await each.read(_CHUNK_BYTES)):
                 digest.update(chunk)
         beside = None if companion is None else companion.file
-        yield _ReceivedUpload(part.file, part.filename or "", beside, digest.hexdigest())
+        yield part.file, part.filename or "", beside, digest.hexdigest()
 
 
 def _part(form: FormData, name: str) -> UploadFile | None:

@@ -11,7 +11,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.campaigns.campaign_files import preset_names
+from app.campaigns.trials import records
 from app.cli.commands import app
+from app.core.experiments.base import Experiment
+from app.core.records.glitches import Glitch
+from app.core.records.trajectory import Trajectory
 
 RUN_ON_TWIN = ("run", "ardrone-takeoff", "--vehicle", "twin", "--set", "scatter=0")
 
@@ -193,3 +197,43 @@ def test_a_refused_start_flies_with_a_reason_that_the_result_keeps(tmp_path: Pat
     campaign = flown(tmp_path, *undamped, "--overrule", "to see it swing")
     assert [trial["overrule_reason"] for trial in campaign["trials"]] == ["to see it swing"]
     assert errors(campaign)[0] > 0.3
+
+
+SPIKE = Glitch(kind="acceleration", start_s=1.0, end_s=1.1, sentence="The altitude jumps.")
+
+
+def test_flights_with_a_glitch_do_not_count_and_a_low_battery_ends_their_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The twin's battery holds 11.1 V; every record has a glitch, and there is nobody to look at it."""
+
+    def always_one(_experiment: Experiment, _record: Trajectory) -> tuple[Glitch, ...]:
+        return (SPIKE,)
+
+    monkeypatch.setattr(records, "find_glitches", always_one)
+    monkeypatch.setattr(records, "repaired", lambda _experiment, record, _glitches: record)
+    file = tmp_path / "low.yaml"
+    file.write_text(
+        "name: Low battery\nvehicle: {kind: twin}\ndefinition: {stop: {kind: budget, max_flights: 3, "
+        "min_battery_v: 11.5}}\n"
+    )
+    campaign = flown(tmp_path, "run", str(file))
+    assert [(trial["outcome"], trial["reason"], trial["error"]) for trial in campaign["trials"]] == [
+        ("invalid", "The altitude jumps.", None)
+    ]
+    assert campaign["best"] is None
+    assert campaign["stopped_because"].startswith("The last flight ended at 11.10 V; the minimum is 11.5 V.")
+
+
+def test_flights_that_cannot_count_end_with_the_budget(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(records, "find_glitches", lambda _experiment, _record: (SPIKE,))
+    monkeypatch.setattr(records, "repaired", lambda _experiment, record, _glitches: record)
+    campaign = flown(tmp_path, *RUN_ON_TWIN, "--max-flights", "2")
+    assert [trial["outcome"] for trial in campaign["trials"]] == ["invalid"] * 2
+    assert campaign["stopped_because"] == "All 2 flights have been flown; 2 of them could not be scored."
+
+
+def test_a_strategy_without_a_further_step_is_said_to_propose_none(tmp_path: Path) -> None:
+    named = ("--strategy", "simplex", "--set", "stop=budget", "--max-flights", "3")
+    campaign = flown(tmp_path, *RUN_ON_TWIN, *named)
+    assert [trial["kind"] for trial in campaign["trials"]] == ["start", "step", "none"]
