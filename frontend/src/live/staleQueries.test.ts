@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import { changeFrom, staleQueries, staleQueriesOnce } from "./staleQueries";
+import { changeFrom, staleQueries } from "./staleQueries";
 
 test("a changed trial makes its campaign, the lists and what flies doubtful", () => {
-  expect(staleQueries({ topic: "trial", entity_id: 9, campaign_id: 4 })).toEqual([
+  expect(staleQueries([{ topic: "trial", entity_id: 9, campaign_id: 4 }])).toEqual([
     ["flying"],
     ["campaigns"],
     ["trial", 9],
@@ -12,19 +12,19 @@ test("a changed trial makes its campaign, the lists and what flies doubtful", ()
 });
 
 test("a changed job makes the jobs doubtful, and one without a campaign the reproductions", () => {
-  expect(staleQueries({ topic: "job", entity_id: 3, campaign_id: null })).toEqual([["jobs"], ["reproductions"]]);
-  expect(staleQueries({ topic: "job", entity_id: 3, campaign_id: 4 })).toEqual([["jobs"], ["campaign", 4]]);
+  expect(staleQueries([{ topic: "job", entity_id: 3, campaign_id: null }])).toEqual([["jobs"], ["reproductions"]]);
+  expect(staleQueries([{ topic: "job", entity_id: 3, campaign_id: 4 }])).toEqual([["jobs"], ["campaign", 4]]);
 });
 
 test("a changed vehicle makes itself and the list of vehicles doubtful", () => {
-  const keys = staleQueries({ topic: "vehicle", entity_id: 2, campaign_id: null });
+  const keys = staleQueries([{ topic: "vehicle", entity_id: 2, campaign_id: null }]);
   expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2], ["wear"]]);
 });
 
 test("new gains and a flight make doubtful what is known of the vehicles' wear", () => {
-  expect(staleQueries({ topic: "proposal", entity_id: 7, campaign_id: 4 })).toContainEqual(["wear"]);
-  expect(staleQueries({ topic: "flight", entity_id: 7, campaign_id: 4 })).toContainEqual(["wear"]);
-  expect(staleQueries({ topic: "job", entity_id: 7, campaign_id: 4 })).not.toContainEqual(["wear"]);
+  expect(staleQueries([{ topic: "proposal", entity_id: 7, campaign_id: 4 }])).toContainEqual(["wear"]);
+  expect(staleQueries([{ topic: "flight", entity_id: 7, campaign_id: 4 }])).toContainEqual(["wear"]);
+  expect(staleQueries([{ topic: "job", entity_id: 7, campaign_id: 4 }])).not.toContainEqual(["wear"]);
 });
 
 test("many changes together ask for each answer once", () => {
@@ -33,7 +33,7 @@ test("many changes together ask for each answer once", () => {
     { topic: "campaign", entity_id: 4, campaign_id: 4 },
     { topic: "campaign", entity_id: 4, campaign_id: 4 },
   ];
-  expect(staleQueriesOnce(changes)).toEqual([["flying"], ["wear"], ["campaign", 4], ["campaigns"]]);
+  expect(staleQueries(changes)).toEqual([["flying"], ["wear"], ["campaign", 4], ["campaigns"]]);
 });
 
 test("a line that is no change is left alone", () => {

@@ -11,7 +11,7 @@ export type QueryKey = readonly (string | number)[];
 /** Topics that affect calibration history. Most do not name the vehicle, so all vehicles are invalidated. */
 const TELLING = new Set(["campaign", "trial", "flight", "proposal", "vehicle"]);
 
-export function staleQueries(change: Change): QueryKey[] {
+function keysOf(change: Change): QueryKey[] {
   if (change.topic === "check") return [["checks"]];
   const keys: QueryKey[] = change.topic === "job" ? [["jobs"]] : [["flying"]];
   if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
@@ -24,8 +24,8 @@ export function staleQueries(change: Change): QueryKey[] {
 }
 
 /** The keys of all changes, each once. */
-export function staleQueriesOnce(changes: readonly Change[]): QueryKey[] {
-  const keys = new Map(changes.flatMap(staleQueries).map((key) => [JSON.stringify(key), key]));
+export function staleQueries(changes: readonly Change[]): QueryKey[] {
+  const keys = new Map(changes.flatMap(keysOf).map((key) => [JSON.stringify(key), key]));
   return [...keys.values()];
 }
 

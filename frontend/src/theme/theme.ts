@@ -42,7 +42,7 @@ const dark: MantineColorsTuple = [
   "#0b0e12",
 ];
 
-export const TOUCH_TARGET_PX = 48;
+const TOUCH_TARGET_PX = 48;
 
 const tall = { styles: { input: { minHeight: TOUCH_TARGET_PX } }, defaultProps: { size: "md" } } as const;
 

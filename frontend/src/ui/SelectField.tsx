@@ -1,7 +1,7 @@
 import { InputBase, type InputBaseProps } from "@mantine/core";
 import { IconChevronDown } from "@tabler/icons-react";
 
-export interface Option<Value extends string = string> {
+interface Option<Value extends string = string> {
   value: Value;
   label: string;
 }

@@ -1,6 +1,6 @@
 /** Protection against accidental touches: a button held for two seconds, and a slider dragged to its end. */
 
-export const HOLD_MS = 2000;
+const HOLD_MS = 2000;
 /** A page that hung for longer cannot tell whether the finger stayed down. */
 const BLIND_MS = 1000;
 

@@ -93,7 +93,7 @@ function presetFor(catalogue: Catalogue, experiment: string, vehicle: string): P
   );
 }
 
-export function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
+function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
   const title = catalogue.experiments.find(({ name }) => name === experiment)?.title ?? experiment;
   return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${vehicle}`;
 }

@@ -40,7 +40,7 @@ export const PURPOSES: Record<GivenGains["purpose"], string> = {
 };
 
 /** Usual address of each autopilot. */
-export const ADDRESSES: Readonly<Record<string, string>> = {
+const ADDRESSES: Readonly<Record<string, string>> = {
   paparazzi: "udp:192.168.1.1:4245@4244",
   ardupilot: "udpin:127.0.0.1:14550",
   px4: "udpin:127.0.0.1:14550",
