@@ -2,6 +2,7 @@ import { ActionIcon } from "@mantine/core";
 import { IconKeyboard } from "@tabler/icons-react";
 import { useEffect, useRef } from "react";
 import { useLocation } from "react-router";
+import { Note } from "../ui/Note";
 import classes from "./KeyboardHelp.module.css";
 import { commandOf, keysOf } from "./keys";
 
@@ -61,9 +62,9 @@ export function KeyboardHelp() {
             </div>
           ))}
         </dl>
-        <p className={classes["note"]}>
+        <Note mt={14} fz="small">
           There is no shortcut for the take-off of a real vehicle: hold its button for 2 s.
-        </p>
+        </Note>
       </dialog>
     </>
   );

@@ -1,7 +1,6 @@
-import { Skeleton } from "@mantine/core";
+import { Box, Skeleton, Title } from "@mantine/core";
 import type { ReactNode } from "react";
 import { ErrorNotice } from "./ErrorNotice";
-import classes from "./Form.module.css";
 
 interface Props {
   title: string;
@@ -13,11 +12,13 @@ interface Props {
 /** A page with one form, while what the form needs is loaded, and after. */
 export function FormPage({ title, error, isPending, children }: Props) {
   return (
-    <div className={classes["page"]}>
-      <h1 className={classes["title"]}>{title}</h1>
+    <Box maw={860} mx="auto">
+      <Title order={1} mt={4} mb={16}>
+        {title}
+      </Title>
       {children}
       <ErrorNotice error={error} />
       {isPending && <Skeleton height={420} radius="md" aria-busy="true" />}
-    </div>
+    </Box>
   );
 }

@@ -1,4 +1,4 @@
-import { ActionIcon, Anchor, Button, TextInput } from "@mantine/core";
+import { ActionIcon, Anchor, Button, Group, TextInput, Title } from "@mantine/core";
 import { IconPencil } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
 import { Link } from "react-router";
@@ -19,18 +19,20 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const catalogue = useCatalogue().data;
   return (
     <header className={classes["header"]}>
-      <Anchor component={Link} to="/" className={classes["back"]}>
+      <Anchor component={Link} to="/" display="inline-block" py={4} fz="small">
         All campaigns
       </Anchor>
       {renaming ? (
         <Rename campaign={campaign} onClose={() => setRenaming(false)} />
       ) : (
-        <div className={classes["line"]}>
-          <h1 className={classes["name"]}>{campaign.name}</h1>
+        <Group gap={4} wrap="nowrap">
+          <Title order={1} lh={1.2} style={{ overflowWrap: "anywhere" }}>
+            {campaign.name}
+          </Title>
           <ActionIcon color="gray" aria-label="Rename campaign" title="Rename" onClick={() => setRenaming(true)}>
             <IconPencil size={18} color="var(--dim)" />
           </ActionIcon>
-        </div>
+        </Group>
       )}
       <div className={classes["facts"]}>
         <StateBadge words={campaignStateLabel(campaign.state, campaign.outcome, campaign.rehearsal.state)} />

@@ -1,4 +1,4 @@
-import { Skeleton, useComputedColorScheme } from "@mantine/core";
+import { Box, SimpleGrid, Skeleton, Stack, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
@@ -93,7 +93,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <CampaignHeader campaign={campaign} />
       <ReadOnlyNotice why={watching} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
-        <div className={classes["flown"]}>
+        <Stack gap="var(--gap)" miw={0}>
           <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} onChoose={choose} />
           {shown !== null && (
             <Verdict
@@ -104,7 +104,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
               experiment={experiment}
             />
           )}
-        </div>
+        </Stack>
         <div className={classes["next"]}>
           {standing !== null && <Next {...standing} onChoose={setChosen} />}
           {standing === null &&
@@ -115,11 +115,11 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
             ))}
         </div>
       </div>
-      <div className={classes["halves"]}>
+      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt="var(--gap)">
         <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
-      </div>
+      </SimpleGrid>
       <Landscape campaignId={campaign.id} />
-      <div className={classes["row"]}>{read !== null && <Statistics campaignId={campaign.id} />}</div>
+      <Box mt="var(--gap)">{read !== null && <Statistics campaignId={campaign.id} />}</Box>
       <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
     </>
   );

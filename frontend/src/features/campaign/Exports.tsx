@@ -1,8 +1,7 @@
-import { Button } from "@mantine/core";
+import { Button, Group } from "@mantine/core";
 import { pathOf, useDownload } from "../../api/files";
 import type { Campaign } from "../../api/types";
 import { ErrorNotice } from "../../ui/ErrorNotice";
-import classes from "./CampaignHeader.module.css";
 
 /** Report and bundle of the campaign; no bundle during a flight. */
 export function Exports({ campaign }: { campaign: Campaign }) {
@@ -10,7 +9,7 @@ export function Exports({ campaign }: { campaign: Campaign }) {
   const bundle = useDownload(pathOf(campaign.id, "bundle"));
   return (
     <>
-      <div className={classes["away"]}>
+      <Group gap={8} ms="auto">
         <Button
           component="a"
           variant="default"
@@ -28,7 +27,7 @@ export function Exports({ campaign }: { campaign: Campaign }) {
             Export bundle
           </Button>
         )}
-      </div>
+      </Group>
       <ErrorNotice error={pdf.error ?? bundle.error} />
     </>
   );

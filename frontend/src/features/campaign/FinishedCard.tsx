@@ -1,10 +1,11 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { IconArchive } from "@tabler/icons-react";
 import { useArchive } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { against, percentChange, withUnit } from "../../ui/format";
 import { GainList } from "../../ui/GainList";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { campaignStateLabel } from "../../ui/states";
 import { plusMinus } from "../../ui/uncertainty";
@@ -32,10 +33,8 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const change = percentChange(campaign.best?.mean, first?.error);
   return (
     <Panel title={title}>
-      <div className={classes["stack"]}>
-        {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && (
-          <p className={classes["quiet"]}>{campaign.stop_reason}</p>
-        )}
+      <Stack gap={14}>
+        {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && <Note fz="body">{campaign.stop_reason}</Note>}
         {best !== null && campaign.best !== null && (
           <div className={`${classes["best"]} numbers`}>
             <p>Best: flight {best.number}</p>
@@ -59,10 +58,10 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
           </Button>
         )}
         <PromoteGains campaign={campaign} />
-        <p className={classes["quiet"]}>
+        <Note fz="body">
           This campaign has no more flights. To continue, clone it. With “Start from flight” on, the clone starts from
           the best gains found here.
-        </p>
+        </Note>
         <CloneForm {...campaign} experiment={experiment} />
         {campaign.actions.includes("archive") && (
           <Button
@@ -77,7 +76,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
           </Button>
         )}
         <ErrorNotice error={archive.error} />
-      </div>
+      </Stack>
     </Panel>
   );
 }

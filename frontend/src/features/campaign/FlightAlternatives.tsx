@@ -1,6 +1,7 @@
 import { Button } from "@mantine/core";
 import { IconPencil } from "@tabler/icons-react";
 import { useStatistics } from "../../api/queries";
+import { Note } from "../../ui/Note";
 import classes from "./NextFlight.module.css";
 import { type Choice, expectationOf, type Variant } from "./proposal";
 
@@ -34,5 +35,9 @@ export function FlightAlternatives({ campaignId, choices, disabled, onFly, onEdi
 /** One line below the button that flies the variant. */
 export function Expectation({ campaignId, variant }: { campaignId: number; variant: Variant }) {
   const expectation = expectationOf(variant, useStatistics(campaignId).data);
-  return expectation === "" ? null : <p className={`${classes["expectation"]} numbers`}>{expectation}</p>;
+  return expectation === "" ? null : (
+    <Note fz="fine" lh={1.35} m="6px 2px 4px" className="numbers">
+      {expectation}
+    </Note>
+  );
 }

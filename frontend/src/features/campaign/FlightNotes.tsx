@@ -1,4 +1,4 @@
-import { Button, FileButton, InputBase } from "@mantine/core";
+import { Button, FileButton, Group, InputBase } from "@mantine/core";
 import { IconCamera, IconTrash } from "@tabler/icons-react";
 import { useState } from "react";
 import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/photos";
@@ -40,7 +40,7 @@ export function FlightNotes({ trial }: { trial: Trial }) {
         </ul>
       )}
       {asked !== null && doomed >= 0 && (
-        <div className={classes["asks"]}>
+        <Group gap={8}>
           <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
           <Button variant="default" onClick={() => setAsked(null)}>
             Cancel
@@ -48,7 +48,7 @@ export function FlightNotes({ trial }: { trial: Trial }) {
           <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
             Delete photo {doomed + 1}
           </Button>
-        </div>
+        </Group>
       )}
       <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
         {(props) => (

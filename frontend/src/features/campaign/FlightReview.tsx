@@ -1,4 +1,4 @@
-import { Button, Chip, TextInput } from "@mantine/core";
+import { Button, Chip, Text, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useClassify } from "../../api/mutations";
 import { problemOf, reasonsByField } from "../../api/problems";
@@ -80,10 +80,10 @@ export function FlightReview({ trial, trials }: Props) {
   return (
     <>
       {suggestion !== null && (
-        <p className={classes["suggested"]}>
+        <Text w="100%" fz="body" lh={1.4}>
           Suggested: <strong>{suggestion.outcome}</strong>, {suggestion.why}.
           {suggestion.outcome === "invalid" && ` ${consequenceOf(trial, trials, "invalid")}`}
-        </p>
+        </Text>
       )}
       {others.map((outcome) => (
         <Button

@@ -2,6 +2,7 @@ import { Anchor, Skeleton } from "@mantine/core";
 import { memo } from "react";
 import { Link } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import classes from "./FlightsPanel.module.css";
 import { TrialsTable } from "./TrialsTable";
@@ -25,9 +26,7 @@ export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown
   return (
     <Panel title="All flights" className={classes["panel"]} tools={trials?.length ? compare : null}>
       {trials === null && <Skeleton height={320} radius="md" />}
-      {trials?.length === 0 && (
-        <p className={classes["none"]}>No flights yet. Flights appear here with their gains and errors.</p>
-      )}
+      {trials?.length === 0 && <Note>No flights yet. Flights appear here with their gains and errors.</Note>}
       {trials !== null && trials.length > 0 && (
         <TrialsTable campaign={campaign} trials={trials} shown={shown} unit={unit} onChoose={onChoose} />
       )}

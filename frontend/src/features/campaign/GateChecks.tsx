@@ -2,6 +2,7 @@ import { IconCircleCheck, IconCircleX } from "@tabler/icons-react";
 import type { Check, Gate } from "../../api/types";
 import { count, gainText } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
+import { Note } from "../../ui/Note";
 import classes from "./NextFlight.module.css";
 
 /** Gate checks of a flight: a summary line, and each check when opened or when one has failed. */
@@ -29,10 +30,10 @@ export function GateChecks({ gate }: { gate: Gate }) {
             );
           })}
         </ul>
-        <p className={classes["gateNote"]}>
+        <Note fz="fine" mt={10}>
           Checked before every flight, for proposed and manual gains.
           <HelpTip topic="gate" />
-        </p>
+        </Note>
       </div>
     </details>
   );

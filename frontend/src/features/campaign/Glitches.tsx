@@ -1,7 +1,7 @@
 import type { Trial } from "../../api/types";
+import { Aside } from "../../ui/Aside";
 import { HelpTip } from "../../ui/HelpTip";
 import { plusMinus } from "../../ui/uncertainty";
-import classes from "./Verdict.module.css";
 
 const KINDS = {
   acceleration: "Impossible acceleration",
@@ -15,7 +15,7 @@ export function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
   const glitches = trial.glitches ?? [];
   if (glitches.length === 0) return null;
   return (
-    <div className={classes["glitches"]}>
+    <Aside tone="bad" mb={14} fz="small">
       <h3>
         The record has {glitches.length === 1 ? "a glitch" : `${glitches.length} glitches`}
         <HelpTip topic="glitch" />
@@ -36,6 +36,6 @@ export function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
           {plusMinus(trial.repaired_error, null, unit)}.
         </p>
       )}
-    </div>
+    </Aside>
   );
 }

@@ -1,4 +1,4 @@
-import { Button, Loader } from "@mantine/core";
+import { Button, Loader, Stack, Text } from "@mantine/core";
 import { useRecompute, useUploadRecord } from "../../api/mutations";
 import type { NextFlight } from "../../api/types";
 import { ErrorNotice } from "../../ui/ErrorNotice";
@@ -45,11 +45,11 @@ function Step({ campaign, next, trials, onChoose }: Props) {
     case "judge":
       return (
         <Panel title={`Review flight ${step.trial.number}`}>
-          <p className={classes["lead"]}>
+          <Text lh={1.45} mb={14}>
             {step.trial.state === "lost"
               ? "The end of this flight is unknown. Classify it; then the next gains are proposed."
               : "Classify this flight; then the next gains are proposed."}
-          </p>
+          </Text>
           <Button fullWidth onClick={() => onChoose(step.trial.number)}>
             Review flight {step.trial.number}
           </Button>
@@ -77,7 +77,7 @@ function FailedCard({ campaignId, next }: { campaignId: number; next: NextFlight
   const recompute = useRecompute(campaignId);
   return (
     <Panel title="Next flight">
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         <div role="alert" className={classes["failed"]}>
           <strong>{next.problem?.title ?? "The next gains could not be computed."}</strong>
           <p>{next.problem?.detail}</p>
@@ -87,7 +87,7 @@ function FailedCard({ campaignId, next }: { campaignId: number; next: NextFlight
           Compute again
         </Button>
         <ErrorNotice error={recompute.error} />
-      </div>
+      </Stack>
     </Panel>
   );
 }

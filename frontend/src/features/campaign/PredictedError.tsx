@@ -1,6 +1,7 @@
 import type { Proposal } from "../../api/types";
 import { against, percentChange, withUnit } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
+import { Note } from "../../ui/Note";
 import { intervalText } from "../../ui/uncertainty";
 import classes from "./NextFlight.module.css";
 
@@ -14,7 +15,7 @@ interface Props {
 export function PredictedError({ proposal, best, unit }: Props) {
   const { predicted_error: error, interval } = proposal;
   const change = percentChange(error, best);
-  if (error === null) return <p className={classes["quiet"]}>No prediction: there is no model of these gains.</p>;
+  if (error === null) return <Note fz="body">No prediction: there is no model of these gains.</Note>;
   return (
     <div className={`${classes["predicted"]} numbers`}>
       <span>

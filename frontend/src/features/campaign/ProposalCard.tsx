@@ -1,4 +1,4 @@
-import { Button } from "@mantine/core";
+import { Button, Stack, Text } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useState } from "react";
 import { type RecordUpload, useCreateTrial } from "../../api/mutations";
@@ -11,7 +11,6 @@ import { GainTable } from "./GainTable";
 import { GateChecks } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
 import { ManualGains } from "./ManualGains";
-import classes from "./NextFlight.module.css";
 import { speedOf } from "./nextStep";
 import { PredictedError } from "./PredictedError";
 import { ProposalExplanation } from "./ProposalExplanation";
@@ -53,8 +52,15 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
     );
   }
   return (
-    <Panel title={`Next flight: ${number}`} tools={<span className={classes["quiet"]}>{KINDS[proposal.kind]}</span>}>
-      <div className={classes["stack"]}>
+    <Panel
+      title={`Next flight: ${number}`}
+      tools={
+        <Text span c="dimmed" fz="body">
+          {KINDS[proposal.kind]}
+        </Text>
+      }
+    >
+      <Stack gap={14}>
         {trials.length > 0 && <Recommendation advice={advice} />}
         {advice.variant !== null && (
           <div>
@@ -107,7 +113,7 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
           <GateChecks gate={proposal.gate} />
         </div>
         {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
-      </div>
+      </Stack>
     </Panel>
   );
 }

@@ -1,3 +1,4 @@
+import { Stack } from "@mantine/core";
 import type { Explanation, FittedParameter } from "../../api/types";
 import { gainText, NOTHING, withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
@@ -18,7 +19,7 @@ export function ProposalExplanation({ explanation, unit, gains }: Props) {
     <>
       <details className={classes["more"]}>
         <summary>Explanation</summary>
-        <div className={classes["stack"]}>
+        <Stack gap={14}>
           <span>
             {explanation.summary} <HelpTip topic="bias" />
           </span>
@@ -38,7 +39,7 @@ export function ProposalExplanation({ explanation, unit, gains }: Props) {
             <span key={note}>{note}</span>
           ))}
           {fitted.length > 0 && <Fitted parameters={fitted} />}
-        </div>
+        </Stack>
       </details>
       <Tried explanation={explanation} unit={unit} gains={gains} />
     </>
@@ -83,7 +84,7 @@ function Tried({ explanation, unit, gains }: Props) {
   return (
     <details className={classes["more"]}>
       <summary>Steps evaluated on the model</summary>
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         {slopes.length > 0 && (
           <span className="numbers">
             Gradient of the error:{" "}
@@ -116,7 +117,7 @@ function Tried({ explanation, unit, gains }: Props) {
             </table>
           </section>
         )}
-      </div>
+      </Stack>
     </details>
   );
 }

@@ -1,3 +1,4 @@
+import { Stack } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useStatistics } from "../../api/queries";
 import type { CampaignStatistics } from "../../api/types";
@@ -5,6 +6,7 @@ import { ErrorNotice } from "../../ui/ErrorNotice";
 import { count } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { confidenceText, percent, plusMinus, scatterSource } from "../../ui/uncertainty";
@@ -18,12 +20,12 @@ export function StatisticsPanel({ campaignId }: { campaignId: number }) {
   return (
     <Panel title="Statistics">
       <ErrorNotice error={statistics.error} />
-      {statistics.isPending && <div className={classes["waiting"]} aria-busy="true" />}
+      {statistics.isPending && <div style={{ minHeight: 160 }} aria-busy="true" />}
       {statistics.data && statistics.data.groups.length === 0 && (
-        <p className={classes["none"]}>
+        <Note>
           Available after the first valid flight: the scatter of the error, whether the best gains are better, and how
           good the predictions are.
-        </p>
+        </Note>
       )}
       {statistics.data && statistics.data.groups.length > 0 && <Results {...statistics.data} />}
     </Panel>
@@ -34,7 +36,7 @@ function Results(all: CampaignStatistics) {
   const { comparison, drift, track_record: record, notes, trends } = all;
   const shown = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
   return (
-    <div className={classes["said"]}>
+    <Stack gap={14}>
       <div className={classes["facts"]}>
         <Verdict comparison={comparison} unit={all.error_unit} />
         <Scatter {...all} />
@@ -56,7 +58,7 @@ function Results(all: CampaignStatistics) {
             <li key={note}>{note}</li>
           ))}
       </ul>
-    </div>
+    </Stack>
   );
 }
 

@@ -1,7 +1,8 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { useState } from "react";
 import { useFinish } from "../../api/mutations";
 import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Note } from "../../ui/Note";
 import classes from "./NextFlight.module.css";
 
 /** Ends the campaign between flights, after a confirmation because it cannot be undone. */
@@ -16,10 +17,8 @@ export function StopCampaign({ campaignId }: { campaignId: number }) {
     );
   }
   return (
-    <div className={classes["stack"]}>
-      <p className={classes["quiet"]}>
-        Stop this campaign? It cannot be resumed. Its flights are kept, and it can be cloned.
-      </p>
+    <Stack gap={14}>
+      <Note fz="body">Stop this campaign? It cannot be resumed. Its flights are kept, and it can be cloned.</Note>
       <div className={classes["row"]}>
         <Button variant="default" onClick={() => setAsking(false)}>
           Continue
@@ -29,6 +28,6 @@ export function StopCampaign({ campaignId }: { campaignId: number }) {
         </Button>
       </div>
       <ErrorNotice error={finish.error} />
-    </div>
+    </Stack>
   );
 }

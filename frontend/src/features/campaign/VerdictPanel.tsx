@@ -1,9 +1,10 @@
-import { Anchor, Button } from "@mantine/core";
+import { Anchor, Button, Group, Text } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
 import { recordCsv, useCampaign, useStatistics } from "../../api/queries";
 import type { Trial } from "../../api/types";
+import { Aside } from "../../ui/Aside";
 import type { Topic } from "../../ui/explanations";
 import { percentChange, percentText, withUnit } from "../../ui/format";
 import { GainList } from "../../ui/GainList";
@@ -85,7 +86,11 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </span>
       }
     >
-      {asked && <p className={classes["sentence"]}>{asked}</p>}
+      {asked && (
+        <Text fz="body" lh={1.45} mb={4}>
+          {asked}
+        </Text>
+      )}
       <p className={asked ? classes["reason"] : classes["sentence"]}>{sentenceOf(trial)}</p>
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
         <p className={classes["reason"]}>{trial.reason}</p>
@@ -93,9 +98,9 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       <AbortCause trial={trial} />
       <TrialComparisons trial={trial} unit={unit} />
       {trial.overrule_reason && (
-        <p className={classes["overruled"]}>
+        <Aside tone="warn" mt={6} fz="body">
           <strong>The gate refused these gains and was overruled:</strong> {trial.overrule_reason}
-        </p>
+        </Aside>
       )}
       <dl className={`${classes["figures"]} numbers`}>
         <Fact title="Error" topic="error">
@@ -129,11 +134,11 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       </dl>
       <Glitches trial={trial} unit={unit} />
       {without && (
-        <p className={classes["sentence"]} role="status">
+        <Text fz="body" lh={1.45} mb={4} role="status">
           {without}
-        </p>
+        </Text>
       )}
-      <div className={classes["acts"]}>
+      <Group gap="10px 14px">
         <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
         {campaign && <RetryGains campaign={campaign} trial={trial} />}
         {trial.record !== null && (
@@ -150,21 +155,18 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         <Anchor
           component={Link}
           to={`/compare?add=${trial.id}&campaign=${trial.campaign_id}`}
-          className={classes["link"]}
+          px={6}
+          py={12}
           aria-label={`Compare flight ${trial.number}`}
         >
           Compare
         </Anchor>
         {!own && (
-          <Anchor
-            component={Link}
-            to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`}
-            className={classes["link"]}
-          >
+          <Anchor component={Link} to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`} px={6} py={12}>
             Open flight
           </Anchor>
         )}
-      </div>
+      </Group>
       <FlightNotes trial={trial} />
       {campaign && isBest && campaign.state !== "finished" && <PromoteGains campaign={campaign} />}
     </Panel>

@@ -1,4 +1,4 @@
-import { SegmentedControl } from "@mantine/core";
+import { SegmentedControl, Stack } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import type { ReactNode } from "react";
 import type { Catalogue, OptionInfo } from "../../api/types";
@@ -31,7 +31,7 @@ export function AdvancedFields(props: Props) {
   const titled = (things: readonly { name: string; title: string }[], name: string): string =>
     things.find((thing) => thing.name === name)?.title ?? name;
   return (
-    <div className={classes["all"]}>
+    <Stack gap={22}>
       <StopFields {...props} />
       <OptionGroup
         title={`Strategy: ${titled(catalogue.strategies, form.strategy)}`}
@@ -67,7 +67,7 @@ export function AdvancedFields(props: Props) {
           onChange={(seed) => set({ seed })}
         />
       </Group>
-    </div>
+    </Stack>
   );
 }
 

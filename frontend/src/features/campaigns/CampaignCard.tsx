@@ -1,4 +1,4 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { IconArchive } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "react-router";
@@ -59,7 +59,7 @@ function More({ campaign }: { campaign: CampaignSummary }) {
         {campaign.state === "finished" ? "Clone or archive" : "Clone"}
       </summary>
       {open && (
-        <div className={classes["acts"]}>
+        <Stack gap={10} pb={12}>
           <CloneForm {...campaign} />
           {campaign.state === "finished" && (
             <Button
@@ -72,7 +72,7 @@ function More({ campaign }: { campaign: CampaignSummary }) {
             </Button>
           )}
           <ErrorNotice error={archive.error} />
-        </div>
+        </Stack>
       )}
     </details>
   );

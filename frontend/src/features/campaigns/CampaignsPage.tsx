@@ -1,4 +1,4 @@
-import { Button, SegmentedControl, Skeleton, TextInput } from "@mantine/core";
+import { Box, Button, Group, SegmentedControl, Skeleton, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -39,13 +39,15 @@ export function CampaignsPage() {
   if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
   return (
     <>
-      <div className={`${work["head"]} ${classes["head"]}`}>
-        <h1 className={`${work["title"]} ${classes["title"]}`}>Campaigns</h1>
+      <Group gap={12} mb={14}>
+        <Title order={1} me="auto">
+          Campaigns
+        </Title>
         <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
           New campaign
         </Button>
         <ImportBundle />
-      </div>
+      </Group>
       <search className={classes["filters"]}>
         <TextInput
           aria-label="Search campaigns by name"
@@ -104,11 +106,11 @@ export function CampaignsPage() {
         ))}
       </ul>
       {campaigns.hasNextPage && (
-        <div className={work["more"]}>
+        <Box mt={20} ta="center">
           <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
             Show more ({found.length} of {total})
           </Button>
-        </div>
+        </Box>
       )}
     </>
   );

@@ -7,6 +7,7 @@ import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue, Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
+import { Aside } from "../../ui/Aside";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { FoldedSection } from "../../ui/FoldedSection";
 import classes from "../../ui/Form.module.css";
@@ -119,10 +120,10 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         onVehicle={(vehicle) => setForm(withRegistered(form, catalogue, vehicle))}
       />
       {isReal && (
-        <p className={classes["rehearse"]}>
+        <Aside tone="warn">
           {form.registered?.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
           simulation, which you start from the campaign page.
-        </p>
+        </Aside>
       )}
       <TextInput
         label="Name"

@@ -1,4 +1,4 @@
-import { ActionIcon, Anchor, Button, Skeleton } from "@mantine/core";
+import { ActionIcon, Anchor, Box, Button, Skeleton, Title } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { type DragEvent, useState } from "react";
 import { Link, useNavigate, useParams } from "react-router";
@@ -47,7 +47,7 @@ export function ControllerPage() {
       onDragLeave={() => setOver(false)}
       onDrop={drop}
     >
-      <h1 className={classes["title"]}>Controller check</h1>
+      <Title order={1}>Controller check</Title>
       {checkId > 0 && <CheckResult key={checkId} checkId={checkId} upload={upload} onCheck={check} />}
       <CheckForm upload={upload} onCheck={check} over={over} brief={checkId > 0} />
       <EarlierChecks shown={checkId} />
@@ -101,11 +101,11 @@ function EarlierChecks({ shown }: { shown: number }) {
         ))}
       </ul>
       {checks.hasNextPage && (
-        <div className={classes["more"]}>
+        <Box mt={20} ta="center">
           <Button variant="default" loading={checks.isFetchingNextPage} onClick={() => void addPage(checks)}>
             Show more ({found.length} of {total})
           </Button>
-        </div>
+        </Box>
       )}
     </section>
   );

@@ -1,4 +1,4 @@
-import { Button, useComputedColorScheme } from "@mantine/core";
+import { Button, Group, Stack, Title, useComputedColorScheme } from "@mantine/core";
 import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
 import { useEffect, useMemo, useState } from "react";
 import { useSearchParams } from "react-router";
@@ -49,15 +49,15 @@ export function ComparePage() {
   const kept = withoutRefused(chosen, problem);
   return (
     <>
-      <div className={work["head"]}>
-        <h1 className={work["title"]}>Compare</h1>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Compare</Title>
         {chosen.length > 0 && (
           <Button variant="default" onClick={() => choose([])}>
             Clear selection
           </Button>
         )}
-      </div>
-      <div className={classes["stack"]}>
+      </Group>
+      <Stack gap="var(--gap)">
         {chosen.length === 0 && <Introduction />}
         {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
         {problem !== null && chosen.length > 1 && (
@@ -79,7 +79,7 @@ export function ComparePage() {
           from={from > 0 ? from : null}
           onToggle={(trial) => choose(toggled(chosen, trial))}
         />
-      </div>
+      </Stack>
     </>
   );
 }

@@ -4,6 +4,7 @@ import type { ReactNode } from "react";
 import { Link } from "react-router";
 import type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } from "../../api/compare";
 import { count, gainText, NOTHING } from "../../ui/format";
+import { Note } from "../../ui/Note";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { StateBadge } from "../../ui/StateBadge";
 import { trialStateLabel } from "../../ui/states";
@@ -99,7 +100,7 @@ function Name({ flight, several, pen }: { flight: ComparedFlight; several: boole
         {pen && <LineSample pen={pen} />}
       </span>
       <span>
-        <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`} className={classes["link"]}>
+        <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`}>
           Flight {number}
         </Anchor>
         {several && <small className={`${classes["small"]} ${classes["campaignName"]}`}>{campaign_name}</small>}
@@ -192,7 +193,7 @@ export function SettingsTable({ comparison: { flights, settings } }: { compariso
   return (
     <>
       {settings.length === 0 && (
-        <p className={classes["quiet"]}>No other differences: same vehicle, experiment, strategy and settings.</p>
+        <Note mt={10}>No other differences: same vehicle, experiment, strategy and settings.</Note>
       )}
       {everywhere.length > 0 && <Settings flights={flights} settings={everywhere} title="Settings that differ" />}
       {somewhere.length > 0 && (

@@ -1,10 +1,9 @@
-import { Button } from "@mantine/core";
+import { Button, Group } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
 import { comparisonFigure, curvesCsv } from "../../api/compare";
 import { loadPlotly } from "../../charts/plotly";
 import type { PlotlyFigure } from "../../charts/traces";
 import { ErrorNotice } from "../../ui/ErrorNotice";
-import classes from "./Compare.module.css";
 
 type Format = "png" | "svg";
 
@@ -25,7 +24,7 @@ async function save(trials: readonly number[], filename: string, format: Format)
 export function SaveComparison({ trials, stem }: { trials: readonly number[]; stem: string }) {
   const saving = useMutation({ mutationFn: (format: Format) => save(trials, stem, format) });
   return (
-    <div className={classes["save"]}>
+    <Group gap={8}>
       <Button
         component="a"
         variant="default"
@@ -47,6 +46,6 @@ export function SaveComparison({ trials, stem }: { trials: readonly number[]; st
         </Button>
       ))}
       <ErrorNotice error={saving.error} />
-    </div>
+    </Group>
   );
 }

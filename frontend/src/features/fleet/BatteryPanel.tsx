@@ -1,4 +1,4 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Stack, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useEditVehicle } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
@@ -17,7 +17,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
   const label = typed ?? vehicle.battery;
   return (
     <Panel title="Battery">
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         <dl className={`${classes["facts"]} numbers`}>
           <LabelledValue
             title="Voltage now"
@@ -46,7 +46,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
           </Button>
         </form>
         <ErrorNotice error={edit.error} />
-      </div>
+      </Stack>
     </Panel>
   );
 }

@@ -1,5 +1,6 @@
 import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
 import type { Vehicle } from "../../api/types";
+import { Note } from "../../ui/Note";
 import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
@@ -7,7 +8,7 @@ import classes from "./Fleet.module.css";
 /** All items of the last preflight check. */
 export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicle }) {
   if (checks === null) {
-    return <p className={classes["quiet"]}>Not checked yet. All items are checked again before every flight.</p>;
+    return <Note>Not checked yet. All items are checked again before every flight.</Note>;
   }
   return (
     <>
@@ -47,9 +48,9 @@ export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicl
           </tbody>
         </table>
       </div>
-      <p className={classes["quiet"]}>
+      <Note>
         Checked <Time at={checked_at} />.
-      </p>
+      </Note>
     </>
   );
 }

@@ -5,6 +5,7 @@ import type { GivenGains } from "../../api/types";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { NOTHING } from "../../ui/format";
 import { gainsInBrackets, sameHeld } from "../../ui/gains";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { addPage } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
@@ -20,7 +21,7 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
     <Panel title="Gain history" className={classes["wide"]}>
       <ErrorNotice error={ledger.error} />
       {ledger.isPending && <Skeleton height={120} aria-busy="true" />}
-      {ledger.data && lines.length === 0 && <p className={classes["quiet"]}>No gains written yet.</p>}
+      {ledger.data && lines.length === 0 && <Note>No gains written yet.</Note>}
       {lines.length > 0 && (
         <ScrollTable label="Gain history" className={classes["table"]}>
           <thead>
@@ -39,12 +40,7 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
         </ScrollTable>
       )}
       {ledger.hasNextPage && (
-        <Button
-          variant="default"
-          className={classes["more"] ?? ""}
-          loading={ledger.isFetchingNextPage}
-          onClick={() => void addPage(ledger)}
-        >
+        <Button variant="default" mt={12} loading={ledger.isFetchingNextPage} onClick={() => void addPage(ledger)}>
           Show more ({lines.length} of {ledger.data?.pages[0]?.total})
         </Button>
       )}

@@ -1,8 +1,10 @@
+import { Stack } from "@mantine/core";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
 import { linkText, stepWord } from "../../live/vehicleStatus";
 import { NOTHING, withUnit } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { percent } from "../../ui/uncertainty";
 import classes from "./Fleet.module.css";
@@ -21,7 +23,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
   const { identity } = vehicle;
   return (
     <Panel title="Connection">
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         {isLinked ? (
           <dl className={`${classes["facts"]} numbers`}>
             <LabelledValue title="Link age" topic="linkAge" value={linkText(aged)} bad={stale} />
@@ -41,21 +43,21 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
             />
           </dl>
         ) : (
-          <p className={classes["quiet"]}>
+          <Note>
             Not connected.{" "}
             {identity === null
               ? "Connecting compares the vehicle's gains with the safe gains and changes nothing."
               : "Connecting writes the safe gains and reads them back. The vehicle does not move."}
-          </p>
+          </Note>
         )}
-        {status?.said && <p className={classes["quiet"]}>Message: {status.said}</p>}
+        {status?.said && <Note>Message: {status.said}</Note>}
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
-        <p className={classes["quiet"]}>
+        <Note>
           {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
           {identity !== null && `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
           {identity?.uid && `, hardware id ${identity.uid}`}
-        </p>
-      </div>
+        </Note>
+      </Stack>
     </Panel>
   );
 }

@@ -1,4 +1,4 @@
-import { Button, Checkbox, Switch, TextInput } from "@mantine/core";
+import { Button, Checkbox, Stack, Switch, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
@@ -124,7 +124,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         onChange={(safeGains) => set({ safeGains, confirmed: false })}
       />
       {!simulated && (
-        <div className={classes["confirm"]}>
+        <Stack gap={12}>
           <Checkbox
             size="md"
             label="These gains have been verified on this vehicle."
@@ -140,7 +140,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
             error={reasons["statement"]}
             onChange={(event) => set({ statement: event.currentTarget.value })}
           />
-        </div>
+        </Stack>
       )}
       <FoldedSection title="Advanced: identity, limits, motion capture, signing" forcedOpen={refusedBelow}>
         <div className={classes["pair"]}>

@@ -1,4 +1,4 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Text, TextInput } from "@mantine/core";
 import { IconUserCheck } from "@tabler/icons-react";
 import { useReleaseControl, useTakeControl } from "../../api/control";
 import { useOwnLease } from "../../api/leases";
@@ -53,9 +53,9 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
       }}
     >
       {other !== null && (
-        <p className={classes["say"]}>
+        <Text lh={1.4}>
           <strong>{other} is in control.</strong> Ask them to release control, or take over. All users see the takeover.
-        </p>
+        </Text>
       )}
       <div className={classes["take"]}>
         <TextInput

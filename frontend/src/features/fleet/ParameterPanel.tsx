@@ -1,7 +1,8 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Stack, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useActs } from "../../api/fleet";
 import { gainText } from "../../ui/format";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
@@ -34,11 +35,11 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
         </Button>
       }
     >
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         {parameters.length === 0 ? (
-          <p className={classes["quiet"]}>
+          <Note>
             {latest?.state === "failed" ? latest.problem : "Not read yet. Reading all parameters takes a few seconds."}
-          </p>
+          </Note>
         ) : (
           <>
             <TextInput
@@ -61,12 +62,12 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
                 </tbody>
               </table>
             </section>
-            <p className={classes["quiet"]}>
+            <Note>
               Read <Time at={read?.finished_at} />.
-            </p>
+            </Note>
           </>
         )}
-      </div>
+      </Stack>
     </Panel>
   );
 }

@@ -44,12 +44,7 @@ export function RequestList({ vehicleId }: { vehicleId: number }) {
         </tbody>
       </ScrollTable>
       {acts.hasNextPage && (
-        <Button
-          variant="default"
-          className={classes["more"] ?? ""}
-          loading={acts.isFetchingNextPage}
-          onClick={() => void addPage(acts)}
-        >
+        <Button variant="default" mt={12} loading={acts.isFetchingNextPage} onClick={() => void addPage(acts)}>
           Show more ({items.length} of {acts.data?.pages[0]?.total})
         </Button>
       )}

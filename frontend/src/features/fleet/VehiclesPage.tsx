@@ -1,4 +1,4 @@
-import { Button, Skeleton } from "@mantine/core";
+import { Button, Group, Skeleton, Stack, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useVehicles } from "../../api/vehicles";
@@ -15,16 +15,16 @@ export function VehiclesPage() {
   const shared = vehicles.data?.filter((vehicle) => !vehicle.registered) ?? [];
   return (
     <>
-      <div className={classes["head"]}>
-        <h1 className={classes["title"]}>Vehicles</h1>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Vehicles</Title>
         <Button component={Link} to="/vehicles/new" leftSection={<IconPlus size={20} aria-hidden />}>
           Register a vehicle
         </Button>
-      </div>
+      </Group>
       <ErrorNotice error={vehicles.error} />
       {vehicles.isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
       {vehicles.data && registered.length === 0 && <NoVehicles />}
-      <div className={classes["stack"]}>
+      <Stack gap={28}>
         {registered.length > 0 && (
           <section>
             <h2 className={classes["section"]}>Registered vehicles</h2>
@@ -45,7 +45,7 @@ export function VehiclesPage() {
             </ul>
           </section>
         )}
-      </div>
+      </Stack>
     </>
   );
 }

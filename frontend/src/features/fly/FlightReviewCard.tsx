@@ -1,4 +1,4 @@
-import { Anchor, Button } from "@mantine/core";
+import { Anchor, Button, Stack } from "@mantine/core";
 import { Link } from "react-router";
 import { useTrials } from "../../api/queries";
 import type { Campaign, Trial } from "../../api/types";
@@ -21,7 +21,7 @@ export function FlightReviewCard({ campaign, trial }: Props) {
   const trials = useTrials(campaign.id).data ?? [];
   const page = `/campaigns/${campaign.id}`;
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       <p className={classes["marks"]}>
         <StateBadge words={trialStateLabel(trial.state)} />
         <PredictionResult trial={trial} />
@@ -29,9 +29,9 @@ export function FlightReviewCard({ campaign, trial }: Props) {
       </p>
       {trial.state !== "captured" && <p className={classes["say"]}>{sentenceOf(trial)}</p>}
       <AbortCause trial={trial} />
-      <div className={classes["classes"]}>
+      <Stack gap={8}>
         <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
-      </div>
+      </Stack>
       <FlightNotes trial={trial} />
       <div className={classes["onward"]}>
         {trial.state !== "captured" && trial.state !== "lost" && (
@@ -39,10 +39,10 @@ export function FlightReviewCard({ campaign, trial }: Props) {
             Next flight
           </Button>
         )}
-        <Anchor component={Link} to={`${page}/flights/${trial.id}`} className={classes["link"]}>
+        <Anchor component={Link} to={`${page}/flights/${trial.id}`} display="inline-block" py={12}>
           Open flight
         </Anchor>
       </div>
-    </div>
+    </Stack>
   );
 }

@@ -32,7 +32,7 @@ export function Quarantine({ vehicle, concern, orders }: Props) {
         Land now
       </Button>
       {orders.said?.order === "land" && <CommandResult orders={orders} />}
-      <Anchor component={Link} to={`/vehicles/${vehicle.id}`} className={classes["link"]}>
+      <Anchor component={Link} to={`/vehicles/${vehicle.id}`} display="inline-block" py={12}>
         Inspect and release {vehicle.name}
       </Anchor>
     </section>

@@ -1,4 +1,4 @@
-import { Anchor, Button, Loader } from "@mantine/core";
+import { Anchor, Button, Loader, Stack } from "@mantine/core";
 import { IconOctagonFilled, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
@@ -55,7 +55,7 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
   switch (step) {
     case "plan":
       return (
-        <div className={classes["stack"]}>
+        <Stack gap={12}>
           {campaign.vehicle.can_fly ? (
             <>
               <Button
@@ -79,7 +79,7 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
           )}
           <Problem trial={trial} />
           <ErrorNotice error={fly.error} />
-        </div>
+        </Stack>
       );
     case "judge":
     case "over":
@@ -106,7 +106,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
   }
   const isReady = vehicle.actions.includes("stage") && trial.actions.includes("stage");
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       {(vehicle.is_real || isOthers || isInControl) && <OperatorControl vehicle={vehicle} />}
       {vehicle.state === "disconnected" && (
         <p className={classes["say"]}>
@@ -133,7 +133,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
           : "Writes these gains to the landed and disarmed vehicle and reads each one back. The vehicle does not move."}
       </p>
       <ErrorNotice error={stage.error} />
-    </div>
+    </Stack>
   );
 }
 
@@ -143,7 +143,7 @@ function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
   const isOthers = vehicle.control !== null && !isInControl;
   const may = trial.actions.includes("take-off") && !isOthers && (isInControl || !vehicle.is_real);
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       {(vehicle.is_real || isOthers) && !isInControl && <OperatorControl vehicle={vehicle} />}
       {vehicle.is_real ? (
         <HoldButton
@@ -171,7 +171,7 @@ function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
         Unstage (restore safe gains)
       </Button>
       <ErrorNotice error={takeOff.error ?? unstage.error} />
-    </div>
+    </Stack>
   );
 }
 
@@ -179,7 +179,7 @@ function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
 function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
   const asked = abort.asked.has(trial.id);
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       <button type="button" className={classes["abort"]} onClick={() => abort.press([trial.id])}>
         <IconOctagonFilled size={40} aria-hidden />
         {asked ? "ABORTING" : "ABORT"}
@@ -190,19 +190,19 @@ function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
           ? "Sending safe gains and Land until the vehicle confirms."
           : "Ends the flight immediately: sends safe gains and Land until the vehicle confirms."}
       </p>
-    </div>
+    </Stack>
   );
 }
 
 function Waiting({ text, children }: { text: string; children?: ReactNode }) {
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       <p className={classes["waiting"]}>
         <Loader size="sm" aria-hidden />
         {text}
       </p>
       {children}
-    </div>
+    </Stack>
   );
 }
 

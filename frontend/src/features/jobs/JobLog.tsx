@@ -2,6 +2,7 @@ import { useState } from "react";
 import { type Job, type JobLogLine, useJobLog } from "../../api/jobs";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { utcTime } from "../../ui/format";
+import { Note } from "../../ui/Note";
 import classes from "./JobLog.module.css";
 
 /** The worker's log of a job, loaded when it is opened. */
@@ -13,12 +14,14 @@ export function JobLog({ job }: { job: Job }) {
       <summary className={classes["summary"]}>Log of job {job.id}</summary>
       <ErrorNotice error={error} />
       {log?.lines.length === 0 && (
-        <p className={classes["none"]}>{job.started_at === null ? "Not started yet." : "The log was deleted."}</p>
+        <Note fz="small" mb={6}>
+          {job.started_at === null ? "Not started yet." : "The log was deleted."}
+        </Note>
       )}
       {log !== undefined && log.total > log.lines.length && (
-        <p className={classes["none"]}>
+        <Note fz="small" mb={6}>
           The last {log.lines.length} of {log.total} lines:
-        </p>
+        </Note>
       )}
       <ol className={classes["lines"]}>
         {log?.lines.map((line) => (

@@ -1,11 +1,13 @@
+import { Box } from "@mantine/core";
 import type { Job } from "../../api/jobs";
+import { Note } from "../../ui/Note";
 import classes from "./JobProgress.module.css";
 import { progressText } from "./jobs";
 
 /** Progress of a queued or running job. */
 export function JobProgress({ job, title }: { job: Job; title: string }) {
   return (
-    <div className={classes["progress"]}>
+    <Box miw={0}>
       <progress
         className={classes["bar"]}
         aria-label={title}
@@ -13,7 +15,9 @@ export function JobProgress({ job, title }: { job: Job; title: string }) {
         value={Math.floor(100 * (job.done_share ?? 0))}
         max={100}
       />
-      <p className={`${classes["text"]} numbers`}>{progressText(job)}</p>
-    </div>
+      <Note mt={4} fz="small" style={{ overflowWrap: "anywhere" }} className="numbers">
+        {progressText(job)}
+      </Note>
+    </Box>
   );
 }

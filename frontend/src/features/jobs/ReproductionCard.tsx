@@ -1,4 +1,4 @@
-import { Button, useComputedColorScheme } from "@mantine/core";
+import { Button, Text, useComputedColorScheme } from "@mantine/core";
 import { IconPlayerPlay, IconX } from "@tabler/icons-react";
 import {
   type ReproductionSummary,
@@ -9,6 +9,7 @@ import {
 } from "../../api/jobs";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { Time } from "../../ui/Time";
 import { JobProgress } from "./JobProgress";
@@ -26,13 +27,13 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
   return (
     <article id={name} className={classes["card"]} aria-label={title}>
       <Panel title={title} tools={<Actions reproduction={reproduction} />}>
-        <p className={classes["paper"]}>
+        <Text maw="90ch" lh={1.45} mb={8}>
           <strong>In the paper:</strong> {paper}
-        </p>
-        <p className={classes["line"]}>
+        </Text>
+        <Text maw="90ch" lh={1.45} mb={8}>
           <strong>Here:</strong> {line}
           {span !== null && <> Our results: {span}.</>}
-        </p>
+        </Text>
         <Standing reproduction={reproduction} />
         <ErrorNotice error={result.error} />
         {result.data && result.data.rows.length > 0 && (
@@ -103,7 +104,11 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
   return (
     <>
       {job !== null && isUnderWay(job) && <JobProgress job={job} title={`Progress: ${title}`} />}
-      {job?.state === "cancelled" && <p className={classes["line"]}>The last run was cancelled.</p>}
+      {job?.state === "cancelled" && (
+        <Text maw="90ch" lh={1.45} mb={8}>
+          The last run was cancelled.
+        </Text>
+      )}
       {job?.problem && (
         <div className={classes["trouble"]} role="alert">
           <strong>The last run failed: {job.problem.title}</strong>
@@ -111,7 +116,7 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
           <p>{job.problem.hint}</p>
         </div>
       )}
-      <p className={classes["when"]}>
+      <Note fz="small" my={10}>
         {latest === null ? (
           "Not run yet."
         ) : (
@@ -120,7 +125,7 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
             {latest.full && " (full)"}, took {duration(latest.seconds)}.
           </>
         )}
-      </p>
+      </Note>
     </>
   );
 }

@@ -1,9 +1,10 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
 import { useDownload } from "../../api/files";
 import { BACKUP, type System } from "../../api/system";
 import { ErrorNotice } from "../../ui/ErrorNotice";
 import { bytesText } from "../../ui/format";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import classes from "./SettingsPage.module.css";
 
@@ -12,12 +13,12 @@ export function Backup({ system }: { system: System }) {
   const backup = useDownload(BACKUP);
   return (
     <Panel title="Backup">
-      <div className={classes["stack"]}>
-        <p className={classes["quiet"]}>
+      <Stack gap={18}>
+        <Note>
           One file with the current state of all campaigns, flights and vehicles, about{" "}
           {bytesText(system.database_bytes)}. Flights and computations continue during the download. Telemetry logs
           (folder tlogs) are not included.
-        </p>
+        </Note>
         <div>
           <Button
             leftSection={<IconDownload size={18} aria-hidden />}
@@ -40,7 +41,7 @@ export function Backup({ system }: { system: System }) {
             <li>Start Gainline. A backup of an earlier version is migrated.</li>
           </ol>
         </details>
-      </div>
+      </Stack>
     </Panel>
   );
 }

@@ -1,15 +1,24 @@
-import { SegmentedControl, Skeleton, Switch, TextInput, useMantineColorScheme } from "@mantine/core";
+import {
+  Group,
+  SegmentedControl,
+  SimpleGrid,
+  Skeleton,
+  Stack,
+  Switch,
+  Text,
+  TextInput,
+  Title,
+  useMantineColorScheme,
+} from "@mantine/core";
 import { useSystem } from "../../api/system";
 import { speak } from "../../live/speak";
 import { ErrorNotice } from "../../ui/ErrorNotice";
-import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { useOperatorName, useSpeechWanted } from "../../ui/usePreferences";
 import { useTitle } from "../../ui/useTitle";
 import { About } from "./About";
 import { Backup } from "./Backup";
 import { RemoteAccess } from "./RemoteAccess";
-import classes from "./SettingsPage.module.css";
 
 const THEMES = [
   { value: "light", label: "Light" },
@@ -23,28 +32,28 @@ export function SettingsPage() {
   const system = useSystem();
   return (
     <>
-      <div className={work["head"]}>
-        <h1 className={work["title"]}>Settings</h1>
-      </div>
-      <div className={classes["columns"]}>
-        <div className={classes["column"]}>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Settings</Title>
+      </Group>
+      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" style={{ alignItems: "start" }}>
+        <Stack gap="var(--gap)">
           <Panel title="This browser">
             <ThisBrowser />
           </Panel>
           {system.data && <About system={system.data} />}
-        </div>
+        </Stack>
         {system.data === undefined ? (
           <div>
             <ErrorNotice error={system.error} />
             {system.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
           </div>
         ) : (
-          <div className={classes["column"]}>
+          <Stack gap="var(--gap)">
             <RemoteAccess system={system.data} />
             <Backup system={system.data} />
-          </div>
+          </Stack>
         )}
-      </div>
+      </SimpleGrid>
     </>
   );
 }
@@ -55,11 +64,11 @@ function ThisBrowser() {
   const [speech, setSpeech] = useSpeechWanted();
   const canSpeak = "speechSynthesis" in window;
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={18}>
       <div>
-        <p className={classes["label"]} id="appearance">
+        <Text fw={550} mb={6} id="appearance">
           Appearance
-        </p>
+        </Text>
         <SegmentedControl
           aria-labelledby="appearance"
           size="md"
@@ -91,6 +100,6 @@ function ThisBrowser() {
         autoComplete="name"
         onChange={({ currentTarget: { value } }) => setName(value)}
       />
-    </div>
+    </Stack>
   );
 }
