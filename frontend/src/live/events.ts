@@ -1,8 +1,7 @@
 /** The event stream of the tab: changes invalidate queries, telemetry feeds the live curves. */
 
 import type { QueryClient } from "@tanstack/react-query";
-import { createInvalidator } from "./invalidation";
-import { type Change, changeFrom, staleQueries } from "./staleQueries";
+import { type Change, changeFrom, createInvalidator, staleQueries } from "./staleQueries";
 import { applyPhase, applyStatus, applyTelemetry, momentNow, setConnection, setNotLive } from "./store";
 import { telemetryFrom } from "./telemetry";
 import { secondsBetween, statusFrom } from "./vehicleStatus";

@@ -1,7 +1,7 @@
 import type { FigureTable } from "../api/types";
 import classes from "./DataTable.module.css";
 import { gainText, NOTHING } from "./format";
-import { useLastRows } from "./useLastRows";
+import { useLastRows } from "./paging";
 
 function cell(value: string | number | null, digits: number | null): string {
   if (value === null) return NOTHING;

@@ -2,16 +2,17 @@ import { ActionIcon, Anchor, Button, Group, TextInput, Title } from "@mantine/co
 import { IconPencil } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
 import { Link } from "react-router";
+import { pathOf, useDownload } from "../../api/files";
 import { useRename } from "../../api/mutations";
 import { problemOf } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
+import { StateBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
-import { StateBadge } from "../../ui/StateBadge";
+import { ErrorNotice } from "../../ui/Notices";
 import { campaignStateLabel } from "../../ui/states";
-import classes from "./CampaignHeader.module.css";
+import classes from "./CampaignPage.module.css";
 import { settingsOf } from "./definition";
-import { Exports } from "./Exports";
 
 /** Name, state, and the settings that proposals depend on. */
 export function CampaignHeader({ campaign }: { campaign: Campaign }) {
@@ -83,5 +84,35 @@ function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void
         Cancel
       </Button>
     </form>
+  );
+}
+
+/** Report and bundle of the campaign; no bundle during a flight. */
+function Exports({ campaign }: { campaign: Campaign }) {
+  const pdf = useDownload(pathOf(campaign.id, "report.pdf"));
+  const bundle = useDownload(pathOf(campaign.id, "bundle"));
+  return (
+    <>
+      <Group gap={8} ms="auto">
+        <Button
+          component="a"
+          variant="default"
+          href={pathOf(campaign.id, "report.html")}
+          target="_blank"
+          rel="noreferrer"
+        >
+          Open report
+        </Button>
+        <Button variant="default" loading={pdf.isPending} onClick={() => pdf.mutate()}>
+          PDF
+        </Button>
+        {campaign.flying === null && (
+          <Button variant="default" loading={bundle.isPending} onClick={() => bundle.mutate()}>
+            Export bundle
+          </Button>
+        )}
+      </Group>
+      <ErrorNotice error={pdf.error ?? bundle.error} />
+    </>
   );
 }

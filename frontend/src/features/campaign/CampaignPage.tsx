@@ -6,20 +6,16 @@ import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } 
 import type { Campaign, Trial } from "../../api/types";
 import { loadPlotly } from "../../charts/plotly";
 import { pointAt } from "../../charts/pointing";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { NotFound } from "../../ui/NotFound";
-import { NotFoundPage } from "../../ui/NotFoundPage";
-import { ReadOnlyNotice } from "../../ui/ReadOnlyNotice";
+import { NotFound, NotFoundPage } from "../../ui/NotFound";
+import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
+import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { useUnits } from "../../ui/useUnits";
-import { ByFlightPanels, CurvesPanel } from "./CampaignCharts";
+import { ByFlightPanels, CurvesPanel, LandscapePanel } from "./CampaignCharts";
 import { CampaignHeader } from "./CampaignHeader";
 import classes from "./CampaignPage.module.css";
 import { FlightsPanel } from "./FlightsPanel";
-import { LandscapePanel } from "./LandscapePanel";
-import { NextFlightCard } from "./NextFlightCard";
+import { NextFlightCard, useCampaignStatus } from "./NextFlightCard";
 import { StatisticsPanel } from "./StatisticsPanel";
-import { useCampaignStatus } from "./useCampaignStatus";
 import { VerdictPanel } from "./VerdictPanel";
 import { selectedTrial } from "./verdict";
 

@@ -1,10 +1,10 @@
 import { Button, FileButton, Group, InputBase } from "@mantine/core";
 import { IconCamera, IconTrash } from "@tabler/icons-react";
 import { useState } from "react";
-import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/photos";
+import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/records";
 import type { Trial } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import classes from "./FlightNotes.module.css";
+import { ErrorNotice } from "../../ui/Notices";
+import classes from "./Verdict.module.css";
 
 const PICTURES = "image/jpeg,image/png,image/webp";
 

@@ -3,10 +3,9 @@ import { Link, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { grouped } from "../../ui/format";
-import { NotFound } from "../../ui/NotFound";
-import { NotFoundPage } from "../../ui/NotFoundPage";
+import { NotFound, NotFoundPage } from "../../ui/NotFound";
+import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { useUnits } from "../../ui/useUnits";
 import { GateChecks } from "./GateChecks";
 import { VerdictPanel } from "./VerdictPanel";
 

@@ -8,7 +8,7 @@ import { gainsInBrackets } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { percent, predictedText } from "../../ui/uncertainty";
-import { useUnits } from "../../ui/useUnits";
+import { useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import classes from "./NextFlight.module.css";
 

@@ -3,8 +3,8 @@ import { IconFileUpload } from "@tabler/icons-react";
 import type { RecordOrder, RecordUpload } from "../../api/mutations";
 import { problemOf } from "../../api/problems";
 import { RECORD_FILES, recordOf, takeoffsIn, wantsConfirmation } from "../../api/records";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 
 interface Props {
   upload: RecordUpload;

@@ -5,11 +5,10 @@ import { useCreateTrial } from "../../api/mutations";
 import { isGateRefusal, offersOf, problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { gainText } from "../../ui/format";
+import { gainText, readNumber, typed, typedGain } from "../../ui/format";
 import { Note } from "../../ui/Note";
-import { readNumber, typed, typedGain } from "../../ui/numbers";
-import { GateRefusal } from "./GateRefusal";
+import { ErrorNotice } from "../../ui/Notices";
+import { GateRefusal } from "./GateChecks";
 import classes from "./NextFlight.module.css";
 import type { Speed } from "./nextStep";
 

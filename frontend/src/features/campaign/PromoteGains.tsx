@@ -5,9 +5,9 @@ import { usePromote } from "../../api/mutations";
 import { problemOf, reasonsByField } from "../../api/problems";
 import type { Campaign } from "../../api/types";
 import { useVehicle } from "../../api/vehicles";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { gainsInBrackets, sameHeld } from "../../ui/gains";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "./NextFlight.module.css";
 import { heldGainsNotice, promotable } from "./verdict";
 

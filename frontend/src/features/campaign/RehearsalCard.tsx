@@ -3,8 +3,8 @@ import { Link, useNavigate } from "react-router";
 import { useRehearse } from "../../api/mutations";
 import { useCampaign } from "../../api/queries";
 import type { Campaign } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import classes from "./NextFlight.module.css";
 

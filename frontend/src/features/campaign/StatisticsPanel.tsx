@@ -2,15 +2,15 @@ import { Stack } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useStatistics } from "../../api/queries";
 import type { CampaignStatistics } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { count } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
+import { useLastRows } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { confidenceText, percent, plusMinus, scatterSource } from "../../ui/uncertainty";
-import { useLastRows } from "../../ui/useLastRows";
 import classes from "./Statistics.module.css";
 import { VERDICTS } from "./verdict";
 

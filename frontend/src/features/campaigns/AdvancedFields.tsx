@@ -2,10 +2,9 @@ import { SegmentedControl, Stack } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import type { ReactNode } from "react";
 import type { Catalogue, OptionInfo } from "../../api/types";
-import { NumberField } from "../../ui/NumberField";
-import { OptionField, type OptionValue } from "../../ui/OptionField";
+import { NumberField, OptionField, type OptionValue } from "../../ui/Fields";
 import { unitsOf } from "../../ui/units";
-import classes from "./AdvancedFields.module.css";
+import classes from "./NewCampaign.module.css";
 import { type CampaignForm, gainsOf, hasModel, optionsOf, type StopKind } from "./newCampaign";
 
 interface Props {

@@ -4,10 +4,10 @@ import { useState } from "react";
 import { useCampaigns } from "../../api/queries";
 import type { CampaignSummary } from "../../api/types";
 import { Aside } from "../../ui/Aside";
-import { GainList } from "../../ui/GainList";
+import { GainList } from "../../ui/gains";
 import { plusMinus } from "../../ui/uncertainty";
-import { useUnits } from "../../ui/useUnits";
-import classes from "./DonorPicker.module.css";
+import { useUnits } from "../../ui/units";
+import classes from "./NewCampaign.module.css";
 
 interface Props {
   experiment: string;

@@ -3,10 +3,10 @@ import { IconPlus } from "@tabler/icons-react";
 import { Link, useNavigate } from "react-router";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
+import { ImportBundle } from "./CampaignsPage";
 import classes from "./FirstCampaign.module.css";
-import { ImportBundle } from "./ImportBundle";
 import { firstPreset } from "./newCampaign";
 
 const STEPS = [

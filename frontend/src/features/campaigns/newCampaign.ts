@@ -9,8 +9,7 @@ import type {
   Vehicle,
   VehicleKindInfo,
 } from "../../api/types";
-import type { NumberEntry } from "../../ui/NumberField";
-import type { OptionValue } from "../../ui/OptionField";
+import type { NumberEntry, OptionValue } from "../../ui/Fields";
 
 export type StartKind = "default" | "simplex" | "given" | "campaign";
 export type StopKind = "paper" | "noise" | "budget";

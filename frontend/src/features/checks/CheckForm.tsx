@@ -4,7 +4,7 @@ import { useState } from "react";
 import { useNavigate } from "react-router";
 import { type RecordingCheck, useCheckExample } from "../../api/checks";
 import { problemOf } from "../../api/problems";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import classes from "./Checks.module.css";
 import { RECORDINGS } from "./checks";

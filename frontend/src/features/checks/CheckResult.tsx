@@ -7,10 +7,10 @@ import {
   useCheckFigure,
 } from "../../api/checks";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { StateBadge } from "../../ui/Badges";
 import { DataTable } from "../../ui/DataTable";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { StateBadge } from "../../ui/StateBadge";
 import { Time } from "../../ui/Time";
 import jobs from "../jobs/JobCard.module.css";
 import classes from "./Checks.module.css";

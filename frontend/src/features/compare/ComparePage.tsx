@@ -1,22 +1,29 @@
 import { Button, Group, Stack, Title, useComputedColorScheme } from "@mantine/core";
 import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
+import { useMutation } from "@tanstack/react-query";
 import { useEffect, useMemo, useState } from "react";
 import { useSearchParams } from "react-router";
-import { type FlightComparison, useComparison, useComparisonFigure } from "../../api/compare";
+import {
+  comparisonFigure,
+  curvesCsv,
+  type FlightComparison,
+  useComparison,
+  useComparisonFigure,
+} from "../../api/compare";
 import { problemOf } from "../../api/problems";
 import { useTrial } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { loadPlotly } from "../../charts/plotly";
+import type { PlotlyFigure } from "../../charts/traces";
 import { count } from "../../ui/format";
+import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./Compare.module.css";
-import { ComparisonTable, SettingsTable } from "./ComparisonTable";
+import { ComparisonTable, lineStylesOf, SettingsTable } from "./ComparisonTable";
 import { againstFirst, chosenIn, paramsOf, remember, remembered, toggled, withoutRefused } from "./chosenFlights";
 import { FlightPicker } from "./FlightPicker";
-import { lineStylesOf } from "./LineSample";
-import { SaveComparison } from "./SaveComparison";
 
 /** The flights in the URL. `add` adds one to those stored in this tab; a URL without flights restores them. */
 function useChosen(): [number[], (trials: readonly number[]) => void] {
@@ -168,5 +175,50 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
         )}
       </Panel>
     </>
+  );
+}
+
+type Format = "png" | "svg";
+
+const FORMATS: readonly Format[] = ["png", "svg"];
+const SIZE = { width: 1280, height: 800 } as const;
+
+/** Save the figure in the light theme on white, for documents. */
+async function save(trials: readonly number[], filename: string, format: Format): Promise<void> {
+  const { figure, reason } = await comparisonFigure(trials, "light");
+  if (!figure) throw new Error(reason);
+  const { data, layout } = figure as unknown as PlotlyFigure;
+  const plotly = await loadPlotly();
+  const onWhite = { ...layout, paper_bgcolor: "white", margin: { l: 70, r: 30, t: 30, b: 60 } };
+  await plotly.downloadImage({ data, layout: onWhite }, { ...SIZE, format, filename, scale: format === "png" ? 2 : 1 });
+}
+
+/** Download of the curves as CSV and of the figure as an image. */
+function SaveComparison({ trials, stem }: { trials: readonly number[]; stem: string }) {
+  const saving = useMutation({ mutationFn: (format: Format) => save(trials, stem, format) });
+  return (
+    <Group gap={8}>
+      <Button
+        component="a"
+        variant="default"
+        aria-label="Curves as CSV"
+        href={curvesCsv(trials)}
+        download={`${stem}.csv`}
+      >
+        CSV
+      </Button>
+      {FORMATS.map((format) => (
+        <Button
+          key={format}
+          variant="default"
+          aria-label={`Figure as ${format.toUpperCase()}`}
+          loading={saving.isPending && saving.variables === format}
+          onClick={() => saving.mutate(format)}
+        >
+          {format.toUpperCase()}
+        </Button>
+      ))}
+      <ErrorNotice error={saving.error} />
+    </Group>
   );
 }

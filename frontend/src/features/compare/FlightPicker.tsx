@@ -3,14 +3,14 @@ import { useDebouncedValue } from "@mantine/hooks";
 import { IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useCampaign, useCampaigns, useTrials } from "../../api/queries";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { count, withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { addPage } from "../../ui/paging";
 import { trialStateLabel, wasFlown } from "../../ui/states";
-import { useUnits } from "../../ui/useUnits";
+import { useUnits } from "../../ui/units";
 import classes from "./Compare.module.css";
 import { MOST_FLIGHTS } from "./chosenFlights";
 

@@ -6,16 +6,12 @@ import { useRegisterVehicle } from "../../api/fleet";
 import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { FoldedSection } from "../../ui/FoldedSection";
+import { VehicleBadge } from "../../ui/Badges";
+import { OptionField, SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FormPage } from "../../ui/FormPage";
-import { GainFields } from "../../ui/GainFields";
-import { MissingNumbers } from "../../ui/MissingNumbers";
-import { OptionField } from "../../ui/OptionField";
-import { SelectField } from "../../ui/SelectField";
+import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
+import { ErrorNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
-import { VehicleBadge } from "../../ui/VehicleBadge";
 import {
   AUTOPILOTS,
   autopilotOf,

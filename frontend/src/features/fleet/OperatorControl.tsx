@@ -1,11 +1,10 @@
 import { Button, Text, TextInput } from "@mantine/core";
 import { IconUserCheck } from "@tabler/icons-react";
-import { useReleaseControl, useTakeControl } from "../../api/control";
-import { useOwnLease } from "../../api/leases";
+import { useOwnLease, useReleaseControl, useTakeControl } from "../../api/control";
 import type { Vehicle } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
 import { useOperatorName } from "../../ui/usePreferences";
-import classes from "./OperatorControl.module.css";
+import classes from "./Fleet.module.css";
 
 /** Whether this tab has the vehicle's lease. */
 export function useIsInControl(vehicle: Vehicle): boolean {

@@ -5,12 +5,11 @@ import { useVehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
 import { linkText } from "../../live/vehicleStatus";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
+import { ErrorNotice } from "../../ui/Notices";
 import row from "../../ui/RowCard.module.css";
-import { StateBadge } from "../../ui/StateBadge";
-import { VehicleBadge } from "../../ui/VehicleBadge";
 import { vehicleStateLabel } from "./fleet";
 import classes from "./VehicleCard.module.css";
 

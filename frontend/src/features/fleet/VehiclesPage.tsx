@@ -2,7 +2,7 @@ import { Button, Group, Skeleton, Stack, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useVehicles } from "../../api/vehicles";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "../../ui/Page.module.css";
 import { useTitle } from "../../ui/useTitle";
 import { VehicleCard } from "./VehicleCard";

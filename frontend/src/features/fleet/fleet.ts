@@ -1,8 +1,7 @@
 /** Labels of vehicles, requests and gain history, and the form of a new vehicle. */
 
 import type { ActKind, Catalogue, GivenGains, NewVehicle, OptionInfo, Vehicle, VehicleState } from "../../api/types";
-import type { NumberEntry } from "../../ui/NumberField";
-import type { OptionValue } from "../../ui/OptionField";
+import type { NumberEntry, OptionValue } from "../../ui/Fields";
 import type { StateLabel } from "../../ui/states";
 
 const STATES: Record<VehicleState, StateLabel> = {

@@ -1,8 +1,8 @@
 import { Box, Button, Group, SegmentedControl, Skeleton, Stack, Title } from "@mantine/core";
 import { useState } from "react";
 import { JOBS_PAGE, type JobState, useJobs, useReproductions } from "../../api/jobs";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";

@@ -1,6 +1,7 @@
 import { Button, Text, useComputedColorScheme } from "@mantine/core";
 import { IconPlayerPlay, IconX } from "@tabler/icons-react";
 import {
+  type ReproductionRow,
   type ReproductionSummary,
   useCancelJob,
   useReproductionFigure,
@@ -8,14 +9,14 @@ import {
   useRunReproduction,
 } from "../../api/jobs";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
-import { JobProgress } from "./JobProgress";
-import { duration, isUnderWay, ratioSpan } from "./jobs";
+import { JobProgress } from "./JobCard";
+import { type ComparedColumn, comparedColumns, duration, grouped, isUnderWay, measure, ratioSpan } from "./jobs";
 import classes from "./ReproductionCard.module.css";
-import { ReproductionRows } from "./ReproductionRows";
 
 const FIGURE_HEIGHT_PX = 360;
 
@@ -142,5 +143,60 @@ function Figure({ name, figure, title, jobId }: FigureProps) {
   const card = useReproductionFigure(name, figure, theme, jobId);
   return (
     <FigurePanel title={card.data?.title ?? title} card={card.data} error={card.error} height={FIGURE_HEIGHT_PX} />
+  );
+}
+
+const RATIO_DIGITS = 3;
+
+/** Own and published numbers, grouped. */
+function ReproductionRows({ rows, title }: { rows: readonly ReproductionRow[]; title: string }) {
+  const columns = comparedColumns(rows);
+  return (
+    <ScrollTable label={`${title}: numbers`} className={classes["table"]}>
+      <thead>
+        <tr>
+          <td />
+          <th scope="col">Ours</th>
+          {columns.map(([key, heading]) => (
+            <th key={key} scope="col">
+              {heading}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      {grouped(rows).map((group) => (
+        <tbody key={group.title}>
+          <tr className={classes["group"]}>
+            <th scope="rowgroup" colSpan={2 + columns.length}>
+              {group.title}
+            </th>
+          </tr>
+          {group.rows.map((row) => (
+            <Row key={row.label} row={row} columns={columns} />
+          ))}
+        </tbody>
+      ))}
+    </ScrollTable>
+  );
+}
+
+function Row({ row, columns }: { row: ReproductionRow; columns: readonly ComparedColumn[] }) {
+  return (
+    <tr>
+      <th scope="row">
+        {row.label} {row.note !== "" && <span className={classes["note"]}>{row.note}</span>}{" "}
+        {row.overruled !== "" && (
+          <span className={classes["note"]} title={row.overruled}>
+            refused by the gate, overruled
+          </span>
+        )}
+      </th>
+      <td className={classes["ours"]}>
+        {measure(row.measured, row.digits)} <span className={classes["unit"]}>{row.unit}</span>
+      </td>
+      {columns.map(([key]) => (
+        <td key={key}>{measure(row[key], key === "ratio" ? RATIO_DIGITS : row.digits)}</td>
+      ))}
+    </tr>
   );
 }
