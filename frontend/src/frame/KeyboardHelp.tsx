@@ -1,4 +1,4 @@
-import { ActionIcon } from "@mantine/core";
+import { ActionIcon, Title } from "@mantine/core";
 import { IconKeyboard } from "@tabler/icons-react";
 import { useEffect, useRef } from "react";
 import { useLocation } from "react-router";
@@ -47,9 +47,9 @@ export function KeyboardHelp() {
         className={classes["dialog"]}
         onToggle={({ newState, currentTarget }) => newState === "open" && currentTarget.focus()}
       >
-        <h2 id="keys-title" className={classes["title"]}>
+        <Title order={2} id="keys-title" fz="strong" mb={12}>
           Keyboard shortcuts
-        </h2>
+        </Title>
         <dl className={classes["keys"]}>
           {keysOf(pathname).map(({ keys, does }) => (
             <div key={does}>

@@ -7,7 +7,7 @@ const MOST_DIGITS = 6;
 /** An uncertainty with a smaller leading digit keeps two digits: rounding 0.012 to 0.01 would lose too much. */
 const TWO_DIGITS_BELOW = 3.55;
 
-/** Decimal places for an uncertainty of this size; three if it is unknown. @internal for its test */
+/** Decimal places for an uncertainty of this size; three if it is unknown. */
 export function decimalsOf(uncertainty: number | null | undefined): number {
   if (uncertainty === null || uncertainty === undefined || !(uncertainty > 0) || !Number.isFinite(uncertainty))
     return 3;

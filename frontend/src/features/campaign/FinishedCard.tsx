@@ -2,6 +2,7 @@ import { Button, Stack } from "@mantine/core";
 import { IconArchive } from "@tabler/icons-react";
 import { useArchive } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
+import { Aside } from "../../ui/Aside";
 import { against, percentChange, withUnit } from "../../ui/format";
 import { GainList } from "../../ui/gains";
 import { Note } from "../../ui/Note";
@@ -36,7 +37,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
       <Stack gap={14}>
         {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && <Note fz="body">{campaign.stop_reason}</Note>}
         {best !== null && campaign.best !== null && (
-          <div className={`${classes["best"]} numbers`}>
+          <Aside tone="good" className={`${classes["best"]} numbers`}>
             <p>Best: flight {best.number}</p>
             <p className={classes["figure"]}>{plusMinus(campaign.best.mean, campaign.best.standard_error, unit)}</p>
             {campaign.best.standard_error !== null && <p>± standard error</p>}
@@ -50,7 +51,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
                 {campaign.verdict && <strong> · {VERDICTS[campaign.verdict].toLowerCase()}</strong>}
               </p>
             )}
-          </div>
+          </Aside>
         )}
         {best !== null && (
           <Button variant="default" onClick={() => onChoose(best.number)}>

@@ -1,6 +1,7 @@
 import { Stack } from "@mantine/core";
 import { IconFlagCheck, IconHome, IconRepeat, IconStairsUp } from "@tabler/icons-react";
 import type { Explanation, FittedParameter, Proposal } from "../../api/types";
+import { Aside } from "../../ui/Aside";
 import { against, gainText, NOTHING, percentChange, withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
@@ -89,13 +90,13 @@ const ICONS = { step: IconStairsUp, repeat: IconRepeat, baseline: IconHome, stop
 export function Recommendation({ advice }: { advice: Advised }) {
   const Icon = ICONS[advice.kind];
   return (
-    <div className={classes["advice"]} data-kind={advice.kind}>
-      <Icon size={22} className={classes["adviceIcon"]} aria-hidden />
+    <Aside tone="good" className={classes["advice"] ?? ""} data-kind={advice.kind}>
+      <Icon size={22} color="var(--best)" aria-hidden />
       <p>
         <strong>Recommended: {RECOMMENDED[advice.kind].toLowerCase()}</strong>
         {advice.why && <span>{advice.why}</span>}
       </p>
-    </div>
+    </Aside>
   );
 }
 

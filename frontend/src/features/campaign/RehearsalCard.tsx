@@ -3,6 +3,7 @@ import { Link, useNavigate } from "react-router";
 import { useRehearse } from "../../api/mutations";
 import { useCampaign } from "../../api/queries";
 import type { Campaign } from "../../api/types";
+import { Aside } from "../../ui/Aside";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
@@ -60,7 +61,7 @@ export function RehearsalNote({ campaignId }: { campaignId: number }) {
   if (real === undefined) return null;
   const passed = real.rehearsal.state === "passed";
   return (
-    <div className={classes["advice"]}>
+    <Aside tone="good" className={classes["advice"] ?? ""}>
       <p>
         <strong>{passed ? "Rehearsal passed" : "This is a rehearsal"}</strong>
         <span>
@@ -70,6 +71,6 @@ export function RehearsalNote({ campaignId }: { campaignId: number }) {
           </Anchor>
         </span>
       </p>
-    </div>
+    </Aside>
   );
 }

@@ -190,7 +190,7 @@ function TrialComparisons({ trial, unit }: { trial: Trial; unit: string }) {
         const Icon = ICONS[verdict];
         return (
           <li key={against} data-verdict={asked ? undefined : verdict} className="numbers">
-            <Icon size={20} className={classes["sign"]} aria-hidden />
+            <Icon size={20} aria-hidden />
             <span>
               {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>},{" "}
               {confidence === null ? "" : `${confidenceText(confidence)} confidence, `}against{" "}

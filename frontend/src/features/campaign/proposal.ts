@@ -26,7 +26,6 @@ export const RECOMMENDED: Record<Recommended, string> = {
 
 type GainSet = Readonly<Record<string, number>>;
 
-/** @internal for its test */
 export function sameGains(one: GainSet, other: GainSet): boolean {
   const names = Object.keys(one);
   return names.length === Object.keys(other).length && names.every((name) => one[name] === other[name]);

@@ -1,4 +1,4 @@
-import { Anchor, Button } from "@mantine/core";
+import { Anchor, Button, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link, useNavigate } from "react-router";
 import { useCreateCampaign } from "../../api/mutations";
@@ -24,7 +24,9 @@ export function FirstCampaign() {
   return (
     <section className={classes["first"]}>
       <Drawing />
-      <h1>Tune a takeoff in a few flights</h1>
+      <Title order={1} lh={1.15}>
+        Tune a takeoff in a few flights
+      </Title>
       <Note maw={560} fz="strong" lh={1.5}>
         A campaign flies one vehicle repeatedly, each time with better gains, and stops when no further improvement is
         found.

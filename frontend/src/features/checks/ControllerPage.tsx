@@ -66,12 +66,16 @@ function EarlierChecks({ shown }: { shown: number }) {
     <section>
       <ErrorNotice error={checks.error ?? remove.error} />
       {checks.isPending && <Skeleton height={90} radius="md" aria-busy="true" />}
-      {found.length > 0 && <h2 className={classes["section"]}>Earlier checks</h2>}
+      {found.length > 0 && (
+        <Title order={2} c="dimmed" fz="body" mb={10}>
+          Earlier checks
+        </Title>
+      )}
       <ul className={classes["list"]} aria-label="Earlier checks">
         {found.map(({ id, file_name, kind, passed, checked_at }) => (
           <li key={id} className={`${row["card"]} ${jobs["job"]}`}>
             <div className={`${row["what"]} ${jobs["what"]}`}>
-              <h3 className={jobs["title"]}>
+              <Title order={3} fz="body">
                 <Anchor
                   component={Link}
                   to={`/controller/${id}`}
@@ -80,7 +84,7 @@ function EarlierChecks({ shown }: { shown: number }) {
                 >
                   {file_name}
                 </Anchor>
-              </h3>
+              </Title>
               <p className={`${jobs["facts"]} numbers`}>
                 <StateBadge words={checkStateLabel(passed)} />
                 <span>{KINDS[kind]}</span>

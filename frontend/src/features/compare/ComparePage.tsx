@@ -15,6 +15,7 @@ import { useTrial } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { loadPlotly } from "../../charts/plotly";
 import type { PlotlyFigure } from "../../charts/traces";
+import { Aside, toneOf } from "../../ui/Aside";
 import { count } from "../../ui/format";
 import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
@@ -139,14 +140,16 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
   );
   return (
     <>
-      <section className={classes["verdict"]} data-verdict={verdict ?? undefined} aria-label="Verdict">
-        <Icon size={24} aria-hidden />
-        <div role="status">
-          <p>{sentence}</p>
-          {notes.map((note) => (
-            <p key={note}>{note}</p>
-          ))}
-        </div>
+      <section aria-label="Verdict">
+        <Aside tone={toneOf(verdict)} className={classes["verdict"] ?? ""}>
+          <Icon size={24} aria-hidden />
+          <div role="status">
+            <p>{sentence}</p>
+            {notes.map((note) => (
+              <p key={note}>{note}</p>
+            ))}
+          </div>
+        </Aside>
       </section>
       <FigurePanel
         title="Curves"

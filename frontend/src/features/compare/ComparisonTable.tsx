@@ -273,7 +273,7 @@ export function lineStylesOf(card: FigureCard | undefined): Map<number, LineStyl
 /** Sample of a flight's line in the figure. */
 function LineSample({ pen }: { pen: LineStyle }) {
   return (
-    <svg width="44" height="12" aria-hidden className={classes["stroke"]}>
+    <svg width="44" height="12" aria-hidden>
       <line x1="1" y1="6" x2="43" y2="6" stroke={pen.colour} strokeWidth="3" strokeDasharray={DASHES[pen.dash]} />
     </svg>
   );

@@ -5,6 +5,7 @@ import { useActs, useLedger } from "../../api/fleet";
 import type { FigureCard, GivenGains } from "../../api/types";
 import { useCalibration, useVehicleFigure } from "../../api/vehicles";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { Aside } from "../../ui/Aside";
 import { NOTHING } from "../../ui/format";
 import { gainsInBrackets, sameHeld } from "../../ui/gains";
 import { Note } from "../../ui/Note";
@@ -136,12 +137,12 @@ export function CalibrationHistory({ vehicleId }: { vehicleId: number }) {
       <div className={`${classes["wide"]} ${classes["stack"]}`}>
         <ErrorNotice error={known.error} />
         {retune?.due && (
-          <p className={classes["due"]} role="status">
+          <Aside tone="warn" display="flex" style={{ gap: 8 }} role="status">
             <IconAlertTriangle size={20} aria-hidden />
             <span>
               <strong>Re-tune due.</strong> {retune.sentence}
             </span>
-          </p>
+          </Aside>
         )}
         <FigurePanel
           title="Calibration history"

@@ -27,7 +27,9 @@ export function VehiclesPage() {
       <Stack gap={28}>
         {registered.length > 0 && (
           <section>
-            <h2 className={classes["section"]}>Registered vehicles</h2>
+            <Title order={2} c="dimmed" fz="body" mb={10}>
+              Registered vehicles
+            </Title>
             <ul className={classes["list"]} aria-label="Registered vehicles">
               {registered.map((vehicle) => (
                 <VehicleCard key={vehicle.id} vehicle={vehicle} />
@@ -37,7 +39,9 @@ export function VehiclesPage() {
         )}
         {shared.length > 0 && (
           <section>
-            <h2 className={classes["section"]}>Shared simulations and flight records</h2>
+            <Title order={2} c="dimmed" fz="body" mb={10}>
+              Shared simulations and flight records
+            </Title>
             <ul className={classes["list"]} aria-label="Shared simulations">
               {shared.map((vehicle) => (
                 <VehicleCard key={vehicle.id} vehicle={vehicle} />

@@ -1,7 +1,8 @@
-import { Anchor, Box, Button } from "@mantine/core";
+import { Anchor, Box, Button, Text, Title } from "@mantine/core";
 import { useState } from "react";
 import { Link } from "react-router";
 import { type Job, type JobLogLine, useCancelJob, useJobLog, useRetryJob } from "../../api/jobs";
+import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import { count, utcTime } from "../../ui/format";
 import { Note } from "../../ui/Note";
@@ -20,7 +21,7 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
   return (
     <li className={`${row["card"]} ${classes["job"]}`} data-state={job.state}>
       <div className={`${row["what"]} ${classes["what"]}`}>
-        <h3 className={classes["title"]}>
+        <Title order={3} fz="body">
           {link === null ? (
             title
           ) : (
@@ -28,7 +29,7 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
               {title}
             </Anchor>
           )}
-        </h3>
+        </Title>
         <p className={`${classes["facts"]} numbers`}>
           <StateBadge words={jobStateLabel(job.state)} />
           <span>Job {job.id}</span>
@@ -42,11 +43,11 @@ export function JobCard({ job, titles }: { job: Job; titles: ReadonlyMap<string,
         </p>
         {isUnderWay(job) && <JobProgress job={job} title={`Progress of job ${job.id}: ${title}`} />}
         {job.problem !== null && (
-          <div className={classes["trouble"]}>
+          <Aside tone={job.state === "failed" ? "bad" : undefined} fz="body">
             <strong>{job.problem.title}</strong>
             {job.problem.detail && <p>{job.problem.detail}</p>}
-            {job.problem.hint && <p className={classes["hint"]}>{job.problem.hint}</p>}
-          </div>
+            {job.problem.hint && <Text c="dimmed">{job.problem.hint}</Text>}
+          </Aside>
         )}
         <ErrorNotice error={cancel.error ?? retry.error} />
         <JobLog job={job} />
@@ -101,7 +102,7 @@ function JobLog({ job }: { job: Job }) {
   const { data: log, error } = useJobLog(job.id, open);
   return (
     <details onToggle={(event) => setOpen(event.currentTarget.open)}>
-      <summary className={classes["summary"]}>Log of job {job.id}</summary>
+      <summary>Log of job {job.id}</summary>
       <ErrorNotice error={error} />
       {log?.lines.length === 0 && (
         <Note fz="small" mb={6}>

@@ -84,7 +84,9 @@ function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, o
   const { title } = GROUPS[group];
   return (
     <section>
-      <h2 className={classes["section"]}>{title}</h2>
+      <Title order={2} c="dimmed" fz="body" mb={10}>
+        {title}
+      </Title>
       <ul className={classes["list"]} aria-label={title}>
         {items.map((job) => (
           <JobCard key={job.id} job={job} titles={titles} />

@@ -9,8 +9,10 @@ import {
   useRunReproduction,
 } from "../../api/jobs";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { Aside } from "../../ui/Aside";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
+import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
@@ -40,7 +42,7 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
         {result.data && result.data.rows.length > 0 && (
           <>
             <ReproductionRows rows={result.data.rows} title={title} />
-            <ul className={classes["notes"]}>
+            <ul className={page["notes"]}>
               {result.data.notes.map((note) => (
                 <li key={note}>{note}</li>
               ))}
@@ -111,11 +113,11 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
         </Text>
       )}
       {job?.problem && (
-        <div className={classes["trouble"]} role="alert">
+        <Aside tone="bad" fz="body" role="alert">
           <strong>The last run failed: {job.problem.title}</strong>
           {job.problem.detail && <p>{job.problem.detail}</p>}
           <p>{job.problem.hint}</p>
-        </div>
+        </Aside>
       )}
       <Note fz="small" my={10}>
         {latest === null ? (

@@ -17,6 +17,7 @@ import { useState } from "react";
 import { useDownload } from "../../api/files";
 import { BACKUP, codeOf, type System, useSystem } from "../../api/system";
 import { speak } from "../../live/speech";
+import { Aside } from "../../ui/Aside";
 import { SelectField } from "../../ui/Fields";
 import { bytesText } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
@@ -214,9 +215,9 @@ function Reachable({ system: { addresses, exposes, host, in_container } }: { sys
           computer’s address and the published port.
         </Note>
       )}
-      <p className={classes["warning"]}>
+      <Aside tone="warn">
         <strong>The server listens on {host}</strong>, so {exposes}
-      </p>
+      </Aside>
     </>
   );
 }
@@ -233,9 +234,9 @@ function LocalOnly({ system: { exposes, host, is_exposed } }: { system: System }
       </Note>
       <code className={classes["command"]}>gainline serve --host 0.0.0.0</code>
       <Note>(from a checkout: ./dev up --host 0.0.0.0). Its address then appears here.</Note>
-      <p className={classes["warning"]}>
+      <Aside tone="warn">
         <strong>Security:</strong> {exposes}
-      </p>
+      </Aside>
     </>
   );
 }
