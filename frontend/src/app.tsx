@@ -1,10 +1,12 @@
-import { useEffect } from "react";
+import { type ComponentType, lazy, useEffect } from "react";
 import { Route, Routes } from "react-router";
+import { ApiError, PAGE_MISSING } from "./api/problems";
+import { loadPlotly } from "./charts/plotly";
 import { CampaignPage } from "./features/campaign/CampaignPage";
 import { CampaignsPage } from "./features/campaigns/CampaignsPage";
 import { AppFrame } from "./frame/AppFrame";
-import { fetchEveryPage, lazyPage } from "./lazyPage";
-import { NotFoundPage } from "./ui/NotFoundPage";
+import type * as PageModule from "./pages";
+import { NotFoundPage } from "./ui/NotFound";
 
 const ComparePage = lazyPage("ComparePage");
 const ControllerPage = lazyPage("ControllerPage");
@@ -40,4 +42,27 @@ export function App() {
       </Route>
     </Routes>
   );
+}
+
+type Pages = typeof PageModule;
+
+async function fetchPages(): Promise<Pages> {
+  try {
+    return await import("./pages");
+  } catch {
+    throw new ApiError(PAGE_MISSING);
+  }
+}
+
+/** A page whose code is loaded on demand. */
+function lazyPage(name: keyof Pages): ComponentType {
+  return lazy(async () => ({ default: (await fetchPages())[name] }));
+}
+
+const SOON_MS = 2500;
+
+/** Preload the code of all pages and charts, so that they still open when the server or the Wi-Fi is lost. */
+function fetchEveryPage(): void {
+  // A page whose preload failed loads its code again when it is opened, and reports the error.
+  setTimeout(() => void Promise.allSettled([fetchPages(), loadPlotly(), loadPlotly("contours")]), SOON_MS);
 }

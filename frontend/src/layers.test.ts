@@ -20,7 +20,6 @@ const LAYERS = [
   "features/compare",
   "features/fly",
   "pages",
-  "lazyPage",
   "app",
   "main",
 ];

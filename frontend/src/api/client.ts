@@ -1,8 +1,7 @@
 /** Setup of the generated client: same origin, an idempotency key for every POST, problem documents as errors. */
 
+import { controlHeader } from "./control";
 import { client } from "./generated/client.gen";
-import { randomKey } from "./ids";
-import { controlHeader } from "./leases";
 import { ApiError, problemFrom } from "./problems";
 
 client.setConfig({ baseUrl: "" });
@@ -36,4 +35,10 @@ export async function answer<Data>(call: Promise<Outcome<Data>>): Promise<Data> 
   if (response === undefined) throw new ApiError(problemFrom(undefined, undefined));
   if (!response.ok) throw new ApiError(problemFrom(response.status, error));
   return data as Data;
+}
+
+/** A random key for one request. `crypto.randomUUID` is missing on plain http, where a tablet in the field is. */
+export function randomKey(): string {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }

@@ -2,8 +2,7 @@
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
-import { fileNameIn } from "./fileName";
-import { randomKey } from "./ids";
+import { randomKey } from "./client";
 import { ApiError, problemFrom } from "./problems";
 import type { Campaign } from "./types";
 
@@ -49,4 +48,10 @@ export function useImportBundle() {
       return queries.invalidateQueries({ queryKey: ["campaigns"] });
     },
   });
+}
+
+/** The file name in a Content-Disposition header; empty if it has none. */
+export function fileNameIn(disposition: string | null): string {
+  const [, encoded, plain] = /filename\*=utf-8''([^;]+)|filename="([^"]*)"/i.exec(disposition ?? "") ?? [];
+  return encoded === undefined ? (plain ?? "") : decodeURIComponent(encoded);
 }

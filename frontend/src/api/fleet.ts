@@ -2,6 +2,7 @@
 
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
+import { controlHeader } from "./control";
 import {
   checkVehicle,
   connectVehicle,
@@ -16,7 +17,6 @@ import {
   restoreSafeGains,
   type VehicleEdit,
 } from "./generated";
-import { controlHeader } from "./leases";
 import { useVehicleChanged } from "./vehicles";
 
 const SHOWN = 20;

@@ -3,6 +3,7 @@
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
 import { answer } from "./client";
+import { controlHeader } from "./control";
 import {
   archiveCampaign,
   type Campaign,
@@ -23,7 +24,6 @@ import {
   type Trial,
   uploadTrajectory,
 } from "./generated";
-import { controlHeader } from "./leases";
 import type { RecordFiles } from "./records";
 
 function useSettled() {

@@ -9,6 +9,7 @@ import {
   getCampaignFigure,
   getCatalogue,
   getFlightFigure,
+  getLandscape,
   getProposal,
   getStatistics,
   getTrajectory,
@@ -148,3 +149,13 @@ export function useFlightFigure(trialId: number, theme: Theme) {
 }
 
 export const recordCsv = (trialId: number): string => `/api/trials/${trialId}/trajectory.csv`;
+
+/** The request starts the computation, so it is sent only when the panel is in view. */
+export function useLandscape(campaignId: number, theme: Theme, stacked: boolean, enabled: boolean) {
+  return useQuery({
+    queryKey: ["campaign", campaignId, "landscape", theme, String(stacked)],
+    queryFn: () => answer(getLandscape({ path: { campaign_id: campaignId }, query: { theme, stacked } })),
+    placeholderData: keepPreviousData,
+    enabled,
+  });
+}

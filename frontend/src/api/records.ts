@@ -1,5 +1,8 @@
 /** Records of flights made elsewhere: their files, and the server's questions about them. */
 
+import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { answer } from "./client";
+import { addPhoto, deletePhoto, editTrial, listPhotos, type Trial } from "./generated";
 import type { Problem } from "./problems";
 
 /** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
@@ -37,4 +40,37 @@ export function takeoffsIn(problem: Problem | null): Takeoff[] {
 /** Whether the log has other gains than planned, which needs a confirmation. */
 export function wantsConfirmation(problem: Problem | null): boolean {
   return (problem?.problems ?? []).some(({ field }) => field === "confirm");
+}
+
+export const photoAddress = (trialId: number, photoId: number): string => `/api/trials/${trialId}/photos/${photoId}`;
+
+export function usePhotos(trialId: number) {
+  return useQuery({
+    queryKey: ["trial", trialId, "photos"],
+    queryFn: () => answer(listPhotos({ path: { trial_id: trialId } })),
+  });
+}
+
+export function usePhotoActions(trialId: number) {
+  const queries = useQueryClient();
+  const onSettled = () => queries.invalidateQueries({ queryKey: ["trial", trialId, "photos"] });
+  return {
+    add: useMutation({
+      mutationFn: (file: File) => answer(addPhoto({ path: { trial_id: trialId }, body: { file } })),
+      onSettled,
+    }),
+    remove: useMutation({
+      mutationFn: (photoId: number) => answer(deletePhoto({ path: { trial_id: trialId, photo_id: photoId } })),
+      onSettled,
+    }),
+  };
+}
+
+export function useNote({ id, campaign_id, version }: Trial) {
+  const queries = useQueryClient();
+  return useMutation({
+    mutationFn: (note: string) => answer(editTrial({ path: { trial_id: id }, body: { version, note } })),
+    onSuccess: (after) => queries.setQueryData(["trial", id], after),
+    onSettled: () => queries.invalidateQueries({ queryKey: ["campaign", campaign_id] }),
+  });
 }

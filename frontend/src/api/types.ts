@@ -3,7 +3,6 @@
 export type {
   Access,
   ActKind,
-  Advice,
   Campaign,
   CampaignState,
   CampaignStatistics,
@@ -11,7 +10,6 @@ export type {
   Catalogue,
   Check,
   DefinitionOutput as Definition,
-  ExperimentInfo,
   Explanation,
   FigureCard,
   FigureTable,
@@ -20,7 +18,6 @@ export type {
   Gate,
   GivenGains,
   Interval,
-  LadderStep,
   NewCampaignInput as NewCampaign,
   NewVehicle,
   NextFlight,
@@ -33,9 +30,7 @@ export type {
   TrialState,
   Trouble,
   Vehicle,
-  VehicleAct,
   VehicleCheck,
-  VehicleEdit,
   VehicleKindInfo,
   VehicleState,
 } from "./generated";

@@ -1,8 +1,9 @@
 /** Queries of vehicles. `live/staleQueries.ts` invalidates them by their keys. */
 
-import { useQuery, useQueryClient } from "@tanstack/react-query";
+import { keepPreviousData, useQuery, useQueryClient } from "@tanstack/react-query";
 import { answer } from "./client";
-import { listVehicles, type PageVehicle, type Vehicle } from "./generated";
+import { getCalibration, getVehicleFigure, listVehicles, type PageVehicle, type Vehicle } from "./generated";
+import type { Theme } from "./queries";
 
 const LARGEST_PAGE = 200;
 /** The expiry of a lease causes no event, so a shown lease is polled. */
@@ -42,4 +43,19 @@ export function useVehicleChanged() {
       queries.invalidateQueries({ queryKey: ["vehicles"] }),
       queries.invalidateQueries({ queryKey: ["vehicle", vehicleId] }),
     ]);
+}
+
+export function useCalibration(vehicleId: number) {
+  return useQuery({
+    queryKey: ["wear", vehicleId, "calibration"],
+    queryFn: () => answer(getCalibration({ path: { vehicle_id: vehicleId } })),
+  });
+}
+
+export function useVehicleFigure(vehicleId: number, name: "calibration" | "batteries", theme: Theme) {
+  return useQuery({
+    queryKey: ["wear", vehicleId, name, theme],
+    queryFn: () => answer(getVehicleFigure({ path: { vehicle_id: vehicleId, name }, query: { theme } })),
+    placeholderData: keepPreviousData,
+  });
 }

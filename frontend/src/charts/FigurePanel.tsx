@@ -4,9 +4,10 @@ import { type ReactNode, useMemo, useState } from "react";
 import type { TimeRange } from "../api/queries";
 import type { FigureCard } from "../api/types";
 import { DataTable } from "../ui/DataTable";
-import { ErrorNotice } from "../ui/ErrorNotice";
 import type { Topic } from "../ui/explanations";
 import { HelpTip } from "../ui/HelpTip";
+import { Note } from "../ui/Note";
+import { ErrorNotice } from "../ui/Notices";
 import { Panel } from "../ui/Panel";
 import classes from "../ui/Panel.module.css";
 import { Chart } from "./Chart";
@@ -103,7 +104,7 @@ export function FigurePanel({
           build={build}
         />
       )}
-      {note && <p className={classes["note"]}>{note}</p>}
+      {note && <Note mt={10}>{note}</Note>}
     </Panel>
   );
 }

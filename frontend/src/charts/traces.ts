@@ -3,7 +3,7 @@
 import type { TimeRange } from "../api/queries";
 import type { LiveFlight } from "../live/telemetry";
 
-export interface TraceMeta {
+interface TraceMeta {
   role?: string;
   trial?: number;
   standing?: string;

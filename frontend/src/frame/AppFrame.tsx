@@ -8,17 +8,15 @@ import { useVehicle } from "../api/vehicles";
 import { followEvents } from "../live/events";
 import { useAbort, useFlying } from "../live/flights";
 import { liveFlightsNow, useConnection } from "../live/store";
-import { ReadOnlyNotice } from "../ui/ReadOnlyNotice";
-import { VehicleBadge } from "../ui/VehicleBadge";
-import { abortTargets, type Flying } from "./abortTargets";
-import { ConnectionNotice, ConnectionState } from "./ConnectionState";
-import { FlyingBar } from "./FlyingBar";
+import { VehicleBadge } from "../ui/Badges";
+import { ReadOnlyNotice } from "../ui/Notices";
 import classes from "./Frame.module.css";
+import { ConnectionNotice, ConnectionState, FlyingBar, ThemeSwitch } from "./HeaderBar";
 import { KeyboardHelp } from "./KeyboardHelp";
+import { abortTargets, type Flying } from "./keys";
 import { MainNav } from "./MainNav";
 import { PageGuard } from "./PageGuard";
 import { SpokenAnnouncements } from "./SpokenAnnouncements";
-import { ThemeSwitch } from "./ThemeSwitch";
 import { VehicleStrip } from "./VehicleStrip";
 
 /**

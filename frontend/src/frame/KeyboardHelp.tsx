@@ -1,7 +1,8 @@
-import { ActionIcon } from "@mantine/core";
+import { ActionIcon, Title } from "@mantine/core";
 import { IconKeyboard } from "@tabler/icons-react";
 import { useEffect, useRef } from "react";
 import { useLocation } from "react-router";
+import { Note } from "../ui/Note";
 import classes from "./KeyboardHelp.module.css";
 import { commandOf, keysOf } from "./keys";
 
@@ -46,9 +47,9 @@ export function KeyboardHelp() {
         className={classes["dialog"]}
         onToggle={({ newState, currentTarget }) => newState === "open" && currentTarget.focus()}
       >
-        <h2 id="keys-title" className={classes["title"]}>
+        <Title order={2} id="keys-title" fz="strong" mb={12}>
           Keyboard shortcuts
-        </h2>
+        </Title>
         <dl className={classes["keys"]}>
           {keysOf(pathname).map(({ keys, does }) => (
             <div key={does}>
@@ -61,9 +62,9 @@ export function KeyboardHelp() {
             </div>
           ))}
         </dl>
-        <p className={classes["note"]}>
+        <Note mt={14} fz="small">
           There is no shortcut for the take-off of a real vehicle: hold its button for 2 s.
-        </p>
+        </Note>
       </dialog>
     </>
   );

@@ -3,7 +3,7 @@ import { IconRefresh } from "@tabler/icons-react";
 import { Component, type ReactNode, useEffect, useRef, useState } from "react";
 import { ApiError, BROKEN_PAGE } from "../api/problems";
 import { useConnection } from "../live/store";
-import { ErrorNotice } from "../ui/ErrorNotice";
+import { ErrorNotice } from "../ui/Notices";
 
 async function reloadWhenAnswered(): Promise<boolean> {
   const answered = await fetch("/", { cache: "no-store" }).then(

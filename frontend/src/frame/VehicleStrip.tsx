@@ -1,13 +1,13 @@
 import { IconAlertTriangle, IconAntennaBars5, IconAntennaBarsOff, IconBattery3, IconUser } from "@tabler/icons-react";
 import { Link } from "react-router";
-import { useOwnLease } from "../api/leases";
+import { useOwnLease } from "../api/control";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { useVehicleStatus } from "../live/store";
 import { linkText } from "../live/vehicleStatus";
+import { VehicleBadge } from "../ui/Badges";
 import { withUnit } from "../ui/format";
 import { gainsInBrackets, inOrder, sameHeld } from "../ui/gains";
-import { VehicleBadge } from "../ui/VehicleBadge";
 import classes from "./VehicleStrip.module.css";
 
 /** On every page: each connected vehicle with its link, battery, gains and operator. */

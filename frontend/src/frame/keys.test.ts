@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { commandOf, keysOf } from "./keys";
+import { abortTargets, commandOf, keysOf } from "./keys";
 
 const press = (key: string, more: Partial<KeyboardEvent> = {}) =>
   ({ key, ctrlKey: false, metaKey: false, altKey: false, ...more }) as KeyboardEvent;
@@ -17,4 +17,19 @@ test("a page's own keys come before those of every page, and abort is on every p
   expect(words("/")).toEqual(["/", "Space", "Tab", "Enter", "Esc", "?"]);
   expect(words("/campaigns/3")[0]).toBe("← →");
   expect(words("/fly/3")[0]).toBe("Space");
+});
+
+const flying = [
+  { campaignId: 1, trialId: 11 },
+  { campaignId: 2, trialId: 22 },
+];
+
+test("Space aborts the flight that one looks at", () => {
+  expect(abortTargets(flying, 2)).toEqual([{ campaignId: 2, trialId: 22 }]);
+});
+
+test("Space aborts everything when the page shows no flight", () => {
+  expect(abortTargets(flying, null)).toEqual(flying);
+  expect(abortTargets(flying, 7)).toEqual(flying);
+  expect(abortTargets([], 7)).toEqual([]);
 });

@@ -37,3 +37,16 @@ const COMMANDS: Readonly<Record<string, "help" | "search">> = { "?": "help", "/"
 export function commandOf({ key, ctrlKey, metaKey, altKey }: Press, isTyping: boolean): "help" | "search" | null {
   return isTyping || ctrlKey || metaKey || altKey ? null : (COMMANDS[key] ?? null);
 }
+
+/** Flights that the Space key aborts. */
+
+export interface Flying {
+  campaignId: number;
+  trialId: number;
+}
+
+/** The flight of the open page; if it has none, all flights. */
+export function abortTargets(flying: readonly Flying[], campaignOnPage: number | null): Flying[] {
+  const here = flying.filter((flight) => flight.campaignId === campaignOnPage);
+  return here.length > 0 ? here : [...flying];
+}

@@ -1,8 +1,7 @@
 /** The event stream of the tab: changes invalidate queries, telemetry feeds the live curves. */
 
 import type { QueryClient } from "@tanstack/react-query";
-import { createInvalidator } from "./invalidation";
-import { type Change, changeFrom, staleQueriesOnce } from "./staleQueries";
+import { type Change, changeFrom, createInvalidator, staleQueries } from "./staleQueries";
 import { applyPhase, applyStatus, applyTelemetry, momentNow, setConnection, setNotLive } from "./store";
 import { telemetryFrom } from "./telemetry";
 import { secondsBetween, statusFrom } from "./vehicleStatus";
@@ -44,7 +43,7 @@ export function followEvents(queries: QueryClient, somethingFlies: () => boolean
     const changes = gathered;
     gathered = [];
     gathering = undefined;
-    for (const queryKey of staleQueriesOnce(changes)) invalidator.invalidate({ queryKey });
+    for (const queryKey of staleQueries(changes)) invalidator.invalidate({ queryKey });
   }
 
   function take(change: Change | null): void {

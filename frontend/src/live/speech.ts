@@ -109,3 +109,12 @@ export function outcomeSentence(state: string, error: number | null, unit: strin
   const tells = error !== null && (state === "captured" || state === "valid");
   return { ...outcome, text: `${outcome.text}${tells ? `, ${aloud(error, unit)}` : ""}.` };
 }
+
+/** Speak after the current sentence, or at once if urgent. Does nothing without speech synthesis. */
+export function speak({ text, urgent }: Sentence): void {
+  if (!("speechSynthesis" in window)) return;
+  if (urgent) window.speechSynthesis.cancel();
+  const words = new SpeechSynthesisUtterance(text);
+  words.lang = "en";
+  window.speechSynthesis.speak(words);
+}

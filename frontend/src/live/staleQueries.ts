@@ -1,3 +1,34 @@
+import type { InvalidateQueryFilters, QueryClient } from "@tanstack/react-query";
+
+export interface Invalidator {
+  /** Refetch matching queries; all queries without filters. */
+  invalidate(filters?: InvalidateQueryFilters): void;
+  stop(): void;
+}
+
+/**
+ * Refetch queries after a change. The query client does not restart a first fetch that is pending, although its response
+ * may be older than the change: such a query is invalidated again when the response is there.
+ */
+export function createInvalidator(queries: QueryClient): Invalidator {
+  const cache = queries.getQueryCache();
+  const awaited = new Set<string>();
+  const unsubscribe = cache.subscribe((event) => {
+    if (event.type !== "updated" || event.action.type !== "success") return;
+    const { queryHash, queryKey } = event.query;
+    if (awaited.delete(queryHash)) void queries.invalidateQueries({ queryKey, exact: true });
+  });
+  return {
+    invalidate(filters = {}) {
+      for (const { state, queryHash } of cache.findAll({ ...filters, fetchStatus: "fetching" })) {
+        if (state.data === undefined) awaited.add(queryHash);
+      }
+      void queries.invalidateQueries(filters);
+    },
+    stop: unsubscribe,
+  };
+}
+
 /** Query keys that a change on the server invalidates. */
 
 export interface Change {
@@ -11,7 +42,7 @@ export type QueryKey = readonly (string | number)[];
 /** Topics that affect calibration history. Most do not name the vehicle, so all vehicles are invalidated. */
 const TELLING = new Set(["campaign", "trial", "flight", "proposal", "vehicle"]);
 
-export function staleQueries(change: Change): QueryKey[] {
+function keysOf(change: Change): QueryKey[] {
   if (change.topic === "check") return [["checks"]];
   const keys: QueryKey[] = change.topic === "job" ? [["jobs"]] : [["flying"]];
   if (change.topic === "campaign" || change.topic === "trial") keys.push(["campaigns"]);
@@ -24,8 +55,8 @@ export function staleQueries(change: Change): QueryKey[] {
 }
 
 /** The keys of all changes, each once. */
-export function staleQueriesOnce(changes: readonly Change[]): QueryKey[] {
-  const keys = new Map(changes.flatMap(staleQueries).map((key) => [JSON.stringify(key), key]));
+export function staleQueries(changes: readonly Change[]): QueryKey[] {
+  const keys = new Map(changes.flatMap(keysOf).map((key) => [JSON.stringify(key), key]));
   return [...keys.values()];
 }
 

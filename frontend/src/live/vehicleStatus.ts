@@ -1,6 +1,6 @@
 /** Last received status of a connected vehicle, and its age. */
 
-export type LinkState = "connecting" | "connected" | "gone" | "not answering";
+type LinkState = "connecting" | "connected" | "gone" | "not answering";
 
 export interface VehicleStatus {
   vehicleId: number;

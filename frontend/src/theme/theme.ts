@@ -42,7 +42,7 @@ const dark: MantineColorsTuple = [
   "#0b0e12",
 ];
 
-export const TOUCH_TARGET_PX = 48;
+const TOUCH_TARGET_PX = 48;
 
 const tall = { styles: { input: { minHeight: TOUCH_TARGET_PX } }, defaultProps: { size: "md" } } as const;
 
@@ -53,7 +53,15 @@ export const theme = createTheme({
   defaultRadius: "md",
   radius: { md: "10px" },
   fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', 'DejaVu Sans', sans-serif",
-  headings: { fontWeight: "650" },
+  fontSizes: {
+    fine: "var(--text-fine)",
+    small: "var(--text-small)",
+    body: "var(--text-body)",
+    strong: "var(--text-strong)",
+    title: "var(--text-title)",
+  },
+  headings: { fontWeight: "650", sizes: { h1: { fontSize: "var(--text-page)", lineHeight: "1.55" } } },
+  breakpoints: { sm: "51.3125em" },
   cursorType: "pointer",
   respectReducedMotion: true,
   components: {
@@ -61,6 +69,7 @@ export const theme = createTheme({
     ActionIcon: { defaultProps: { size: TOUCH_TARGET_PX, variant: "subtle" } },
     TextInput: tall,
     InputBase: tall,
+    Title: { styles: { root: { letterSpacing: "-0.015em" } } },
     Textarea: { defaultProps: { size: "md" } },
     FileInput: tall,
     // Text is unreadable while it unfolds.

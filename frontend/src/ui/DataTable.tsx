@@ -1,7 +1,7 @@
 import type { FigureTable } from "../api/types";
-import classes from "./DataTable.module.css";
 import { gainText, NOTHING } from "./format";
-import { useLastRows } from "./useLastRows";
+import { useLastRows } from "./paging";
+import classes from "./ScrollTable.module.css";
 
 function cell(value: string | number | null, digits: number | null): string {
   if (value === null) return NOTHING;
@@ -15,13 +15,13 @@ export function DataTable({ table, label, height }: { table: FigureTable; label:
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
     <section className={`${classes["scroll"]} sideways`} style={{ height }} aria-label={label} tabIndex={0}>
-      <table className={classes["table"]}>
+      <table className={`${classes["table"]} ${classes["numeric"]}`}>
         <thead>
           <tr>
             {table.columns.map((column) => (
               <th key={column.name} scope="col">
                 {column.title}
-                {column.unit && <span className={classes["unit"]}> ({column.unit})</span>}
+                {column.unit && <small> ({column.unit})</small>}
               </th>
             ))}
           </tr>

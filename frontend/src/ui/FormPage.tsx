@@ -1,7 +1,9 @@
-import { Skeleton } from "@mantine/core";
-import type { ReactNode } from "react";
-import { ErrorNotice } from "./ErrorNotice";
+import { Accordion, Box, Skeleton, Title } from "@mantine/core";
+import { type ReactNode, useState } from "react";
+import type { GainInfo } from "../api/types";
+import { type NumberEntry, NumberField } from "./Fields";
 import classes from "./Form.module.css";
+import { ErrorNotice } from "./Notices";
 
 interface Props {
   title: string;
@@ -13,11 +15,72 @@ interface Props {
 /** A page with one form, while what the form needs is loaded, and after. */
 export function FormPage({ title, error, isPending, children }: Props) {
   return (
-    <div className={classes["page"]}>
-      <h1 className={classes["title"]}>{title}</h1>
+    <Box maw={860} mx="auto">
+      <Title order={1} mt={4} mb={16}>
+        {title}
+      </Title>
       {children}
       <ErrorNotice error={error} />
       {isPending && <Skeleton height={420} radius="md" aria-busy="true" />}
-    </div>
+    </Box>
+  );
+}
+
+/** The fields without a valid number, which block the form. */
+export function MissingNumbers({ fields }: { fields: readonly string[] }) {
+  return fields.length === 0 ? null : <p role="status">Enter a number for {fields.join(", ")}.</p>;
+}
+
+/** The library makes ids of it, so it must be one word. */
+const SECTION = "section";
+
+interface FoldedSectionProps {
+  title: string;
+  /** Whether it must be open, because it contains a refused field. */
+  forcedOpen: boolean;
+  children: ReactNode;
+}
+
+/** The part of a form that has defaults, collapsed at first. */
+export function FoldedSection({ title, forcedOpen, children }: FoldedSectionProps) {
+  const [opened, setOpened] = useState<string | null>(null);
+  return (
+    <Accordion variant="contained" chevronPosition="left" value={forcedOpen ? SECTION : opened} onChange={setOpened}>
+      <Accordion.Item value={SECTION}>
+        <Accordion.Control mih={56}>{title}</Accordion.Control>
+        <Accordion.Panel>{children}</Accordion.Panel>
+      </Accordion.Item>
+    </Accordion>
+  );
+}
+
+interface GainFieldsProps {
+  legend: string;
+  gains: readonly GainInfo[];
+  values: Readonly<Record<string, NumberEntry>>;
+  /** Refusals by field name, which is `prefix` and the gain's name. */
+  reasons: Readonly<Record<string, string>>;
+  prefix: string;
+  onChange: (values: Record<string, NumberEntry>) => void;
+}
+
+/** A required number for each gain, with its range. */
+export function GainFields({ legend, gains, values, reasons, prefix, onChange }: GainFieldsProps) {
+  return (
+    <fieldset className={classes["gains"]}>
+      <legend>{legend}</legend>
+      {gains.map(({ name, lower, upper, unit }) => (
+        <NumberField
+          key={name}
+          required
+          withAsterisk={false}
+          label={name}
+          description={`${lower} … ${upper} ${unit}`}
+          value={values[name] ?? ""}
+          error={reasons[`${prefix}.${name}`]}
+          onChange={(value) => onChange({ ...values, [name]: value })}
+        />
+      ))}
+    </fieldset>
   );
 }

@@ -1,6 +1,7 @@
 import { Anchor } from "@mantine/core";
 import { Link } from "react-router";
-import { ErrorNotice } from "./ErrorNotice";
+import { ErrorNotice } from "./Notices";
+import { useTitle } from "./useTitle";
 
 /** Error page of an item that could not be loaded, with a link to all campaigns. */
 export function NotFound({ error }: { error: unknown }) {
@@ -11,5 +12,18 @@ export function NotFound({ error }: { error: unknown }) {
         All campaigns
       </Anchor>
     </>
+  );
+}
+
+export function NotFoundPage() {
+  useTitle("Not found");
+  return (
+    <div style={{ padding: "12vh 0", textAlign: "center" }}>
+      <h1>Page not found</h1>
+      <p>The URL is wrong, or the item was deleted.</p>
+      <Anchor component={Link} to="/">
+        All campaigns
+      </Anchor>
+    </div>
   );
 }

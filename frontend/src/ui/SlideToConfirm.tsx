@@ -1,6 +1,6 @@
 import { IconChevronsRight } from "@tabler/icons-react";
 import { type PointerEvent, useId, useRef, useState } from "react";
-import { hasArrived, slideShare } from "./hold";
+import { hasArrived, slideShare } from "./HoldButton";
 import classes from "./SlideToConfirm.module.css";
 
 interface Props {

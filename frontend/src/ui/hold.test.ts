@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { hasArrived, holdProgress, slideShare } from "./hold";
+import { hasArrived, holdProgress, slideShare } from "./HoldButton";
 
 test("a hold counts up to two seconds and is done then, not before", () => {
   const half = holdProgress({ sinceMs: 1000, seenMs: 1950 }, 2000);

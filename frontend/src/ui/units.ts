@@ -1,5 +1,6 @@
 /** Units and gain names of a campaign, from its experiment. */
 
+import { useCatalogue } from "../api/queries";
 import type { Catalogue } from "../api/types";
 
 export interface Units {
@@ -30,4 +31,12 @@ export function unitsOf(catalogue: Catalogue | undefined, experiment: string): U
 export function gainTitles(catalogue: Catalogue | undefined, experiment: string): Readonly<Record<string, string>> {
   const found = catalogue?.experiments.find(({ name }) => name === experiment);
   return Object.fromEntries((found?.gains ?? []).map(({ name, title }) => [name, title]));
+}
+
+export function useUnits(experiment: string): Units {
+  return unitsOf(useCatalogue().data, experiment);
+}
+
+export function useGainTitles(experiment: string): Readonly<Record<string, string>> {
+  return gainTitles(useCatalogue().data, experiment);
 }

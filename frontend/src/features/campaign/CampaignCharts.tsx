@@ -1,12 +1,13 @@
 /** The charts of a campaign. Each keeps its own state, so that the page is not rendered again for it. */
 
 import { SegmentedControl, useComputedColorScheme } from "@mantine/core";
-import { memo, useCallback, useDeferredValue, useState } from "react";
-import type { TimeRange } from "../../api/queries";
-import { useCampaignFigure, useCurveOf } from "../../api/queries";
-import type { Campaign, Trial } from "../../api/types";
+import { useIdle, useMediaQuery } from "@mantine/hooks";
+import { memo, useCallback, useDeferredValue, useEffect, useRef, useState } from "react";
+import { type TimeRange, useCampaignFigure, useCurveOf, useLandscape } from "../../api/queries";
+import type { Campaign, FigureCard, Trial } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { type PlotlyFigure, withChosen, withTimeRange } from "../../charts/traces";
+import classes from "./CampaignPage.module.css";
 
 /** Height of the lower charts: enough for a panel of each gain. */
 const LOWER_PX = 300;
@@ -100,3 +101,49 @@ export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, onChoos
     </>
   );
 });
+
+const BESIDE_PX = 420;
+const STACKED_PX = 330;
+const WAITING_PX = 160;
+const IDLE_MS = 1500;
+
+function heightOf(card: FigureCard | undefined, stacked: boolean): number {
+  if (card?.state !== "ready") return WAITING_PX;
+  const axes = Object.keys((card.figure?.["layout"] ?? {}) as object).filter((name) => name.startsWith("xaxis"));
+  return stacked ? STACKED_PX * axes.length + 60 : BESIDE_PX;
+}
+
+/**
+ * The gains as a path over the model's error. Drawing it is slow, so it is drawn when it is in view or the user is idle.
+ */
+export function LandscapePanel({ campaignId }: { campaignId: number }) {
+  const place = useRef<HTMLDivElement>(null);
+  const [inView, setInView] = useState(false);
+  const [seen, setSeen] = useState(false);
+  const [shown, setShown] = useState<FigureCard | undefined>(undefined);
+  const idle = useIdle(IDLE_MS);
+  const theme = useComputedColorScheme("light");
+  const stacked = useMediaQuery("(max-width: 820px)", false, { getInitialValueInEffect: false });
+  const landscape = useLandscape(campaignId, theme, stacked, seen);
+  useEffect(() => {
+    const target = place.current;
+    if (target === null) return;
+    const observer = new IntersectionObserver((entries) => setInView(entries.at(-1)?.isIntersecting ?? false));
+    observer.observe(target);
+    return () => observer.disconnect();
+  }, []);
+  if (inView && !seen) setSeen(true);
+  if ((inView || (seen && idle)) && shown !== landscape.data) setShown(landscape.data);
+  return (
+    <div ref={place} className={classes["place"]}>
+      <FigurePanel
+        title="Error landscape of the model"
+        card={shown}
+        error={landscape.error}
+        wanted={seen}
+        height={heightOf(shown, stacked)}
+        build="contours"
+      />
+    </div>
+  );
+}

@@ -1,17 +1,18 @@
-import { ActionIcon, Anchor, Button, TextInput } from "@mantine/core";
+import { ActionIcon, Anchor, Button, Group, TextInput, Title } from "@mantine/core";
 import { IconPencil } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
 import { Link } from "react-router";
+import { pathOf, useDownload } from "../../api/files";
 import { useRename } from "../../api/mutations";
 import { problemOf } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
+import { StateBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
-import { StateBadge } from "../../ui/StateBadge";
+import { ErrorNotice } from "../../ui/Notices";
 import { campaignStateLabel } from "../../ui/states";
-import classes from "./CampaignHeader.module.css";
+import classes from "./CampaignPage.module.css";
 import { settingsOf } from "./definition";
-import { Exports } from "./Exports";
 
 /** Name, state, and the settings that proposals depend on. */
 export function CampaignHeader({ campaign }: { campaign: Campaign }) {
@@ -19,18 +20,20 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const catalogue = useCatalogue().data;
   return (
     <header className={classes["header"]}>
-      <Anchor component={Link} to="/" className={classes["back"]}>
+      <Anchor component={Link} to="/" display="inline-block" py={4} fz="small">
         All campaigns
       </Anchor>
       {renaming ? (
         <Rename campaign={campaign} onClose={() => setRenaming(false)} />
       ) : (
-        <div className={classes["line"]}>
-          <h1 className={classes["name"]}>{campaign.name}</h1>
+        <Group gap={4} wrap="nowrap">
+          <Title order={1} lh={1.2} style={{ overflowWrap: "anywhere" }}>
+            {campaign.name}
+          </Title>
           <ActionIcon color="gray" aria-label="Rename campaign" title="Rename" onClick={() => setRenaming(true)}>
             <IconPencil size={18} color="var(--dim)" />
           </ActionIcon>
-        </div>
+        </Group>
       )}
       <div className={classes["facts"]}>
         <StateBadge words={campaignStateLabel(campaign.state, campaign.outcome, campaign.rehearsal.state)} />
@@ -81,5 +84,35 @@ function Rename({ campaign, onClose }: { campaign: Campaign; onClose: () => void
         Cancel
       </Button>
     </form>
+  );
+}
+
+/** Report and bundle of the campaign; no bundle during a flight. */
+function Exports({ campaign }: { campaign: Campaign }) {
+  const pdf = useDownload(pathOf(campaign.id, "report.pdf"));
+  const bundle = useDownload(pathOf(campaign.id, "bundle"));
+  return (
+    <>
+      <Group gap={8} ms="auto">
+        <Button
+          component="a"
+          variant="default"
+          href={pathOf(campaign.id, "report.html")}
+          target="_blank"
+          rel="noreferrer"
+        >
+          Open report
+        </Button>
+        <Button variant="default" loading={pdf.isPending} onClick={() => pdf.mutate()}>
+          PDF
+        </Button>
+        {campaign.flying === null && (
+          <Button variant="default" loading={bundle.isPending} onClick={() => bundle.mutate()}>
+            Export bundle
+          </Button>
+        )}
+      </Group>
+      <ErrorNotice error={pdf.error ?? bundle.error} />
+    </>
   );
 }

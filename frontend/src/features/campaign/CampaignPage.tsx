@@ -1,4 +1,4 @@
-import { Skeleton, useComputedColorScheme } from "@mantine/core";
+import { Box, SimpleGrid, Skeleton, Stack, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
@@ -6,20 +6,16 @@ import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } 
 import type { Campaign, Trial } from "../../api/types";
 import { loadPlotly } from "../../charts/plotly";
 import { pointAt } from "../../charts/pointing";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { NotFound } from "../../ui/NotFound";
-import { NotFoundPage } from "../../ui/NotFoundPage";
-import { ReadOnlyNotice } from "../../ui/ReadOnlyNotice";
+import { NotFound, NotFoundPage } from "../../ui/NotFound";
+import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
+import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { useUnits } from "../../ui/useUnits";
-import { ByFlightPanels, CurvesPanel } from "./CampaignCharts";
+import { ByFlightPanels, CurvesPanel, LandscapePanel } from "./CampaignCharts";
 import { CampaignHeader } from "./CampaignHeader";
 import classes from "./CampaignPage.module.css";
 import { FlightsPanel } from "./FlightsPanel";
-import { LandscapePanel } from "./LandscapePanel";
-import { NextFlightCard } from "./NextFlightCard";
+import { NextFlightCard, useCampaignStatus } from "./NextFlightCard";
 import { StatisticsPanel } from "./StatisticsPanel";
-import { useCampaignStatus } from "./useCampaignStatus";
 import { VerdictPanel } from "./VerdictPanel";
 import { selectedTrial } from "./verdict";
 
@@ -93,7 +89,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <CampaignHeader campaign={campaign} />
       <ReadOnlyNotice why={watching} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
-        <div className={classes["flown"]}>
+        <Stack gap="var(--gap)" miw={0}>
           <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} onChoose={choose} />
           {shown !== null && (
             <Verdict
@@ -104,7 +100,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
               experiment={experiment}
             />
           )}
-        </div>
+        </Stack>
         <div className={classes["next"]}>
           {standing !== null && <Next {...standing} onChoose={setChosen} />}
           {standing === null &&
@@ -115,11 +111,11 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
             ))}
         </div>
       </div>
-      <div className={classes["halves"]}>
+      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt="var(--gap)">
         <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
-      </div>
+      </SimpleGrid>
       <Landscape campaignId={campaign.id} />
-      <div className={classes["row"]}>{read !== null && <Statistics campaignId={campaign.id} />}</div>
+      <Box mt="var(--gap)">{read !== null && <Statistics campaignId={campaign.id} />}</Box>
       <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
     </>
   );

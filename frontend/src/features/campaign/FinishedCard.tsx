@@ -1,14 +1,16 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { IconArchive } from "@tabler/icons-react";
 import { useArchive } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Aside } from "../../ui/Aside";
 import { against, percentChange, withUnit } from "../../ui/format";
-import { GainList } from "../../ui/GainList";
+import { GainList } from "../../ui/gains";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { campaignStateLabel } from "../../ui/states";
 import { plusMinus } from "../../ui/uncertainty";
-import { useUnits } from "../../ui/useUnits";
+import { useUnits } from "../../ui/units";
 import { CloneForm } from "../campaigns/CloneForm";
 import classes from "./NextFlight.module.css";
 import { bestOf } from "./nextStep";
@@ -32,12 +34,10 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const change = percentChange(campaign.best?.mean, first?.error);
   return (
     <Panel title={title}>
-      <div className={classes["stack"]}>
-        {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && (
-          <p className={classes["quiet"]}>{campaign.stop_reason}</p>
-        )}
+      <Stack gap={14}>
+        {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && <Note fz="body">{campaign.stop_reason}</Note>}
         {best !== null && campaign.best !== null && (
-          <div className={`${classes["best"]} numbers`}>
+          <Aside tone="good" className={`${classes["best"]} numbers`}>
             <p>Best: flight {best.number}</p>
             <p className={classes["figure"]}>{plusMinus(campaign.best.mean, campaign.best.standard_error, unit)}</p>
             {campaign.best.standard_error !== null && <p>± standard error</p>}
@@ -51,7 +51,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
                 {campaign.verdict && <strong> · {VERDICTS[campaign.verdict].toLowerCase()}</strong>}
               </p>
             )}
-          </div>
+          </Aside>
         )}
         {best !== null && (
           <Button variant="default" onClick={() => onChoose(best.number)}>
@@ -59,10 +59,10 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
           </Button>
         )}
         <PromoteGains campaign={campaign} />
-        <p className={classes["quiet"]}>
+        <Note fz="body">
           This campaign has no more flights. To continue, clone it. With “Start from flight” on, the clone starts from
           the best gains found here.
-        </p>
+        </Note>
         <CloneForm {...campaign} experiment={experiment} />
         {campaign.actions.includes("archive") && (
           <Button
@@ -77,7 +77,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
           </Button>
         )}
         <ErrorNotice error={archive.error} />
-      </div>
+      </Stack>
     </Panel>
   );
 }

@@ -1,6 +1,6 @@
 import { IconAlertTriangle, IconCircleArrowDown, IconCircleArrowUp, IconCircleCheck } from "@tabler/icons-react";
 import type { Trial } from "../../api/types";
-import classes from "./FlightMarkers.module.css";
+import classes from "./Verdict.module.css";
 import { marksOf, predictionResult } from "./verdict";
 
 /** Markers of special flights: refused gains that were flown, glitches in the record. */

@@ -1,10 +1,10 @@
-import { Button, FileButton, InputBase } from "@mantine/core";
+import { Button, FileButton, Group, InputBase } from "@mantine/core";
 import { IconCamera, IconTrash } from "@tabler/icons-react";
 import { useState } from "react";
-import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/photos";
+import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/records";
 import type { Trial } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import classes from "./FlightNotes.module.css";
+import { ErrorNotice } from "../../ui/Notices";
+import classes from "./Verdict.module.css";
 
 const PICTURES = "image/jpeg,image/png,image/webp";
 
@@ -40,7 +40,7 @@ export function FlightNotes({ trial }: { trial: Trial }) {
         </ul>
       )}
       {asked !== null && doomed >= 0 && (
-        <div className={classes["asks"]}>
+        <Group gap={8}>
           <p role="status">Delete photo {doomed + 1}? This cannot be undone.</p>
           <Button variant="default" onClick={() => setAsked(null)}>
             Cancel
@@ -48,7 +48,7 @@ export function FlightNotes({ trial }: { trial: Trial }) {
           <Button color="red" loading={remove.isPending} onClick={() => remove.mutate(asked)}>
             Delete photo {doomed + 1}
           </Button>
-        </div>
+        </Group>
       )}
       <FileButton accept={PICTURES} capture="environment" onChange={(file) => file && add.mutate(file)}>
         {(props) => (

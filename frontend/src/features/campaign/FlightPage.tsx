@@ -1,13 +1,11 @@
-import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Box, Skeleton, Title, useComputedColorScheme } from "@mantine/core";
 import { Link, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { grouped } from "../../ui/format";
-import { NotFound } from "../../ui/NotFound";
-import { NotFoundPage } from "../../ui/NotFoundPage";
+import { NotFound, NotFoundPage } from "../../ui/NotFound";
+import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { useUnits } from "../../ui/useUnits";
-import classes from "./FlightPage.module.css";
 import { GateChecks } from "./GateChecks";
 import { VerdictPanel } from "./VerdictPanel";
 
@@ -33,12 +31,14 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   const { number, record, gate } = trial.data;
   return (
     <>
-      <Anchor component={Link} to={`/campaigns/${campaignId}`} className={classes["back"]}>
+      <Anchor component={Link} to={`/campaigns/${campaignId}`} display="inline-block" py={4} fz="small">
         {campaign?.name ?? "The campaign"}
       </Anchor>
-      <h1 className={classes["name"]}>Flight {number}</h1>
+      <Title order={1} mb={12}>
+        Flight {number}
+      </Title>
       <FigurePanel title="Record" card={figure.data} error={figure.error} height={480} />
-      <div className={classes["row"]}>
+      <Box mt="var(--gap)">
         <VerdictPanel
           trial={trial.data}
           trials={trials}
@@ -47,8 +47,8 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
           experiment={experiment}
           own
         />
-      </div>
-      <div className={classes["facts"]}>
+      </Box>
+      <Box mt="var(--gap)" px={18} py={4} c="dimmed" fz="small">
         {record !== null && (
           <p className="numbers">
             {grouped(record.samples)} samples over {record.duration_s.toFixed(1)} s, source {record.source}, clock{" "}
@@ -56,7 +56,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
           </p>
         )}
         <GateChecks gate={gate} />
-      </div>
+      </Box>
     </>
   );
 }

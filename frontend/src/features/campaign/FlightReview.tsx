@@ -1,12 +1,19 @@
-import { Button, Chip, TextInput } from "@mantine/core";
+import { Button, Chip, Group, Text, TextInput } from "@mantine/core";
 import { useState } from "react";
-import { useClassify } from "../../api/mutations";
+import { useClassify, useJudgeAbort } from "../../api/mutations";
 import { problemOf, reasonsByField } from "../../api/problems";
 import type { Trial } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { type Suggestion, suggestedClass } from "./review";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "./Verdict.module.css";
-import { consequenceOf, INVALID_REASONS, otherClasses } from "./verdict";
+import {
+  abortSentence,
+  abortWords,
+  consequenceOf,
+  INVALID_REASONS,
+  otherClasses,
+  type Suggestion,
+  suggestedClass,
+} from "./verdict";
 
 const WORDS = { valid: "Mark valid", aborted: "Mark aborted", invalid: "Mark invalid" } as const;
 
@@ -80,10 +87,10 @@ export function FlightReview({ trial, trials }: Props) {
   return (
     <>
       {suggestion !== null && (
-        <p className={classes["suggested"]}>
+        <Text w="100%" fz="body" lh={1.4}>
           Suggested: <strong>{suggestion.outcome}</strong>, {suggestion.why}.
           {suggestion.outcome === "invalid" && ` ${consequenceOf(trial, trials, "invalid")}`}
-        </p>
+        </Text>
       )}
       {others.map((outcome) => (
         <Button
@@ -107,4 +114,35 @@ const rank = (outcome: Suggestion["outcome"], suggestion: Suggestion | null): nu
 function standsOut(outcome: Suggestion["outcome"], trial: Trial, suggestion: Suggestion | null): boolean {
   if (suggestion !== null) return outcome === suggestion.outcome;
   return outcome !== "invalid" && trial.state !== "invalid";
+}
+
+const LABELS = { "behaved badly": "The vehicle behaved badly", "something else": "Something else" } as const;
+
+/** Whether an aborted flight counts against its gains, with buttons for the cause. */
+export function AbortCause({ trial }: { trial: Trial }) {
+  const judge = useJudgeAbort();
+  const causes = abortWords(trial);
+  const sentence = abortSentence(trial);
+  if (sentence === "") return null;
+  return (
+    <section className={classes["abortCause"]} aria-label="Abort cause">
+      <p role="status">{sentence}</p>
+      {causes.length > 0 && (
+        <Group gap={8}>
+          {causes.map((cause) => (
+            <Button
+              key={cause}
+              px={12}
+              variant="default"
+              loading={judge.isPending}
+              onClick={() => judge.mutate({ trial, cause })}
+            >
+              {LABELS[cause]}
+            </Button>
+          ))}
+        </Group>
+      )}
+      <ErrorNotice error={judge.error} />
+    </section>
+  );
 }

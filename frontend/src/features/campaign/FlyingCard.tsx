@@ -1,13 +1,14 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { Link } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
 import { useLiveFlight } from "../../live/store";
 import { type LiveFlight, readingOf } from "../../live/telemetry";
 import { NOTHING, withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
+import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { percent, predictedText } from "../../ui/uncertainty";
-import { useUnits } from "../../ui/useUnits";
+import { useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import classes from "./NextFlight.module.css";
 
@@ -38,7 +39,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
       title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
       tools={trial === undefined ? undefined : <FlightMarkers trial={trial} />}
     >
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         <dl className={`${classes["big"]} numbers`}>
           <div className={classes["reading"]} data-wide>
             <dt>{reading.title}</dt>
@@ -64,10 +65,10 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           )}
         </dl>
         {trial && (
-          <p className={`${classes["quiet"]} numbers`}>
+          <Note fz="body" className="numbers">
             Gains {Object.keys(trial.gains).join(", ")} {gainsInBrackets(trial.gains)}
             {trial.read_back && ", read back from the vehicle"}.
-          </p>
+          </Note>
         )}
         {registered && (
           <Button component={Link} to={`/fly/${step.trialId}`} size="lg">
@@ -75,11 +76,9 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           </Button>
         )}
         {stage !== STAGED && (
-          <p className={classes["quiet"]}>
-            ABORT or the Space key ends the flight immediately and restores the safe gains.
-          </p>
+          <Note fz="body">ABORT or the Space key ends the flight immediately and restores the safe gains.</Note>
         )}
-      </div>
+      </Stack>
     </Panel>
   );
 }

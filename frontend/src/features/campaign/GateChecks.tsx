@@ -1,7 +1,11 @@
+import { Button } from "@mantine/core";
 import { IconCircleCheck, IconCircleX } from "@tabler/icons-react";
+import { Fragment } from "react";
+import { limitsOf, type Problem, reasonsByWeight } from "../../api/problems";
 import type { Check, Gate } from "../../api/types";
 import { count, gainText } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
+import { Note } from "../../ui/Note";
 import classes from "./NextFlight.module.css";
 
 /** Gate checks of a flight: a summary line, and each check when opened or when one has failed. */
@@ -29,10 +33,10 @@ export function GateChecks({ gate }: { gate: Gate }) {
             );
           })}
         </ul>
-        <p className={classes["gateNote"]}>
+        <Note fz="fine" mt={10}>
           Checked before every flight, for proposed and manual gains.
           <HelpTip topic="gate" />
-        </p>
+        </Note>
       </div>
     </details>
   );
@@ -45,4 +49,79 @@ function Facts({ check }: { check: Check }) {
     (part) => part !== "",
   );
   return parts.length === 0 ? null : <small className="numbers">{parts.join(" · ")}</small>;
+}
+
+type Offer = [gain: string, value: number];
+
+interface RefusalProps {
+  problem: Problem;
+  offers: Offer[];
+  onUse: (offers: readonly Offer[]) => void;
+}
+
+/** Main reason of a refusal and values that would pass; other failed checks are collapsed. */
+export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
+  const [first, ...reasons] = reasonsByWeight(problem);
+  const limits = limitsOf(problem);
+  const besides = limits.filter((limit) => limit !== first);
+  const others = reasons.filter((reason) => !limits.includes(reason));
+  return (
+    <div className={`${classes["failed"]} ${classes["stack"]}`} role="alert">
+      <div>
+        <strong>{problem.detail || problem.title}</strong>
+        <p>{first}</p>
+      </div>
+      {offers.length > 0 && (
+        <div>
+          <Button fullWidth variant="light" h="auto" onClick={() => onUse(offers)}>
+            <span className={classes["offer"]}>
+              Use{" "}
+              {offers.map(([name, value], index) => (
+                <Fragment key={name}>
+                  {index > 0 && ", "}
+                  <span>
+                    {name} {gainText(value)}
+                  </span>
+                </Fragment>
+              ))}
+            </span>
+          </Button>
+          <OfferNote several={offers.length > 1} above={limits.includes(first ?? "")} besides={besides} />
+        </div>
+      )}
+      {others.length > 0 && (
+        <details className={classes["more"]}>
+          <summary>{count(others.length, "more check")} failed</summary>
+          <ul className={classes["gate"]}>
+            {others.map((reason) => (
+              <li key={reason}>{reason}</li>
+            ))}
+          </ul>
+        </details>
+      )}
+      {problem.hint && <p className={classes["offerNote"]}>{problem.hint}</p>}
+    </div>
+  );
+}
+
+/** Explains why the offered values can be below those that the refusal names: several limits apply at once. */
+function OfferNote({ several, above, besides }: { several: boolean; above: boolean; besides: readonly string[] }) {
+  const nearest = several
+    ? "These are the closest values to yours that satisfy"
+    : "This is the closest value to yours that satisfies";
+  const limits = above ? "the limit above and these limits:" : "these limits. The flights are simulated again:";
+  return (
+    <>
+      <p className={classes["offerNote"]}>
+        {nearest} {besides.length > 0 ? limits : "the limit above."}
+      </p>
+      {besides.length > 0 && (
+        <ul className={classes["offerNote"]}>
+          {besides.map((limit) => (
+            <li key={limit}>{limit}</li>
+          ))}
+        </ul>
+      )}
+    </>
+  );
 }

@@ -1,10 +1,10 @@
-import { Button, FileButton } from "@mantine/core";
+import { Button, FileButton, Stack } from "@mantine/core";
 import { IconFileUpload } from "@tabler/icons-react";
 import type { RecordOrder, RecordUpload } from "../../api/mutations";
 import { problemOf } from "../../api/problems";
 import { RECORD_FILES, recordOf, takeoffsIn, wantsConfirmation } from "../../api/records";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import classes from "./NextFlight.module.css";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 
 interface Props {
   upload: RecordUpload;
@@ -22,12 +22,12 @@ export function ImportRecord({ upload, trialId, proposalId }: Props) {
   const again = (answer: Partial<RecordOrder>) =>
     upload.variables !== undefined && upload.mutate({ ...upload.variables, ...target, ...answer });
   return (
-    <div className={classes["stack"]}>
-      <p className={classes["quiet"]}>
+    <Stack gap={14}>
+      <Note fz="body">
         Set these gains on your vehicle, fly, and upload the log: MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi
         .data (with its .log), or a CSV file with the columns <code>time_s</code> (seconds since the command) and{" "}
         <code>altitude_m</code>.
-      </p>
+      </Note>
       <FileButton
         multiple
         accept={RECORD_FILES}
@@ -61,6 +61,6 @@ export function ImportRecord({ upload, trialId, proposalId }: Props) {
           Import with the gains in the log
         </Button>
       )}
-    </div>
+    </Stack>
   );
 }

@@ -1,14 +1,14 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Stack, TextInput } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useState } from "react";
 import { useCreateTrial } from "../../api/mutations";
 import { isGateRefusal, offersOf, problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { gainText } from "../../ui/format";
-import { readNumber, typed, typedGain } from "../../ui/numbers";
-import { GateRefusal } from "./GateRefusal";
+import { gainText, readNumber, typed, typedGain } from "../../ui/format";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
+import { GateRefusal } from "./GateChecks";
 import classes from "./NextFlight.module.css";
 import type { Speed } from "./nextStep";
 
@@ -88,13 +88,13 @@ export function ManualGains({ campaign, start, speed, onClose }: Props) {
         />
       )}
       {refused && !campaign.vehicle.is_real && <Overrule pending={create.isPending} onFly={submit} />}
-      <p className={`${classes["quiet"]} numbers`} aria-live="polite">
+      <Note fz="body" className="numbers" aria-live="polite">
         {unread.length > 0
           ? `Enter a number for ${unread.join(", ")}.`
           : `${act === "Fly" ? "Flies" : "Plans"} ${Object.entries(gains)
               .map(([name, value]) => `${name} ${typed(value).replace("-", "−")}`)
               .join(" · ")}`}
-      </p>
+      </Note>
       <Button type="submit" size="lg" disabled={unread.length > 0} loading={create.isPending}>
         {act} these gains
       </Button>
@@ -112,10 +112,10 @@ function Overrule({ pending, onFly }: { pending: boolean; onFly: (reason: string
   return (
     <details className={classes["more"]}>
       <summary>Overrule the gate</summary>
-      <div className={classes["stack"]}>
-        <p className={classes["quiet"]}>
+      <Stack gap={14}>
+        <Note fz="body">
           Refused gains can be flown on a simulated vehicle only. The reason is saved and shown with the flight.
-        </p>
+        </Note>
         <TextInput
           label="Reason"
           placeholder="For example: the paper flew these gains"
@@ -133,7 +133,7 @@ function Overrule({ pending, onFly }: { pending: boolean; onFly: (reason: string
         >
           Fly refused gains
         </Button>
-      </div>
+      </Stack>
     </details>
   );
 }

@@ -1,16 +1,17 @@
-import { Button, Loader } from "@mantine/core";
+import { Button, Loader, Stack, Text } from "@mantine/core";
+import { useState } from "react";
 import { useRecompute, useUploadRecord } from "../../api/mutations";
-import type { NextFlight } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { useCampaign, useProposal, useTrials } from "../../api/queries";
+import type { Campaign, NextFlight, Trial } from "../../api/types";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { FinishedCard } from "./FinishedCard";
 import { FlyingCard } from "./FlyingCard";
 import classes from "./NextFlight.module.css";
-import { nextStep } from "./nextStep";
+import { hasLanded, nextStep } from "./nextStep";
 import { PlannedCard } from "./PlannedCard";
 import { ProposalCard } from "./ProposalCard";
 import { RehearsalCard, RehearsalNote } from "./RehearsalCard";
-import type { CampaignStatus } from "./useCampaignStatus";
 
 interface Props extends CampaignStatus {
   onChoose: (trialNumber: number) => void;
@@ -45,11 +46,11 @@ function Step({ campaign, next, trials, onChoose }: Props) {
     case "judge":
       return (
         <Panel title={`Review flight ${step.trial.number}`}>
-          <p className={classes["lead"]}>
+          <Text lh={1.45} mb={14}>
             {step.trial.state === "lost"
               ? "The end of this flight is unknown. Classify it; then the next gains are proposed."
               : "Classify this flight; then the next gains are proposed."}
-          </p>
+          </Text>
           <Button fullWidth onClick={() => onChoose(step.trial.number)}>
             Review flight {step.trial.number}
           </Button>
@@ -77,7 +78,7 @@ function FailedCard({ campaignId, next }: { campaignId: number; next: NextFlight
   const recompute = useRecompute(campaignId);
   return (
     <Panel title="Next flight">
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         <div role="alert" className={classes["failed"]}>
           <strong>{next.problem?.title ?? "The next gains could not be computed."}</strong>
           <p>{next.problem?.detail}</p>
@@ -87,7 +88,36 @@ function FailedCard({ campaignId, next }: { campaignId: number; next: NextFlight
           Compute again
         </Button>
         <ErrorNotice error={recompute.error} />
-      </div>
+      </Stack>
     </Panel>
   );
+}
+
+/** A consistent set of a campaign, its trials and its next flight. */
+export interface CampaignStatus {
+  campaign: Campaign;
+  trials: readonly Trial[];
+  next: NextFlight;
+}
+
+/** Null until all parts are loaded. Keeps the last consistent set while a part is stale, so that the page does not ask
+ * for a review that was just given or offer superseded gains. */
+export function useCampaignStatus(campaignId: number): CampaignStatus | null {
+  const campaign = useCampaign(campaignId);
+  const trials = useTrials(campaignId);
+  const next = useProposal(campaignId);
+  const [held, setHeld] = useState<CampaignStatus | null>(null);
+  const parts = { campaign: campaign.data, trials: trials.data, next: next.data };
+  const areNew = [campaign, trials, next].every(({ isStale, error }) => !isStale || error !== null);
+  const areOther = parts.campaign !== held?.campaign || parts.trials !== held?.trials || parts.next !== held?.next;
+  if (areNew && areOther && isKnown(parts)) setHeld(parts);
+  // A landing is shown at once: a landed flight must not be shown as flying.
+  if (held !== null && parts.trials !== undefined && hasLanded(held.campaign, parts.trials)) {
+    return { ...held, trials: parts.trials };
+  }
+  return held;
+}
+
+function isKnown(parts: { [Part in keyof CampaignStatus]: CampaignStatus[Part] | undefined }): parts is CampaignStatus {
+  return parts.campaign !== undefined && parts.trials !== undefined && parts.next !== undefined;
 }

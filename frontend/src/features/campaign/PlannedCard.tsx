@@ -1,13 +1,13 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { gainText } from "../../ui/format";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { predictedText } from "../../ui/uncertainty";
-import { useGainTitles, useUnits } from "../../ui/useUnits";
+import { useGainTitles, useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
@@ -31,7 +31,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
   const { can_fly, needs_staging, registered } = campaign.vehicle;
   return (
     <Panel title={`Flight ${trial.number} is planned`} tools={<FlightMarkers trial={trial} />}>
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         <dl className={`${classes["big"]} numbers`}>
           {Object.entries(trial.gains).map(([name, value]) => (
             <div key={name} className={classes["reading"]}>
@@ -86,7 +86,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           Cancel trial
         </Button>
         <ErrorNotice error={fly.error ?? cancel.error} />
-      </div>
+      </Stack>
     </Panel>
   );
 }

@@ -5,8 +5,9 @@ import { usePromote } from "../../api/mutations";
 import { problemOf, reasonsByField } from "../../api/problems";
 import type { Campaign } from "../../api/types";
 import { useVehicle } from "../../api/vehicles";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { gainsInBrackets, sameHeld } from "../../ui/gains";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "./NextFlight.module.css";
 import { heldGainsNotice, promotable } from "./verdict";
 
@@ -21,9 +22,9 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
   if (!possible) {
     const isDone = sameHeld(vehicle.safe_gains, campaign.best.gains);
     return (
-      <p className={classes["quiet"]}>
+      <Note fz="body">
         {why} {isDone && heldGainsNotice(vehicle)}
-      </p>
+      </Note>
     );
   }
   if (!asking) {
@@ -49,10 +50,10 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
         promote.mutate({ version: vehicle.version, statement }, { onSuccess: () => setAsking(false) });
       }}
     >
-      <p className={classes["quiet"]}>
+      <Note fz="body">
         After every flight and abort, {vehicle.name} then gets {gainsInBrackets(campaign.best.gains)} instead of{" "}
         {gainsInBrackets(vehicle.safe_gains)}.
-      </p>
+      </Note>
       <TextInput
         label="Decided by, and why"
         value={statement}

@@ -1,24 +1,21 @@
-import { Button } from "@mantine/core";
-import { IconPlaneDeparture } from "@tabler/icons-react";
+import { Button, Stack, Text } from "@mantine/core";
+import { IconPencil, IconPlaneDeparture } from "@tabler/icons-react";
 import { useState } from "react";
-import { type RecordUpload, useCreateTrial } from "../../api/mutations";
+import { type RecordUpload, useCreateTrial, useFinish } from "../../api/mutations";
+import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { useGainTitles, useUnits } from "../../ui/useUnits";
-import { Expectation, FlightAlternatives } from "./FlightAlternatives";
-import { GainTable } from "./GainTable";
+import { useGainTitles, useUnits } from "../../ui/units";
 import { GateChecks } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
 import { ManualGains } from "./ManualGains";
 import classes from "./NextFlight.module.css";
 import { speedOf } from "./nextStep";
-import { PredictedError } from "./PredictedError";
-import { ProposalExplanation } from "./ProposalExplanation";
-import { advised, choicesFor, KINDS, type Variant } from "./proposal";
-import { Recommendation } from "./Recommendation";
+import { GainTable, PredictedError, ProposalExplanation, Recommendation } from "./ProposalDetails";
+import { advised, type Choice, choicesFor, expectationOf, KINDS, type Variant } from "./proposal";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
-import { StopCampaign } from "./StopCampaign";
 
 interface Props {
   campaign: Campaign;
@@ -53,8 +50,15 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
     );
   }
   return (
-    <Panel title={`Next flight: ${number}`} tools={<span className={classes["quiet"]}>{KINDS[proposal.kind]}</span>}>
-      <div className={classes["stack"]}>
+    <Panel
+      title={`Next flight: ${number}`}
+      tools={
+        <Text span c="dimmed" fz="body">
+          {KINDS[proposal.kind]}
+        </Text>
+      }
+    >
+      <Stack gap={14}>
         {trials.length > 0 && <Recommendation advice={advice} />}
         {advice.variant !== null && (
           <div>
@@ -107,7 +111,7 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
           <GateChecks gate={proposal.gate} />
         </div>
         {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
-      </div>
+      </Stack>
     </Panel>
   );
 }
@@ -139,5 +143,69 @@ function FlyButton({ label, loading, onClick, quiet = false, disabled = false }:
     >
       {label}
     </Button>
+  );
+}
+
+interface FlightAlternativesProps {
+  campaignId: number;
+  choices: readonly Choice[];
+  disabled: boolean;
+  onFly: (variant: Variant) => void;
+  onEdit: () => void;
+}
+
+/** Alternatives to the proposal, each with its expected error. */
+function FlightAlternatives({ campaignId, choices, disabled, onFly, onEdit }: FlightAlternativesProps) {
+  return (
+    <div className={classes["row"]}>
+      {choices.map(({ variant, label, hint }) => (
+        <div key={variant}>
+          <Button fullWidth variant="default" title={hint} disabled={disabled} onClick={() => onFly(variant)}>
+            {label}
+          </Button>
+          <Expectation campaignId={campaignId} variant={variant} />
+        </div>
+      ))}
+      <Button variant="default" leftSection={<IconPencil size={18} aria-hidden />} onClick={onEdit}>
+        Edit gains
+      </Button>
+    </div>
+  );
+}
+
+/** One line below the button that flies the variant. */
+function Expectation({ campaignId, variant }: { campaignId: number; variant: Variant }) {
+  const expectation = expectationOf(variant, useStatistics(campaignId).data);
+  return expectation === "" ? null : (
+    <Note fz="fine" lh={1.35} m="6px 2px 4px" className="numbers">
+      {expectation}
+    </Note>
+  );
+}
+
+/** Ends the campaign between flights, after a confirmation because it cannot be undone. */
+function StopCampaign({ campaignId }: { campaignId: number }) {
+  const [asking, setAsking] = useState(false);
+  const finish = useFinish(campaignId);
+  if (!asking) {
+    return (
+      <Button variant="subtle" color="gray" c="var(--dim)" onClick={() => setAsking(true)}>
+        Stop campaign
+      </Button>
+    );
+  }
+  return (
+    <Stack gap={14}>
+      <Note fz="body">Stop this campaign? It cannot be resumed. Its flights are kept, and it can be cloned.</Note>
+      <div className={classes["row"]}>
+        <Button variant="default" onClick={() => setAsking(false)}>
+          Continue
+        </Button>
+        <Button color="red" loading={finish.isPending} onClick={() => finish.mutate()}>
+          Stop campaign
+        </Button>
+      </div>
+      <ErrorNotice error={finish.error} />
+    </Stack>
   );
 }

@@ -1,9 +1,11 @@
-import { Anchor, Button } from "@mantine/core";
+import { Anchor, Button, Stack } from "@mantine/core";
 import { Link, useNavigate } from "react-router";
 import { useRehearse } from "../../api/mutations";
 import { useCampaign } from "../../api/queries";
 import type { Campaign } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Aside } from "../../ui/Aside";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import classes from "./NextFlight.module.css";
 
@@ -14,12 +16,12 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
   const { state, campaign_id, reason } = campaign.rehearsal;
   return (
     <Panel title="Rehearse first">
-      <div className={classes["stack"]}>
-        <p className={classes["quiet"]}>
+      <Stack gap={14}>
+        <Note fz="body">
           {campaign.vehicle.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
           simulation with the same strategy, bounds, stop rule and gains: three valid flights, or fewer if the stop rule
           ends it, and none aborted or invalid.
-        </p>
+        </Note>
         <p role="status">
           <strong>{STANDING[state]}</strong> {reason}.
         </p>
@@ -37,12 +39,12 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
           </Button>
         )}
         {state === "failed" && campaign_id !== null && (
-          <Anchor component={Link} to={`/campaigns/${campaign_id}`} className={classes["link"]}>
+          <Anchor component={Link} to={`/campaigns/${campaign_id}`} py={12} display="inline-block">
             Open failed rehearsal
           </Anchor>
         )}
         <ErrorNotice error={rehearse.error} />
-      </div>
+      </Stack>
     </Panel>
   );
 }
@@ -59,7 +61,7 @@ export function RehearsalNote({ campaignId }: { campaignId: number }) {
   if (real === undefined) return null;
   const passed = real.rehearsal.state === "passed";
   return (
-    <div className={classes["advice"]}>
+    <Aside tone="good" className={classes["advice"] ?? ""}>
       <p>
         <strong>{passed ? "Rehearsal passed" : "This is a rehearsal"}</strong>
         <span>
@@ -69,6 +71,6 @@ export function RehearsalNote({ campaignId }: { campaignId: number }) {
           </Anchor>
         </span>
       </p>
-    </div>
+    </Aside>
   );
 }

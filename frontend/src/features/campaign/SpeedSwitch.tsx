@@ -1,6 +1,5 @@
-import { SegmentedControl } from "@mantine/core";
+import { Group, SegmentedControl } from "@mantine/core";
 import { useLocalStorage } from "@mantine/hooks";
-import classes from "./NextFlight.module.css";
 import { SPEEDS } from "./nextStep";
 
 /** The selected simulation speed, stored on this device. */
@@ -15,7 +14,7 @@ export function useSpeed(): [string, (value: string) => void] {
 
 export function SpeedSwitch({ value, onChange }: { value: string; onChange: (value: string) => void }) {
   return (
-    <div className={classes["speed"]}>
+    <Group justify="space-between" wrap="nowrap" gap={12} c="dimmed" fz="small">
       <span id="speed-label">Simulated at</span>
       <SegmentedControl
         aria-labelledby="speed-label"
@@ -24,6 +23,6 @@ export function SpeedSwitch({ value, onChange }: { value: string; onChange: (val
         onChange={onChange}
         data={SPEEDS.map(({ value: name, label }) => ({ value: name, label }))}
       />
-    </div>
+    </Group>
   );
 }

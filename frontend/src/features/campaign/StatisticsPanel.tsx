@@ -1,14 +1,18 @@
+import { Stack } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useStatistics } from "../../api/queries";
 import type { CampaignStatistics } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Aside, toneOf } from "../../ui/Aside";
 import { count } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
+import { useLastRows } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
+import table from "../../ui/ScrollTable.module.css";
 import { confidenceText, percent, plusMinus, scatterSource } from "../../ui/uncertainty";
-import { useLastRows } from "../../ui/useLastRows";
 import classes from "./Statistics.module.css";
 import { VERDICTS } from "./verdict";
 
@@ -18,12 +22,12 @@ export function StatisticsPanel({ campaignId }: { campaignId: number }) {
   return (
     <Panel title="Statistics">
       <ErrorNotice error={statistics.error} />
-      {statistics.isPending && <div className={classes["waiting"]} aria-busy="true" />}
+      {statistics.isPending && <div style={{ minHeight: 160 }} aria-busy="true" />}
       {statistics.data && statistics.data.groups.length === 0 && (
-        <p className={classes["none"]}>
+        <Note>
           Available after the first valid flight: the scatter of the error, whether the best gains are better, and how
           good the predictions are.
-        </p>
+        </Note>
       )}
       {statistics.data && statistics.data.groups.length > 0 && <Results {...statistics.data} />}
     </Panel>
@@ -34,7 +38,7 @@ function Results(all: CampaignStatistics) {
   const { comparison, drift, track_record: record, notes, trends } = all;
   const shown = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
   return (
-    <div className={classes["said"]}>
+    <Stack gap={14}>
       <div className={classes["facts"]}>
         <Verdict comparison={comparison} unit={all.error_unit} />
         <Scatter {...all} />
@@ -56,24 +60,24 @@ function Results(all: CampaignStatistics) {
             <li key={note}>{note}</li>
           ))}
       </ul>
-    </div>
+    </Stack>
   );
 }
 
 function Verdict({ comparison, unit }: { comparison: CampaignStatistics["comparison"]; unit: string }) {
   if (comparison === null) {
     return (
-      <div className={classes["fact"]}>
+      <Aside className={classes["fact"] ?? ""}>
         <h3>Best against first gains</h3>
         <p className={classes["big"]}>Same gains</p>
         <p>Nothing to compare: the first flight's gains are the best so far.</p>
-      </div>
+      </Aside>
     );
   }
   const { verdict, confidence, difference, standard_error, further } = comparison;
   const more = further === null ? null : further.best + further.baseline;
   return (
-    <div className={classes["fact"]} data-verdict={verdict}>
+    <Aside tone={toneOf(verdict)} className={classes["fact"] ?? ""}>
       <h3>
         Best against first gains
         <HelpTip topic="difference" />
@@ -93,7 +97,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
           </strong>
         )}
       </p>
-    </div>
+    </Aside>
   );
 }
 
@@ -107,7 +111,7 @@ function Scatter({
 }: CampaignStatistics) {
   const repeats = groups.reduce((sum, group) => sum + group.errors.length - 1, 0);
   return (
-    <div className={classes["fact"]}>
+    <Aside className={classes["fact"] ?? ""}>
       <h3>
         Scatter of one flight
         <HelpTip topic="scatter" />
@@ -127,13 +131,13 @@ function Scatter({
           error: {plusMinus(shrunk_error, null, unit)}.
         </p>
       )}
-    </div>
+    </Aside>
   );
 }
 
 function Predictions({ record }: { record: CampaignStatistics["track_record"] }) {
   return (
-    <div className={classes["fact"]} data-verdict={record.trustworthy ? undefined : "worse"}>
+    <Aside tone={record.trustworthy ? undefined : "bad"} className={classes["fact"] ?? ""}>
       <h3>
         Predictions inside their interval
         <HelpTip topic="record" />
@@ -148,7 +152,7 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
         </p>
       )}
       <p className={classes["fine"]}>{record.sentence}</p>
-    </div>
+    </Aside>
   );
 }
 
@@ -157,7 +161,7 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
   const names = Object.keys(groups[0]?.gains ?? {});
   const { more, listed } = useLastRows(groups, 4, "gain sets", (group) => group.is_best || group.is_baseline);
   return (
-    <ScrollTable label="Gain sets flown" className={classes["groups"]}>
+    <ScrollTable label="Gain sets flown" className={`${table["numeric"]} ${classes["groups"]}`}>
       <thead>
         <tr>
           <th scope="col">[{names.join(" ")}]</th>

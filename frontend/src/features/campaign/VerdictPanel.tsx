@@ -1,28 +1,29 @@
-import { Anchor, Button } from "@mantine/core";
-import { IconDownload } from "@tabler/icons-react";
+import { Anchor, Button, Group, Text } from "@mantine/core";
+import { IconCircleArrowDown, IconCircleArrowUp, IconDownload, IconHelpHexagon, IconRepeat } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
+import { useCreateTrial } from "../../api/mutations";
 import { recordCsv, useCampaign, useStatistics } from "../../api/queries";
-import type { Trial } from "../../api/types";
+import type { Campaign, Trial } from "../../api/types";
+import { Aside } from "../../ui/Aside";
+import { StateBadge } from "../../ui/Badges";
 import type { Topic } from "../../ui/explanations";
 import { percentChange, percentText, withUnit } from "../../ui/format";
-import { GainList } from "../../ui/GainList";
+import { GainList } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { StateBadge } from "../../ui/StateBadge";
 import { trialStateLabel } from "../../ui/states";
 import { Time } from "../../ui/Time";
-import { intervalText, plusMinus } from "../../ui/uncertainty";
-import { AbortCause } from "./AbortCause";
+import { confidenceText, intervalText, plusMinus } from "../../ui/uncertainty";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
 import { FlightNotes } from "./FlightNotes";
-import { FlightReview } from "./FlightReview";
-import { Glitches } from "./Glitches";
+import { AbortCause, FlightReview } from "./FlightReview";
+import { speedOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
-import { RetryGains } from "./RetryGains";
-import { TrialComparisons } from "./TrialComparisons";
+import { useSpeed } from "./SpeedSwitch";
 import classes from "./Verdict.module.css";
-import { bestBeforeOf, repeatPurpose, sentenceOf, standingWithout } from "./verdict";
+import { bestBeforeOf, repeatPurpose, sentenceOf, standingWithout, VERDICTS } from "./verdict";
 
 interface Props {
   trial: Trial;
@@ -85,7 +86,11 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </span>
       }
     >
-      {asked && <p className={classes["sentence"]}>{asked}</p>}
+      {asked && (
+        <Text fz="body" lh={1.45} mb={4}>
+          {asked}
+        </Text>
+      )}
       <p className={asked ? classes["reason"] : classes["sentence"]}>{sentenceOf(trial)}</p>
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
         <p className={classes["reason"]}>{trial.reason}</p>
@@ -93,9 +98,9 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       <AbortCause trial={trial} />
       <TrialComparisons trial={trial} unit={unit} />
       {trial.overrule_reason && (
-        <p className={classes["overruled"]}>
+        <Aside tone="warn" mt={6} fz="body">
           <strong>The gate refused these gains and was overruled:</strong> {trial.overrule_reason}
-        </p>
+        </Aside>
       )}
       <dl className={`${classes["figures"]} numbers`}>
         <Fact title="Error" topic="error">
@@ -129,11 +134,11 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       </dl>
       <Glitches trial={trial} unit={unit} />
       {without && (
-        <p className={classes["sentence"]} role="status">
+        <Text fz="body" lh={1.45} mb={4} role="status">
           {without}
-        </p>
+        </Text>
       )}
-      <div className={classes["acts"]}>
+      <Group gap="10px 14px">
         <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
         {campaign && <RetryGains campaign={campaign} trial={trial} />}
         {trial.record !== null && (
@@ -150,23 +155,111 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         <Anchor
           component={Link}
           to={`/compare?add=${trial.id}&campaign=${trial.campaign_id}`}
-          className={classes["link"]}
+          px={6}
+          py={12}
           aria-label={`Compare flight ${trial.number}`}
         >
           Compare
         </Anchor>
         {!own && (
-          <Anchor
-            component={Link}
-            to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`}
-            className={classes["link"]}
-          >
+          <Anchor component={Link} to={`/campaigns/${trial.campaign_id}/flights/${trial.id}`} px={6} py={12}>
             Open flight
           </Anchor>
         )}
-      </div>
+      </Group>
       <FlightNotes trial={trial} />
       {campaign && isBest && campaign.state !== "finished" && <PromoteGains campaign={campaign} />}
     </Panel>
+  );
+}
+
+const ICONS = {
+  better: IconCircleArrowDown,
+  worse: IconCircleArrowUp,
+  unresolved: IconHelpHexagon,
+  "not known yet": IconHelpHexagon,
+} as const;
+
+/** Verdicts of the flight's gains against the best before it and against the first. */
+function TrialComparisons({ trial, unit }: { trial: Trial; unit: string }) {
+  if (trial.comparisons.length === 0) return null;
+  const asked = repeatPurpose(trial) !== "";
+  return (
+    <ul className={classes["comparisons"]}>
+      {trial.comparisons.map(({ against, trial_number, verdict, confidence, difference, standard_error }) => {
+        const Icon = ICONS[verdict];
+        return (
+          <li key={against} data-verdict={asked ? undefined : verdict} className="numbers">
+            <Icon size={20} aria-hidden />
+            <span>
+              {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>},{" "}
+              {confidence === null ? "" : `${confidenceText(confidence)} confidence, `}against{" "}
+              {against === "first" ? "the first" : "the best before"}, flight {trial_number}:{" "}
+              {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
+              <small>{standard_error === null ? "(no gains were flown twice)" : "(± standard error)"}</small>
+            </span>
+          </li>
+        );
+      })}
+    </ul>
+  );
+}
+
+const KINDS = {
+  acceleration: "Impossible acceleration",
+  frozen: "Frozen samples",
+  gap: "Gap",
+  disagreement: "Sources disagree",
+} as const;
+
+/** Glitches of the record, and the error without them. The stored record is unchanged. */
+function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
+  const glitches = trial.glitches ?? [];
+  if (glitches.length === 0) return null;
+  return (
+    <Aside tone="bad" mb={14} fz="small">
+      <h3>
+        The record has {glitches.length === 1 ? "a glitch" : `${glitches.length} glitches`}
+        <HelpTip topic="glitch" />
+      </h3>
+      <ul>
+        {glitches.map(({ kind, start_s, end_s, sentence }) => (
+          <li key={`${kind} ${start_s}`} className="numbers">
+            <strong>
+              {KINDS[kind]}, {start_s.toFixed(2)} … {end_s.toFixed(2)} s.
+            </strong>{" "}
+            {sentence}
+          </li>
+        ))}
+      </ul>
+      {trial.repaired_error !== null && trial.repaired_error !== undefined && (
+        <p className="numbers">
+          Error as recorded {plusMinus(trial.error, null, unit)}, with the glitches bridged{" "}
+          {plusMinus(trial.repaired_error, null, unit)}.
+        </p>
+      )}
+    </Aside>
+  );
+}
+
+/** Retry of the gains of an aborted or invalid flight: flown at once on a simulation, otherwise staged. */
+function RetryGains({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
+  const create = useCreateTrial(campaign);
+  const [speed] = useSpeed();
+  const { can_fly, needs_staging } = campaign.vehicle;
+  if (!campaign.actions.includes("plan") || !can_fly || !["aborted", "invalid"].includes(trial.state)) return null;
+  const order = needs_staging ? {} : { fly: { speed: speedOf(speed) } };
+  return (
+    <>
+      <Button
+        variant="default"
+        leftSection={<IconRepeat size={18} aria-hidden />}
+        loading={create.isPending}
+        onClick={() => create.mutate({ gains: trial.gains, ...order })}
+      >
+        Retry these gains
+      </Button>
+      <ErrorNotice error={create.error} />
+    </>
   );
 }

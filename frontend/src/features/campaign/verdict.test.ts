@@ -14,6 +14,7 @@ import {
   selectedTrial,
   sentenceOf,
   standingWithout,
+  suggestedClass,
 } from "./verdict";
 
 const trial = (number: number, state: Trial["state"], error: number | null, predicted_error: number | null = null) =>
@@ -130,4 +131,20 @@ test("the operator may say what they have not said already, where the server let
   expect(abortWords({ actions, abort_cause: "operator" })).toEqual(["behaved badly", "something else"]);
   expect(abortWords({ actions, abort_cause: "behaved badly" })).toEqual(["something else"]);
   expect(abortWords({ actions: [], abort_cause: "limit" })).toEqual([]);
+});
+
+test("a class is suggested from how the record ended, with its reason", () => {
+  const record = { ending: "completed" } as Trial["record"] & object;
+  const landed = { state: "captured", record, glitches: [], reason: "" } as const;
+  expect(suggestedClass({ ...landed, glitches: [] })?.outcome).toBe("valid");
+  expect(suggestedClass({ ...landed, glitches: [{} as Trial["glitches"][number]] })?.why).toContain("1 glitch");
+  const doubted = {
+    ...landed,
+    glitches: [],
+    record: { ...record, ending: "invalid" as const },
+    reason: "clock jumped",
+  };
+  expect(suggestedClass(doubted)).toEqual({ outcome: "invalid", why: "clock jumped" });
+  expect(suggestedClass({ ...landed, glitches: [], state: "valid" })).toBeNull();
+  expect(suggestedClass({ ...landed, glitches: [], record: null, state: "lost" })?.outcome).toBe("invalid");
 });

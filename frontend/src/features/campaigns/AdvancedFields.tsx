@@ -1,11 +1,10 @@
-import { SegmentedControl } from "@mantine/core";
+import { SegmentedControl, Stack } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import type { ReactNode } from "react";
 import type { Catalogue, OptionInfo } from "../../api/types";
-import { NumberField } from "../../ui/NumberField";
-import { OptionField, type OptionValue } from "../../ui/OptionField";
+import { NumberField, OptionField, type OptionValue } from "../../ui/Fields";
 import { unitsOf } from "../../ui/units";
-import classes from "./AdvancedFields.module.css";
+import classes from "./NewCampaign.module.css";
 import { type CampaignForm, gainsOf, hasModel, optionsOf, type StopKind } from "./newCampaign";
 
 interface Props {
@@ -31,7 +30,7 @@ export function AdvancedFields(props: Props) {
   const titled = (things: readonly { name: string; title: string }[], name: string): string =>
     things.find((thing) => thing.name === name)?.title ?? name;
   return (
-    <div className={classes["all"]}>
+    <Stack gap={22}>
       <StopFields {...props} />
       <OptionGroup
         title={`Strategy: ${titled(catalogue.strategies, form.strategy)}`}
@@ -67,7 +66,7 @@ export function AdvancedFields(props: Props) {
           onChange={(seed) => set({ seed })}
         />
       </Group>
-    </div>
+    </Stack>
   );
 }
 

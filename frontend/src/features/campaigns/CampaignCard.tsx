@@ -1,17 +1,16 @@
-import { Button } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { IconArchive } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "react-router";
 import { useArchive } from "../../api/mutations";
 import type { CampaignSummary } from "../../api/types";
 import { Sparkline } from "../../charts/Sparkline";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
-import { StateBadge } from "../../ui/StateBadge";
+import { ErrorNotice } from "../../ui/Notices";
 import { campaignStateLabel } from "../../ui/states";
 import { plusMinus } from "../../ui/uncertainty";
-import { useUnits } from "../../ui/useUnits";
-import { VehicleBadge } from "../../ui/VehicleBadge";
+import { useUnits } from "../../ui/units";
 import classes from "./CampaignCard.module.css";
 import { CloneForm } from "./CloneForm";
 import { progress } from "./campaignList";
@@ -59,7 +58,7 @@ function More({ campaign }: { campaign: CampaignSummary }) {
         {campaign.state === "finished" ? "Clone or archive" : "Clone"}
       </summary>
       {open && (
-        <div className={classes["acts"]}>
+        <Stack gap={10} pb={12}>
           <CloneForm {...campaign} />
           {campaign.state === "finished" && (
             <Button
@@ -72,7 +71,7 @@ function More({ campaign }: { campaign: CampaignSummary }) {
             </Button>
           )}
           <ErrorNotice error={archive.error} />
-        </div>
+        </Stack>
       )}
     </details>
   );

@@ -1,20 +1,20 @@
-import { Button, SegmentedControl, Skeleton, TextInput } from "@mantine/core";
+import { Box, Button, FileButton, Group, SegmentedControl, Skeleton, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "react-router";
+import { useImportBundle } from "../../api/files";
 import { useCampaigns, useCatalogue } from "../../api/queries";
 import type { Sort } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { SelectField } from "../../ui/Fields";
+import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
-import { SelectField } from "../../ui/SelectField";
 import { useTitle } from "../../ui/useTitle";
 import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignsPage.module.css";
 import { STATE_FILTERS, type StateFilter, statesFor } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
-import { ImportBundle } from "./ImportBundle";
 
 const SORTS: { value: Sort; label: string }[] = [
   { value: "-updated", label: "Last updated" },
@@ -39,13 +39,15 @@ export function CampaignsPage() {
   if (campaigns.data && total === 0 && !filtered) return <FirstCampaign />;
   return (
     <>
-      <div className={`${work["head"]} ${classes["head"]}`}>
-        <h1 className={`${work["title"]} ${classes["title"]}`}>Campaigns</h1>
+      <Group gap={12} mb={14}>
+        <Title order={1} me="auto">
+          Campaigns
+        </Title>
         <Button component={Link} to="/new" leftSection={<IconPlus size={20} aria-hidden />}>
           New campaign
         </Button>
         <ImportBundle />
-      </div>
+      </Group>
       <search className={classes["filters"]}>
         <TextInput
           aria-label="Search campaigns by name"
@@ -104,12 +106,29 @@ export function CampaignsPage() {
         ))}
       </ul>
       {campaigns.hasNextPage && (
-        <div className={work["more"]}>
+        <Box mt={20} ta="center">
           <Button variant="default" loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>
             Show more ({found.length} of {total})
           </Button>
-        </div>
+        </Box>
       )}
     </>
+  );
+}
+
+/** Import of a campaign bundle from another installation. */
+export function ImportBundle() {
+  const imported = useImportBundle();
+  return (
+    <div>
+      <FileButton accept=".zip" onChange={(file) => file && imported.mutate(file)}>
+        {(props) => (
+          <Button {...props} variant="default" loading={imported.isPending}>
+            Import bundle
+          </Button>
+        )}
+      </FileButton>
+      <ErrorNotice error={imported.error} />
+    </div>
   );
 }

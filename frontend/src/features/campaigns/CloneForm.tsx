@@ -6,10 +6,10 @@ import { useClone } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { SelectField } from "../../ui/Fields";
 import { HelpTip } from "../../ui/HelpTip";
-import { SelectField } from "../../ui/SelectField";
-import classes from "./CloneForm.module.css";
+import { ErrorNotice } from "../../ui/Notices";
+import classes from "./NewCampaign.module.css";
 import { kindsFor, registeredFor } from "./newCampaign";
 
 interface Props extends Pick<Campaign, "id" | "vehicle" | "best"> {
@@ -29,7 +29,7 @@ export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props)
   const chosen = registered.find(({ id }) => String(id) === vehicle);
   const choice = chosen === undefined ? { kind: vehicle } : { kind: chosen.kind, id: chosen.id };
   return (
-    <div className={classes["form"]}>
+    <div className={classes["clone"]}>
       <SelectField
         label="Clone to vehicle"
         data={[

@@ -1,12 +1,13 @@
-import { TextInput, UnstyledButton } from "@mantine/core";
+import { Stack, TextInput, UnstyledButton } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { useState } from "react";
 import { useCampaigns } from "../../api/queries";
 import type { CampaignSummary } from "../../api/types";
-import { GainList } from "../../ui/GainList";
+import { Aside } from "../../ui/Aside";
+import { GainList } from "../../ui/gains";
 import { plusMinus } from "../../ui/uncertainty";
-import { useUnits } from "../../ui/useUnits";
-import classes from "./DonorPicker.module.css";
+import { useUnits } from "../../ui/units";
+import classes from "./NewCampaign.module.css";
 
 interface Props {
   experiment: string;
@@ -30,7 +31,7 @@ export function DonorPicker({ experiment, donor, error, onChange }: Props) {
     onChange(chosen);
   };
   return (
-    <div className={classes["donor"]}>
+    <Stack gap={8}>
       <TextInput
         label="Campaign"
         type="search"
@@ -50,7 +51,7 @@ export function DonorPicker({ experiment, donor, error, onChange }: Props) {
       />
       {donor === null && found.data !== undefined && <Offers campaigns={usable} onChoose={choose} />}
       {donor?.best && <Taken donor={donor} best={donor.best} experiment={experiment} />}
-    </div>
+    </Stack>
   );
 }
 
@@ -85,7 +86,7 @@ interface TakenProps {
 function Taken({ donor, best, experiment }: TakenProps) {
   const unit = useUnits(experiment).error;
   return (
-    <p className={`${classes["taken"]} numbers`}>
+    <Aside tone="good" fz="small" className="numbers">
       Best flight: {best.trial_number} on {donor.vehicle.title}:{" "}
       <strong>
         <GainList gains={best.gains} experiment={experiment} />
@@ -93,6 +94,6 @@ function Taken({ donor, best, experiment }: TakenProps) {
       , error {plusMinus(best.mean, best.standard_error, unit)}
       {best.standard_error === null ? "" : " (± standard error)"}. The first flight uses these gains and shows whether
       the vehicles are similar enough to build on what was learned there.
-    </p>
+    </Aside>
   );
 }

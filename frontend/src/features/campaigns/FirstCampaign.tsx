@@ -1,11 +1,12 @@
-import { Anchor, Button } from "@mantine/core";
+import { Anchor, Button, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link, useNavigate } from "react-router";
 import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
+import { ImportBundle } from "./CampaignsPage";
 import classes from "./FirstCampaign.module.css";
-import { ImportBundle } from "./ImportBundle";
 import { firstPreset } from "./newCampaign";
 
 const STEPS = [
@@ -23,11 +24,13 @@ export function FirstCampaign() {
   return (
     <section className={classes["first"]}>
       <Drawing />
-      <h1>Tune a takeoff in a few flights</h1>
-      <p className={classes["lead"]}>
+      <Title order={1} lh={1.15}>
+        Tune a takeoff in a few flights
+      </Title>
+      <Note maw={560} fz="strong" lh={1.5}>
         A campaign flies one vehicle repeatedly, each time with better gains, and stops when no further improvement is
         found.
-      </p>
+      </Note>
       <ol className={classes["steps"]}>
         {STEPS.map(([title, text]) => (
           <li key={title}>
@@ -48,7 +51,7 @@ export function FirstCampaign() {
       >
         Create “{preset?.title ?? "AR.Drone takeoff to 3 m, simulated"}”
       </Button>
-      <Anchor component={Link} to="/new" className={classes["other"]}>
+      <Anchor component={Link} to="/new" display="inline-block" py={12}>
         Choose vehicle and settings first
       </Anchor>
       <ImportBundle />

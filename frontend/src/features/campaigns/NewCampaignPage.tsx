@@ -7,13 +7,11 @@ import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue, Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { FoldedSection } from "../../ui/FoldedSection";
+import { Aside } from "../../ui/Aside";
+import { SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FormPage } from "../../ui/FormPage";
-import { GainFields } from "../../ui/GainFields";
-import { MissingNumbers } from "../../ui/MissingNumbers";
-import { SelectField } from "../../ui/SelectField";
+import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
+import { ErrorNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import { AdvancedFields } from "./AdvancedFields";
 import { DonorPicker } from "./DonorPicker";
@@ -119,10 +117,10 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         onVehicle={(vehicle) => setForm(withRegistered(form, catalogue, vehicle))}
       />
       {isReal && (
-        <p className={classes["rehearse"]}>
+        <Aside tone="warn">
           {form.registered?.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
           simulation, which you start from the campaign page.
-        </p>
+        </Aside>
       )}
       <TextInput
         label="Name"

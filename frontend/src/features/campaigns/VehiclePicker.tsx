@@ -1,10 +1,9 @@
 import { Anchor, Button, Radio } from "@mantine/core";
 import { Link } from "react-router";
 import type { Vehicle, VehicleKindInfo } from "../../api/types";
-import { StateBadge } from "../../ui/StateBadge";
-import { VehicleBadge } from "../../ui/VehicleBadge";
+import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { autopilotTitle, vehicleStateLabel } from "../fleet/fleet";
-import classes from "./VehiclePicker.module.css";
+import classes from "./NewCampaign.module.css";
 
 interface Props {
   kinds: readonly VehicleKindInfo[];

@@ -9,8 +9,7 @@ import type {
   Vehicle,
   VehicleKindInfo,
 } from "../../api/types";
-import type { NumberEntry } from "../../ui/NumberField";
-import type { OptionValue } from "../../ui/OptionField";
+import type { NumberEntry, OptionValue } from "../../ui/Fields";
 
 export type StartKind = "default" | "simplex" | "given" | "campaign";
 export type StopKind = "paper" | "noise" | "budget";
@@ -93,7 +92,7 @@ function presetFor(catalogue: Catalogue, experiment: string, vehicle: string): P
   );
 }
 
-export function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
+function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
   const title = catalogue.experiments.find(({ name }) => name === experiment)?.title ?? experiment;
   return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${vehicle}`;
 }

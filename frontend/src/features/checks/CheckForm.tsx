@@ -1,10 +1,10 @@
-import { Button, FileButton, TextInput } from "@mantine/core";
+import { Button, FileButton, Group, Text, TextInput } from "@mantine/core";
 import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
 import { type RecordingCheck, useCheckExample } from "../../api/checks";
 import { problemOf } from "../../api/problems";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import classes from "./Checks.module.css";
 import { RECORDINGS } from "./checks";
@@ -28,18 +28,18 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
       className={over ? classes["over"] : ""}
     >
       {!brief && (
-        <p className={classes["line"]}>
+        <Text maw="90ch" lh={1.45} mb={10}>
           The method requires an exact replica of the controller. Upload a recorded run of the autopilot's vertical
           loop. It is replayed through the replica in the model, and every signal is compared, bit by bit where the
           recording allows it.
-        </p>
+        </Text>
       )}
-      <p className={classes["line"]}>
+      <Text maw="90ch" lh={1.45} mb={10}>
         Drop a file here or choose one: Paparazzi's <code>.data</code> file with <code>VERT_LOOP</code> messages (add
         its <code>.log</code>, which contains the gains), or a recording of every step as <code>.csv</code> or{" "}
         <code>.csv.gz</code>. The file is not stored.
-      </p>
-      <div className={classes["actions"]}>
+      </Text>
+      <Group gap={10} align="end" mt={4} mb={10}>
         <FileButton multiple accept={RECORDINGS} onChange={(files) => onCheck(files)}>
           {(props) => (
             <Button {...props} loading={upload.isPending} leftSection={<IconFileUpload size={20} aria-hidden />}>
@@ -55,7 +55,7 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
         >
           Check example
         </Button>
-      </div>
+      </Group>
       <ErrorNotice error={upload.error ?? example.error} />
       <GainsAsked upload={upload} onCheck={onCheck} />
     </Panel>

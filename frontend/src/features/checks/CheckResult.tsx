@@ -7,10 +7,11 @@ import {
   useCheckFigure,
 } from "../../api/checks";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { StateBadge } from "../../ui/Badges";
 import { DataTable } from "../../ui/DataTable";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
+import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
-import { StateBadge } from "../../ui/StateBadge";
 import { Time } from "../../ui/Time";
 import jobs from "../jobs/JobCard.module.css";
 import classes from "./Checks.module.css";
@@ -48,7 +49,7 @@ export function CheckResult({ checkId, upload, onCheck }: Props) {
           </span>
         </p>
         <DataTable table={table} label="Difference of every signal" height={ROW_PX * (table.rows.length + 1)} />
-        <ul className={classes["notes"]}>
+        <ul className={page["notes"]}>
           {[...allowances(check.signals), ...check.notes].map((note) => (
             <li key={note}>{note}</li>
           ))}

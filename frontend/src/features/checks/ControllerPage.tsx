@@ -1,14 +1,14 @@
-import { ActionIcon, Anchor, Button, Skeleton } from "@mantine/core";
+import { ActionIcon, Anchor, Box, Button, Skeleton, Title } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { type DragEvent, useState } from "react";
 import { Link, useNavigate, useParams } from "react-router";
 import { useCheckRecording, useChecks, useDeleteCheck } from "../../api/checks";
 import { recordOf } from "../../api/records";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { StateBadge } from "../../ui/Badges";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
 import row from "../../ui/RowCard.module.css";
-import { StateBadge } from "../../ui/StateBadge";
 import { Time } from "../../ui/Time";
 import { useTitle } from "../../ui/useTitle";
 import jobs from "../jobs/JobCard.module.css";
@@ -47,7 +47,7 @@ export function ControllerPage() {
       onDragLeave={() => setOver(false)}
       onDrop={drop}
     >
-      <h1 className={classes["title"]}>Controller check</h1>
+      <Title order={1}>Controller check</Title>
       {checkId > 0 && <CheckResult key={checkId} checkId={checkId} upload={upload} onCheck={check} />}
       <CheckForm upload={upload} onCheck={check} over={over} brief={checkId > 0} />
       <EarlierChecks shown={checkId} />
@@ -66,12 +66,16 @@ function EarlierChecks({ shown }: { shown: number }) {
     <section>
       <ErrorNotice error={checks.error ?? remove.error} />
       {checks.isPending && <Skeleton height={90} radius="md" aria-busy="true" />}
-      {found.length > 0 && <h2 className={classes["section"]}>Earlier checks</h2>}
+      {found.length > 0 && (
+        <Title order={2} c="dimmed" fz="body" mb={10}>
+          Earlier checks
+        </Title>
+      )}
       <ul className={classes["list"]} aria-label="Earlier checks">
         {found.map(({ id, file_name, kind, passed, checked_at }) => (
           <li key={id} className={`${row["card"]} ${jobs["job"]}`}>
             <div className={`${row["what"]} ${jobs["what"]}`}>
-              <h3 className={jobs["title"]}>
+              <Title order={3} fz="body">
                 <Anchor
                   component={Link}
                   to={`/controller/${id}`}
@@ -80,7 +84,7 @@ function EarlierChecks({ shown }: { shown: number }) {
                 >
                   {file_name}
                 </Anchor>
-              </h3>
+              </Title>
               <p className={`${jobs["facts"]} numbers`}>
                 <StateBadge words={checkStateLabel(passed)} />
                 <span>{KINDS[kind]}</span>
@@ -101,11 +105,11 @@ function EarlierChecks({ shown }: { shown: number }) {
         ))}
       </ul>
       {checks.hasNextPage && (
-        <div className={classes["more"]}>
+        <Box mt={20} ta="center">
           <Button variant="default" loading={checks.isFetchingNextPage} onClick={() => void addPage(checks)}>
             Show more ({found.length} of {total})
           </Button>
-        </div>
+        </Box>
       )}
     </section>
   );

@@ -1,22 +1,30 @@
-import { Button, useComputedColorScheme } from "@mantine/core";
+import { Button, Group, Stack, Title, useComputedColorScheme } from "@mantine/core";
 import { IconCircleArrowDown, IconCircleArrowUp, IconHelpHexagon } from "@tabler/icons-react";
+import { useMutation } from "@tanstack/react-query";
 import { useEffect, useMemo, useState } from "react";
 import { useSearchParams } from "react-router";
-import { type FlightComparison, useComparison, useComparisonFigure } from "../../api/compare";
+import {
+  comparisonFigure,
+  curvesCsv,
+  type FlightComparison,
+  useComparison,
+  useComparisonFigure,
+} from "../../api/compare";
 import { problemOf } from "../../api/problems";
 import { useTrial } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { loadPlotly } from "../../charts/plotly";
+import type { PlotlyFigure } from "../../charts/traces";
+import { Aside, toneOf } from "../../ui/Aside";
 import { count } from "../../ui/format";
+import { ErrorNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./Compare.module.css";
-import { ComparisonTable, SettingsTable } from "./ComparisonTable";
+import { ComparisonTable, lineStylesOf, SettingsTable } from "./ComparisonTable";
 import { againstFirst, chosenIn, paramsOf, remember, remembered, toggled, withoutRefused } from "./chosenFlights";
 import { FlightPicker } from "./FlightPicker";
-import { lineStylesOf } from "./LineSample";
-import { SaveComparison } from "./SaveComparison";
 
 /** The flights in the URL. `add` adds one to those stored in this tab; a URL without flights restores them. */
 function useChosen(): [number[], (trials: readonly number[]) => void] {
@@ -49,15 +57,15 @@ export function ComparePage() {
   const kept = withoutRefused(chosen, problem);
   return (
     <>
-      <div className={work["head"]}>
-        <h1 className={work["title"]}>Compare</h1>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Compare</Title>
         {chosen.length > 0 && (
           <Button variant="default" onClick={() => choose([])}>
             Clear selection
           </Button>
         )}
-      </div>
-      <div className={classes["stack"]}>
+      </Group>
+      <Stack gap="var(--gap)">
         {chosen.length === 0 && <Introduction />}
         {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
         {problem !== null && chosen.length > 1 && (
@@ -79,7 +87,7 @@ export function ComparePage() {
           from={from > 0 ? from : null}
           onToggle={(trial) => choose(toggled(chosen, trial))}
         />
-      </div>
+      </Stack>
     </>
   );
 }
@@ -132,14 +140,16 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
   );
   return (
     <>
-      <section className={classes["verdict"]} data-verdict={verdict ?? undefined} aria-label="Verdict">
-        <Icon size={24} aria-hidden />
-        <div role="status">
-          <p>{sentence}</p>
-          {notes.map((note) => (
-            <p key={note}>{note}</p>
-          ))}
-        </div>
+      <section aria-label="Verdict">
+        <Aside tone={toneOf(verdict)} className={classes["verdict"] ?? ""}>
+          <Icon size={24} aria-hidden />
+          <div role="status">
+            <p>{sentence}</p>
+            {notes.map((note) => (
+              <p key={note}>{note}</p>
+            ))}
+          </div>
+        </Aside>
       </section>
       <FigurePanel
         title="Curves"
@@ -168,5 +178,50 @@ function Compared({ comparison, trials, choose }: ComparedProps) {
         )}
       </Panel>
     </>
+  );
+}
+
+type Format = "png" | "svg";
+
+const FORMATS: readonly Format[] = ["png", "svg"];
+const SIZE = { width: 1280, height: 800 } as const;
+
+/** Save the figure in the light theme on white, for documents. */
+async function save(trials: readonly number[], filename: string, format: Format): Promise<void> {
+  const { figure, reason } = await comparisonFigure(trials, "light");
+  if (!figure) throw new Error(reason);
+  const { data, layout } = figure as unknown as PlotlyFigure;
+  const plotly = await loadPlotly();
+  const onWhite = { ...layout, paper_bgcolor: "white", margin: { l: 70, r: 30, t: 30, b: 60 } };
+  await plotly.downloadImage({ data, layout: onWhite }, { ...SIZE, format, filename, scale: format === "png" ? 2 : 1 });
+}
+
+/** Download of the curves as CSV and of the figure as an image. */
+function SaveComparison({ trials, stem }: { trials: readonly number[]; stem: string }) {
+  const saving = useMutation({ mutationFn: (format: Format) => save(trials, stem, format) });
+  return (
+    <Group gap={8}>
+      <Button
+        component="a"
+        variant="default"
+        aria-label="Curves as CSV"
+        href={curvesCsv(trials)}
+        download={`${stem}.csv`}
+      >
+        CSV
+      </Button>
+      {FORMATS.map((format) => (
+        <Button
+          key={format}
+          variant="default"
+          aria-label={`Figure as ${format.toUpperCase()}`}
+          loading={saving.isPending && saving.variables === format}
+          onClick={() => saving.mutate(format)}
+        >
+          {format.toUpperCase()}
+        </Button>
+      ))}
+      <ErrorNotice error={saving.error} />
+    </Group>
   );
 }

@@ -3,17 +3,18 @@ import { IconArrowBarToUp, IconX } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
 import type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } from "../../api/compare";
+import type { FigureCard } from "../../api/types";
+import type { PlotlyFigure } from "../../charts/traces";
+import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { count, gainText, NOTHING } from "../../ui/format";
+import { Note } from "../../ui/Note";
 import { ScrollTable } from "../../ui/ScrollTable";
-import { StateBadge } from "../../ui/StateBadge";
 import { trialStateLabel } from "../../ui/states";
 import { Time } from "../../ui/Time";
 import { confidenceText, plusMinus } from "../../ui/uncertainty";
-import { VehicleBadge } from "../../ui/VehicleBadge";
 import { VERDICTS } from "../campaign/verdict";
 import classes from "./Compare.module.css";
 import { againstFirst } from "./chosenFlights";
-import { LineSample, type LineStyle } from "./LineSample";
 
 interface Props {
   comparison: FlightComparison;
@@ -99,7 +100,7 @@ function Name({ flight, several, pen }: { flight: ComparedFlight; several: boole
         {pen && <LineSample pen={pen} />}
       </span>
       <span>
-        <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`} className={classes["link"]}>
+        <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`}>
           Flight {number}
         </Anchor>
         {several && <small className={`${classes["small"]} ${classes["campaignName"]}`}>{campaign_name}</small>}
@@ -192,7 +193,7 @@ export function SettingsTable({ comparison: { flights, settings } }: { compariso
   return (
     <>
       {settings.length === 0 && (
-        <p className={classes["quiet"]}>No other differences: same vehicle, experiment, strategy and settings.</p>
+        <Note mt={10}>No other differences: same vehicle, experiment, strategy and settings.</Note>
       )}
       {everywhere.length > 0 && <Settings flights={flights} settings={everywhere} title="Settings that differ" />}
       {somewhere.length > 0 && (
@@ -240,5 +241,40 @@ function Settings({ flights, settings, title }: SettingsProps) {
         ))}
       </tbody>
     </ScrollTable>
+  );
+}
+
+export interface LineStyle {
+  colour: string;
+  dash: string;
+}
+
+/** Plotly's dash patterns for the sample line. */
+const DASHES: Readonly<Record<string, string>> = {
+  dash: "7 4",
+  dot: "2 3",
+  dashdot: "7 3 2 3",
+  longdash: "12 4",
+  longdashdot: "12 3 2 3",
+};
+
+/** Line style of each flight in the figure. */
+export function lineStylesOf(card: FigureCard | undefined): Map<number, LineStyle> {
+  const traces = (card?.figure as unknown as PlotlyFigure | null | undefined)?.data ?? [];
+  return new Map(
+    traces.flatMap(({ meta, line }) =>
+      meta?.role === "flight" && meta.trial !== undefined
+        ? [[meta.trial, { colour: String(line?.["color"]), dash: String(line?.["dash"]) }] as const]
+        : [],
+    ),
+  );
+}
+
+/** Sample of a flight's line in the figure. */
+function LineSample({ pen }: { pen: LineStyle }) {
+  return (
+    <svg width="44" height="12" aria-hidden>
+      <line x1="1" y1="6" x2="43" y2="6" stroke={pen.colour} strokeWidth="3" strokeDasharray={DASHES[pen.dash]} />
+    </svg>
   );
 }

@@ -3,13 +3,14 @@ import { useDebouncedValue } from "@mantine/hooks";
 import { IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useCampaign, useCampaigns, useTrials } from "../../api/queries";
-import { ErrorNotice } from "../../ui/ErrorNotice";
 import { count, withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { addPage } from "../../ui/paging";
 import { trialStateLabel, wasFlown } from "../../ui/states";
-import { useUnits } from "../../ui/useUnits";
+import { useUnits } from "../../ui/units";
 import classes from "./Compare.module.css";
 import { MOST_FLIGHTS } from "./chosenFlights";
 
@@ -37,16 +38,16 @@ export function FlightPicker({ chosen, onToggle, from }: Props) {
         value={search}
         onChange={(event) => setSearch(event.currentTarget.value)}
       />
-      {full && <p className={classes["quiet"]}>At most {MOST_FLIGHTS} flights can be compared at once.</p>}
+      {full && <Note mt={10}>At most {MOST_FLIGHTS} flights can be compared at once.</Note>}
       <ErrorNotice error={campaigns.error} />
       {from !== null && sought === "" && <From campaignId={from} chosen={chosen} onToggle={onToggle} />}
       {flown.map(({ id, name, experiment, flights }) => (
         <Campaign key={id} id={id} title={name} flights={flights} {...{ experiment, chosen, onToggle }} />
       ))}
       {campaigns.data && flown.length === 0 && from === null && (
-        <p className={classes["quiet"]}>
+        <Note mt={10}>
           {sought === "" ? "No flights yet. Fly a campaign first." : "No campaigns with flights match."}
-        </p>
+        </Note>
       )}
       {campaigns.hasNextPage && (
         <Button variant="default" mt={8} loading={campaigns.isFetchingNextPage} onClick={() => void addPage(campaigns)}>

@@ -1,8 +1,13 @@
+import { Button, Stack, TextInput } from "@mantine/core";
+import { useState } from "react";
+import { useEditVehicle } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
 import { linkText, stepWord } from "../../live/vehicleStatus";
 import { NOTHING, withUnit } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { percent } from "../../ui/uncertainty";
 import classes from "./Fleet.module.css";
@@ -21,7 +26,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
   const { identity } = vehicle;
   return (
     <Panel title="Connection">
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         {isLinked ? (
           <dl className={`${classes["facts"]} numbers`}>
             <LabelledValue title="Link age" topic="linkAge" value={linkText(aged)} bad={stale} />
@@ -41,21 +46,63 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
             />
           </dl>
         ) : (
-          <p className={classes["quiet"]}>
+          <Note>
             Not connected.{" "}
             {identity === null
               ? "Connecting compares the vehicle's gains with the safe gains and changes nothing."
               : "Connecting writes the safe gains and reads them back. The vehicle does not move."}
-          </p>
+          </Note>
         )}
-        {status?.said && <p className={classes["quiet"]}>Message: {status.said}</p>}
+        {status?.said && <Note>Message: {status.said}</Note>}
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
-        <p className={classes["quiet"]}>
+        <Note>
           {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
           {identity !== null && `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
           {identity?.uid && `, hardware id ${identity.uid}`}
-        </p>
-      </div>
+        </Note>
+      </Stack>
+    </Panel>
+  );
+}
+
+/** Label and voltage of the battery. Every flight stores the label. */
+export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
+  const status = useVehicleStatus(vehicle.id);
+  const edit = useEditVehicle(vehicle.id);
+  const [typed, setTyped] = useState<string | null>(null);
+  const label = typed ?? vehicle.battery;
+  return (
+    <Panel title="Battery">
+      <Stack gap={14}>
+        <dl className={`${classes["facts"]} numbers`}>
+          <LabelledValue
+            title="Voltage now"
+            value={withUnit(status?.status.batteryV, "V", 1)}
+            stale={!status?.isCurrent}
+          />
+          <LabelledValue title="Minimum to fly" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
+        </dl>
+        <form
+          className={classes["row"]}
+          onSubmit={(event) => {
+            event.preventDefault();
+            edit.mutate({ version: vehicle.version, battery: label }, { onSuccess: () => setTyped(null) });
+          }}
+        >
+          <TextInput
+            label="Battery label"
+            placeholder="No. 3"
+            value={label}
+            maxLength={60}
+            disabled={!vehicle.actions.includes("edit")}
+            onChange={(event) => setTyped(event.currentTarget.value)}
+          />
+          <Button type="submit" variant="default" disabled={label === vehicle.battery} loading={edit.isPending}>
+            Save
+          </Button>
+        </form>
+        <ErrorNotice error={edit.error} />
+      </Stack>
     </Panel>
   );
 }

@@ -1,4 +1,4 @@
-import { Button, Checkbox, Switch, TextInput } from "@mantine/core";
+import { Button, Checkbox, Stack, Switch, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
@@ -6,16 +6,12 @@ import { useRegisterVehicle } from "../../api/fleet";
 import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { FoldedSection } from "../../ui/FoldedSection";
+import { VehicleBadge } from "../../ui/Badges";
+import { OptionField, SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FormPage } from "../../ui/FormPage";
-import { GainFields } from "../../ui/GainFields";
-import { MissingNumbers } from "../../ui/MissingNumbers";
-import { OptionField } from "../../ui/OptionField";
-import { SelectField } from "../../ui/SelectField";
+import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
+import { ErrorNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
-import { VehicleBadge } from "../../ui/VehicleBadge";
 import {
   AUTOPILOTS,
   autopilotOf,
@@ -124,7 +120,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         onChange={(safeGains) => set({ safeGains, confirmed: false })}
       />
       {!simulated && (
-        <div className={classes["confirm"]}>
+        <Stack gap={12}>
           <Checkbox
             size="md"
             label="These gains have been verified on this vehicle."
@@ -140,7 +136,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
             error={reasons["statement"]}
             onChange={(event) => set({ statement: event.currentTarget.value })}
           />
-        </div>
+        </Stack>
       )}
       <FoldedSection title="Advanced: identity, limits, motion capture, signing" forcedOpen={refusedBelow}>
         <div className={classes["pair"]}>

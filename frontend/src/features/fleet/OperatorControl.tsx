@@ -1,11 +1,10 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Text, TextInput } from "@mantine/core";
 import { IconUserCheck } from "@tabler/icons-react";
-import { useReleaseControl, useTakeControl } from "../../api/control";
-import { useOwnLease } from "../../api/leases";
+import { useOwnLease, useReleaseControl, useTakeControl } from "../../api/control";
 import type { Vehicle } from "../../api/types";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
 import { useOperatorName } from "../../ui/usePreferences";
-import classes from "./OperatorControl.module.css";
+import classes from "./Fleet.module.css";
 
 /** Whether this tab has the vehicle's lease. */
 export function useIsInControl(vehicle: Vehicle): boolean {
@@ -53,9 +52,9 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
       }}
     >
       {other !== null && (
-        <p className={classes["say"]}>
+        <Text lh={1.4}>
           <strong>{other} is in control.</strong> Ask them to release control, or take over. All users see the takeover.
-        </p>
+        </Text>
       )}
       <div className={classes["take"]}>
         <TextInput

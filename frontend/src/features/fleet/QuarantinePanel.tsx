@@ -6,9 +6,10 @@ import { useRelease } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicleStatus } from "../../live/store";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import type { Aged } from "../../live/vehicleStatus";
+import { ErrorNotice } from "../../ui/Notices";
+import { SlideToConfirm } from "../../ui/SlideToConfirm";
 import classes from "./Fleet.module.css";
-import { MotorsOff } from "./MotorsOff";
 
 /** Reason of the quarantine, the remaining commands, and the release. */
 export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
@@ -59,5 +60,40 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
       </form>
       <ErrorNotice error={release.error} />
     </section>
+  );
+}
+
+interface Props {
+  vehicle: Vehicle;
+  status: Aged | null;
+  orders: ReturnType<typeof useVehicleCommands>;
+  /** Whether this browser has read-only access, which disables the control. */
+  watching?: boolean;
+}
+
+/** Emergency stop of the motors, separate from other controls. */
+export function MotorsOff({ vehicle, status, orders, watching = false }: Props) {
+  const asked = vehicle.actions.includes("motors off") || status?.status.armed === true;
+  const enabled = asked && !watching;
+  return (
+    <div className={classes["motorsOff"]}>
+      <SlideToConfirm
+        label="Motors off – the drone falls"
+        meaning="Stops the motors at any altitude."
+        disabled={!enabled}
+        onConfirm={() => orders.press("motors off")}
+      />
+      <CommandResult orders={orders} />
+    </div>
+  );
+}
+
+/** Result of the last command, as an alert. */
+export function CommandResult({ orders: { said } }: { orders: ReturnType<typeof useVehicleCommands> }) {
+  if (said === null) return null;
+  return (
+    <p className={classes["said"]} data-bad={!said.accepted || undefined} role="alert">
+      {said.accepted ? said.sentence : `Not sent: ${said.order}. ${said.sentence}`}
+    </p>
   );
 }

@@ -1,15 +1,16 @@
-import { Button, TextInput } from "@mantine/core";
+import { Button, Group, Stack, TextInput } from "@mantine/core";
 import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
 import { useState } from "react";
 import { useEditVehicle } from "../../api/fleet";
 import { problemOf, reasonsByField } from "../../api/problems";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { type NumberEntry, NumberField } from "../../ui/Fields";
 import { gainText, NOTHING } from "../../ui/format";
 import { inOrder, sameHeld } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
-import { type NumberEntry, NumberField } from "../../ui/NumberField";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
@@ -33,7 +34,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   if (entered) return <SafeGainsForm vehicle={vehicle} entered={entered} onDone={() => setEntered(undefined)} />;
   return (
     <Panel title="Gains">
-      <div className={classes["stack"]}>
+      <Stack gap={14}>
         <table className={`${table["table"]} ${classes["table"]}`}>
           <thead>
             <tr>
@@ -70,7 +71,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
               : "At the last reading, its gains differed from the safe gains"}
           </span>
         )}
-        <p className={classes["quiet"]}>
+        <Note>
           {isKnown ? (
             <>
               Read back <Time at={vehicle.held_at} />.
@@ -79,8 +80,8 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
             "Gains not read yet."
           )}{" "}
           The safe gains are restored after every flight.
-        </p>
-        <div className={classes["buttons"]}>
+        </Note>
+        <Group gap={10}>
           <Button
             variant="default"
             disabled={!vehicle.actions.includes("restore")}
@@ -97,8 +98,8 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           <Button variant="subtle" disabled={!vehicle.actions.includes("edit")} onClick={() => setEntered(safe)}>
             Change safe gains
           </Button>
-        </div>
-      </div>
+        </Group>
+      </Stack>
     </Panel>
   );
 }
@@ -150,7 +151,7 @@ function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
           onChange={(event) => setStatement(event.currentTarget.value)}
         />
         <ErrorNotice error={edit.error} shown={fields} />
-        <div className={classes["buttons"]}>
+        <Group gap={10}>
           <Button
             type="submit"
             disabled={read.length < Object.keys(gains).length || statement.trim() === ""}
@@ -161,7 +162,7 @@ function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
           <Button variant="default" onClick={onDone}>
             Cancel
           </Button>
-        </div>
+        </Group>
       </form>
     </Panel>
   );

@@ -5,12 +5,12 @@ import { useVehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
 import { linkText } from "../../live/vehicleStatus";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Aside } from "../../ui/Aside";
+import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
+import { ErrorNotice } from "../../ui/Notices";
 import row from "../../ui/RowCard.module.css";
-import { StateBadge } from "../../ui/StateBadge";
-import { VehicleBadge } from "../../ui/VehicleBadge";
 import { vehicleStateLabel } from "./fleet";
 import classes from "./VehicleCard.module.css";
 
@@ -40,7 +40,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
           />
           {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "no operator"} />}
         </dl>
-        {vehicle.state === "quarantined" && <p className={classes["concern"]}>{vehicle.concern}</p>}
+        {vehicle.state === "quarantined" && <Aside tone="bad">{vehicle.concern}</Aside>}
         <ErrorNotice error={ask.error} />
       </div>
       {vehicle.registered && vehicle.actions.includes("connect") && (

@@ -1,29 +1,23 @@
-import { Anchor, Button, Skeleton } from "@mantine/core";
+import { Anchor, Button, Group, SimpleGrid, Skeleton, Title } from "@mantine/core";
 import { IconChevronLeft, IconPlugConnected, IconPlugConnectedX, IconPlus } from "@tabler/icons-react";
 import { Link, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useVehicleRequest, type VehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import { NotFoundPage } from "../../ui/NotFoundPage";
+import { StateBadge, VehicleBadge } from "../../ui/Badges";
+import { NotFoundPage } from "../../ui/NotFound";
+import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { ReadOnlyNotice } from "../../ui/ReadOnlyNotice";
-import { StateBadge } from "../../ui/StateBadge";
 import { useTitle } from "../../ui/useTitle";
-import { VehicleBadge } from "../../ui/VehicleBadge";
-import { BatteryPanel } from "./BatteryPanel";
-import { CalibrationHistory } from "./CalibrationHistory";
-import { CheckList } from "./CheckList";
+import classes from "./Fleet.module.css";
 import { vehicleStateLabel } from "./fleet";
-import { LedgerTable } from "./LedgerTable";
-import { LinkPanel } from "./LinkPanel";
+import { BatteryPanel, LinkPanel } from "./LinkPanel";
 import { OperatorControl } from "./OperatorControl";
-import { ParameterPanel } from "./ParameterPanel";
 import { QuarantinePanel } from "./QuarantinePanel";
-import { RequestList } from "./RequestList";
 import { SafeGains } from "./SafeGains";
-import classes from "./VehiclePage.module.css";
+import { CalibrationHistory, LedgerTable, RequestList } from "./VehicleHistory";
+import { CheckList, ParameterPanel } from "./VehicleReadings";
 
 export function VehiclePage() {
   const vehicleId = Number(useParams()["vehicleId"]);
@@ -40,20 +34,22 @@ export function VehiclePage() {
 function SharedView({ vehicle }: { vehicle: Vehicle }) {
   return (
     <>
-      <div className={classes["head"]}>
+      <Group gap="6px 14px" mb={14}>
         <Anchor component={Link} to="/vehicles" className={classes["back"]}>
           <IconChevronLeft size={20} aria-hidden />
           Vehicles
         </Anchor>
-        <h1 className={classes["title"]}>{vehicle.name}</h1>
+        <Title order={1} style={{ overflowWrap: "anywhere" }}>
+          {vehicle.name}
+        </Title>
         <VehicleBadge isReal={vehicle.is_real} />
         <StateBadge words={vehicleStateLabel(vehicle)} />
-      </div>
+      </Group>
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
-      <div className={classes["grid"]}>
+      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
         <CalibrationHistory vehicleId={vehicle.id} />
         <LedgerTable vehicleId={vehicle.id} />
-      </div>
+      </SimpleGrid>
     </>
   );
 }
@@ -66,12 +62,14 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
   const asking = ask.isPending ? ask.variables : null;
   return (
     <>
-      <div className={classes["head"]}>
+      <Group gap="6px 14px" mb={14}>
         <Anchor component={Link} to="/vehicles" className={classes["back"]}>
           <IconChevronLeft size={20} aria-hidden />
           Vehicles
         </Anchor>
-        <h1 className={classes["title"]}>{vehicle.name}</h1>
+        <Title order={1} style={{ overflowWrap: "anywhere" }}>
+          {vehicle.name}
+        </Title>
         <VehicleBadge isReal={vehicle.is_real} />
         <StateBadge words={vehicleStateLabel(vehicle)} />
         <div className={classes["acts"]}>
@@ -103,11 +101,11 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
             </Button>
           )}
         </div>
-      </div>
+      </Group>
       <ReadOnlyNotice why={watching} />
       <ErrorNotice error={ask.error} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
-      <div className={classes["grid"]}>
+      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
         <LinkPanel vehicle={vehicle} />
         <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
         <Panel title="In control">
@@ -143,7 +141,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           reading={asking === "parameters"}
           onRead={() => ask.mutate("parameters")}
         />
-      </div>
+      </SimpleGrid>
     </>
   );
 }

@@ -1,8 +1,8 @@
-import { Button, Skeleton } from "@mantine/core";
+import { Button, Group, Skeleton, Stack, Title } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useVehicles } from "../../api/vehicles";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "../../ui/Page.module.css";
 import { useTitle } from "../../ui/useTitle";
 import { VehicleCard } from "./VehicleCard";
@@ -15,19 +15,21 @@ export function VehiclesPage() {
   const shared = vehicles.data?.filter((vehicle) => !vehicle.registered) ?? [];
   return (
     <>
-      <div className={classes["head"]}>
-        <h1 className={classes["title"]}>Vehicles</h1>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Vehicles</Title>
         <Button component={Link} to="/vehicles/new" leftSection={<IconPlus size={20} aria-hidden />}>
           Register a vehicle
         </Button>
-      </div>
+      </Group>
       <ErrorNotice error={vehicles.error} />
       {vehicles.isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
       {vehicles.data && registered.length === 0 && <NoVehicles />}
-      <div className={classes["stack"]}>
+      <Stack gap={28}>
         {registered.length > 0 && (
           <section>
-            <h2 className={classes["section"]}>Registered vehicles</h2>
+            <Title order={2} c="dimmed" fz="body" mb={10}>
+              Registered vehicles
+            </Title>
             <ul className={classes["list"]} aria-label="Registered vehicles">
               {registered.map((vehicle) => (
                 <VehicleCard key={vehicle.id} vehicle={vehicle} />
@@ -37,7 +39,9 @@ export function VehiclesPage() {
         )}
         {shared.length > 0 && (
           <section>
-            <h2 className={classes["section"]}>Shared simulations and flight records</h2>
+            <Title order={2} c="dimmed" fz="body" mb={10}>
+              Shared simulations and flight records
+            </Title>
             <ul className={classes["list"]} aria-label="Shared simulations">
               {shared.map((vehicle) => (
                 <VehicleCard key={vehicle.id} vehicle={vehicle} />
@@ -45,7 +49,7 @@ export function VehiclesPage() {
             </ul>
           </section>
         )}
-      </div>
+      </Stack>
     </>
   );
 }

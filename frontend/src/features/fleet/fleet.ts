@@ -1,8 +1,7 @@
 /** Labels of vehicles, requests and gain history, and the form of a new vehicle. */
 
 import type { ActKind, Catalogue, GivenGains, NewVehicle, OptionInfo, Vehicle, VehicleState } from "../../api/types";
-import type { NumberEntry } from "../../ui/NumberField";
-import type { OptionValue } from "../../ui/OptionField";
+import type { NumberEntry, OptionValue } from "../../ui/Fields";
 import type { StateLabel } from "../../ui/states";
 
 const STATES: Record<VehicleState, StateLabel> = {
@@ -40,7 +39,7 @@ export const PURPOSES: Record<GivenGains["purpose"], string> = {
 };
 
 /** Usual address of each autopilot. */
-export const ADDRESSES: Readonly<Record<string, string>> = {
+const ADDRESSES: Readonly<Record<string, string>> = {
   paparazzi: "udp:192.168.1.1:4245@4244",
   ardupilot: "udpin:127.0.0.1:14550",
   px4: "udpin:127.0.0.1:14550",

@@ -1,5 +1,5 @@
-import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
-import { IconChevronLeft } from "@tabler/icons-react";
+import { Anchor, Button, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { IconAlertOctagonFilled, IconArrowBarToDown, IconChevronLeft } from "@tabler/icons-react";
 import { useCallback, useMemo } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
@@ -11,18 +11,15 @@ import { Chart } from "../../charts/Chart";
 import { type PlotlyFigure, withChosen } from "../../charts/traces";
 import type { AbortControl } from "../../live/flights";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
-import { NotFound } from "../../ui/NotFound";
-import { NotFoundPage } from "../../ui/NotFoundPage";
-import { ReadOnlyNotice } from "../../ui/ReadOnlyNotice";
+import { VehicleBadge } from "../../ui/Badges";
+import { NotFound, NotFoundPage } from "../../ui/NotFound";
+import { ReadOnlyNotice } from "../../ui/Notices";
+import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { useGainTitles, useUnits } from "../../ui/useUnits";
-import { VehicleBadge } from "../../ui/VehicleBadge";
-import { MotorsOff } from "../fleet/MotorsOff";
+import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
 import { endOfTime, type FlyStep, flyStateLabel, flyStep } from "./flyScreen";
-import { HeldGains } from "./HeldGains";
-import { Quarantine } from "./Quarantine";
-import { Readouts } from "./Readouts";
+import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
 
 export function FlyPage() {
@@ -139,4 +136,37 @@ function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure |
   );
   const figure = useMemo(() => (raw ? dress(raw as unknown as PlotlyFigure) : null), [raw, dress]);
   return { figure, summary: card?.summary ?? "" };
+}
+
+interface QuarantineProps {
+  vehicle: Vehicle;
+  concern: string;
+  orders: ReturnType<typeof useVehicleCommands>;
+}
+
+/** Reason of the quarantine, the Land command, and a link to the release. */
+function Quarantine({ vehicle, concern, orders }: QuarantineProps) {
+  return (
+    <section className={classes["quarantine"]}>
+      <div role="alert">
+        <h2>
+          <IconAlertOctagonFilled size={24} aria-hidden />
+          Do not fly
+        </h2>
+        <p>{concern}</p>
+      </div>
+      <Button
+        size="lg"
+        color="red"
+        leftSection={<IconArrowBarToDown size={22} aria-hidden />}
+        onClick={() => orders.press("land")}
+      >
+        Land now
+      </Button>
+      {orders.said?.order === "land" && <CommandResult orders={orders} />}
+      <Anchor component={Link} to={`/vehicles/${vehicle.id}`} display="inline-block" py={12}>
+        Inspect and release {vehicle.name}
+      </Anchor>
+    </section>
+  );
 }

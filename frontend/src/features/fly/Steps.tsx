@@ -1,20 +1,25 @@
-import { Anchor, Button, Loader } from "@mantine/core";
-import { IconOctagonFilled, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
+import { Anchor, Button, Loader, Stack } from "@mantine/core";
+import { IconAlertTriangle, IconOctagonFilled, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
 import { useFlyTrial } from "../../api/mutations";
-import type { Campaign, Trial, Vehicle } from "../../api/types";
+import { useTrials } from "../../api/queries";
+import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
 import type { AbortControl } from "../../live/flights";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { StateBadge } from "../../ui/Badges";
 import { HoldButton } from "../../ui/HoldButton";
+import { ErrorNotice } from "../../ui/Notices";
+import { trialStateLabel } from "../../ui/states";
+import { FlightMarkers, PredictionResult } from "../campaign/FlightMarkers";
+import { FlightNotes } from "../campaign/FlightNotes";
+import { AbortCause, FlightReview } from "../campaign/FlightReview";
 import { speedOf, wantsRehearsal } from "../campaign/nextStep";
 import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
+import { sentenceOf } from "../campaign/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
-import { FlightReviewCard } from "./FlightReviewCard";
 import classes from "./Fly.module.css";
 import type { FlyStep } from "./flyScreen";
-import { PreflightChecks } from "./PreflightChecks";
 
 interface Props {
   campaign: Campaign;
@@ -55,7 +60,7 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
   switch (step) {
     case "plan":
       return (
-        <div className={classes["stack"]}>
+        <Stack gap={12}>
           {campaign.vehicle.can_fly ? (
             <>
               <Button
@@ -79,7 +84,7 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
           )}
           <Problem trial={trial} />
           <ErrorNotice error={fly.error} />
-        </div>
+        </Stack>
       );
     case "judge":
     case "over":
@@ -106,7 +111,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
   }
   const isReady = vehicle.actions.includes("stage") && trial.actions.includes("stage");
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       {(vehicle.is_real || isOthers || isInControl) && <OperatorControl vehicle={vehicle} />}
       {vehicle.state === "disconnected" && (
         <p className={classes["say"]}>
@@ -133,7 +138,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
           : "Writes these gains to the landed and disarmed vehicle and reads each one back. The vehicle does not move."}
       </p>
       <ErrorNotice error={stage.error} />
-    </div>
+    </Stack>
   );
 }
 
@@ -143,7 +148,7 @@ function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
   const isOthers = vehicle.control !== null && !isInControl;
   const may = trial.actions.includes("take-off") && !isOthers && (isInControl || !vehicle.is_real);
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       {(vehicle.is_real || isOthers) && !isInControl && <OperatorControl vehicle={vehicle} />}
       {vehicle.is_real ? (
         <HoldButton
@@ -171,7 +176,7 @@ function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
         Unstage (restore safe gains)
       </Button>
       <ErrorNotice error={takeOff.error ?? unstage.error} />
-    </div>
+    </Stack>
   );
 }
 
@@ -179,7 +184,7 @@ function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
 function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
   const asked = abort.asked.has(trial.id);
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       <button type="button" className={classes["abort"]} onClick={() => abort.press([trial.id])}>
         <IconOctagonFilled size={40} aria-hidden />
         {asked ? "ABORTING" : "ABORT"}
@@ -190,19 +195,19 @@ function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
           ? "Sending safe gains and Land until the vehicle confirms."
           : "Ends the flight immediately: sends safe gains and Land until the vehicle confirms."}
       </p>
-    </div>
+    </Stack>
   );
 }
 
 function Waiting({ text, children }: { text: string; children?: ReactNode }) {
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={12}>
       <p className={classes["waiting"]}>
         <Loader size="sm" aria-hidden />
         {text}
       </p>
       {children}
-    </div>
+    </Stack>
   );
 }
 
@@ -210,4 +215,58 @@ function Waiting({ text, children }: { text: string; children?: ReactNode }) {
 function Problem({ trial }: { trial: Trial }) {
   const problem = trial.flight?.problem ?? "";
   return problem === "" ? null : <ErrorNotice error={new Error(problem)} />;
+}
+
+/** Failed preflight checks; renders nothing if all passed. */
+function PreflightChecks({ checks }: { checks: readonly VehicleCheck[] }) {
+  const failed = checks.filter(({ passed }) => !passed);
+  if (failed.length === 0) return null;
+  return (
+    <ul className={classes["checks"]} aria-label="Failed preflight checks">
+      {failed.map(({ name, title, found, needed, hint }) => (
+        <li key={name}>
+          <IconAlertTriangle size={18} aria-hidden />
+          <span>
+            <strong>{title}</strong>: {found}, required {needed}.{hint && ` ${hint}`}
+          </span>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+interface FlightReviewCardProps {
+  campaign: Campaign;
+  trial: Trial;
+}
+
+/** Result of the flight, its review, and the link to the next flight. */
+function FlightReviewCard({ campaign, trial }: FlightReviewCardProps) {
+  const trials = useTrials(campaign.id).data ?? [];
+  const page = `/campaigns/${campaign.id}`;
+  return (
+    <Stack gap={12}>
+      <p className={classes["marks"]}>
+        <StateBadge words={trialStateLabel(trial.state)} />
+        <PredictionResult trial={trial} />
+        <FlightMarkers trial={trial} />
+      </p>
+      {trial.state !== "captured" && <p className={classes["say"]}>{sentenceOf(trial)}</p>}
+      <AbortCause trial={trial} />
+      <Stack gap={8}>
+        <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
+      </Stack>
+      <FlightNotes trial={trial} />
+      <div className={classes["onward"]}>
+        {trial.state !== "captured" && trial.state !== "lost" && (
+          <Button component={Link} to={page} size="lg" fullWidth>
+            Next flight
+          </Button>
+        )}
+        <Anchor component={Link} to={`${page}/flights/${trial.id}`} display="inline-block" py={12}>
+          Open flight
+        </Anchor>
+      </div>
+    </Stack>
+  );
 }

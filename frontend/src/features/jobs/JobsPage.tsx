@@ -1,16 +1,17 @@
-import { Button, SegmentedControl, Skeleton } from "@mantine/core";
+import { Box, Button, Group, SegmentedControl, Skeleton, Stack, Title } from "@mantine/core";
 import { useState } from "react";
 import { JOBS_PAGE, type JobState, useJobs, useReproductions } from "../../api/jobs";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import classes from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";
 import { JobCard } from "./JobCard";
 
-type Group = "failed" | "open" | "over";
-type Filter = "all" | Group;
+type GroupName = "failed" | "open" | "over";
+type Filter = "all" | GroupName;
 
-const GROUPS: Record<Group, { title: string; states: readonly JobState[]; none: string }> = {
+const GROUPS: Record<GroupName, { title: string; states: readonly JobState[]; none: string }> = {
   failed: { title: "Failed jobs", states: ["failed"], none: "No failed jobs." },
   open: { title: "Active jobs", states: ["queued", "running"], none: "No active jobs." },
   over: { title: "Finished jobs", states: ["done", "cancelled"], none: "No finished jobs." },
@@ -30,8 +31,8 @@ export function JobsPage() {
   const isEmpty = !isPending && shown.every((group) => jobs[group].total === 0);
   return (
     <>
-      <div className={classes["head"]}>
-        <h1 className={classes["title"]}>Jobs</h1>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Jobs</Title>
         <SegmentedControl
           aria-label="Jobs shown"
           size="md"
@@ -44,28 +45,28 @@ export function JobsPage() {
             { value: "over", label: "Finished" },
           ]}
         />
-      </div>
+      </Group>
       <ErrorNotice error={shown.map((group) => jobs[group].error).find((error) => error !== null)} />
       {isPending && <Skeleton height={240} radius="md" aria-busy="true" />}
       {isEmpty && (
-        <p className={classes["none"]}>
+        <Note py={48} ta="center">
           {filter === "all"
             ? "No jobs yet. Proposals, error landscapes and reproductions appear here."
             : GROUPS[filter].none}
-        </p>
+        </Note>
       )}
-      <div className={classes["stack"]}>
+      <Stack gap={28}>
         {shown
           .filter((group) => jobs[group].total > 0)
           .map((group) => (
             <JobGroup key={group} group={group} found={jobs[group]} titles={titles} onAll={() => setFilter(group)} />
           ))}
-      </div>
+      </Stack>
     </>
   );
 }
 
-function useGroup(group: Group, filter: Filter) {
+function useGroup(group: GroupName, filter: Filter) {
   const isBrief = group === "failed" && filter === "all";
   const query = useJobs(GROUPS[group].states, isBrief ? FAILURES_FIRST : JOBS_PAGE);
   const items = query.data?.pages.flatMap((page) => page.items) ?? [];
@@ -73,7 +74,7 @@ function useGroup(group: Group, filter: Filter) {
 }
 
 interface JobGroupProps {
-  group: Group;
+  group: GroupName;
   found: ReturnType<typeof useGroup>;
   titles: ReadonlyMap<string, string>;
   onAll: () => void;
@@ -83,14 +84,16 @@ function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, o
   const { title } = GROUPS[group];
   return (
     <section>
-      <h2 className={classes["section"]}>{title}</h2>
+      <Title order={2} c="dimmed" fz="body" mb={10}>
+        {title}
+      </Title>
       <ul className={classes["list"]} aria-label={title}>
         {items.map((job) => (
           <JobCard key={job.id} job={job} titles={titles} />
         ))}
       </ul>
       {query.hasNextPage && (
-        <div className={classes["more"]}>
+        <Box mt={20} ta="center">
           <Button
             variant="default"
             loading={query.isFetchingNextPage}
@@ -98,7 +101,7 @@ function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, o
           >
             {isBrief ? `Show all ${total} failed jobs` : `Show more (${items.length} of ${total})`}
           </Button>
-        </div>
+        </Box>
       )}
     </section>
   );

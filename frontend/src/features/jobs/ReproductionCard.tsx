@@ -1,6 +1,7 @@
-import { Button, useComputedColorScheme } from "@mantine/core";
+import { Button, Text, useComputedColorScheme } from "@mantine/core";
 import { IconPlayerPlay, IconX } from "@tabler/icons-react";
 import {
+  type ReproductionRow,
   type ReproductionSummary,
   useCancelJob,
   useReproductionFigure,
@@ -8,13 +9,16 @@ import {
   useRunReproduction,
 } from "../../api/jobs";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { ErrorNotice } from "../../ui/ErrorNotice";
+import { Aside } from "../../ui/Aside";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
+import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
+import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
-import { JobProgress } from "./JobProgress";
-import { duration, isUnderWay, ratioSpan } from "./jobs";
+import { JobProgress } from "./JobCard";
+import { type ComparedColumn, comparedColumns, duration, grouped, isUnderWay, measure, ratioSpan } from "./jobs";
 import classes from "./ReproductionCard.module.css";
-import { ReproductionRows } from "./ReproductionRows";
 
 const FIGURE_HEIGHT_PX = 360;
 
@@ -26,19 +30,19 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
   return (
     <article id={name} className={classes["card"]} aria-label={title}>
       <Panel title={title} tools={<Actions reproduction={reproduction} />}>
-        <p className={classes["paper"]}>
+        <Text maw="90ch" lh={1.45} mb={8}>
           <strong>In the paper:</strong> {paper}
-        </p>
-        <p className={classes["line"]}>
+        </Text>
+        <Text maw="90ch" lh={1.45} mb={8}>
           <strong>Here:</strong> {line}
           {span !== null && <> Our results: {span}.</>}
-        </p>
+        </Text>
         <Standing reproduction={reproduction} />
         <ErrorNotice error={result.error} />
         {result.data && result.data.rows.length > 0 && (
           <>
             <ReproductionRows rows={result.data.rows} title={title} />
-            <ul className={classes["notes"]}>
+            <ul className={page["notes"]}>
               {result.data.notes.map((note) => (
                 <li key={note}>{note}</li>
               ))}
@@ -103,15 +107,19 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
   return (
     <>
       {job !== null && isUnderWay(job) && <JobProgress job={job} title={`Progress: ${title}`} />}
-      {job?.state === "cancelled" && <p className={classes["line"]}>The last run was cancelled.</p>}
+      {job?.state === "cancelled" && (
+        <Text maw="90ch" lh={1.45} mb={8}>
+          The last run was cancelled.
+        </Text>
+      )}
       {job?.problem && (
-        <div className={classes["trouble"]} role="alert">
+        <Aside tone="bad" fz="body" role="alert">
           <strong>The last run failed: {job.problem.title}</strong>
           {job.problem.detail && <p>{job.problem.detail}</p>}
           <p>{job.problem.hint}</p>
-        </div>
+        </Aside>
       )}
-      <p className={classes["when"]}>
+      <Note fz="small" my={10}>
         {latest === null ? (
           "Not run yet."
         ) : (
@@ -120,7 +128,7 @@ function Standing({ reproduction: { title, job, latest } }: { reproduction: Repr
             {latest.full && " (full)"}, took {duration(latest.seconds)}.
           </>
         )}
-      </p>
+      </Note>
     </>
   );
 }
@@ -137,5 +145,60 @@ function Figure({ name, figure, title, jobId }: FigureProps) {
   const card = useReproductionFigure(name, figure, theme, jobId);
   return (
     <FigurePanel title={card.data?.title ?? title} card={card.data} error={card.error} height={FIGURE_HEIGHT_PX} />
+  );
+}
+
+const RATIO_DIGITS = 3;
+
+/** Own and published numbers, grouped. */
+function ReproductionRows({ rows, title }: { rows: readonly ReproductionRow[]; title: string }) {
+  const columns = comparedColumns(rows);
+  return (
+    <ScrollTable label={`${title}: numbers`} className={classes["table"]}>
+      <thead>
+        <tr>
+          <td />
+          <th scope="col">Ours</th>
+          {columns.map(([key, heading]) => (
+            <th key={key} scope="col">
+              {heading}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      {grouped(rows).map((group) => (
+        <tbody key={group.title}>
+          <tr className={classes["group"]}>
+            <th scope="rowgroup" colSpan={2 + columns.length}>
+              {group.title}
+            </th>
+          </tr>
+          {group.rows.map((row) => (
+            <Row key={row.label} row={row} columns={columns} />
+          ))}
+        </tbody>
+      ))}
+    </ScrollTable>
+  );
+}
+
+function Row({ row, columns }: { row: ReproductionRow; columns: readonly ComparedColumn[] }) {
+  return (
+    <tr>
+      <th scope="row">
+        {row.label} {row.note !== "" && <span className={classes["note"]}>{row.note}</span>}{" "}
+        {row.overruled !== "" && (
+          <span className={classes["note"]} title={row.overruled}>
+            refused by the gate, overruled
+          </span>
+        )}
+      </th>
+      <td className={classes["ours"]}>
+        {measure(row.measured, row.digits)} <span className={classes["unit"]}>{row.unit}</span>
+      </td>
+      {columns.map(([key]) => (
+        <td key={key}>{measure(row[key], key === "ratio" ? RATIO_DIGITS : row.digits)}</td>
+      ))}
+    </tr>
   );
 }

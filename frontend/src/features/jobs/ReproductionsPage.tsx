@@ -1,10 +1,10 @@
-import { Button, Skeleton } from "@mantine/core";
+import { Button, Group, Skeleton, Stack, Title } from "@mantine/core";
 import { IconPlayerPlay } from "@tabler/icons-react";
 import { useEffect } from "react";
 import { useLocation } from "react-router";
 import { useReproductions, useRunReproduction } from "../../api/jobs";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import classes from "../../ui/Page.module.css";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import { isUnderWay } from "./jobs";
 import { ReproductionCard } from "./ReproductionCard";
@@ -19,8 +19,8 @@ export function ReproductionsPage() {
   useScrollToHash(found.length > 0);
   return (
     <>
-      <div className={classes["head"]}>
-        <h1 className={classes["title"]}>Reproductions</h1>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Reproductions</Title>
         <Button
           variant="default"
           leftSection={<IconPlayerPlay size={18} aria-hidden />}
@@ -31,18 +31,18 @@ export function ReproductionsPage() {
         >
           Run all
         </Button>
-      </div>
-      <p className={classes["intro"]}>
+      </Group>
+      <Note maw="90ch" mb={18}>
         All experiments, tables and figures of the paper, run on this machine and compared with the published numbers.
         Flights and proposals have priority. A run can be cancelled and restarted at any time.
-      </p>
+      </Note>
       <ErrorNotice error={list.error ?? run.error} />
       {list.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
-      <div className={classes["stack"]}>
+      <Stack gap={28}>
         {found.map((reproduction) => (
           <ReproductionCard key={reproduction.name} reproduction={reproduction} />
         ))}
-      </div>
+      </Stack>
     </>
   );
 }

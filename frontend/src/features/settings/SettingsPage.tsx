@@ -1,14 +1,32 @@
-import { SegmentedControl, Skeleton, Switch, TextInput, useMantineColorScheme } from "@mantine/core";
-import { useSystem } from "../../api/system";
-import { speak } from "../../live/speak";
-import { ErrorNotice } from "../../ui/ErrorNotice";
-import work from "../../ui/Page.module.css";
+import {
+  Anchor,
+  Button,
+  Group,
+  SegmentedControl,
+  SimpleGrid,
+  Skeleton,
+  Stack,
+  Switch,
+  Text,
+  TextInput,
+  Title,
+  useMantineColorScheme,
+} from "@mantine/core";
+import { IconDownload } from "@tabler/icons-react";
+import { useState } from "react";
+import { useDownload } from "../../api/files";
+import { BACKUP, codeOf, type System, useSystem } from "../../api/system";
+import { speak } from "../../live/speech";
+import { Aside } from "../../ui/Aside";
+import { SelectField } from "../../ui/Fields";
+import { bytesText } from "../../ui/format";
+import { LabelledValue } from "../../ui/LabelledValue";
+import { Note } from "../../ui/Note";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useOperatorName, useSpeechWanted } from "../../ui/usePreferences";
 import { useTitle } from "../../ui/useTitle";
-import { About } from "./About";
-import { Backup } from "./Backup";
-import { RemoteAccess } from "./RemoteAccess";
+import fleet from "../fleet/Fleet.module.css";
 import classes from "./SettingsPage.module.css";
 
 const THEMES = [
@@ -23,28 +41,28 @@ export function SettingsPage() {
   const system = useSystem();
   return (
     <>
-      <div className={work["head"]}>
-        <h1 className={work["title"]}>Settings</h1>
-      </div>
-      <div className={classes["columns"]}>
-        <div className={classes["column"]}>
+      <Group justify="space-between" gap={12} mb={14}>
+        <Title order={1}>Settings</Title>
+      </Group>
+      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" style={{ alignItems: "start" }}>
+        <Stack gap="var(--gap)">
           <Panel title="This browser">
             <ThisBrowser />
           </Panel>
           {system.data && <About system={system.data} />}
-        </div>
+        </Stack>
         {system.data === undefined ? (
           <div>
             <ErrorNotice error={system.error} />
             {system.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
           </div>
         ) : (
-          <div className={classes["column"]}>
+          <Stack gap="var(--gap)">
             <RemoteAccess system={system.data} />
             <Backup system={system.data} />
-          </div>
+          </Stack>
         )}
-      </div>
+      </SimpleGrid>
     </>
   );
 }
@@ -55,11 +73,11 @@ function ThisBrowser() {
   const [speech, setSpeech] = useSpeechWanted();
   const canSpeak = "speechSynthesis" in window;
   return (
-    <div className={classes["stack"]}>
+    <Stack gap={18}>
       <div>
-        <p className={classes["label"]} id="appearance">
+        <Text fw={550} mb={6} id="appearance">
           Appearance
-        </p>
+        </Text>
         <SegmentedControl
           aria-labelledby="appearance"
           size="md"
@@ -91,6 +109,134 @@ function ThisBrowser() {
         autoComplete="name"
         onChange={({ currentTarget: { value } }) => setName(value)}
       />
-    </div>
+    </Stack>
+  );
+}
+
+const SCARCE_BYTES = 1e9;
+
+/** Version and resources of the server, for bug reports. */
+function About({ system }: { system: System }) {
+  const scarce = system.free_bytes < SCARCE_BYTES;
+  return (
+    <Panel title="This server">
+      <dl className={fleet["facts"]}>
+        <LabelledValue title="Gainline" value={system.version} />
+        <LabelledValue title="Worker" value={system.worker} bad={system.worker !== "running"} />
+        <LabelledValue title="Database" value={`revision ${system.database_revision}`} />
+        <LabelledValue title="Data" value={bytesText(system.data_bytes)} />
+        <LabelledValue
+          title={scarce ? "Free disk space, low" : "Free disk space"}
+          value={bytesText(system.free_bytes)}
+          bad={scarce}
+        />
+        <LabelledValue title="Data folder" value={system.data_dir} />
+      </dl>
+    </Panel>
+  );
+}
+
+/** Download of a backup, and how to restore it. */
+function Backup({ system }: { system: System }) {
+  const backup = useDownload(BACKUP);
+  return (
+    <Panel title="Backup">
+      <Stack gap={18}>
+        <Note>
+          One file with the current state of all campaigns, flights and vehicles, about{" "}
+          {bytesText(system.database_bytes)}. Flights and computations continue during the download. Telemetry logs
+          (folder tlogs) are not included.
+        </Note>
+        <div>
+          <Button
+            leftSection={<IconDownload size={18} aria-hidden />}
+            loading={backup.isPending}
+            onClick={() => backup.mutate()}
+          >
+            Download backup
+          </Button>
+        </div>
+        <ErrorNotice error={backup.error} />
+        <details className={classes["details"]}>
+          <summary>How to restore a backup</summary>
+          <ol>
+            <li>Stop Gainline.</li>
+            <li>
+              In {system.data_dir}, delete gainline.sqlite3-wal and gainline.sqlite3-shm, and move gainline.sqlite3
+              away.
+            </li>
+            <li>Copy the backup there as gainline.sqlite3.</li>
+            <li>Start Gainline. A backup of an earlier version is migrated.</li>
+          </ol>
+        </details>
+      </Stack>
+    </Panel>
+  );
+}
+
+/** How to open this dashboard on another device, and the security consequences. */
+function RemoteAccess({ system }: { system: System }) {
+  return (
+    <Panel title="Open on a tablet">
+      <Stack gap={18}>
+        {system.addresses.length > 0 ? <Reachable system={system} /> : <LocalOnly system={system} />}
+      </Stack>
+    </Panel>
+  );
+}
+
+function Reachable({ system: { addresses, exposes, host, in_container } }: { system: System }) {
+  const urls = addresses.map(({ url }) => url);
+  const [chosen, setChosen] = useState(urls[0] ?? "");
+  return (
+    <>
+      {addresses.length > 1 && (
+        <SelectField
+          label="Network"
+          value={chosen}
+          onChange={setChosen}
+          data={addresses.map(({ url, interface: name }) => ({ value: url, label: `${name}: ${url}` }))}
+        />
+      )}
+      <div className={classes["code"]}>
+        <img src={codeOf(chosen)} alt={`QR code of ${chosen}`} width={220} height={220} />
+        <Note>
+          Scan the code with the tablet’s camera, or enter
+          <Anchor href={chosen} className={classes["address"] ?? ""}>
+            {chosen}
+          </Anchor>
+          Both devices must be on the same network. The tablet has read-only access. To change campaigns and fly
+          simulations from it, open the link that <code>gainline unlock</code> prints on this computer.
+        </Note>
+      </div>
+      {in_container && (
+        <Note>
+          Gainline runs in a container, and this is the container’s address. If the tablet cannot reach it, use the
+          computer’s address and the published port.
+        </Note>
+      )}
+      <Aside tone="warn">
+        <strong>The server listens on {host}</strong>, so {exposes}
+      </Aside>
+    </>
+  );
+}
+
+function LocalOnly({ system: { exposes, host, is_exposed } }: { system: System }) {
+  if (is_exposed) {
+    return <Note>The server listens on {host}, but this computer is not connected to a network.</Note>;
+  }
+  return (
+    <>
+      <Note>
+        Only this computer can open the dashboard, because the server listens on {host}. To open it on a tablet on the
+        same network, stop the server and start it with
+      </Note>
+      <code className={classes["command"]}>gainline serve --host 0.0.0.0</code>
+      <Note>(from a checkout: ./dev up --host 0.0.0.0). Its address then appears here.</Note>
+      <Aside tone="warn">
+        <strong>Security:</strong> {exposes}
+      </Aside>
+    </>
   );
 }

@@ -1,0 +1,217 @@
+import { Stack } from "@mantine/core";
+import { IconFlagCheck, IconHome, IconRepeat, IconStairsUp } from "@tabler/icons-react";
+import type { Explanation, FittedParameter, Proposal } from "../../api/types";
+import { Aside } from "../../ui/Aside";
+import { against, gainText, NOTHING, percentChange, withUnit } from "../../ui/format";
+import { gainsInBrackets } from "../../ui/gains";
+import { HelpTip } from "../../ui/HelpTip";
+import { Note } from "../../ui/Note";
+import { intervalText, percent, plusMinus } from "../../ui/uncertainty";
+import classes from "./NextFlight.module.css";
+import { type Advised, RECOMMENDED } from "./proposal";
+
+interface Props {
+  changes: Proposal["changes"];
+  unit: string;
+  titles?: Readonly<Record<string, string>>;
+}
+
+/** Gains now and next, with the change of each. */
+export function GainTable({ changes, unit, titles = {} }: Props) {
+  return (
+    <table className={classes["gains"]}>
+      <caption className="visually-hidden">Gains now and proposed</caption>
+      <thead>
+        <tr>
+          <th scope="col">Gain{unit && ` (${unit})`}</th>
+          <th scope="col">Now</th>
+          <th scope="col">Next</th>
+          <th scope="col" className={classes["delta"]}>
+            Change
+          </th>
+        </tr>
+      </thead>
+      <tbody>
+        {Object.entries(changes).map(([name, { now, next, delta }]) => (
+          <tr key={name}>
+            <th scope="row">
+              {name} {titles[name] && <small>{titles[name]}</small>}
+            </th>
+            <td className={classes["now"]} title={String(now)}>
+              {gainText(now)}
+            </td>
+            <td className={classes["next"]} title={String(next)}>
+              {gainText(next)}
+            </td>
+            <td className={classes["delta"]} data-same={delta === 0 || undefined}>
+              {delta === 0 ? "same" : `${delta > 0 ? "+" : "−"}${gainText(Math.abs(delta))}`}
+            </td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+interface PredictedErrorProps {
+  proposal: Proposal;
+  best: number | null;
+  unit: string;
+}
+
+/** Predicted error with its interval. */
+export function PredictedError({ proposal, best, unit }: PredictedErrorProps) {
+  const { predicted_error: error, interval } = proposal;
+  const change = percentChange(error, best);
+  if (error === null) return <Note fz="body">No prediction: there is no model of these gains.</Note>;
+  return (
+    <div className={`${classes["predicted"]} numbers`}>
+      <span>
+        Predicted
+        <HelpTip topic="predicted" />
+      </span>
+      <span>
+        <strong>{withUnit(error, unit)}</strong>
+        {interval && (
+          <small>
+            {intervalText(interval, unit)}
+            <HelpTip topic="interval" />
+          </small>
+        )}
+        {change !== null && <small>{against(change, "the best")}</small>}
+      </span>
+    </div>
+  );
+}
+
+const ICONS = { step: IconStairsUp, repeat: IconRepeat, baseline: IconHome, stop: IconFlagCheck } as const;
+
+/** The recommended action, and its reason. */
+export function Recommendation({ advice }: { advice: Advised }) {
+  const Icon = ICONS[advice.kind];
+  return (
+    <Aside tone="good" className={classes["advice"] ?? ""} data-kind={advice.kind}>
+      <Icon size={22} color="var(--best)" aria-hidden />
+      <p>
+        <strong>Recommended: {RECOMMENDED[advice.kind].toLowerCase()}</strong>
+        {advice.why && <span>{advice.why}</span>}
+      </p>
+    </Aside>
+  );
+}
+
+interface ProposalExplanationProps {
+  explanation: Explanation;
+  unit: string;
+  gains: Readonly<Record<string, number>>;
+}
+
+/** Explanation of the proposed gains: summary, expected information, trust region, limits, fitted parameters. */
+export function ProposalExplanation({ explanation, unit, gains }: ProposalExplanationProps) {
+  const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
+  return (
+    <>
+      <details className={classes["more"]}>
+        <summary>Explanation</summary>
+        <Stack gap={14}>
+          <span>
+            {explanation.summary} <HelpTip topic="bias" />
+          </span>
+          {lesson && (
+            <span>
+              <strong>Expected to learn:</strong> {lesson}
+            </span>
+          )}
+          {trust !== null && (
+            <span className="numbers">
+              Trust region: {percent(trust)} of each gain's range
+              <HelpTip topic="trustRegion" />
+            </span>
+          )}
+          {clipped.length > 0 && <span>Limited by: {clipped.join(", ")}.</span>}
+          {notes.map((note) => (
+            <span key={note}>{note}</span>
+          ))}
+          {fitted.length > 0 && <Fitted parameters={fitted} />}
+        </Stack>
+      </details>
+      <Tried explanation={explanation} unit={unit} gains={gains} />
+    </>
+  );
+}
+
+function withOwnUnit(text: string, unit: string): string {
+  return unit === "" || unit === "1" ? text : `${text} (${unit})`;
+}
+
+/** Fitted parameters of the vehicle, next to their values before the flights. */
+function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
+  return (
+    <table className={classes["ladder"]}>
+      <caption>
+        Fitted parameters (± standard error) <HelpTip topic="fitted" />
+      </caption>
+      {parameters.map(({ name, title, unit, value, standard_error, nominal, prior_sd }) => (
+        <tbody key={name}>
+          <tr>
+            <th colSpan={2} scope="rowgroup">
+              {withOwnUnit(title, unit)}
+            </th>
+          </tr>
+          <tr className={classes["fitted"]}>
+            <td>
+              now <strong>{plusMinus(value, standard_error, "")}</strong>
+            </td>
+            <td>before {plusMinus(nominal, prior_sd, "")}</td>
+          </tr>
+        </tbody>
+      ))}
+    </table>
+  );
+}
+
+/** Details: the gradient, and the steps evaluated along it. */
+function Tried({ explanation, unit, gains }: ProposalExplanationProps) {
+  const { gradient = {}, ladder = [], chosen_length: chosen } = explanation;
+  const slopes = Object.entries(gradient);
+  if (slopes.length === 0 && ladder.length === 0) return null;
+  return (
+    <details className={classes["more"]}>
+      <summary>Steps evaluated on the model</summary>
+      <Stack gap={14}>
+        {slopes.length > 0 && (
+          <span className="numbers">
+            Gradient of the error:{" "}
+            {slopes.map(([name, value]) => `${name} ${value.toPrecision(2).replace("-", "−")}`).join(", ")} {unit} per
+            unit of the gain. <HelpTip topic="gradient" />
+          </span>
+        )}
+        {ladder.length > 0 && (
+          // biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard
+          <section className={`${classes["wide"]} sideways`} aria-label="Steps evaluated on the model" tabIndex={0}>
+            <table className={classes["ladder"]}>
+              <thead>
+                <tr>
+                  <th scope="col">Step</th>
+                  <th scope="col">[{Object.keys(gains).join(" ")}]</th>
+                  <th scope="col">Predicted</th>
+                  <th scope="col">Limit</th>
+                </tr>
+              </thead>
+              <tbody>
+                {ladder.map((step) => (
+                  <tr key={step.length} data-chosen={step.length === chosen || undefined}>
+                    <td>{gainText(step.length)}</td>
+                    <td>{gainsInBrackets(step.gains)}</td>
+                    <td>{withUnit(step.predicted_error, unit, 4)}</td>
+                    <td>{step.clipped?.join(", ") || NOTHING}</td>
+                  </tr>
+                ))}
+              </tbody>
+            </table>
+          </section>
+        )}
+      </Stack>
+    </details>
+  );
+}

@@ -1,0 +1,125 @@
+import { Button, Stack, TextInput } from "@mantine/core";
+import { IconAlertTriangle, IconCircleCheck } from "@tabler/icons-react";
+import { useState } from "react";
+import { useActs } from "../../api/fleet";
+import type { Vehicle } from "../../api/types";
+import { gainText } from "../../ui/format";
+import { Note } from "../../ui/Note";
+import { Panel } from "../../ui/Panel";
+import table from "../../ui/ScrollTable.module.css";
+import { Time } from "../../ui/Time";
+import classes from "./Fleet.module.css";
+import { parametersOf } from "./fleet";
+
+/** All items of the last preflight check. */
+export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicle }) {
+  if (checks === null) {
+    return <Note>Not checked yet. All items are checked again before every flight.</Note>;
+  }
+  return (
+    <>
+      <div className={table["scroll"]}>
+        <table className={`${table["table"]} ${classes["table"]}`}>
+          <thead>
+            <tr>
+              <th scope="col">Item</th>
+              <th scope="col">Result</th>
+              <th scope="col">Found</th>
+            </tr>
+          </thead>
+          <tbody>
+            {checks.map(({ name, title, passed, found, needed, hint }) => (
+              <tr key={name}>
+                <th scope="row">
+                  {title}
+                  {!passed && hint && <small>{hint}</small>}
+                </th>
+                <td>
+                  {passed ? (
+                    <span className={classes["good"]}>
+                      <IconCircleCheck size={18} aria-hidden /> passed
+                    </span>
+                  ) : (
+                    <span className={classes["bad"]}>
+                      <IconAlertTriangle size={18} aria-hidden /> failed
+                    </span>
+                  )}
+                </td>
+                <td>
+                  {found}
+                  <small>required: {needed}</small>
+                </td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+      <Note>
+        Checked <Time at={checked_at} />.
+      </Note>
+    </>
+  );
+}
+
+interface Props {
+  vehicleId: number;
+  mayRead: boolean;
+  reading: boolean;
+  onRead: () => void;
+}
+
+/** All parameters of the vehicle, as last read. */
+export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
+  const [wanted, setWanted] = useState("");
+  const acts = useActs(vehicleId).data?.pages.flatMap((page) => page.items) ?? [];
+  const latest = acts.find(({ kind }) => kind === "parameters");
+  const read = acts.find(({ kind, state }) => kind === "parameters" && state === "done");
+  const underWay = latest?.state === "requested" || latest?.state === "running";
+  const parameters = parametersOf(read?.result ?? null);
+  const found = parameters.filter(([name]) => name.toLowerCase().includes(wanted.trim().toLowerCase()));
+  return (
+    <Panel
+      title="Parameters"
+      className={classes["wide"]}
+      tools={
+        <Button variant="default" disabled={!mayRead || underWay} loading={reading || underWay} onClick={onRead}>
+          Read all
+        </Button>
+      }
+    >
+      <Stack gap={14}>
+        {parameters.length === 0 ? (
+          <Note>
+            {latest?.state === "failed" ? latest.problem : "Not read yet. Reading all parameters takes a few seconds."}
+          </Note>
+        ) : (
+          <>
+            <TextInput
+              label={`Search ${parameters.length} parameters`}
+              value={wanted}
+              onChange={(event) => setWanted(event.currentTarget.value)}
+            />
+            {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrolling region has to be reachable by keyboard */}
+            <section className={classes["parameters"]} aria-label="Parameters" tabIndex={0}>
+              <table className={`${table["table"]} ${classes["table"]}`}>
+                <tbody>
+                  {found.map(([name, value]) => (
+                    <tr key={name}>
+                      <th scope="row">{name}</th>
+                      <td data-number title={String(value)}>
+                        {gainText(value)}
+                      </td>
+                    </tr>
+                  ))}
+                </tbody>
+              </table>
+            </section>
+            <Note>
+              Read <Time at={read?.finished_at} />.
+            </Note>
+          </>
+        )}
+      </Stack>
+    </Panel>
+  );
+}

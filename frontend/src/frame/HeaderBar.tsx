@@ -1,0 +1,111 @@
+import { ActionIcon, useComputedColorScheme, useMantineColorScheme } from "@mantine/core";
+import {
+  IconMoon,
+  IconOctagonFilled,
+  IconPlugConnected,
+  IconPlugConnectedX,
+  IconRefresh,
+  IconSun,
+} from "@tabler/icons-react";
+import { Link } from "react-router";
+import type { FlyingCampaign, useAbort } from "../live/flights";
+import { type Connection, useConnection, useIsCurrent, useLiveFlight } from "../live/store";
+import { readingOf } from "../live/telemetry";
+import { withUnit } from "../ui/format";
+import { Time } from "../ui/Time";
+import classes from "./Frame.module.css";
+
+function describe({ state, worker }: Connection) {
+  if (state === "away") return { text: "Server unreachable", Icon: IconPlugConnectedX, bad: true };
+  if (state === "connecting") return { text: "Connecting", Icon: IconRefresh, bad: false };
+  if (!worker) return { text: "Worker unreachable", Icon: IconPlugConnectedX, bad: true };
+  return { text: "Live", Icon: IconPlugConnected, bad: false };
+}
+
+export function ConnectionState() {
+  const { text, Icon, bad } = describe(useConnection());
+  return (
+    <span className={classes["connection"]} data-bad={bad || undefined} title={text}>
+      <Icon size={18} aria-hidden />
+      <span className={classes["connectionText"]}>{text}</span>
+    </span>
+  );
+}
+
+/** Banner that explains a lost connection until it is restored. */
+export function ConnectionNotice() {
+  const { state, worker, heardAt } = useConnection();
+  if (state === "away") {
+    return (
+      <p className={classes["notice"]} role="status">
+        <strong>The server is not responding.</strong> The data shown is
+        {heardAt === null ? " out of date" : [" from ", <Time key="at" at={heardAt} />]}. The page updates automatically
+        when the server is back.
+      </p>
+    );
+  }
+  if (state === "live" && !worker) {
+    return (
+      <p className={classes["notice"]} role="status">
+        <strong>No worker is running.</strong> Flights and computations are paused until it is back. Start it with{" "}
+        <code>gainline worker</code>.
+      </p>
+    );
+  }
+  return null;
+}
+
+/** Live readings of one flight and its abort button, which acts without confirmation. */
+export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: ReturnType<typeof useAbort> }) {
+  const live = useLiveFlight(flying.trialId);
+  const isCurrent = useIsCurrent(live);
+  const asked = abort.asked.has(flying.trialId);
+  const time = live?.timeS.at(-1);
+  const reading = readingOf(live?.channel ?? "");
+  return (
+    <section className={classes["flight"]} aria-label={`Flying: ${flying.name}`}>
+      <span className={classes["flightName"]} title={flying.name}>
+        {flying.name} · flight {flying.trialNumber}
+      </span>
+      {isCurrent && <span className={classes["pulse"]} aria-hidden />}
+      <Link
+        to={`/fly/${flying.trialId}`}
+        className={`${classes["readings"]} numbers`}
+        data-stale={!isCurrent || undefined}
+        title="Open the fly screen"
+      >
+        {time === undefined ? (
+          <span>{live?.phase === "staging" ? "setting gains" : "flying"}</span>
+        ) : (
+          <>
+            <span className={classes["big"]}>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</span>
+            <span>{withUnit(time, "s", 1)}</span>
+            {!isCurrent && <span>last known</span>}
+          </>
+        )}
+      </Link>
+      <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
+        <IconOctagonFilled size={20} aria-hidden />
+        {asked ? "ABORTING" : "ABORT"}
+        {!asked && <kbd>Space</kbd>}
+      </button>
+    </section>
+  );
+}
+
+export function ThemeSwitch() {
+  const { setColorScheme } = useMantineColorScheme();
+  const dark = useComputedColorScheme("light") === "dark";
+  const next = dark ? "light" : "dark";
+  return (
+    <ActionIcon
+      color="gray"
+      variant="subtle"
+      aria-label={`Switch to the ${next} theme`}
+      title={`Switch to the ${next} theme`}
+      onClick={() => setColorScheme(next)}
+    >
+      {dark ? <IconSun size={22} color="var(--ink)" /> : <IconMoon size={22} color="var(--ink)" />}
+    </ActionIcon>
+  );
+}

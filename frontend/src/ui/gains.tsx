@@ -1,0 +1,43 @@
+import { Fragment } from "react";
+import { gainText } from "./format";
+import { useGainTitles } from "./units";
+
+interface Props {
+  gains: Readonly<Record<string, number>>;
+  experiment: string;
+}
+
+/** Gains in a line, to four digits; the title has the name and the full number. */
+export function GainList({ gains, experiment }: Props) {
+  const titles = useGainTitles(experiment);
+  return (
+    <span>
+      {Object.entries(gains).map(([name, value], index) => (
+        <Fragment key={name}>
+          {index > 0 && " · "}
+          <span style={{ whiteSpace: "nowrap" }} title={`${titles[name] ?? name}: ${value}`}>
+            {name} {gainText(value)}
+          </span>
+        </Fragment>
+      ))}
+    </span>
+  );
+}
+
+/** A gain set as in the paper: `[400 20 100]`, in the experiment's order. */
+export function gainsInBrackets(gains: Readonly<Record<string, number>>): string {
+  return `[${Object.values(gains).map(gainText).join(" ")}]`;
+}
+
+type Gains = Readonly<Record<string, number>>;
+
+/** The known gains, in the order of `names`. */
+export function inOrder(gains: Gains, names: readonly string[]): Gains {
+  return Object.fromEntries(names.flatMap((name) => (gains[name] === undefined ? [] : [[name, gains[name]]])));
+}
+
+/** Whether the held gains equal all safe gains. */
+export function sameHeld(held: Gains, safe: Gains): boolean {
+  const names = Object.keys(safe);
+  return names.length > 0 && names.every((name) => held[name] === safe[name]);
+}
