@@ -90,5 +90,5 @@ def test_throttle_mode_passes_the_thrust_through_and_keeps_the_last_commands() -
     assert (loop.z_ref, loop.zd_ref, loop.zdd_ref, loop.z_sum_err) == (-100, 5, 0, 0)
 
 
-def test_a_trace_knows_its_length() -> None:
+def test_a_trace_has_a_length() -> None:
     assert len(LoopTrace(np.zeros((5, 9), dtype=np.int64), np.zeros((5, 7), dtype=np.int64))) == 5
