@@ -1,14 +1,13 @@
-"""How soon an abort is on the wire: from the request to the server until the first packet that carries it out.
+"""Latency of an abort, from the request to the server to the first packet that executes it.
 
     ./dev exec python -m bench.abort [--seconds 25] [--idle 2000] [--files 1024]
 
-A real server, its worker and two simulated drones, each a process of its own, as people run them. Between each vehicle
-and its link a tap hands every packet on and takes down when the operating system received it. 20 clients follow the
-event stream all the while. Flights are aborted over HTTP at random instants after their take-off; in between, Land is
-ordered of whatever stands on the ground. With `--idle` somebody keeps so many connections open besides that say
-nothing, and opens one again that the server has closed, 200 a second; the server may have `--files` open. Prints the
-figures; exits 1 when the 99th percentile of either is above 50 ms, when one never came on the wire, or when a client
-saw no telemetry.
+Runs a real server, its worker and two simulated drones in separate processes. A tap between each vehicle and its link
+forwards every packet and records when the operating system received it. 20 clients follow the event stream. Flights are
+aborted over HTTP at random instants after the take-off; in between, vehicles on the ground are sent Land. With `--idle`
+a client keeps so many idle connections open and reopens those that the server closes, 200 a second; `--files` limits
+the files that the server may have open. Prints the figures. Exits with 1 if the 99th percentile of either latency is
+above 50 ms, a command was never sent, or a client received no telemetry.
 """
 
 import argparse
@@ -49,23 +48,23 @@ TRIED: Final = {"kp": 300, "ki": 20, "kd": 90}
 PATIENCE_S: Final = 60.0
 SLOW_END_S: Final = 30.0
 ENDS_WITHIN_S: Final = 90.0
-"""Longer than a server waits for its worker."""
+"""Time-out of requests, longer than the server waits for its worker."""
 ORDERS_EVERY_S: Final = 0.4
-"""Each is written down afterwards, which costs the worker more than to pass it on."""
+"""Interval between Land commands; the worker records each one, which takes longer than forwarding it."""
 SEED: Final = 20261121
 LONG: Final = {"kind": "budget", "max_flights": 100}
 OPENED_EVERY_S: Final = 0.1
 OPENED_AT_ONCE: Final = 20
 
 Frames = list[tuple[int, bytes]]
-"""What the ground sent, and when that was received, ns since 1970."""
+"""Packets from the ground, with their times of arrival, ns since 1970."""
 
 
 # ---- the tap
 
 
 def tap(pipe: Connection) -> None:
-    """A process: hand on what comes from either side, and keep the ground's packets with their times."""
+    """Forward the packets of both sides, recording the ground's with their times; main function of a process."""
     with contextlib.ExitStack() as stack:
         ground, drone = (stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2))
         for side in (ground, drone):
@@ -95,7 +94,7 @@ class Drone:
     pipe: Connection
 
     def frames(self) -> Frames:
-        """Everything that the ground sent; the tap ends."""
+        """End the tap and return everything that the ground sent."""
         self.pipe.send("end")
         sent: Frames = self.pipe.recv()
         return sent
@@ -126,8 +125,10 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def program(*arguments: str, until: str, files: int | None = None) -> Iterator[str]:
-    """`gainline …` from its line that contains `until`, which is given, to the end of the block; with at most so many
-    open files."""
+    """Run `gainline …` until the end of the block, and yield its output line that contains `until`.
+
+    `files` limits the number of open files.
+    """
     with tempfile.TemporaryFile("w+") as said:
         process = subprocess.Popen(
             [sys.executable, "-m", "app.cli", *arguments],
@@ -154,7 +155,7 @@ def program(*arguments: str, until: str, files: int | None = None) -> Iterator[s
                     said.seek(0)
                     print("".join(said.readlines()[-300:]), file=sys.stderr)
             except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGUSR1)  # say what every thread does
+                os.killpg(process.pid, signal.SIGUSR1)  # prints the stack of every thread
                 time.sleep(1.0)
                 said.seek(0)
                 print("".join(said.readlines()[-300:]), file=sys.stderr)
@@ -166,8 +167,10 @@ def program(*arguments: str, until: str, files: int | None = None) -> Iterator[s
 
 
 def watch(url: str, pipe: Connection) -> None:
-    """A process: CLIENTS streams, each read to the end; tells when all are open, and how many telemetry messages the
-    slowest had."""
+    """Read CLIENTS event streams to the end; the main function of a process.
+
+    Reports when all are open, and then how many telemetry messages the slowest has received.
+    """
     counts = [0] * CLIENTS
     opened = threading.Barrier(CLIENTS + 1)
     done = threading.Event()
@@ -190,8 +193,10 @@ def watch(url: str, pipe: Connection) -> None:
 
 
 def idle(address: tuple[str, int], connections: int, pipe: Connection) -> None:
-    """A process: so many connections that say nothing, until told to end; tells when all were open once, and then how
-    often one was closed."""
+    """Keep idle connections open until the pipe ends it; the main function of a process.
+
+    Reports when all have been open once, and then how often one was closed.
+    """
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, connections + 256), most))
     kept = [socket.create_connection(address) for _ in range(connections)]
@@ -212,19 +217,19 @@ def idle(address: tuple[str, int], connections: int, pipe: Connection) -> None:
     pipe.send(closed)
 
 
-# ---- what is asked
+# ---- requests
 
 
 @dataclass(slots=True)
 class RequestTimes:
-    """When something was asked for, ns since 1970, of each vehicle."""
+    """Times of the requests for each vehicle, ns since 1970."""
 
     aborts: list[tuple[int, int]] = field(default_factory=list)
     orders: list[tuple[int, int]] = field(default_factory=list)
 
 
 class Operator:
-    """One person with one vehicle: flights, each aborted soon after its take-off, until the time is over."""
+    """One operator with one vehicle: flights until the time is over, each aborted soon after its take-off."""
 
     def __init__(self, url: str, index: int, address: str, asked: RequestTimes) -> None:
         each_its_own = httpx2.Limits(max_keepalive_connections=0)
@@ -254,7 +259,7 @@ class Operator:
             trial = self._post(f"/campaigns/{self._campaign}/trials", {"gains": TRIED})["id"]
             self._post(f"/trials/{trial}/fly")
             self._until(f"/trials/{trial}", lambda found: found["state"] == "flying")
-            time.sleep(2.5 + self._randomness.uniform(0.0, 1.0))  # it stands, arms, and is told to take off
+            time.sleep(2.5 + self._randomness.uniform(0.0, 1.0))  # time for arming and the take-off command
             self._asked.aborts.append((self._index, time.time_ns()))
             assert self._post(f"/trials/{trial}/abort", {"reason": "bench"})["accepted"]
             self._until(f"/vehicles/{self._vehicle}", lambda vehicle: vehicle["state"] == "ready")
@@ -277,7 +282,7 @@ class Operator:
 def delays_s(
     asked: list[tuple[int, int]], sent: Mapping[int, Frames], carries: Callable[[Message], bool]
 ) -> list[float]:
-    """From each request to the first packet after it that carries it out; infinite where there is none within 2 s."""
+    """Return the delay from each request to the first packet that executes it; infinite if there is none within 2 s."""
     codec = PAPARAZZI.codec(system=1, component=1)
     wanted = {
         index: [at_ns for at_ns, frame in frames if any(carries(message) for message in codec.parse(frame))]
@@ -291,7 +296,7 @@ def delays_s(
 
 
 def ends_a_flight(message: Message) -> bool:
-    """The first safe gain, with which an abort begins."""
+    """Whether a packet writes the first safe gain, with which an abort begins."""
     return message.get_type() == "PARAM_SET" and (text(message, "param_id"), number(message, "param_value")) == (
         "gui_v_kp",
         SAFE_KP,
@@ -303,7 +308,7 @@ def is_landing(message: Message) -> bool:
 
 
 def judge(what: str, delays: list[float]) -> bool:
-    """Print the figures; whether they are above the limit."""
+    """Print the figures and return whether they are above the limit."""
     median_s, high_s = np.quantile(delays, [0.5, 0.99], method="higher") if delays else (np.inf, np.inf)
     print(
         f"{what}: {len(delays)}, p50 {median_s * 1e3:.1f} ms, p99 {high_s * 1e3:.1f} ms (limit {LIMIT_S * 1e3:.0f}), "
@@ -322,9 +327,9 @@ def together(work: list[Callable[[], None]]) -> None:
 
 def main() -> int:
     arguments = argparse.ArgumentParser(prog="bench.abort")
-    arguments.add_argument("--seconds", type=float, default=25.0, help="of flights")
-    arguments.add_argument("--idle", type=int, default=0, help="connections that say nothing")
-    arguments.add_argument("--files", type=int, help="that the server may have open")
+    arguments.add_argument("--seconds", type=float, default=25.0, help="duration of the flights")
+    arguments.add_argument("--idle", type=int, default=0, help="number of idle connections")
+    arguments.add_argument("--files", type=int, help="number of files that the server may have open")
     chosen = arguments.parse_args()
     seconds = chosen.seconds
     asked = RequestTimes()

@@ -1,18 +1,21 @@
-"""How soon the dashboard is there and how soon it answers, in a Chromium, with a thousand flights too.
+"""Loading and interaction times of the dashboard in Chromium, with up to a thousand flights.
 
     ./dev exec python -m bench.dashboard [--rounds 3] [--flights 1000]
 
-A real server on a database of a campaign with 50 flights, one with a thousand (16 700 samples each) and 2000 small ones
-(`bench.seeding`), up for ten seconds, in which its worker has loaded what it computes with; a Chromium that has never
-seen it, again for every figure. Interactive: the list's search takes a letter. Drawn: all three charts of the campaign
-have been painted. Interactions: a scripted session on the campaign of a thousand flights (pointing along its curves,
-marks and rows, choosing rows and marks, switching the span, zooming and coming back, opening tables), of which the
-browser tells how long each event took to the next paint (Event Timing, from 16 ms on; quicker ones are not told, so
-that the 95th percentile is one of the slower). Weight: what the page fetched of scripts and styles, compressed, without
-the chart library.
+Runs a real server on a database with a campaign of 50 flights, one of a thousand (16 700 samples each) and 2000 small
+ones (`bench.seeding`). The server has been up for ten seconds, so that its worker has loaded its modules. Each figure
+is measured in a new Chromium profile.
 
-Of several rounds the quickest counts where the machine has other things to do. Prints the figures; exits 1 above a
-limit.
+- Interactive: the search field of the list accepts a letter.
+- Drawn: all three charts of the campaign have been painted.
+- Interactions: a scripted session on the campaign of a thousand flights (pointing along curves, markers and rows,
+  selecting rows and markers, switching the time range, zooming and resetting, opening tables). The browser reports the
+  time from each event to the next paint if it is 16 ms or more (Event Timing). Quicker events are not reported, so the
+  95th percentile is that of the slower ones.
+- Weight: scripts and styles that the page loads, compressed, without the chart library.
+
+The quickest of several rounds counts, because the machine may be busy. Prints the figures; exits with 1 if one is above
+its limit.
 """
 
 import argparse
@@ -76,7 +79,7 @@ PAINTED: Final = "() => new Promise(done => requestAnimationFrame(() => setTimeo
 
 @contextlib.contextmanager
 def server(data_dir: Path) -> Iterator[str]:
-    """`gainline serve` in a process of its own, with its start behind it; its address."""
+    """Run `gainline serve` in another process, wait until it has started, and yield its address."""
     gainline = Path(sys.executable).with_name("gainline")
     command = [str(gainline), "serve", "--port", "0", "--data-dir", str(data_dir)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
@@ -96,7 +99,7 @@ def server(data_dir: Path) -> Iterator[str]:
 
 @contextlib.contextmanager
 def tab(browser: Browser, address: str) -> Iterator[Page]:
-    """In a browser profile of its own: nothing is cached."""
+    """Open a page in a new browser profile, so that nothing is cached."""
     context = browser.new_context(base_url=address, viewport={"width": 1440, "height": 900})
     context.add_init_script(OBSERVE)
     page = context.new_page()
@@ -106,7 +109,7 @@ def tab(browser: Browser, address: str) -> Iterator[Page]:
 
 
 def first_page_s(page: Page) -> float:
-    """Until a letter typed into the search has been painted."""
+    """Return the time until a letter typed into the search has been painted."""
     page.goto("/", wait_until="commit")
     search = page.get_by_label("Search campaigns by name")
     search.press("a")
@@ -114,7 +117,7 @@ def first_page_s(page: Page) -> float:
 
 
 def drawn_s(page: Page, campaign_id: int) -> tuple[float, float]:
-    """Until the three charts were painted, and until the rows of the table were there too."""
+    """Return the time until the three charts were painted, and until the rows of the table were there too."""
     page.goto(f"/campaigns/{campaign_id}", wait_until="commit")
     page.locator("[data-drawn]").nth(2).wait_for()
     page.locator("tbody tr[data-flight]").first.wait_for()
@@ -124,8 +127,10 @@ def drawn_s(page: Page, campaign_id: int) -> tuple[float, float]:
 
 
 def durations_ms(page: Page, campaign_id: int) -> tuple[list[float], list[float]]:
-    """Of every interaction (a click, a tap, a key: what has an interactionId) of the session, and of every event of
-    pointing, that took 16 ms or more to its paint; several events of one interaction count as one."""
+    """Return the times from interaction to paint, and from pointer movement to paint, that are 16 ms or more.
+
+    An interaction (with an interactionId) is a click, a tap or a key; its events count as one.
+    """
     drawn_s(page, campaign_id)
     page.wait_for_timeout(2000)
     page.evaluate("told.length = 0")
@@ -142,7 +147,7 @@ def durations_ms(page: Page, campaign_id: int) -> tuple[list[float], list[float]
 
 
 def use(page: Page) -> None:
-    """The session."""
+    """Perform the session."""
     boxes = [page.get_by_role("group", name=re.compile(f"^{title}")) for title in CHARTS]
     for chart in boxes:
         chart.scroll_into_view_if_needed()
@@ -176,7 +181,7 @@ def _rows(page: Page) -> None:
 
 
 def _zoom(page: Page) -> None:
-    """Brush from 2 to 8 s or so, point along it, and come back."""
+    """Zoom to about 2 to 8 s, point along the curves, and reset."""
     box = page.get_by_role("group", name=re.compile(f"^{CHARTS[0]}")).locator(".nsewdrag").first.bounding_box()
     assert box is not None
     for first, last in ((0.1, 0.3), (0.4, 0.6)):
@@ -191,7 +196,7 @@ def _zoom(page: Page) -> None:
 
 
 def weight_kb(page: Page, path: str, ready: str) -> float:
-    """Scripts and styles that the page fetches, as gzip sends them, without the chart library."""
+    """Return the gzip size of the scripts and styles that the page loads, without the chart library."""
     bodies: list[bytes] = []
     page.on("requestfinished", lambda request: _keep(request, bodies))
     page.goto(path)
@@ -215,12 +220,12 @@ LISTED: Final = """async order => {
 
 
 def listing_ms(page: Page, order: str) -> float:
-    """A page of the list of campaigns over HTTP, the quickest of five."""
+    """Return the time of one page of the list of campaigns over HTTP, the quickest of five."""
     return min(float(page.evaluate(LISTED, order)) for _ in range(5))
 
 
 def opening(browser: Browser, address: str, campaigns: Mapping[str, int], rounds: int) -> Iterator[bool]:
-    """How soon the pages are there, each round in a new profile; the quickest round counts."""
+    """Measure the loading times of the pages, each round in a new profile; the quickest round counts."""
     with_each = [_in_new_tab(browser, address, first_page_s) for _ in range(rounds)]
     yield said("first page interactive", min(with_each), FIRST_PAGE_S, "s")
     for (name, campaign_id), limit_s in zip(campaigns.items(), (FIFTY_S, THOUSAND_S), strict=True):
@@ -231,7 +236,7 @@ def opening(browser: Browser, address: str, campaigns: Mapping[str, int], rounds
 
 
 def using(browser: Browser, address: str, campaign_id: int) -> Iterator[bool]:
-    """How soon the page of a campaign and the list of campaigns answer."""
+    """Measure interactions on a campaign's page and the list of campaigns."""
     acts_ms, pointing_ms = _in_new_tab(browser, address, partial(durations_ms, campaign_id=campaign_id))
     yield said("interaction to next paint, p95", float(np.quantile(acts_ms, 0.95)), INTERACTION_MS, "ms")
     for what, found_ms in (("interactions", acts_ms), ("events of pointing", pointing_ms)):
@@ -247,7 +252,7 @@ def using(browser: Browser, address: str, campaign_id: int) -> Iterator[bool]:
 
 
 def weighing(browser: Browser, address: str, campaign_id: int) -> Iterator[bool]:
-    """What a page loads of scripts and styles."""
+    """Measure the scripts and styles of a page."""
     for path, ready in (("/", "ul[aria-label=Campaigns]"), (f"/campaigns/{campaign_id}", "[data-drawn]")):
         weight = _in_new_tab(browser, address, partial(weight_kb, path=path, ready=ready))
         yield said(f"scripts and styles of {path}, compressed", weight, WEIGHT_KB, "kB")
@@ -259,15 +264,15 @@ def _in_new_tab(browser: Browser, address: str, take: Callable[[Page], T]) -> T:
 
 
 def said(what: str, figure: float, limit: float, unit: str) -> bool:
-    """Print a figure beside its limit; whether it lies below."""
+    """Print a figure with its limit and return whether it is below."""
     print(f"{what}: {figure:.{2 if unit == 's' else 0}f} {unit} (limit {limit:g})", flush=True)
     return figure <= limit
 
 
 def main() -> int:
     asked = argparse.ArgumentParser(prog="bench.dashboard")
-    asked.add_argument("--rounds", type=int, default=3, help="of which the quickest counts")
-    asked.add_argument("--flights", type=int, default=1000, help="of the large campaign")
+    asked.add_argument("--rounds", type=int, default=3, help="number of rounds; the quickest counts")
+    asked.add_argument("--flights", type=int, default=1000, help="flights of the large campaign")
     options = asked.parse_args()
     chromium = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     if chromium is None:

@@ -1,14 +1,14 @@
-"""Whole trials in lockstep, each with something wrong with the vehicle, the link or the wire, and an abort in between.
+"""Whole trials in lockstep, each with injected faults of the vehicle or the link, or acts of the operator.
 
-    ./dev exec python -m bench.faults                                 a sample, as .ci/run has it
+    ./dev exec python -m bench.faults                                 a sample, as in .ci/run
     ./dev exec python -m bench.faults --runs 500 --seed 20261121 --results FILE --out docs
-    ./dev exec python -m bench.faults --only 20261130                 one run again, with all that is known of it
+    ./dev exec python -m bench.faults --only 20261130                 one run again, with all details
 
-A run is drawn from its seed; the seeds count up from `--seed`, and so go through every mishap in every state of a
-trial. The vehicle is a simulated drone in lockstep with the program; a tap at its antenna reads every packet that the
-program sends. What the program did is judged from the wire and from what the drone truly holds, by what
-docs/real-flight.md asks for (bench/hazards/expected.py). Prints what went wrong and a table; with `--out` writes
-faults.md there. Exits 1 when a single run is not as asked.
+The seed determines a run; consecutive seeds, starting from `--seed`, cover every fault in every state of a trial. The
+vehicle is a simulated drone in lockstep with the program, and a tap at its antenna reads every packet that the program
+sends. The program's behaviour is checked from these packets and the drone's true state against docs/real-flight.md
+(bench/hazards/fault_checks.py). Prints the violations and a summary; with `--out` writes faults.md there. Exits with 1
+if there is a violation.
 """
 
 import argparse
@@ -24,16 +24,18 @@ from bench.hazards.results import Line, fly, fly_all, stored
 SEED: Final = 20261121
 SAMPLE: Final = 20
 STRIDE: Final = 12
-"""Of the sample's seeds: each has another mishap than the one before, in another state."""
+"""Step between the seeds of the sample, so that each has another fault in another state than the one before."""
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="bench.faults")
-    parser.add_argument("--runs", type=int, help=f"how many seeds in a row; without it, {SAMPLE} that lie apart")
-    parser.add_argument("--seed", type=int, default=SEED, help="the first")
-    parser.add_argument("--only", type=int, metavar="SEED", help="this run alone")
+    parser.add_argument("--runs", type=int, help=f"number of consecutive seeds; default: a sample of {SAMPLE}")
+    parser.add_argument("--seed", type=int, default=SEED, help="first seed")
+    parser.add_argument("--only", type=int, metavar="SEED", help="fly this run only")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--results", type=Path, help="file for a line of JSON a run; those in it are not flown again")
+    parser.add_argument(
+        "--results", type=Path, help="file of results, a line of JSON for each run; runs in it are not repeated"
+    )
     parser.add_argument("--out", type=Path, help="folder for faults.md")
     return parser.parse_args()
 
@@ -51,7 +53,7 @@ def known(results: Path | None) -> list[Line]:
 
 
 def run(options: argparse.Namespace) -> list[Line]:
-    """Fly what is not in the results yet; all of them, by seed."""
+    """Fly the runs that are not in the results yet, and return all results by seed."""
     wanted = seeds(options)
     lines = [line for line in known(options.results) if line["seed"] in wanted]
     missing = sorted(set(wanted) - {line["seed"] for line in lines})

@@ -1,12 +1,12 @@
-"""How many flights a method needs to good gains, Gainline's beside what a user would take instead.
+"""Number of flights that a method needs to find good gains: Gainline compared with alternatives.
 
     ./dev exec python -m bench.flights_to_target                     a few vehicles, Gainline alone, against its limits
     ./dev exec uv pip install --require-hashes -r requirements/bench.txt
     ./dev exec python -m bench.flights_to_target --vehicles 200 --twins 400 --methods all --out docs
 
-Prints tables; with `--out` writes them and the figure there. `--results FILE` keeps every result as it is made: the
-same command goes on where it was stopped. Exits 1 when Gainline's figures are beyond the limits, which are loose for
-few vehicles.
+Prints tables; with `--out` writes them and the figure there. `--results FILE` saves every result at once, and the same
+command continues where it was stopped. Exits with 1 if Gainline exceeds the limits, which are loose because the
+vehicles are few.
 """
 
 import argparse
@@ -27,26 +27,26 @@ SEED: Final = 20261121
 QUICK_VEHICLES: Final = 12
 QUICK_FLIGHTS: Final = 3
 LIMITS: Final[Mapping[str, float]] = {"four-parameter": 0.75, "further-physics": 0.75, "twin": 0.75}
-"""The share of vehicles that Gainline must bring within 5 % by the third flight, loose enough for a dozen."""
+"""Share of vehicles that Gainline must bring within 5 % by the third flight, loose because vehicles are few."""
 MAX_UNSAFE: Final = 0.05
 INSTALL: Final = "./dev exec uv pip install --require-hashes -r requirements/bench.txt"
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="bench.flights_to_target")
-    parser.add_argument("--vehicles", type=int, default=QUICK_VEHICLES, help="of each random population")
+    parser.add_argument("--vehicles", type=int, default=QUICK_VEHICLES, help="vehicles of each random population")
     parser.add_argument("--twins", type=int, default=0, help="seeds on the twin of the paper's drone")
-    parser.add_argument("--methods", default="", help=f"all, or some of {','.join(METHODS)}")
-    parser.add_argument("--flights", type=int, help="at most so many for each method")
+    parser.add_argument("--methods", default="", help=f"all, or a list of {','.join(METHODS)}")
+    parser.add_argument("--flights", type=int, help="largest number of flights for each method")
     parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--results", type=Path, help="file to keep results in, and to go on from")
+    parser.add_argument("--results", type=Path, help="file of results, also to continue from")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, help="folder for flights-to-target.md and images/flights-to-target.svg")
     return parser.parse_args()
 
 
 def chosen_methods(wanted: str) -> tuple[str, ...]:
-    """Raises SystemExit for an unknown method or one whose libraries are missing."""
+    """Return the chosen methods. Exits if one is unknown or its libraries are missing."""
     names = tuple(METHODS) if wanted == "all" else tuple(wanted.split(",")) if wanted else ("calibrated",)
     if unknown := [name for name in names if name not in METHODS]:
         sys.exit(f"There is no method {', '.join(unknown)}; there are {', '.join(METHODS)}.")
@@ -56,7 +56,7 @@ def chosen_methods(wanted: str) -> tuple[str, ...]:
 
 
 def tasks(methods: tuple[str, ...], vehicles: int, twins: int, seed: int) -> list[tuple[Task, SampledVehicle]]:
-    """The tasks, vehicle by vehicle in all populations, its own optimum first."""
+    """Return the tasks, vehicle by vehicle in all populations, beginning with the vehicle's own optimum."""
     optima: list[tuple[Task, SampledVehicle]] = []
     tunings: list[tuple[Task, SampledVehicle]] = []
     for name, count in (("four-parameter", vehicles), ("further-physics", vehicles), ("twin", twins)):
@@ -72,7 +72,7 @@ def tasks(methods: tuple[str, ...], vehicles: int, twins: int, seed: int) -> lis
 
 
 def run(options: argparse.Namespace, results: Results) -> dict[str, dict[str, Outcome]]:
-    """Carry out what is not in the results yet; every population's outcomes."""
+    """Run the tasks that are not in the results yet, and return the outcomes of every population."""
     methods = chosen_methods(options.methods)
     quick = QUICK_FLIGHTS if not options.methods and options.vehicles == QUICK_VEHICLES else None
     wanted = tasks(methods, options.vehicles, options.twins, options.seed)
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace, results: Results) -> dict[str, dict[str, Ou
 
 
 def is_within_limits(found: Mapping[str, Mapping[str, Outcome]]) -> bool:
-    """Whether Gainline's figures hold; says which do not."""
+    """Print the figures that exceed their limits and return whether there are none."""
     passed = True
     for name, limit in LIMITS.items():
         outcome = found.get(name, {}).get("calibrated")

@@ -1,13 +1,13 @@
-"""Whether the gate refuses what is harmless, or lets pass what is not, and how long it takes.
+"""Errors and computation time of the gate.
 
     ./dev exec python -m bench.gate [--sets 200] [--takeoffs 1000]
 
-Random gain sets inside the default bounds are judged by the gate; each is then flown in as many takeoffs as asked for,
-on vehicles drawn at random from the same spread that the gate samples in its own way, each aborted at a random instant.
-What is harmful is decided here from the altitude curves of the experiment's model, by other code than the gate's:
-above the ceiling, back on the ground after having been within half of the set point, further away from it at the end
-than before, or a climb rate whose swings do not decay. Prints both kinds of error for what is known before a flight and
-after one, exits 1 when a harmless set is refused or judging takes more than 0.15 s of processor time.
+The gate judges random gain sets inside the default bounds. Each set is then flown in many takeoffs, aborted at random
+instants, on vehicles drawn from the parameter distribution that the gate samples in its own way. Code independent of
+the gate decides from the altitude curves of the experiment's model whether a takeoff is harmful: above the ceiling,
+back on the ground after having come within half of the set point, further from it at the end than before, or with a
+climb rate whose oscillation does not decay. Prints both kinds of error, before any flight and after one. Exits with 1
+if a harmless set is refused or a verdict takes more than 0.15 s of processor time.
 """
 
 import argparse
@@ -47,7 +47,7 @@ SAFE_COUNTS: Final[Counts] = TAKEOFF.space.default.astype(np.int64)
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """How often the gate and the takeoffs agree."""
+    """Counts of agreement and disagreement between the gate and the takeoffs."""
 
     refused_harmless: list[str]
     accepted_harmful: list[str]
@@ -57,7 +57,7 @@ class Tally:
 
 
 def after_a_flight() -> ParameterDistribution:
-    """Roughly what one flight of the paper's drone leaves open."""
+    """Parameter distribution that is typical after one flight of the paper's drone."""
     mean = TAKEOFF.nominal_model
     mean[:3] = (0.61, 0.3, 0.05)
     sd = np.array([0.3 * parameter.known_within / 2.0 for parameter in TAKEOFF.model_parameters])
@@ -67,7 +67,7 @@ def after_a_flight() -> ParameterDistribution:
 
 
 def harm(gains: Vector, spread: ParameterDistribution, takeoffs: int, seed: int) -> str:
-    """What the first harmful takeoff does, or nothing."""
+    """Return what the first harmful takeoff does; empty if none is harmful."""
     models = spread.draw_random(TAKEOFF, takeoffs, seed)
     for first in range(0, takeoffs, BATCH):
         curves = TAKEOFF.outputs(np.tile(gains, (len(models[first : first + BATCH]), 1)), models[first : first + BATCH])
@@ -89,12 +89,12 @@ def _astray(altitude: Vector) -> str:
     away = np.abs(altitude - SET_POINT_M)
     middle, last = away[max(near[0], third) : 2 * third], away[max(near[0], 2 * third) :]
     if middle.size and last.max() > max(middle.max(), 0.5 * SET_POINT_M):
-        return f"moves away, {last.max():.2f} m at last"
+        return f"moves away, {last.max():.2f} m at the end"
     return ""
 
 
 def _swinging(altitude: Vector) -> str:
-    """By the peaks and dips of the climb rate after the first third."""
+    """Check the oscillation of the climb rate after the first third of the takeoff."""
     climb = np.diff(altitude) * RATE_HZ
     third = len(climb) // 3
     settled = climb[third:]
@@ -105,12 +105,14 @@ def _swinging(altitude: Vector) -> str:
         for sign in (1.0, -1.0)
         for place in find_peaks(sign * settled, prominence=0.5 * SMALLEST_SWING_M_S)[0]
     ]
-    # Heights of peaks and depths of dips about their middle, in the two thirds; a swing is about the sum of the two.
+    # Heights of peaks and depths of troughs about their mean; the peak-to-peak amplitude is about the sum of the two.
     halves = [[height for place, height in heights if low <= place < low + third] for low in (0, third)]
     if any(len(half) < 2 for half in halves):
         return ""
     middle, last = (2.0 * float(np.mean(sorted(half)[-2:])) for half in halves)
-    return f"swings by {last:.2f} m/s after {middle:.2f}" if last > max(UNDAMPED * middle, SMALLEST_SWING_M_S) else ""
+    return (
+        f"oscillates by {last:.2f} m/s after {middle:.2f}" if last > max(UNDAMPED * middle, SMALLEST_SWING_M_S) else ""
+    )
 
 
 def _aborted(gains: Counts, models: Matrix, seed: int) -> str:
@@ -130,7 +132,7 @@ def _aborted(gains: Counts, models: Matrix, seed: int) -> str:
 
 
 def judge(gains: Vector, spread: ParameterDistribution) -> tuple[tuple[Check, ...], float]:
-    """The gate's checks of hazards, and the processor time they took, s."""
+    """Return the gate's checks of hazards and their processor time, s."""
     start = time.process_time()
     checks = TAKEOFF.hazards(gains, spread, Envelope(ceiling_m=CEILING_M, safe_gains=SAFE))
     return checks, time.process_time() - start
@@ -166,7 +168,7 @@ def main() -> int:
         print(
             f"known from {spread.origin}: {size.sets} sets, {size.takeoffs} takeoffs each: {tally.refused} refused, "
             f"{tally.harmful} harmful; refused though harmless {len(tally.refused_harmless)}, accepted though harmful "
-            f"{len(tally.accepted_harmful)}; slowest judgement {tally.slowest_s * 1e3:.0f} ms"
+            f"{len(tally.accepted_harmful)}; slowest verdict {tally.slowest_s * 1e3:.0f} ms"
         )
         for line in (*tally.refused_harmless, *tally.accepted_harmful):
             print(f"    {line}")

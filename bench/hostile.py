@@ -1,11 +1,10 @@
-"""Whole trials in lockstep over a hostile link, or with a vehicle that something befalls: what may never be seen.
+"""Whole trials in lockstep over a hostile link, or with a fault of the vehicle, checked for unsafe behaviour.
 
     ./dev exec python -m bench.hostile                          a sample, as .ci/run has it
-    ./dev exec python -m bench.hostile --all --out docs         every hazard, from every state on, three autopilots
+    ./dev exec python -m bench.hostile --all --out docs         every hazard in every state, three autopilots
     ./dev exec python -m bench.hostile --only 117               one run again
 
-Prints what went wrong and a table; with `--out` writes hostile-links.md there. Exits 1 when a single run is not as it
-must be.
+Prints the violations and a table; with `--out` writes hostile-links.md there. Exits with 1 if there is a violation.
 """
 
 import argparse
@@ -19,13 +18,13 @@ from pathlib import Path
 from typing import Final
 
 from bench.hazards.cases import Case
-from bench.hazards.hostile import Ended, carry_out, cases
-from bench.hazards.hostility import HAZARDS
+from bench.hazards.hostile_links import HAZARDS
+from bench.hazards.hostile_trial import HostileResult, cases, run_trial
 
 STRIDE: Final = 37
-"""Of the sample: from each case to the next another hazard, another state, in the end another autopilot."""
+"""Step between the cases of the sample, chosen so that it covers hazards, states and autopilots."""
 VERDICTS: Final = ("completed", "aborted", "invalid", "refused")
-LEFT: Final = ("safe", "quarantined", "unopened")
+VEHICLE_STATES: Final = ("safe", "quarantined", "unopened")
 
 
 def arguments() -> argparse.Namespace:
@@ -37,31 +36,31 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def fly(case: Case) -> tuple[Case, Ended]:
+def fly(case: Case) -> tuple[Case, HostileResult]:
     try:
-        return case, carry_out(case)
-    except Exception as error:  # noqa: BLE001 - a run that breaks is a failed one
-        why = f"the run broke: {type(error).__name__}: {error}"
-        return case, Ended("", "", "", str(case.mishaps[0]), (why,))
+        return case, run_trial(case)
+    except Exception as error:  # noqa: BLE001 - a run that raises has failed
+        why = f"the run raised {type(error).__name__}: {error}"
+        return case, HostileResult("", "", "", str(case.faults[0]), (why,))
 
 
-def fly_all(chosen: Sequence[Case], processes: int) -> Iterator[tuple[Case, Ended]]:
+def fly_all(chosen: Sequence[Case], processes: int) -> Iterator[tuple[Case, HostileResult]]:
     with multiprocessing.get_context("fork").Pool(processes) as pool:
         yield from pool.imap_unordered(fly, chosen)
 
 
-def table(flown: Sequence[tuple[Case, Ended]]) -> Iterator[str]:
-    yield f"| what befalls it | runs | {' | '.join((*VERDICTS, *LEFT))} | wrong |"
-    yield "| --- |" + " --- |" * (len(VERDICTS) + len(LEFT) + 2)
+def table(flown: Sequence[tuple[Case, HostileResult]]) -> Iterator[str]:
+    yield f"| hazard | runs | {' | '.join((*VERDICTS, *VEHICLE_STATES))} | failed |"
+    yield "| --- |" + " --- |" * (len(VERDICTS) + len(VEHICLE_STATES) + 2)
     for name in HAZARDS:
-        ended = [each for case, each in flown if case.mishaps[0].kind == name]
+        ended = [each for case, each in flown if case.faults[0].kind == name]
         verdicts, left = Counter(each.outcome for each in ended), Counter(each.vehicle for each in ended)
-        counts = [*(verdicts[each] for each in VERDICTS), *(left[each] for each in LEFT)]
+        counts = [*(verdicts[each] for each in VERDICTS), *(left[each] for each in VEHICLE_STATES)]
         cells = " | ".join(str(count or "") for count in (len(ended), *counts, sum(bool(each.wrong) for each in ended)))
         yield f"| {name} | {cells} |"
 
 
-def page(flown: Sequence[tuple[Case, Ended]]) -> str:
+def page(flown: Sequence[tuple[Case, HostileResult]]) -> str:
     autopilots = Counter(case.autopilot for case, _ in flown)
     wrong = [f"\n- {case.seed}, {case.autopilot}: {'; '.join(each.wrong)}" for case, each in flown if each.wrong]
     return _PAGE.format(
@@ -86,11 +85,11 @@ def main() -> int:
         flown.append((case, ended))
         if ended.wrong:
             print(
-                f"{case.seed} {case.autopilot}: {ended.struck}: {'; '.join(ended.wrong)} ({ended.reason})", flush=True
+                f"{case.seed} {case.autopilot}: {ended.injected}: {'; '.join(ended.wrong)} ({ended.reason})", flush=True
             )
     flown.sort(key=lambda each: each[0].seed)
     wrong = sum(bool(each.wrong) for _, each in flown)
-    print(f"{len(flown)} runs over hostile links in {time.monotonic() - begun_s:.0f} s, {wrong} not as they must be")
+    print(f"{len(flown)} runs over hostile links in {time.monotonic() - begun_s:.0f} s, {wrong} failed")
     if options.out:
         (options.out / "hostile-links.md").write_text(page(flown), encoding="utf-8")
     return 1 if wrong else 0
@@ -102,34 +101,45 @@ _PAGE: Final = """\
     ./dev exec python -m bench.hostile --all --out docs
     ./dev exec python -m bench.hostile --only 117
 
-Whole trials of [real-flight.md](real-flight.md) with a sound vehicle and a link that tells what it likes: values that
-are no numbers, in each field; another component, as it is or posing as the autopilot; a second vehicle with the same
-ids, whose clock is so much older; packets late, twice, or from the future; a heartbeat or a position in the vehicle's
-name, once or every second; one kind of message that does not come; the wrong echo of a parameter; an altitude that is
-suddenly a little other; a second source of altitude that jumps, freezes, falls silent or tells no numbers. Or an honest
-link, and a vehicle that something befalls: a pilot who takes it over, for good or for some seconds; deafness; wind.
-Each sets in in each state of a trial for good, and in the air for a second and a half, under each autopilot. The rig is
-that of [faults.md](faults.md): lockstep, so a run that is flown again is the same.
+Whole trials of [real-flight.md](real-flight.md) with one hazard each. In most of them the vehicle is sound and the link
+delivers something false:
 
-What may never be, read from the packets at the vehicle's antenna, its true height, and what truly befell it:
+- values that are not numbers, in each field; the wrong value of a parameter; an altitude that is suddenly shifted;
+- messages of another component, which may pose as the autopilot;
+- a second vehicle with the same ids, whose clock is ahead by the time in the table;
+- packets that are late, duplicated, or from the future;
+- a false heartbeat or position in the vehicle's name, once or every second;
+- no messages of one kind;
+- a second source of altitude that jumps, freezes, falls silent or sends values that are not numbers.
 
-- its motors told to stop above 0.15 m; a height of more than a metre over the limit of altitude;
-- a vehicle that is not on the ground a minute after its trial, the program attending to it, or that was up for eight
-  seconds then, armed and heard, without sinking and without Land; anything but Land sent to it;
-- anything sent to a vehicle that a pilot flies, once two heartbeats must have told so (it is theirs from then on, also
-  when they switch back: whether they bring it down is not looked at); one taken from a pilot whom a heartbeat told of;
-- *safe* said of one that is armed or holds other gains; nothing said of one that is armed or in the air;
-- a trial *not flown* that left the ground; *completed* that was aborted, or met what is not tolerated; a reason that
-  does not name what befell it; gains blamed for what is not theirs; a quarantine without need
-  (`bench/hazards/expectations.py` says what each may do);
-- a record that counts, and is not whole, or more than 0.35 m from where the vehicle was.
+In the others the link is honest, and something happens to the vehicle: a pilot takes over, permanently or for some
+seconds; it receives nothing (`deaf`); wind carries it away.
 
-{right} of {runs} runs ({autopilots}) were as they must be.{wrong}
+Each hazard begins once in each state of a trial and stays, and once in each state in the air for a second and a half,
+under each autopilot. As in [faults.md](faults.md) the trials run in lockstep, so a repeated run gives the same result.
+
+The checks use the packets at the vehicle's antenna, its true height, and the hazard itself. These are violations:
+
+- motors off above 0.15 m; a height of more than a metre above the altitude limit;
+- a vehicle that is not on the ground a minute after its trial, while the program attends to it; one that is armed and
+  heard and stays up for eight seconds without Land; anything but Land sent to a vehicle in the air after its trial;
+- anything sent to a vehicle that a pilot flies, once two heartbeats must have shown it. From then on the pilot is
+  responsible, also after switching back, so the landing is not checked;
+- a vehicle taken from a pilot whom a heartbeat has shown;
+- a vehicle reported as *safe* that is armed or holds other gains; no concern reported about one that is armed or in the
+  air;
+- a trial reported as *not flown* that left the ground; one reported as *completed* that was aborted, or that met a
+  hazard which must end it;
+- a reason that does not name the hazard; an abort counted against the gains for something else; an unnecessary
+  quarantine (`bench/hazards/hostile_expectations.py` lists the permitted consequences of each hazard);
+- a valid record that is incomplete, or differs from the true height by more than 0.35 m.
+
+{right} of {runs} runs ({autopilots}) passed.{wrong}
 
 {table}
 
-What the runs do not have: somebody who knows the vehicle's next sequence number and speaks in its stead for good. Where
-the link is not signed, nothing tells that one from the vehicle.
+Not covered: a sender who knows the vehicle's next sequence number and continuously sends in its name. On a link that is
+not signed, such a sender cannot be distinguished from the vehicle.
 """
 
 

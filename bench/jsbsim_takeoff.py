@@ -1,10 +1,10 @@
-"""How long one takeoff of the simulated AR.Drone takes, against JSBSim alone, both in one run.
+"""Computation time of one takeoff of the simulated AR.Drone, relative to JSBSim alone.
 
     ./dev exec python -m bench.jsbsim_takeoff
 
-JSBSim alone means the bare stepping loop of the same aircraft over the same time, with no other work in Python; the
-takeoff is a whole flight as the program flies it, the loading of the aircraft and the settling on the ground included.
-Times them in turns and prints the best of each and their ratio; exits 1 when the ratio is above 3.
+JSBSim alone is the bare stepping loop of the same aircraft over the same time, without other work in Python. The
+takeoff is a complete flight as in the program, including loading the aircraft and settling on the ground. Times both in
+turns and prints the best of each and their ratio; exits with 1 if the ratio is above 3.
 """
 
 import sys
@@ -39,7 +39,7 @@ def takeoff(vehicle: Vehicle) -> float:
 
 
 def best(*runs: Callable[[], float]) -> list[float]:
-    """The shortest time of each, s, taken in turns so that a busy machine disturbs all alike."""
+    """Return the shortest time of each, s, measured in turns so that a busy machine affects all alike."""
     rounds = [[run() for run in runs] for _ in range(ROUNDS)]
     return [min(times) for times in zip(*rounds, strict=True)]
 

@@ -1,11 +1,11 @@
-"""How soon a command is on the wire while telemetry streams to many readers, and what recording telemetry costs.
+"""Latency of a command while telemetry streams to many readers, and processor time of recording.
 
     ./dev exec python -m bench.link [--seconds 20]
 
-A process of its own is the vehicle: it streams over the loopback interface and notes when each packet arrives. Here,
-commands of an abort are sent at random instants, while 20 threads read every sample and write it as JSON; in the last
-case one more thread computes without pause. Then telemetry is only recorded, to memory and to a telemetry log, and the
-processor time of this process is counted. Prints the figures; exits 1 when a latency is above 50 ms at the 99th
+Another process acts as the vehicle: it streams over the loopback interface and records when each packet arrives. The
+commands of an abort are sent at random instants while 20 threads read every sample and write it as JSON; in the last
+case one more thread computes continuously. Then telemetry is only recorded, to memory and to a telemetry log, and the
+processor time of this process is measured. Prints the figures. Exits with 1 if a latency is above 50 ms at the 99th
 percentile, a command or a sample was lost, or recording takes more than a tenth of a core.
 """
 
@@ -43,27 +43,27 @@ PATIENCE_S: Final = 2.0
 LOOPBACK: Final = "127.0.0.1"
 SYSTEM: Final = 31
 SO_TIMESTAMPNS: Final = 35
-"""Of Linux: each packet comes with the time at which it was received, however busy the receiver is."""
+"""Linux socket option: the kernel attaches the time of arrival to each packet, however busy the receiver is."""
 SEED: Final = 20261121
 FIELDS: Final = ("time_boot_ms", "x", "y", "z", "vx", "vy", "vz")
 
 Arrivals = dict[int, int]
-"""When the operating system received each command, ns since 1970."""
+"""Times at which the operating system received the commands, ns since 1970."""
 
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """The streaming process: where it is reached, and the pipe that ends it."""
+    """The streaming process: its address, and the pipe that ends it."""
 
     address: UdpAddress
     pipe: Connection
 
     def begin(self) -> None:
-        """Stream from now on: what is sent before somebody listens is lost."""
+        """Begin to stream; packets sent before a receiver is open would be lost."""
         self.pipe.send("begin")
 
     def end(self) -> tuple[int, Arrivals]:
-        """How many samples it sent, and when commands arrived."""
+        """End the process and return the number of samples sent and the times at which commands arrived."""
         self.pipe.send("end")
         sent: int
         arrivals: Arrivals
@@ -72,8 +72,10 @@ class Vehicle:
 
 
 def fly(pipe: Connection, rate_hz: float) -> None:
-    """The vehicle's process: once told to begin, stream positions at `rate_hz`, and note what arrives, until told to
-    end."""
+    """Stream positions at `rate_hz` and record what arrives; the main function of the vehicle's process.
+
+    The pipe begins and ends it.
+    """
     codec = PAPARAZZI.codec(system=SYSTEM, component=190)
     arrived: list[tuple[int, bytes]] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
@@ -102,7 +104,7 @@ def sample(step: int, rate_hz: float) -> dict[str, FieldValue]:
 
 @contextmanager
 def vehicle(rate_hz: float) -> Iterator[Vehicle]:
-    """A vehicle that waits to stream."""
+    """Start a vehicle that waits to stream."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind((LOOPBACK, 0))
         local = probe.getsockname()[1]
@@ -117,13 +119,13 @@ def vehicle(rate_hz: float) -> Iterator[Vehicle]:
 
 
 def serve(samples: "queue.SimpleQueue[Message | None]") -> None:
-    """One reader: every sample as JSON, as a live view would send it."""
+    """Write every sample as JSON, as a live view would send it."""
     while (message := samples.get()) is not None:
         json.dumps({field: number(message, field) for field in FIELDS})
 
 
 def distribute(link: Link, readers: list["queue.SimpleQueue[Message | None]"], done: threading.Event) -> None:
-    """Hand everything heard to all readers."""
+    """Pass everything received to all readers."""
     while not done.is_set():
         for each in link.receive(0.05):
             for reader in readers:
@@ -154,7 +156,7 @@ def audience(link: Link, *, is_computing: bool) -> Iterator[None]:
 
 
 def latencies_s(rate_hz: float, seconds: float, *, is_computing: bool) -> tuple[list[float], int]:
-    """From `Link.send` to arrival, for each command that arrived, and how many did not."""
+    """Return the delay from `Link.send` to arrival of each command, and how many did not arrive."""
     randomness = random.Random(SEED)
     sent_ns: list[int] = []
     with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
@@ -179,7 +181,7 @@ def command(index: int) -> dict[str, FieldValue]:
 
 
 def recording_share(rate_hz: float, seconds: float) -> tuple[float, int, int]:
-    """The processor time of recording over the time it took, how many samples were recorded, and how many sent."""
+    """Return the share of a core that recording takes, and the numbers of samples recorded and sent."""
     recorded: list[Message] = []
     with vehicle(rate_hz) as drone, tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "flight.tlog"
@@ -197,7 +199,7 @@ def recording_share(rate_hz: float, seconds: float) -> tuple[float, int, int]:
 
 def main() -> int:
     asked = argparse.ArgumentParser(prog="bench.link")
-    asked.add_argument("--seconds", type=float, default=1.5, help="for each figure")
+    asked.add_argument("--seconds", type=float, default=1.5, help="duration of each measurement")
     seconds = asked.parse_args().seconds
     failed = False
     for rate_hz, is_computing in ((50.0, False), (500.0, False), (500.0, True)):

@@ -1,12 +1,12 @@
-"""How long it takes from a campaign's stored history to the stored next proposal, as the worker does it.
+"""Time from a campaign's stored history to the stored next proposal, as in the worker.
 
     ./dev exec python -m bench.proposal
 
-A real database, simulated flights stored as a worker stores them, and the job carried out by the worker's own job
-runner: the history is read and unpacked, sent to a process of the pool, the proposal computed there, judged and
-stored. Times every proposal of a campaign of seven flights, for each start and option, the pool warm as it is in a
-running worker, and once from a cold start of everything. Prints the best of three rounds of each and exits 1 when one
-is above a second.
+Uses a real database, simulated flights stored as a worker stores them, and the worker's own job runner: it reads and
+unpacks the history and sends it to a process of the pool, which computes the proposal; then the gate and the stop rule
+are applied and the result is stored. Times every proposal of a campaign of seven flights, for each start and option,
+with the pool ready as in a running worker, and once from a cold start. Prints the best of three rounds of each; exits
+with 1 if one takes more than a second.
 """
 
 import sys
@@ -45,7 +45,7 @@ CASES: Final[dict[str, dict[str, object]]] = {
 
 
 def propose(runner: JobRunner) -> float:
-    """Carry out the waiting job; from its claim to the stored row, s."""
+    """Run the waiting job and return the time from its claim to the stored row, s."""
     start = time.perf_counter()
     job = runner.claim()
     assert job is not None
@@ -54,7 +54,7 @@ def propose(runner: JobRunner) -> float:
 
 
 def fly(database: Database, campaign_id: int) -> bool:
-    """Fly what is proposed; false when the campaign is over."""
+    """Fly the proposal; return False if the campaign has ended."""
     with database.write() as session:
         following = campaigns.next_flight(session, campaign_id).proposal
         if following is None or "plan" not in campaigns.get_campaign(session, campaign_id).actions:
@@ -73,7 +73,7 @@ def fly(database: Database, campaign_id: int) -> bool:
 
 
 def one_campaign(database: Database, runner: JobRunner, fields: dict[str, object]) -> list[float]:
-    """The time of each proposal of a campaign, s."""
+    """Return the time of each proposal of a campaign, s."""
     definition = Definition.model_validate({"stop": StopRule(kind="budget", max_flights=FLIGHTS), **fields})
     with database.write() as session:
         created = campaigns.create_campaign(

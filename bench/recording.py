@@ -1,11 +1,11 @@
-"""A vehicle's telemetry recorded for as long as asked: is every sample kept, and what does it cost.
+"""Completeness and processor time of the record of a long flight.
 
     ./dev exec python -m bench.recording [--minutes 10] [--autopilot px4]
 
-A process of its own is a simulated drone in real time; this one flies a whole trial with it whose record lasts that
-long, telemetry log and all. Positions are distinguished by the vehicle's own time stamps: each that was sent between
-the first and the last of the record must be in the record, and in the log, once. Processor time is that of this process
-from the take-off command to the end of the record. Prints the figures; exits 1 when a sample is missing or recording
+Another process runs a simulated drone in real time; this one flies a whole trial with a record of that length and a
+telemetry log. Positions are identified by the vehicle's own time stamps: each that was sent between the first and the
+last of the record must be exactly once in the record and once in the log. Processor time is that of this process from
+the take-off command to the end of the record. Prints the figures; exits with 1 if a sample is missing or recording
 takes more than a tenth of a core.
 """
 
@@ -45,17 +45,17 @@ DEFAULT_S: Final = 30.0
 LOOPBACK: Final = "127.0.0.1"
 POSITION: Final = "LOCAL_POSITION_NED"
 BOOT_S: Final = 4.0
-"""Until the drone knows where it is."""
+"""Time until the drone has a position."""
 GAINS: Final[Mapping[str, Mapping[str, float]]] = {
     "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_D": 0.0, "PSC_ACCZ_I": 1.0},
     "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_D_ACC": 0.0, "MPC_Z_VEL_I_ACC": 2.0},
 }
-"""Of those autopilots that hover for as long as they are let."""
+"""Autopilots whose hover has no time limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class DroneReport:
-    """What a drone sent in the `on_s` that it was on, and by how much the computer made its clock late."""
+    """What a drone sent while it was on, for `on_s`, and by how much its clock is late on a slow computer."""
 
     sent_ms: list[int]
     packets: int
@@ -64,7 +64,7 @@ class DroneReport:
 
 
 class Counting:
-    """A transport that keeps the time stamp of every position that leaves by it."""
+    """A transport that records the time stamp of every position that it sends."""
 
     def __init__(self, transport: Transport, autopilot: str) -> None:
         self._transport = transport
@@ -95,12 +95,12 @@ class Counting:
 
 
 def stamps(messages: list[Message]) -> list[int]:
-    """The vehicle's own time, ms, of every position among these."""
+    """Return the vehicle's time stamp, ms, of every position in these packets."""
     return [int(number(message, "time_boot_ms")) for message in messages if message.get_type() == POSITION]
 
 
 def be_vehicle(pipe: Connection, autopilot: str, address: UdpAddress) -> None:
-    """The drone's process, until told to end; then it says what it sent."""
+    """Run the drone until the pipe ends it, then report what it sent; the main function of a process."""
     kind = get_autopilot(autopilot)
     transport = Counting(open_transport(address), autopilot)
     drone = Drone(new_body("twin", {"scatter": 0.0}, seed=1), lambda body: kind.set_up(body, kind.system))
@@ -130,7 +130,7 @@ class LongRecord(MavlinkVehicle):
 
 @dataclass(slots=True)
 class Meter:
-    """Processor time of this process, from the command to the end of a record of `until_s`."""
+    """Meter of this process's processor time, from the command to the end of a record of `until_s`."""
 
     until_s: float
     begun_s: float = 0.0
@@ -163,7 +163,7 @@ def free_port() -> int:
 
 
 def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[FlightRecord, Counter[int]]:
-    """A whole trial; its record, and how often each time stamp is in it."""
+    """Fly a whole trial and return its record, with the count of each time stamp in it."""
     vehicle = LongRecord(options, GAINS[autopilot], is_real=False)
     try:
         vehicle.record_s = meter.until_s
@@ -172,12 +172,12 @@ def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[
     finally:
         vehicle.close()
     if len(vehicle.kept_ms) != len(record.trajectory.time_s):
-        raise AssertionError("The record is not made of the samples that were kept.")
+        raise AssertionError("The record does not consist of the samples that were stored.")
     return record, Counter(vehicle.kept_ms)
 
 
 def logged(folder: Path, autopilot: str) -> Counter[int]:
-    """Every position in the one telemetry log, by its time stamp."""
+    """Count the positions in the telemetry log by time stamp."""
     [log] = folder.glob("*.tlog")
     codec, data = PROFILES[autopilot].dialect.codec(system=1, component=1), log.read_bytes()
     found: list[int] = []
@@ -192,7 +192,7 @@ def logged(folder: Path, autopilot: str) -> Counter[int]:
 
 @contextmanager
 def vehicle_process(autopilot: str, address: UdpAddress) -> Iterator[Connection]:
-    """The drone in a process of its own, on and ready to fly."""
+    """Run the drone in another process and yield it ready to fly."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=be_vehicle, args=(theirs, autopilot, address), daemon=True)
@@ -207,7 +207,7 @@ def vehicle_process(autopilot: str, address: UdpAddress) -> Iterator[Connection]
 
 
 def measure(autopilot: str, seconds: float) -> bool:
-    """Fly, count, print; whether everything is within its limit."""
+    """Fly, print the figures and return whether all are within their limits."""
     here, there = free_port(), free_port()
     meter = Meter(seconds)
     chosen: dict[str, OptionValue] = {"autopilot": autopilot, "simulated": True}

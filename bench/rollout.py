@@ -1,10 +1,10 @@
-"""How long one takeoff of the simple model takes, against the same loop in C at -O2, both in one run.
+"""Computation time of one takeoff of the simple model, relative to the same loop in C at -O2.
 
     ./dev exec python -m bench.rollout
 
-Needs a gcc. Compares the two altitudes bit by bit first, then times them in turns and prints the best of each and their
-ratio; exits 1 when the ratio is above 1.3. The rounds are spread over ten seconds: a processor that another machine
-uses too slows the two loops by different shares, for a second or so.
+Needs gcc. Checks that both altitudes are equal bit by bit, then times both in turns and prints the best of each and
+their ratio; exits with 1 if the ratio is above 1.3. The rounds are spread over ten seconds, because a busy processor
+slows the two loops by different factors for a second or so.
 """
 
 import ctypes

@@ -1,4 +1,4 @@
-"""Databases as years of use leave them: campaigns with many flights, each with its whole record, written row by row."""
+"""Databases like those after years of use: campaigns with many flights and complete records, for benchmarks."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -32,7 +32,7 @@ from app.fleet.schemas import VehicleChoice
 SAMPLES: Final = 16_700
 SEED: Final = 20261122
 SPOILT_EVERY: Final = 25
-"""Every so many flights one does not count."""
+"""One of so many flights is invalid."""
 _GOOD: Final = np.array([1600.0, 900.0, 130.0])
 _TRUTH: Final = np.array([0.66, 0.2, 0.05, 0.15, 0.0, 0.1, 0.0, 0.0])
 _NOISE_M: Final = 0.008
@@ -40,7 +40,7 @@ _NOISE_M: Final = 0.008
 
 @cache
 def _gate() -> JsonObject:
-    """The gate's complete result for gains that pass."""
+    """Return the gate's complete result for gains that pass."""
     experiment = Takeoff()
     space = experiment.space
     return gate_json(check_policy(Definition(), experiment, space, space.mapping(space.default), ()))
@@ -48,13 +48,13 @@ def _gate() -> JsonObject:
 
 @dataclass(frozen=True, slots=True)
 class Takeoffs:
-    """Flights of random gains that get better, on a vehicle that the model's fit would find."""
+    """Flights of random gains that improve, on a vehicle that the model can describe."""
 
     randomness: np.random.Generator
     samples: int
 
     def gains(self, number: int) -> dict[str, float]:
-        """Whole ones, nearer to good ones with every flight."""
+        """Return integer gains, closer to good ones with every flight."""
         gains = Takeoff.space.gains
         lower, upper = (np.array([getattr(gain, end) for gain in gains]) for end in ("lower", "upper"))
         spread = (upper - lower) * max(0.03, 0.3 * 0.98**number)
@@ -62,7 +62,7 @@ class Takeoffs:
         return {gain.name: float(round(value)) for gain, value in zip(gains, chosen, strict=True)}
 
     def record(self, gains: Mapping[str, float]) -> Trajectory:
-        """A takeoff with what a tracking system adds to it."""
+        """Return a takeoff with the noise of a tracking system."""
         flown = Takeoff().simulate(np.array(list(gains.values())), _TRUTH)
         time_s = np.linspace(0.0, WINDOW_S, self.samples)
         channels = {name: np.interp(time_s, flown.time_s, values) for name, values in flown.channels.items()}
@@ -74,8 +74,10 @@ class Takeoffs:
 def seed_database(
     data_dir: Path, *, flights: Mapping[str, int], campaigns_of_five: int = 0, samples: int = SAMPLES
 ) -> dict[str, int]:
-    """A database with a campaign of so many flights under each name, a proposal ready in each; and as many small ones
-    as asked for, all alike. Ids of the former, by name."""
+    """Make a database with a campaign of the given number of flights for each name, each with its proposal.
+
+    Adds `campaigns_of_five` small campaigns that are all alike. Returns the ids of the named campaigns.
+    """
     file = Settings(data_dir=data_dir).database_file
     migrate(file)
     database = Database(file)
@@ -130,7 +132,7 @@ def _trial(campaign_id: int, number: int, gains: Mapping[str, float]) -> TrialRo
 
 
 def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: int) -> None:
-    """A fresh proposal with its predicted curve and band, as a strategy would have left it."""
+    """Store a proposal with its predicted curve and band, as a strategy would."""
     with database.write() as session:
         campaign = campaigns.get_row(session, campaign_id)
         campaign.state, campaign.definition_digest = CampaignState.DECIDING, frozen_digest(campaign)
@@ -168,7 +170,7 @@ def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: i
 
 
 def _copies(database: Database, campaign_id: int, count: int) -> None:
-    """So many campaigns with the flights of that one, their records thinned out to a few samples."""
+    """Add copies of a campaign, with their records thinned to a few samples."""
     with database.write() as session:
         campaign = _columns(session.get_one(CampaignRow, campaign_id))
         trials = history.trials_of(session, campaign_id)
@@ -196,5 +198,5 @@ def _thinned(record: Trajectory) -> Trajectory:
 
 
 def _columns(row: CampaignRow | TrialRow) -> dict[str, object]:
-    """What a row holds, but for its own id."""
+    """Return the values of a row, without its id."""
     return {column.key: getattr(row, column.key) for column in row.__table__.columns if column.key != "id"}

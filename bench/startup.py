@@ -1,15 +1,15 @@
-"""How soon the program is there: imports in processor time, the dashboard and the first flight by the clock.
+"""Start-up times: imports in processor time, the dashboard and the first flight in wall-clock time.
 
     ./dev exec python -m bench.startup [--rounds 3]
 
-Processor time is that of a fresh interpreter, user and system, the least of several. By the clock: `./dev up` on a data
-folder that it has served before, from the command to the answer of `GET /`, and to the first telemetry above the ground
-of a campaign that is created as soon as the page is there, with its proposal computed and its flight asked for at
-once. The least of the rounds counts, because a machine that does other things as well tells nothing about start-up.
+Processor time is the user and system time of a fresh interpreter, the least of several runs. Wall-clock time is that of
+`./dev up` on a data folder that it has served before, from the command to the answer of `GET /`, and to the first
+telemetry above the ground of a campaign that is created, proposed and flown as soon as the page is there. The least of
+the rounds counts, because other programs on the machine slow the start down.
 
-The limits are those of a machine that needs `REFERENCE_S` of processor time for `REFERENCE`. Where that takes longer,
-in turn with the others or right before, they are as much longer. Prints the figures beside their limits; exits 1 when
-one is exceeded.
+The limits are those of a machine that needs `REFERENCE_S` of processor time for `REFERENCE`. They are raised in
+proportion where that takes longer, measured at about the same time. Prints the figures beside their limits; exits with
+1 if one is exceeded.
 """
 
 import argparse
@@ -39,7 +39,7 @@ PAGE_S: Final = 2.0
 FLIGHT_S: Final = 4.0
 REFERENCE: Final = (sys.executable, "-c", "import fastapi, sqlalchemy.orm, uvicorn")
 REFERENCE_S: Final = 0.45
-"""On an EPYC at 2.6 GHz that nobody else slows down."""
+"""On an EPYC at 2.6 GHz without other load."""
 INTERPRETERS: Final = 7
 PATIENCE_S: Final = 60.0
 LOOK_EVERY_S: Final = 0.01
@@ -47,8 +47,7 @@ OFF_THE_GROUND_M: Final = 0.02
 
 
 def processor_s(*commands: Sequence[str]) -> list[float]:
-    """Least processor time of several runs of each command, s, in turn; the byte code is kept, as it is everywhere
-    else."""
+    """Return the least processor time of several runs of each command, s, run in turns with cached byte code."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     taken: list[list[float]] = [[] for _ in commands]
     for _ in range(INTERPRETERS):
@@ -69,7 +68,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def up(folder: Path) -> Iterator[str]:
-    """`./dev up`, from the command to the end of the block; the address that it is going to serve."""
+    """Run `./dev up` until the end of the block, and yield the address that it will serve."""
     port = free_port()
     with (folder / "said").open("w") as said:
         process = subprocess.Popen(
@@ -83,10 +82,10 @@ def up(folder: Path) -> Iterator[str]:
 
 
 def until(what: str, look: Callable[[], T | None]) -> T:
-    """What `look` gives once it gives something."""
+    """Wait until `look` returns something other than None, and return that."""
     deadline_s = time.monotonic() + PATIENCE_S
     while (found := look()) is None:
-        assert time.monotonic() < deadline_s, f"waited in vain for {what}"
+        assert time.monotonic() < deadline_s, f"timed out waiting for {what}"
         time.sleep(LOOK_EVERY_S)
     return found
 
@@ -123,7 +122,7 @@ def lift_off(url: str) -> None:
 
 
 def start(folder: Path) -> tuple[float, float]:
-    """From the command to the page and to the first flight, s."""
+    """Return the times from the command to the page and to the first flight, s."""
     begun_s = time.monotonic()
     with up(folder) as url:
         until("the page", lambda: page(url))
@@ -133,19 +132,19 @@ def start(folder: Path) -> tuple[float, float]:
 
 
 def slowness(reference_s: float) -> float:
-    """How much longer than on the limits' machine imports take now; 1 where they take less."""
+    """Return how much slower imports are now than on the machine of the limits; at least 1."""
     return max(1.0, reference_s / REFERENCE_S)
 
 
 def judge(what: str, seconds: float, limit_s: float, slowness: float) -> bool:
-    """Print a figure; whether it is above its limit."""
+    """Print a figure and return whether it is above its limit."""
     print(f"{what}: {seconds:.2f} s (limit {limit_s:g} s × {slowness:.2f})")
     return seconds > limit_s * slowness
 
 
 def main() -> int:
     arguments = argparse.ArgumentParser(prog="bench.startup")
-    arguments.add_argument("--rounds", type=int, default=3, help="starts by the clock")
+    arguments.add_argument("--rounds", type=int, default=3, help="number of starts")
     rounds = arguments.parse_args().rounds
     gainline = str(Path(sys.executable).with_name("gainline"))
     reference_s, import_s, help_s = processor_s(

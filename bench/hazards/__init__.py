@@ -1,1 +1,1 @@
-"""The parts of bench/faults.py: what befalls a trial, the wire between both sides, what is asked for then."""
+"""Trials with injected faults or a hostile link: the cases, the test rig, and the checks of what happened."""

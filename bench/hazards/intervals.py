@@ -1,4 +1,4 @@
-"""Stretches of time."""
+"""Operations on intervals of time."""
 
 from collections.abc import Iterable, Sequence
 
@@ -6,7 +6,7 @@ Span = tuple[float, float]
 
 
 def merged(spans: Iterable[Span]) -> list[Span]:
-    """The same time, each moment once, in order."""
+    """Return the union of the spans as disjoint spans in order."""
     whole: list[Span] = []
     for begin_s, end_s in sorted(spans):
         if whole and begin_s <= whole[-1][1]:
@@ -17,21 +17,21 @@ def merged(spans: Iterable[Span]) -> list[Span]:
 
 
 def overlap(one: Span, other: Span) -> float:
-    """How long both last together, s."""
+    """Return the duration of the intersection, s."""
     return max(min(one[1], other[1]) - max(one[0], other[0]), 0.0)
 
 
 def longest(spans: Sequence[Span], within: Sequence[Span]) -> float:
-    """The longest stretch that one of `spans` spends without a break inside `within`, whose parts follow each other."""
+    """Return the longest intersection of one of `spans` with the union of `within`, s."""
     whole = merged(within)
     return max((overlap(one, other) for one in spans for other in whole), default=0.0)
 
 
 def total(spans: Sequence[Span], within: Sequence[Span]) -> float:
-    """How long `spans` and `within` last together, s."""
+    """Return the duration of the intersection of both unions, s."""
     return sum(overlap(one, other) for one in merged(spans) for other in merged(within))
 
 
-def covers(spans: Sequence[Span], stretch: Span) -> bool:
-    """Whether one of `spans` lasts through all of `stretch`."""
-    return any(one[0] <= stretch[0] and one[1] >= stretch[1] for one in merged(spans))
+def covers(spans: Sequence[Span], span: Span) -> bool:
+    """Whether the union of `spans` contains `span`."""
+    return any(one[0] <= span[0] and one[1] >= span[1] for one in merged(spans))

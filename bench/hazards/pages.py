@@ -1,37 +1,37 @@
-"""The results of many runs as text."""
+"""Summary and document of the results of many runs."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, TypedDict, cast
 
-from bench.hazards.cases import MISHAPS
+from bench.hazards.cases import FAULT_KINDS
 from bench.hazards.results import Line
-from bench.hazards.stages import Stage
+from bench.hazards.trial_states import State
 
 OUTCOMES: Final = ("completed", "aborted", "invalid", "refused")
-VEHICLE: Final = ("safe", "quarantined", "unopened")
+VEHICLE_STATES: Final = ("safe", "quarantined", "unopened")
 
 
-class _Struck(TypedDict):
+class _InjectedFault(TypedDict):
     kind: str
-    stage: str
+    state: str
 
 
 def summary(lines: Sequence[Line]) -> str:
-    """The summary, and the seeds of what went wrong."""
+    """Return the summary, with the seeds and violations of failed runs."""
     wrong = [line for line in lines if line["wrong"]]
     return "\n".join(
         (
-            f"{len(lines)} runs, {len(lines) - len(wrong)} as asked",
+            f"{len(lines)} runs, {len(lines) - len(wrong)} passed",
             *(f"  {line['seed']} {line['autopilot']}: {'; '.join(_wrong(line))}" for line in wrong),
-            f"afterwards: {_counts(lines, 'vehicle', VEHICLE)}",
+            f"vehicles afterwards: {_counts(lines, 'vehicle', VEHICLE_STATES)}",
             f"packets that stop motors: {_total(lines, 'stopping_packets')}, the highest at {_highest(lines):.2f} m",
         )
     )
 
 
 def page(lines: Sequence[Line]) -> str:
-    """docs/faults.md."""
+    """Return the text of docs/faults.md."""
     return _PAGE.format(
         seeds=f"{lines[0]['seed']} … {lines[-1]['seed']}",
         first=lines[0]["seed"],
@@ -39,7 +39,7 @@ def page(lines: Sequence[Line]) -> str:
         right=sum(not line["wrong"] for line in lines),
         autopilots=_counts(lines, "autopilot", ("paparazzi", "ardupilot", "px4")),
         outcomes=_counts(lines, "outcome", OUTCOMES),
-        vehicles=_counts(lines, "vehicle", VEHICLE),
+        vehicles=_counts(lines, "vehicle", VEHICLE_STATES),
         stops=_total(lines, "stopping_packets"),
         highest=f"{_highest(lines):.2f}",
         wrong="".join(f"\n- {line['seed']}: {'; '.join(_wrong(line))}" for line in lines if line["wrong"]),
@@ -49,22 +49,22 @@ def page(lines: Sequence[Line]) -> str:
 
 
 def _where(lines: Sequence[Line]) -> Iterator[str]:
-    """How often each mishap set in in each state."""
-    counted = Counter((each["kind"], each["stage"]) for line in lines for each in _struck(line))
-    wrong = Counter((each["kind"], each["stage"]) for line in lines if line["wrong"] for each in _struck(line))
-    yield from _header("what sets in", [str(stage) for stage in Stage])
-    for kind in MISHAPS:
-        cells = [(counted[kind, stage], wrong[kind, stage]) for stage in Stage]
+    """Yield the table of how often each fault began in each state."""
+    counted = Counter((each["kind"], each["state"]) for line in lines for each in _injected(line))
+    wrong = Counter((each["kind"], each["state"]) for line in lines if line["wrong"] for each in _injected(line))
+    yield from _header("fault", [str(state) for state in State])
+    for kind in FAULT_KINDS:
+        cells = [(counted[kind, state], wrong[kind, state]) for state in State]
         yield _row(kind, [f"{count}{f' ({bad} wrong)' if bad else ''}" if count else "" for count, bad in cells])
 
 
 def _ends(lines: Sequence[Line]) -> Iterator[str]:
-    """Outcomes of runs in which nothing else set in."""
-    yield from _header("what set in, alone", [*OUTCOMES, *VEHICLE])
-    for kind in MISHAPS:
-        alone = [line for line in lines if {each["kind"] for each in _struck(line)} == {kind}]
+    """Yield the table of the outcomes of runs with a single kind of fault."""
+    yield from _header("only fault", [*OUTCOMES, *VEHICLE_STATES])
+    for kind in FAULT_KINDS:
+        alone = [line for line in lines if {each["kind"] for each in _injected(line)} == {kind}]
         counts = [sum(line.get("outcome") == name for line in alone) for name in OUTCOMES]
-        counts += [sum(line.get("vehicle") == name for line in alone) for name in VEHICLE]
+        counts += [sum(line.get("vehicle") == name for line in alone) for name in VEHICLE_STATES]
         yield _row(kind, [str(count or "") for count in counts])
 
 
@@ -77,8 +77,8 @@ def _row(first: str, cells: Sequence[str]) -> str:
     return f"| {first} | {' | '.join(cells)} |"
 
 
-def _struck(line: Line) -> list[_Struck]:
-    return cast("list[_Struck]", line.get("struck", []))
+def _injected(line: Line) -> list[_InjectedFault]:
+    return cast("list[_InjectedFault]", line.get("injected", []))
 
 
 def _wrong(line: Line) -> list[str]:
@@ -95,7 +95,7 @@ def _total(lines: Sequence[Line], field: str) -> int:
 
 
 def _highest(lines: Sequence[Line]) -> float:
-    """Of the packets that stop motors, without those of the operator's own act."""
+    """Return the greatest height at which motors off was sent, without the operator's own."""
     return max((cast("float", line.get("highest_stop_m", 0.0)) for line in lines), default=0.0)
 
 
@@ -105,65 +105,67 @@ _PAGE: Final = """\
     ./dev exec python -m bench.faults --runs {runs} --seed {first}
     ./dev exec python -m bench.faults --only {first}
 
-Whole trials of [real-flight.md](real-flight.md), each with one or two things wrong: the simulated drone's faults
-([sim-drone.md](sim-drone.md)), an operator who aborts or stops the motors, another ground station that interferes,
-gains that do not fly. Without arguments, as `.ci/run` has it, the first command flies a sample of 20; `--only SEED`
-flies one run again and prints all that is known of it. This page is written by `--out docs`.
+Whole trials of [real-flight.md](real-flight.md), each with one or two faults: a fault of the simulated drone
+([sim-drone.md](sim-drone.md)), an operator who aborts or stops the motors, another ground station that interferes, or
+gains that do not fly. The first command without arguments, as in `.ci/run`, flies a sample of 20; `--only SEED` repeats
+one run and prints all details. `--out docs` writes this page.
 
-A run is drawn from its seed: autopilot, gains, what sets in, in which state of the trial, how long after its
-beginning and for how long (a fifth of a second to for good). Consecutive seeds go through everything in every state.
-The vehicle is the simulated drone in the body of `twin` with its scatter; the program is `MavlinkVehicle` as it flies.
-They are in lockstep: the drone's time passes only while the program waits, so a run that is flown again is the same,
-whatever else the machine does. Real sockets and threads are for the tests of the link.
+The seed of a run determines the autopilot, the gains, the faults, the state of the trial in which each begins, how long
+after the beginning of that state, and its duration (from a tenth of a second to permanent). Consecutive seeds cover
+every fault in every state. The vehicle is the simulated drone with the flight model `twin` and its scatter; the program
+flies it with `MavlinkVehicle`, as any vehicle over MAVLink. Both run in lockstep: the drone's time advances only while
+the program waits, so a repeated run gives the same result however busy the machine is. Real sockets and threads are
+covered by the tests of the link.
 
-What the program does is judged without asking it. A tap at the drone's antenna reads every packet that the ground
-sends, whether the drone hears it or not, and knows the drone's true height at that moment. The states in the tables
-are told from these packets. Afterwards the judgement (`bench/hazards/expected.py`, written from the table in
-real-flight.md) asks:
+The checks (`bench/hazards/fault_checks.py`) were written from the table in real-flight.md and do not use the program's
+own account of the trial. A tap at the drone's antenna reads every packet that the ground sends, whether or not the
+drone receives it, together with the drone's true height. The states in the tables below are derived from these packets.
+The checks are:
 
-- Is the trial worth what the table says for what set in, when it did, and for how long it lasted?
-- Does the drone truly hold its safe gains, disarmed on the ground? Or was it quarantined, for a reason that the table
-  knows? A program that says “safe” must be right, and quarantine without need is wrong too.
-- Did no packet that stops motors leave while the drone was more than 0.15 m above the ground, but for the operator's
-  separate act?
-- Did it take off on other gains than those that were read back? Was Land sent first, or the safe gains, as the table
-  has it; was Land repeated every second while the link was lost; was anything sent before a heartbeat was heard?
-- Was every limit of time kept: the record, 40 s to land, 5 s to disarm, 60 s without a link?
+- Is the outcome of the trial the one that the table requires for the fault, its beginning and its duration?
+- Is the drone truly disarmed on the ground with its safe gains, or quarantined for a reason that the table names? A
+  vehicle reported as safe must be safe, and an unnecessary quarantine is a violation too.
+- Was no packet that stops motors sent while the drone was more than 0.15 m above the ground, except by the operator?
+- Did the drone take off with the gains that were read back?
+- Were Land and the safe gains sent in the order that the table requires, and was Land repeated while the link was lost?
+- Was nothing sent before a heartbeat was received?
+- Were all time limits kept: the record, 40 s to land, 5 s to disarm, 60 s without a link?
 
 ## Result
 
-{right} of {runs} runs (seeds {seeds}; {autopilots}) ended as asked.{wrong}
+{right} of {runs} runs (seeds {seeds}; {autopilots}) passed.{wrong}
 
-- The trials: {outcomes}.
-- The vehicles afterwards: {vehicles} (the program never had control of one that could not be opened).
-- {stops} packets that stop motors were sent; but for those of the operator's own act, none with the drone higher than
+- Trials: {outcomes}.
+- Vehicles afterwards: {vehicles} (an unopened vehicle could not be connected, so the program never controlled it).
+- {stops} packets that stop motors were sent. Apart from the operator's own, none was sent with the drone more than
   {highest} m above the ground.
 
-How often each mishap set in in each state:
+Number of runs in which each fault began in each state:
 
 {where}
 
-`other-mode` and `other-landing` are another ground station's; `motors-off` is the operator's separate act; with
-`wild-gains` the gains of the trial do not fly; `mocap-…` are faults of a second source of altitude, which only these
-trials have.
+- `other-mode` and `other-landing`: another ground station changes the mode, or commands Land.
+- `motors-off`: the operator stops the motors.
+- `wild-gains`: the gains of the trial do not fly.
+- `mocap-…`: faults of a second source of altitude, which only these trials have.
 
-Outcomes of runs in which nothing else set in:
+Outcomes of runs with a single kind of fault:
 
 {ends}
 
-## What such runs found
+## Defects found
 
-All of it was mended, and is flown again by `tests/bench/test_faults.py`:
+These were found by such runs and have been fixed. `tests/bench/test_faults.py` flies them again.
 
-- A stop or a refusal between the staging of the gains and arming left these gains on the vehicle until it was closed.
-- An autopilot that restarted while gains were staged was flown on its own; the record was taken for the staged ones'.
-- With a position that jumps now and then, a vehicle on the ground was never at rest for two seconds: it was quarantined
+- A stop or a refusal between staging and arming left the trial's gains on the vehicle until the connection was closed.
+- An autopilot that restarted while gains were staged flew with its own gains, and the record was attributed to the
+  staged ones.
+- With single position samples that jump, a vehicle on the ground was never at rest for two seconds and was quarantined
   after 40 s.
-- Gains that overshoot to the ceiling of the vehicle's own flight plan passed for a landing that the vehicle began by
-  itself: it was landed on these gains, and nothing was learnt of them.
-- A lift-off that could not be seen, because the link was lost at that moment, passed for none, and the gains were
-  blamed for it.
+- When gains overshot to the altitude limit of the vehicle's own flight plan, the program took the landing for one that
+  the vehicle had begun for another reason. It landed with these gains, and the flight did not count against them.
+- When the link was lost during lift-off, the program took this for no lift-off and counted it against the gains.
 
-What the runs do not have: sideways movement, radios that lose single packets, autopilots of other makes, hardware.
-What a link may say of a sound vehicle is in [hostile-links.md](hostile-links.md).
+Not covered: sideways movement, radios that lose single packets, other autopilots, and hardware. Trials in which the
+link delivers false messages of a sound vehicle are in [hostile-links.md](hostile-links.md).
 """

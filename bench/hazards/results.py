@@ -1,4 +1,4 @@
-"""What is kept of every run, a line of JSON each, and the pool of processes that fly them."""
+"""The results of runs as lines of JSON, and the pool of processes that computes them."""
 
 import json
 import multiprocessing
@@ -9,63 +9,63 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
 from bench.hazards.cases import MOTORS_OFF, Case, draw
-from bench.hazards.expected import faults
-from bench.hazards.flying import Flown, carry_out
+from bench.hazards.fault_checks import find_violations
+from bench.hazards.fault_trial import TrialResult, run_trial
 
 LONGEST_RUN_S = 180.0
-"""On the wall; a run that takes longer hangs."""
+"""Wall-clock time after which a run counts as hanging."""
 
 Line = Mapping[str, object]
 
 
 def fly(seed: int) -> Line:
-    """The run of a seed, judged."""
+    """Fly the case of a seed and return its line, with the violations found."""
     return fly_case(draw(seed))
 
 
 def fly_case(case: Case) -> Line:
     begun_s = time.monotonic()
     try:
-        flown = carry_out(case)
-    except Exception as error:  # noqa: BLE001 - a run that breaks is a failed one
-        return _line(case) | {"wrong": [f"the run broke: {type(error).__name__}: {error}"]}
-    told = {
-        "outcome": flown.outcome,
-        "vehicle": flown.vehicle,
-        "reason": flown.reason,
-        "holds_safe": flown.holds_safe,
-        "held": dict(flown.held),
-        "armed": flown.armed,
-        "height_m": round(flown.height_m, 3),
-        "states": [[stage, round(since_s, 3)] for stage, since_s in flown.stages.entered],
-        "over_s": round(flown.stages.over_s, 3),
-        "struck": [_rounded(asdict(each)) for each in flown.struck],
-        "stopping_packets": len(flown.stops),
-        "highest_stop_m": round(highest_m(flown), 3),
-        "wrong": faults(case, flown),
+        result = run_trial(case)
+    except Exception as error:  # noqa: BLE001 - a run that raises has failed
+        return _line(case) | {"wrong": [f"the run raised {type(error).__name__}: {error}"]}
+    outcome = {
+        "outcome": result.outcome,
+        "vehicle": result.vehicle,
+        "reason": result.reason,
+        "holds_safe": result.holds_safe,
+        "held": dict(result.held),
+        "armed": result.armed,
+        "height_m": round(result.height_m, 3),
+        "states": [[state, round(since_s, 3)] for state, since_s in result.states.entered],
+        "ended_s": round(result.states.ended_s, 3),
+        "injected": [_rounded(asdict(each)) for each in result.injected],
+        "stopping_packets": len(result.stops),
+        "highest_stop_m": round(highest_m(result), 3),
+        "wrong": find_violations(case, result),
         "wall_s": round(time.monotonic() - begun_s, 1),
     }
-    return _line(case) | told
+    return _line(case) | outcome
 
 
-def highest_m(flown: Flown) -> float:
-    """At what height the program told the motors to stop, before a person did."""
-    acted_s = min((each.begun_s for each in flown.struck if each.kind == MOTORS_OFF), default=float("inf"))
-    return max((stop.height_m for stop in flown.stops if stop.at_s < acted_s), default=0.0)
+def highest_m(result: TrialResult) -> float:
+    """Return the greatest height at which the program sent motors off, before the operator did."""
+    acted_s = min((each.begun_s for each in result.injected if each.kind == MOTORS_OFF), default=float("inf"))
+    return max((stop.height_m for stop in result.stops if stop.at_s < acted_s), default=0.0)
 
 
 def _line(case: Case) -> dict[str, object]:
     return {
         "seed": case.seed,
         "autopilot": case.autopilot,
-        "mishaps": [_rounded(asdict(each)) for each in case.mishaps],
+        "faults": [_rounded(asdict(each)) for each in case.faults],
         "gains": dict(case.gains),
         "safe": dict(case.safe),
     }
 
 
 def _rounded(fields: Mapping[str, object]) -> dict[str, object]:
-    """Infinite times as null, for JSON has none."""
+    """Round the numbers; infinite times become null, because JSON has no infinity."""
     return {name: _number(value) if isinstance(value, float) else value for name, value in fields.items()}
 
 
@@ -82,7 +82,7 @@ class _Worker:
 
 
 def fly_all(seeds: Sequence[int], *, processes: int) -> Iterator[Line]:
-    """Every run, in the order in which they end. One that hangs is ended, and its line says so."""
+    """Yield the line of every run as it ends. A run that hangs is ended and reported as a failure."""
     waiting = list(reversed(seeds))
     workers: list[_Worker] = []
     while waiting or workers:
@@ -95,19 +95,19 @@ def fly_all(seeds: Sequence[int], *, processes: int) -> Iterator[Line]:
                 continue
             yield line
             if waiting and "hangs" not in str(line["wrong"]) and worker.process.is_alive():
-                _hand(worker, waiting.pop())
+                _assign(worker, waiting.pop())
             else:
                 _end(worker)
                 workers.remove(worker)
 
 
 def _answer(worker: _Worker, *, is_ready: bool) -> Line | None:
-    """The line of its run, None while it flies."""
+    """Return the line of the worker's run, None while it is running."""
     if is_ready:
         try:
             line: Line = worker.pipe.recv()
         except EOFError:
-            return _line(draw(worker.seed)) | {"wrong": ["the process of the run hangs up"]}
+            return _line(draw(worker.seed)) | {"wrong": ["the process of the run ended without a result"]}
         return line
     if time.monotonic() - worker.begun_s > LONGEST_RUN_S:
         return _line(draw(worker.seed)) | {"wrong": [f"the run hangs: it was not over after {LONGEST_RUN_S:g} s"]}
@@ -121,11 +121,11 @@ def _start(seed: int) -> _Worker:
     process.start()
     theirs.close()
     worker = _Worker(process, ours, seed, 0.0)
-    _hand(worker, seed)
+    _assign(worker, seed)
     return worker
 
 
-def _hand(worker: _Worker, seed: int) -> None:
+def _assign(worker: _Worker, seed: int) -> None:
     worker.seed, worker.begun_s = seed, time.monotonic()
     worker.pipe.send(seed)
 

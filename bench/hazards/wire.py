@@ -1,4 +1,4 @@
-"""What a packet from the ground means to a vehicle, read from the frame alone, without the program's own profiles."""
+"""Commands in packets from the ground, read from the frame alone, independent of the program's own profiles."""
 
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -7,11 +7,11 @@ from typing import Final
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, COMMON, PAPARAZZI, Dialect, Message, number, text
 
 
-class Order(StrEnum):
-    """What the ground told the vehicle."""
+class Command(StrEnum):
+    """Command of a packet from the ground."""
 
     HEARTBEAT = "heartbeat"
-    ASK = "ask"
+    REQUEST = "request"
     GAIN = "gain"
     PREPARE_ARMING = "prepare arming"
     ARM = "arm"
@@ -27,12 +27,12 @@ GAINS: Final[Mapping[str, Mapping[str, str]]] = {
     "ardupilot": {name: name for name in ("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_D", "PSC_ACCZ_I")},
     "px4": {name: name for name in ("MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_D_ACC", "MPC_Z_VEL_I_ACC")},
 }
-"""Every gain, and its parameter on the vehicle."""
+"""Parameter of each gain on the vehicle."""
 
-_BLOCKS: Final = {3: Order.ARM, 4: Order.TAKE_OFF, 13: Order.LAND, 14: Order.LAND, 15: Order.LAND}
-"""Of the stock flight plan."""
+_BLOCKS: Final = {3: Command.ARM, 4: Command.TAKE_OFF, 13: Command.LAND, 14: Command.LAND, 15: Command.LAND}
+"""Commands of the blocks of the stock flight plan."""
 _STOPPING_BLOCKS: Final = frozenset({0, 1, 2, 3, 16})
-"""Those that kill the motors or hold their thrust at none."""
+"""Blocks that kill the motors or hold their thrust at zero."""
 _KILL_SETTINGS: Final = frozenset({"kil_thr", "aut_kil_thr"})
 _ARMED: Final = 128
 _ARM_DISARM: Final = 400
@@ -40,21 +40,21 @@ _TERMINATE: Final = 185
 _SET_MODE: Final = 176
 _TAKE_OFF: Final = 22
 _LAND: Final = 21
-_ARDUPILOT_MODES: Final = {4.0: Order.PREPARE_ARMING, 9.0: Order.LAND, 6.0: Order.LAND}
-_PX4_AUTO: Final = {2.0: Order.TAKE_OFF, 6.0: Order.LAND, 5.0: Order.LAND}
+_ARDUPILOT_MODES: Final = {4.0: Command.PREPARE_ARMING, 9.0: Command.LAND, 6.0: Command.LAND}
+_PX4_AUTO: Final = {2.0: Command.TAKE_OFF, 6.0: Command.LAND, 5.0: Command.LAND}
 
 
-def order(autopilot: str, message: Message) -> Order:
-    """What `message` tells a vehicle of this autopilot."""
+def read_command(autopilot: str, message: Message) -> Command:
+    """Return the command that `message` is to a vehicle with this autopilot."""
     if message.get_type() == "HEARTBEAT":
-        return Order.HEARTBEAT
+        return Command.HEARTBEAT
     if stops_motors(autopilot, message) and message.get_type() != "SCRIPT_ITEM":
-        return Order.MOTORS_OFF
+        return Command.MOTORS_OFF
     return _READERS[autopilot](message)
 
 
 def stops_motors(autopilot: str, message: Message) -> bool:
-    """Whether the vehicle's motors would stop if it obeyed, in the air too."""
+    """Whether the message stops the motors of a vehicle that executes it, also in the air."""
     match message.get_type():
         case "COMMAND_LONG":
             command, parameter = number(message, "command"), number(message, "param1")
@@ -70,43 +70,43 @@ def stops_motors(autopilot: str, message: Message) -> bool:
             return False
 
 
-def _gain_or_question(autopilot: str, message: Message) -> Order:
+def _gain_or_request(autopilot: str, message: Message) -> Command:
     writes = message.get_type() == "PARAM_SET" and text(message, "param_id") in GAINS[autopilot].values()
-    return Order.GAIN if writes else Order.ASK
+    return Command.GAIN if writes else Command.REQUEST
 
 
-def _paparazzi(message: Message) -> Order:
+def _paparazzi(message: Message) -> Command:
     match message.get_type():
         case "SCRIPT_ITEM":
-            return _BLOCKS.get(int(number(message, "seq")), Order.PREPARE_ARMING)
+            return _BLOCKS.get(int(number(message, "seq")), Command.PREPARE_ARMING)
         case "MISSION_ITEM":
-            return Order.PREPARE_ARMING
+            return Command.PREPARE_ARMING
         case _:
-            return _gain_or_question("paparazzi", message)
+            return _gain_or_request("paparazzi", message)
 
 
-def _ardupilot(message: Message) -> Order:
+def _ardupilot(message: Message) -> Command:
     if message.get_type() != "COMMAND_LONG":
-        return _gain_or_question("ardupilot", message)
+        return _gain_or_request("ardupilot", message)
     if number(message, "command") == _SET_MODE:
-        return _ARDUPILOT_MODES.get(number(message, "param2"), Order.ASK)
+        return _ARDUPILOT_MODES.get(number(message, "param2"), Command.REQUEST)
     return _command(message)
 
 
-def _px4(message: Message) -> Order:
+def _px4(message: Message) -> Command:
     if message.get_type() != "COMMAND_LONG":
-        return _gain_or_question("px4", message)
+        return _gain_or_request("px4", message)
     if number(message, "command") == _SET_MODE:
-        return _PX4_AUTO.get(number(message, "param3"), Order.ASK)
+        return _PX4_AUTO.get(number(message, "param3"), Command.REQUEST)
     return _command(message)
 
 
-def _command(message: Message) -> Order:
-    known = {_ARM_DISARM: Order.ARM, _TAKE_OFF: Order.TAKE_OFF, _LAND: Order.LAND}
-    return known.get(int(number(message, "command")), Order.ASK)
+def _command(message: Message) -> Command:
+    known = {_ARM_DISARM: Command.ARM, _TAKE_OFF: Command.TAKE_OFF, _LAND: Command.LAND}
+    return known.get(int(number(message, "command")), Command.REQUEST)
 
 
-_READERS: Final[Mapping[str, Callable[[Message], Order]]] = {
+_READERS: Final[Mapping[str, Callable[[Message], Command]]] = {
     "paparazzi": _paparazzi,
     "ardupilot": _ardupilot,
     "px4": _px4,

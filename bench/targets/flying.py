@@ -1,4 +1,4 @@
-"""One tuning of one vehicle: its flights are counted, judged, and stopped at the budget."""
+"""One tuning of one vehicle: its flights are counted and evaluated, and end with the budget."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -17,17 +17,17 @@ EXPERIMENT: Final = Takeoff()
 SPACE: Final[PolicySpace] = EXPERIMENT.space
 DEFAULT: Final[Mapping[str, float]] = SPACE.mapping(SPACE.default)
 WORST_M: Final = 100.0
-"""The error that a method is told of a flight that broke down, and the highest that it is told at all."""
+"""Error reported to a method for a flight that diverged, and the largest error reported."""
 
 
 class BudgetSpentError(Exception):
-    """All flights that a method may ask for are flown."""
+    """The method has used all its flights."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flown:
-    """One flight: its gains and error (m); `chosen` the gains that the method recommends after it, with their
-    noise-free error; the processor's seconds it took to ask for this flight; and the interval predicted for it."""
+    """One flight: its gains and error (m), the gains `chosen` that the method recommends after it, their noise-free
+    error, the processor time of choosing this flight (s), and the predicted interval."""
 
     gains: tuple[float, ...]
     error: float
@@ -40,9 +40,9 @@ class Flown:
 
 @dataclass(kw_only=True)
 class Tuning:
-    """The flights of one method on one vehicle. `recommends_last`: the method stands by the gains it proposed last, not
-    by the best it has observed. Flights depend on the vehicle, the seed and their number, so that every method meets
-    the same scatter."""
+    """The flights of one method on one vehicle. `recommends_last`: the method recommends the gains that it proposed
+    last, not the best that it has flown. The scatter depends only on the vehicle, the seed and the number of the
+    flight, so that it is the same for all methods."""
 
     vehicle: SampledVehicle
     seed: int
@@ -55,15 +55,15 @@ class Tuning:
 
     @property
     def campaign_seed(self) -> int:
-        """The seed of the method and of its flights."""
+        """Seed of the method and of its flights."""
         return int(np.random.SeedSequence((self.seed, self.vehicle.number)).generate_state(1)[0])
 
     def error(self, gains: Vector) -> float:
-        """Fly the nearest flyable gains; their error (m), at most 100. Raises BudgetSpentError when none are left."""
+        """Fly the nearest valid gains and return their error (m), at most 100. Raises BudgetSpentError."""
         return min(float(self.fly(SPACE.nearest(gains)).error or WORST_M), WORST_M)
 
     def fly(self, gains: Vector, interval: Interval | None = None) -> Flight:
-        """Fly flyable gains and keep the outcome. Raises BudgetSpentError when no flights are left."""
+        """Fly valid gains and store the outcome. Raises BudgetSpentError if no flights are left."""
         asked_s = time.process_time() - self._asked_s
         number = len(self.flights) + 1
         if number > self.budget:
@@ -101,7 +101,7 @@ Method = Callable[[Tuning], None]
 
 
 def tune(method: Method, tuning: Tuning) -> dict[str, object]:
-    """Let a method fly until it ends or its budget is spent; what is kept of it, as JSON."""
+    """Run a method until it ends or its budget is spent, and return the stored outcome as JSON."""
     try:
         method(tuning)
     except BudgetSpentError:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 DISTRIBUTIONS: Final[Mapping[str, str]] = MappingProxyType(
     {"optuna": "optuna", "cmaes": "cmaes", "torch": "torch", "bayes_opt": "bayesian-optimization"}
 )
-"""Modules of the group `bench`, and what they are called where they are installed from."""
+"""Modules of the group `bench`, with the names of their distributions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def _tpe(tuning: Tuning) -> None:
 
 
 def _cma_es(tuning: Tuning) -> None:
-    """Starts in the middle of the bounds, once the default gains are flown."""
+    """Start in the middle of the bounds, after flying the default gains."""
     from optuna.samplers import CmaEsSampler  # noqa: PLC0415
 
     _optuna(tuning, CmaEsSampler(seed=tuning.campaign_seed), logarithm=False)
@@ -110,14 +110,14 @@ def _bayes_opt(tuning: Tuning) -> None:
         optimizer.register(point, -math.log(tuning.error(_from_unit(point))))
     while True:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # scikit-learn warns of length scales at their bounds
+            warnings.simplefilter("ignore")  # scikit-learn warns about length scales at their bounds
             suggested = optimizer.suggest()
         point = np.array([suggested[name] for name in SPACE.names], dtype=np.float64)
         optimizer.register(point, -math.log(tuning.error(_from_unit(point))))
 
 
 _STARTUP: Final = 5
-"""Random flights, the default gains among them, before the process is asked: the library's own number."""
+"""Random flights before the Gaussian process is used, including the default gains: the library's default."""
 
 
 def _nelder_mead(tuning: Tuning) -> None:

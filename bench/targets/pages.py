@@ -1,4 +1,4 @@
-"""The table and the figure of the comparison."""
+"""Document and figure of the comparison."""
 
 import platform
 from collections.abc import Mapping
@@ -14,40 +14,41 @@ if TYPE_CHECKING:
 
 TITLES: Final[Mapping[str, str]] = {
     "four-parameter": "Random vehicles that the model can describe",
-    "further-physics": "Random vehicles with physics beyond that",
-    "twin": "The twin of the paper's drone, again and again",
+    "further-physics": "Random vehicles with further physics",
+    "twin": "The twin of the paper's drone, repeatedly",
 }
 LINES: Final[Mapping[str, str]] = {
     "four-parameter": """\
 Hover throttle 0.45 … 0.75, motor lag 0 … 100 ms, start latency 0 … 0.4 s, drag 0 … 0.4 1/s, with the scatter of the
 paper's flights.""",
     "further-physics": """\
-The same, and a quadratic share of thrust of 0 … 1, ground effect 0 … 25 % fading over 0.2 … 0.6 m, measurement delay
-0 … 40 ms, battery sag 0 … 3 % over the flight; every tenth flies in JSBSim, with gusts of 0.5 … 2 m/s and a noisy
-altimeter instead of the scatter.""",
-    "twin": "One vehicle, with the scatter of the paper's flights, tuned from so many seeds.",
+As above, with effects that the model does not describe by default: a quadratic share of thrust of 0 … 1, ground effect
+0 … 25 % fading over 0.2 … 0.6 m, measurement delay 0 … 40 ms, battery sag 0 … 3 % over the flight. Every tenth vehicle
+flies in JSBSim, with gusts of 0.5 … 2 m/s and a noisy altimeter instead of the scatter.""",
+    "twin": "One vehicle, with the scatter of the paper's flights, tuned with many seeds.",
 }
 _INTRODUCTION: Final = """\
 # Flights to the target
 
-How many takeoffs a method needs until the gains that it recommends are within 5 % or 2 % of the best that there are for
-that vehicle.
+The number of takeoffs that a method needs until the error with its recommended gains is within 5 % or 2 % of the lowest
+that is possible on the vehicle.
 
-- All methods start with the default gains, search the same bounds, and meet the same vehicles with the same scatter.
-- Compared is the noise-free error of the gains that a method recommends after so many flights: the best it has
-  observed, or for Gainline the gains it proposed last. The best there are is searched on the vehicle itself, without
-  noise.
-- A flight is unsafe that rises above 3.75 m, is below 2.25 m later than 5 s after the command, or diverges. First
-  flights and default gains flown again do not count.
-- Gainline's proposals pass its gate as in a campaign, and what that takes is counted; a refused proposal ends that
-  tuning as a failure. The other methods have no gate.
-- A method that takes long over each proposal tuned fewer vehicles, the first of each population.
-- A method that ends early, or whose budget of flights is smaller than the number asked about, stands by what it has.
-- Shares carry their Wilson 95 % intervals.
+- All methods start with the default gains, search the same bounds, and tune the same vehicles with the same scatter.
+- The error compared is that of the gains that a method recommends after a number of flights, without noise. Gainline
+  recommends the gains that it proposed last, the other methods the best that they have flown. The lowest possible error
+  is found by a search on the vehicle itself, without noise.
+- A flight is unsafe if it rises above 3.75 m, is below 2.25 m later than 5 s after the command, or diverges. The first
+  flight and repeated flights of the default gains do not count.
+- Gainline's proposals pass its gate as in a campaign, and the processor time of the gate is included. A refused
+  proposal ends the tuning as a failure. The other methods have no gate.
+- Methods with slow proposals tuned fewer vehicles, the first ones of each population.
+- A method that ends early, or has fewer flights than the number in the column, is counted with its last
+  recommendation.
+- Shares have Wilson 95 % intervals.
 
 ![Share of vehicles within 5 % against flights]({figure})
 
-To make this page again (hours; the second command goes on where it was stopped when it is given `--results FILE`):
+To make this page again (takes hours; with `--results FILE` the second command can be interrupted and continued):
 
     ./dev exec uv pip install --require-hashes -r requirements/bench.txt
     ./dev exec python -m bench.flights_to_target --vehicles 200 --twins 400 --methods all --seed {seed} --out docs
@@ -68,7 +69,7 @@ _COLOURS: Final[Mapping[str, str]] = {
 
 
 def summary(found: Mapping[str, Outcome], target: float) -> list[str]:
-    """The rows of one table."""
+    """Return the rows of one table."""
     columns = ["method", "vehicles", "flights", *(f"flight {number}" for number in AT_FLIGHTS), "median"]
     lines = [f"| {' | '.join(columns)} |", f"| {' | '.join(['---'] * len(columns))} |"]
     for name, outcome in found.items():
@@ -85,7 +86,7 @@ def summary(found: Mapping[str, Outcome], target: float) -> list[str]:
 
 
 def safety(found: Mapping[str, Outcome]) -> list[str]:
-    """Unsafe flights and compute time, row by row."""
+    """Return the table of unsafe flights and computation times."""
     columns = (
         "method",
         "unsafe, of all flights after the first",
@@ -104,9 +105,9 @@ def safety(found: Mapping[str, Outcome]) -> list[str]:
 
 
 def own_lines(outcome: Outcome) -> list[str]:
-    """What is known of Gainline's own proposals beyond the table."""
+    """Return the sentences on Gainline's own proposals."""
     lines = [
-        "Gainline's proposals judged each by itself, later ones not excused by earlier ones: "
+        "Share of Gainline's proposals within the target, each flight counted separately: "
         + "; ".join(
             f"flight {number} within 5 % {outcome.standing(0.05, number)}, within 2 % {outcome.standing(0.02, number)}"
             for number in (2, 3)
@@ -115,14 +116,13 @@ def own_lines(outcome: Outcome) -> list[str]:
     ]
     if outcome.coverage.of:
         lines.append(
-            f"Of its flights {outcome.coverage} of {outcome.coverage.of} fell into the interval that was predicted for "
-            "them with 90 %."
+            f"The predicted 90 % interval contained the error of {outcome.coverage} of {outcome.coverage.of} flights."
         )
     return lines
 
 
 def page(all_found: Mapping[str, Mapping[str, Outcome]], results: Results, seed: int, figure: str) -> str:
-    """The whole page, in Markdown."""
+    """Return the page in Markdown."""
     lines = [_INTRODUCTION.format(figure=figure, seed=seed, made=_made(results, seed))]
     for population, found in all_found.items():
         lines += ["", f"## {TITLES[population]}", "", LINES[population]]
@@ -136,7 +136,7 @@ def page(all_found: Mapping[str, Mapping[str, Outcome]], results: Results, seed:
 
 
 def _made(results: Results, seed: int) -> str:
-    """When the flights were flown and with what."""
+    """Return the dates of the flights and the versions of the libraries."""
     made: dict[str, set[str]] = {}
     for task in results:
         if task.seed == seed and isinstance(stamp := results[task]["made"], dict):

@@ -1,4 +1,4 @@
-"""From the flights to shares, medians and counts, and to the page and the figure that show them."""
+"""Shares, medians and counts computed from the flights."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ _DEFAULT: Final = list(DEFAULT.values())
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """So many of so many, with the Wilson 95 % interval."""
+    """A share of a total, with its Wilson 95 % interval."""
 
     count: int
     of: int
@@ -39,7 +39,7 @@ class Share:
         return self.rounded(0)
 
     def rounded(self, decimals: int) -> str:
-        """`85 % (79–90 %)`, with so many decimals."""
+        """Return the share as text with the given number of decimals: `85 % (79–90 %)`."""
         if not self.of:
             return "–"
         low, high = self.interval
@@ -87,7 +87,7 @@ class Outcome:
 
     @property
     def budget(self) -> int:
-        """The most flights that a vehicle was given."""
+        """Largest number of flights of a vehicle."""
         return max(course.budget for course in self.courses)
 
     def reached(self, target: float, flight: int) -> Share:
@@ -98,7 +98,7 @@ class Outcome:
         return Share(sum(course.is_standing(target, flight) for course in self.courses), len(self.courses))
 
     def median_flights(self, target: float) -> str:
-        """The median number of flights, or that it is beyond the budget."""
+        """Return the median number of flights, or that it exceeds the budget."""
         hits = sorted(course.reached(target) or np.inf for course in self.courses)
         middle = median(hits)
         return f"{middle:g}" if np.isfinite(middle) else f"> {self.budget}"
@@ -129,13 +129,13 @@ class Outcome:
 
     @property
     def compute_s(self) -> tuple[float, float]:
-        """Median and largest time from one flight to the next being asked for."""
+        """Median and largest time of choosing a flight."""
         times = [seconds for course in self.courses for seconds in course.compute_s[1:]]
         return (float(np.median(times)), max(times)) if times else (float("nan"), float("nan"))
 
 
 def outcomes(results: Results, population: str, seed: int) -> dict[str, Outcome]:
-    """Every method with results for this population, in the order of the registry."""
+    """Return every method with results for this population, in the order of the registry."""
     found: dict[str, Outcome] = {}
     for method in METHODS:
         tasks = [task for task in results if (task.population, task.seed, task.what) == (population, seed, method)]
@@ -164,7 +164,7 @@ def _course(results: Results, task: Task) -> Course | None:
 
 
 def course_of(flights: Sequence[Mapping[str, object]], *, best: float, ended: str, budget: int) -> Course:
-    """The course of flights as they are kept; `best` is the vehicle's own optimum, m."""
+    """Return the course of stored flights; `best` is the error of the vehicle's own optimum, m."""
     return Course(
         excess=tuple(_number(flight["chosen_error"]) / best - 1.0 for flight in flights),
         unsafe=tuple(bool(flight["is_unsafe"]) for flight in flights),

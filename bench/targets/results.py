@@ -1,4 +1,4 @@
-"""Results on disk, one JSON line each, and the processes that make them; what is there already is not done again."""
+"""Results on disk, one JSON line each, and the processes that compute those that are missing."""
 
 import json
 import multiprocessing
@@ -16,7 +16,7 @@ from bench.targets.methods import DISTRIBUTIONS, METHODS
 from bench.targets.vehicles import SampledVehicle, own_optimum
 
 OPTIMUM: Final = "optimum"
-"""The task that finds a vehicle's own best gains."""
+"""Task that finds a vehicle's own best gains."""
 
 Record = Mapping[str, object]
 
@@ -32,7 +32,7 @@ class Task:
 
 
 class Results:
-    """The file of results. A line that was cut off by an interruption is dropped."""
+    """File of results. A line truncated by an interruption is dropped."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
@@ -55,7 +55,7 @@ class Results:
         return iter(self._kept)
 
     def add(self, task: Task, record: Record) -> None:
-        """Keep a result, on disk before anything else."""
+        """Store a result, on disk first."""
         self._file.parent.mkdir(parents=True, exist_ok=True)
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps({"task": asdict(task), **record}, separators=(",", ":")) + "\n")
@@ -63,7 +63,7 @@ class Results:
 
 
 def carry_out(task: Task, vehicle: SampledVehicle, budget: int | None = None) -> Record:
-    """Do one task; `budget` caps the method's own number of flights."""
+    """Run one task; `budget` limits the method's number of flights."""
     made = {"day": datetime.now(UTC).date().isoformat()}
     if task.what == OPTIMUM:
         optimum = own_optimum(vehicle)
@@ -78,7 +78,7 @@ def carry_out(task: Task, vehicle: SampledVehicle, budget: int | None = None) ->
 def work(
     tasks: Iterable[tuple[Task, SampledVehicle]], results: Results, *, processes: int, budget: int | None = None
 ) -> Iterator[Task]:
-    """Carry out what is not there yet, in so many nice single-threaded processes; each task once it is kept."""
+    """Run the missing tasks in single-threaded processes of low priority; yield each task once it is stored."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
     context = multiprocessing.get_context("spawn")

@@ -21,7 +21,7 @@ class Clock:
         return self.now
 
 
-def test_nobody_else_may_open_what_it_keeps(tmp_path: Path) -> None:
+def test_its_files_are_accessible_to_their_owner_only(tmp_path: Path) -> None:
     keyring = Keyring.open(tmp_path)
     keyring.new_link()
     access = tmp_path / "access"
@@ -90,7 +90,7 @@ def test_no_token_is_stored_and_none_leads_out_of_the_folder(tmp_path: Path) -> 
     assert (tmp_path / "kept").exists()
 
 
-def test_a_damaged_secret_is_told_with_what_to_do(tmp_path: Path) -> None:
+def test_a_damaged_secret_is_reported_with_what_to_do(tmp_path: Path) -> None:
     Keyring.open(tmp_path)
     os.truncate(tmp_path / "access" / "secret", 3)
     with pytest.raises(StorageError, match="does not contain 32 bytes"):

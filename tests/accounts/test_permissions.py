@@ -23,7 +23,7 @@ NEEDED = {
 @pytest.mark.parametrize(
     ("act", "place", "key", "exposed"), [*itertools.product(Permission, RequestOrigin, Key, [False, True])]
 )
-def test_everybody_may_do_what_the_domain_allows_and_is_told_why_not(
+def test_permissions_follow_the_domain_and_refusals_give_the_reason(
     act: Permission, place: RequestOrigin, key: Key, exposed: bool
 ) -> None:
     here, elsewhere, where_others_are = NEEDED[act]
@@ -39,7 +39,7 @@ def test_everybody_may_do_what_the_domain_allows_and_is_told_why_not(
     assert refused.value.hint
 
 
-def test_abort_and_land_are_changes_which_nobody_on_this_computer_needs_a_key_for() -> None:
+def test_abort_and_land_need_no_key_on_this_computer() -> None:
     assert is_allowed(Permission.CHANGE, Caller())
     assert is_allowed(Permission.CHANGE, Caller(exposed=True))
 

@@ -1,4 +1,4 @@
-"""The judge of trials with faults is judged; and what a run once found wrong is flown again."""
+"""The checks of trials with faults, and cases in which runs once found a defect."""
 
 from dataclasses import replace
 from typing import Final
@@ -6,100 +6,106 @@ from typing import Final
 import pytest
 
 from app.vehicles.mavlink.dialects import FieldValue
-from bench.hazards.cases import CELLS, SAFE, TUNED, WILD_GAINS, Case, Mishap, draw
-from bench.hazards.expected import faults
-from bench.hazards.flying import Flown
+from bench.hazards.cases import CELLS, SAFE, TUNED, WILD_GAINS, Case, PlannedFault, draw
+from bench.hazards.fault_checks import find_violations
+from bench.hazards.fault_trial import TrialResult
 from bench.hazards.intervals import covers, longest, merged, total
 from bench.hazards.results import fly_case
-from bench.hazards.rig import Stopping, Struck
-from bench.hazards.stages import Stage, Stages
-from bench.hazards.wire import DIALECTS, Order, order, stops_motors
+from bench.hazards.rig import InjectedFault, MotorStop
+from bench.hazards.trial_states import State, TrialStates
+from bench.hazards.wire import DIALECTS, Command, read_command, stops_motors
 
 
-def case(*mishaps: Mishap, autopilot: str = "paparazzi", waits_s: float = 0.0) -> Case:
+def case(*faults: PlannedFault, autopilot: str = "paparazzi", staged_s: float = 0.0) -> Case:
     return Case(
-        seed=1, autopilot=autopilot, mishaps=mishaps, gains=TUNED[autopilot], warm_s=4.0, waits_s=waits_s, pinned=True
+        seed=1,
+        autopilot=autopilot,
+        faults=faults,
+        gains=TUNED[autopilot],
+        powered_s=4.0,
+        staged_s=staged_s,
+        pinned=True,
     )
 
 
-# ---- what is drawn
+# ---- cases
 
 
-def test_consecutive_seeds_come_past_every_mishap_in_every_state() -> None:
-    firsts = [draw(seed).mishaps[0] for seed in range(1000, 1000 + len(CELLS))]
-    drawn = {(each.kind, each.stage) for each in firsts if each.kind != WILD_GAINS}
+def test_consecutive_seeds_cover_every_fault_in_every_state() -> None:
+    firsts = [draw(seed).faults[0] for seed in range(1000, 1000 + len(CELLS))]
+    drawn = {(each.kind, each.state) for each in firsts if each.kind != WILD_GAINS}
     assert drawn == {cell for cell in CELLS if cell[0] != WILD_GAINS}
 
 
-def test_a_seed_gives_the_same_case_again_and_its_safe_gains_are_told_from_all_others() -> None:
+def test_a_seed_always_gives_the_same_case_whose_gains_all_differ_from_the_safe_ones() -> None:
     for seed in range(50):
         drawn = draw(seed)
         assert drawn == draw(seed)
         assert all(drawn.gains[name] != value for name, value in SAFE[drawn.autopilot].items())
 
 
-# ---- what is read from the wire
+# ---- commands in packets
 
 TO: Final = {"target_system": 31, "target_component": 0}
 ARM_DISARM: Final = {"command": 400, "confirmation": 0, **{f"param{place}": 0.0 for place in range(1, 8)}}
 SET_MODE: Final = ARM_DISARM | {"command": 176, "param1": 1.0}
 SETTING: Final = {"param_type": 9, "param_value": 1.0}
 
-PACKETS: Final[list[tuple[str, str, dict[str, FieldValue], Order, bool]]] = [
-    ("paparazzi", "SCRIPT_ITEM", {**TO, "seq": 13, "name": ""}, Order.LAND, False),
-    ("paparazzi", "SCRIPT_ITEM", {**TO, "seq": 4, "name": ""}, Order.TAKE_OFF, False),
-    ("paparazzi", "SCRIPT_ITEM", {**TO, "seq": 2, "name": ""}, Order.PREPARE_ARMING, True),
-    ("paparazzi", "PARAM_SET", {**TO, **SETTING, "param_id": "kil_thr"}, Order.MOTORS_OFF, True),
-    ("paparazzi", "PARAM_SET", {**TO, **SETTING, "param_id": "gui_v_kp"}, Order.GAIN, False),
-    ("paparazzi", "COMMAND_LONG", {**TO, **ARM_DISARM}, Order.MOTORS_OFF, True),
-    ("paparazzi", "SET_MODE", {"target_system": 31, "base_mode": 1, "custom_mode": 0}, Order.MOTORS_OFF, True),
-    ("px4", "COMMAND_LONG", {**TO, **ARM_DISARM, "param1": 1.0}, Order.ARM, False),
-    ("px4", "COMMAND_LONG", {**TO, **ARM_DISARM, "param2": 21196.0}, Order.MOTORS_OFF, True),
-    ("px4", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 4.0, "param3": 6.0}, Order.LAND, False),
-    ("px4", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 4.0, "param3": 2.0}, Order.TAKE_OFF, False),
-    ("ardupilot", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 9.0}, Order.LAND, False),
-    ("ardupilot", "COMMAND_LONG", {**TO, **ARM_DISARM, "command": 22}, Order.TAKE_OFF, False),
+PACKETS: Final[list[tuple[str, str, dict[str, FieldValue], Command, bool]]] = [
+    ("paparazzi", "SCRIPT_ITEM", {**TO, "seq": 13, "name": ""}, Command.LAND, False),
+    ("paparazzi", "SCRIPT_ITEM", {**TO, "seq": 4, "name": ""}, Command.TAKE_OFF, False),
+    ("paparazzi", "SCRIPT_ITEM", {**TO, "seq": 2, "name": ""}, Command.PREPARE_ARMING, True),
+    ("paparazzi", "PARAM_SET", {**TO, **SETTING, "param_id": "kil_thr"}, Command.MOTORS_OFF, True),
+    ("paparazzi", "PARAM_SET", {**TO, **SETTING, "param_id": "gui_v_kp"}, Command.GAIN, False),
+    ("paparazzi", "COMMAND_LONG", {**TO, **ARM_DISARM}, Command.MOTORS_OFF, True),
+    ("paparazzi", "SET_MODE", {"target_system": 31, "base_mode": 1, "custom_mode": 0}, Command.MOTORS_OFF, True),
+    ("px4", "COMMAND_LONG", {**TO, **ARM_DISARM, "param1": 1.0}, Command.ARM, False),
+    ("px4", "COMMAND_LONG", {**TO, **ARM_DISARM, "param2": 21196.0}, Command.MOTORS_OFF, True),
+    ("px4", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 4.0, "param3": 6.0}, Command.LAND, False),
+    ("px4", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 4.0, "param3": 2.0}, Command.TAKE_OFF, False),
+    ("ardupilot", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 9.0}, Command.LAND, False),
+    ("ardupilot", "COMMAND_LONG", {**TO, **ARM_DISARM, "command": 22}, Command.TAKE_OFF, False),
 ]
 
 
 @pytest.mark.parametrize(("autopilot", "kind", "fields", "told", "stops"), PACKETS)
-def test_a_packet_is_known_for_what_it_does_to_the_vehicle(
-    autopilot: str, kind: str, fields: dict[str, FieldValue], told: Order, stops: bool
+def test_each_packet_is_read_as_the_command_that_the_vehicle_executes(
+    autopilot: str, kind: str, fields: dict[str, FieldValue], told: Command, stops: bool
 ) -> None:
     message = DIALECTS[autopilot].message(kind, fields)
-    assert (order(autopilot, message), stops_motors(autopilot, message)) == (told, stops)
+    assert (read_command(autopilot, message), stops_motors(autopilot, message)) == (told, stops)
 
 
-def test_spans_are_counted_once_and_measured_inside_others() -> None:
+def test_overlapping_spans_count_once() -> None:
     assert merged([(3.0, 4.0), (0.0, 1.0), (0.5, 2.0)]) == [(0.0, 2.0), (3.0, 4.0)]
     assert longest([(0.0, 2.0), (3.0, 7.0)], [(1.0, 4.0), (4.0, 5.0)]) == 2.0
     assert total([(0.0, 2.0), (1.0, 3.0)], [(1.5, 10.0)]) == 1.5
     assert covers([(0.0, 1.0), (1.0, 3.0)], (0.5, 2.5))
 
 
-# ---- the judgement
+# ---- checks
 
 
-def flown(*struck: Struck, **differently: object) -> Flown:
-    """A trial as it goes, told from what it orders; `differently`: what is not so."""
-    stages = Stages()
-    stages.begin(4.0)
+def flown(*injected: InjectedFault, **changes: object) -> TrialResult:
+    """Result of a normal trial with these faults; `changes` replaces some of its fields."""
+    states = TrialStates()
+    states.begin(4.0)
     for at_s, told in (
-        (4.5, Order.ASK),
-        (7.0, Order.GAIN),
-        (9.0, Order.PREPARE_ARMING),
-        (9.5, Order.ARM),
-        (11.0, Order.TAKE_OFF),
-        (44.1, Order.LAND),
-        (51.0, Order.MOTORS_OFF),
-        (51.4, Order.GAIN),
+        (4.5, Command.REQUEST),
+        (7.0, Command.GAIN),
+        (9.0, Command.PREPARE_ARMING),
+        (9.5, Command.ARM),
+        (11.0, Command.TAKE_OFF),
+        (44.1, Command.LAND),
+        (51.0, Command.MOTORS_OFF),
+        (51.4, Command.GAIN),
     ):
-        stages.hear(
+        states.receive(
             told, at_s, armed=9.5 < at_s < 51.2, height_m=3.0 if 12.0 < at_s < 46.0 else 0.0, silent_since_s=None
         )
-        stages.height(3.0 if at_s == 11.0 else 0.0, at_s + 0.6)
-    stages.over_s = 51.6
-    whole = Flown(
+        states.update_height(3.0 if at_s == 11.0 else 0.0, at_s + 0.6)
+    states.ended_s = 51.6
+    whole = TrialResult(
         outcome="completed",
         vehicle="safe",
         reason="",
@@ -110,88 +116,88 @@ def flown(*struck: Struck, **differently: object) -> Flown:
         height_m=0.0,
         impact_m_s=0.8,
         packets=100,
-        stops=(Stopping(51.0, 0.0),),
-        struck=struck,
-        stages=stages,
+        stops=(MotorStop(51.0, 0.0),),
+        injected=injected,
+        states=states,
     )
-    return replace(whole, **differently)  # type: ignore[arg-type]  # by the test's own names
+    return replace(whole, **changes)  # type: ignore[arg-type]  # by the test's own names
 
 
-def test_a_trial_goes_through_its_states_as_its_orders_tell() -> None:
-    assert [stage for stage, _ in flown().stages.entered] == [
-        Stage.CONNECT,
-        Stage.PREFLIGHT,
-        Stage.SET_GAINS,
-        Stage.ARM,
-        Stage.TAKEOFF,
-        Stage.RECORD,
-        Stage.LAND,
-        Stage.DISARM,
-        Stage.RESTORE,
+def test_the_commands_determine_the_states_of_a_trial() -> None:
+    assert [state for state, _ in flown().states.entered] == [
+        State.CONNECT,
+        State.PREFLIGHT,
+        State.SET_GAINS,
+        State.ARM,
+        State.TAKEOFF,
+        State.RECORD,
+        State.LAND,
+        State.DISARM,
+        State.RESTORE,
     ]
-    assert faults(case(), flown()) == []
+    assert find_violations(case(), flown()) == []
 
 
-LINK_LOST: Final = Struck("link-lost", Stage.RECORD, 20.0, 23.0)
-ABORT: Final = Struck("abort", Stage.RECORD, 20.0, float("inf"))
+LINK_LOST: Final = InjectedFault("link-lost", State.RECORD, 20.0, 23.0)
+ABORT: Final = InjectedFault("abort", State.RECORD, 20.0, float("inf"))
 
-WRONG: Final[list[tuple[Flown, str]]] = [
-    (flown(stops=(Stopping(20.0, 0.2),)), "its motors were told to stop at 0.20 m"),
-    (flown(holds_safe=False), "it is said to hold its safe gains"),
+WRONG: Final[list[tuple[TrialResult, str]]] = [
+    (flown(stops=(MotorStop(20.0, 0.2),)), "motors off was sent at 0.20 m"),
+    (flown(holds_safe=False), "reported as holding its safe gains, but"),
     (flown(armed=True), "is armed"),
     (flown(height_m=1.0), "off the ground"),
-    (flown(vehicle="quarantined"), "quarantined without need"),
-    (flown(outcome="invalid"), "the trial is invalid, where nothing was expected"),
-    (flown(LINK_LOST), "the trial is completed, where F5 invalid"),
-    (flown(ABORT), "where F8 aborted was expected"),
-    (flown(ABORT), "an abort was not acted on"),
-    (flown(Struck("reboot", Stage.RECORD, 20.0, 22.0), outcome="invalid"), "was not quarantined"),
-    (flown(Struck("jumping-position", Stage.RECORD, 20.0, 30.0)), "F9b invalid was expected"),
-    (flown(Struck("low-battery", Stage.ARM, 9.2, 99.0)), "F7 invalid"),
-    (flown(flew_on=SAFE["paparazzi"]), "it lifted off holding"),
+    (flown(vehicle="quarantined"), "unnecessary quarantine"),
+    (flown(outcome="invalid"), "the trial is invalid, but nothing was expected"),
+    (flown(LINK_LOST), "the trial is completed, but F5 invalid"),
+    (flown(ABORT), "but F8 aborted was expected"),
+    (flown(ABORT), "an abort took effect only after"),
+    (flown(InjectedFault("reboot", State.RECORD, 20.0, 22.0), outcome="invalid"), "was not quarantined"),
+    (flown(InjectedFault("jumping-position", State.RECORD, 20.0, 30.0)), "F9b invalid was expected"),
+    (flown(InjectedFault("low-battery", State.ARM, 9.2, 99.0)), "F7 invalid"),
+    (flown(flew_on=SAFE["paparazzi"]), "the vehicle lifted off with"),
 ]
 
 
 @pytest.mark.parametrize(("wrong", "complaint"), WRONG, ids=[complaint for _, complaint in WRONG])
-def test_what_is_not_as_asked_is_found(wrong: Flown, complaint: str) -> None:
-    assert any(complaint in each for each in faults(case(), wrong))
+def test_every_violation_is_found(wrong: TrialResult, complaint: str) -> None:
+    assert any(complaint in each for each in find_violations(case(), wrong))
 
 
-# ---- what runs found
+# ---- defects found by runs
 
 
 FOUND: Final = [
     # seed 20261148: each lone sample restarted the two seconds of rest on the ground, until quarantine
-    (case(Mishap("jumping-position", Stage.LAND, 4.4)), "completed", "safe"),
+    (case(PlannedFault("jumping-position", State.LAND, 4.4)), "completed", "safe"),
     # seed 20261209: a stop before arming left the gains of the trial on the vehicle
-    (case(Mishap("abort", Stage.SET_GAINS, 2.0)), "aborted", "safe"),
+    (case(PlannedFault("abort", State.SET_GAINS, 2.0)), "aborted", "safe"),
     # a restart while the gains were staged: the trial flew on the autopilot's own; Paparazzi forgets what was set
-    (case(Mishap("reboot", Stage.SET_GAINS, 3.0), waits_s=8.0), "refused", "safe"),
+    (case(PlannedFault("reboot", State.SET_GAINS, 3.0), staged_s=8.0), "refused", "safe"),
     # and PX4 keeps it
-    (case(Mishap("reboot", Stage.SET_GAINS, 3.0), autopilot="px4", waits_s=8.0), "completed", "safe"),
+    (case(PlannedFault("reboot", State.SET_GAINS, 3.0), autopilot="px4", staged_s=8.0), "completed", "safe"),
     # seed 20261388: a lift-off that could not be seen, for the link was lost, passed for none
-    (case(Mishap("link-lost", Stage.TAKEOFF, 0.53, 1.34)), "invalid", "safe"),
+    (case(PlannedFault("link-lost", State.TAKEOFF, 0.53, 1.34)), "invalid", "safe"),
     # seed 20262209: gains that overshoot to the flight plan's own ceiling passed for a landing of its own
     (
-        replace(case(Mishap("wild-gains", Stage.CONNECT, 0.0)), gains={"kp": 100, "ki": 300, "kd": 10}),
+        replace(case(PlannedFault("wild-gains", State.CONNECT, 0.0)), gains={"kp": 100, "ki": 300, "kd": 10}),
         "aborted",
         "safe",
     ),
     # seed 20261168: over a gap in the climb its altitude seemed not to follow its climb rate
-    (case(Mishap("link-lost", Stage.TAKEOFF, 0.295, 0.446)), "completed", "safe"),
+    (case(PlannedFault("link-lost", State.TAKEOFF, 0.295, 0.446)), "completed", "safe"),
     # seed 20261610: a PX4 that stood on the ground said that it holds its height there
-    (case(Mishap("no-lift-off", Stage.SET_GAINS, 0.1), autopilot="px4"), "aborted", "safe"),
+    (case(PlannedFault("no-lift-off", State.SET_GAINS, 0.1), autopilot="px4"), "aborted", "safe"),
     # seed 20261320: switched back to its previous mode before a heartbeat could tell, it did not lift off
-    (case(Mishap("other-mode", Stage.TAKEOFF, 0.27), autopilot="px4"), "aborted", "safe"),
+    (case(PlannedFault("other-mode", State.TAKEOFF, 0.27), autopilot="px4"), "aborted", "safe"),
 ]
 
 
 @pytest.mark.parametrize(
     ("found", "outcome", "vehicle"),
     FOUND,
-    ids=[f"{each.autopilot}-{each.mishaps[0].kind}-{each.mishaps[0].stage}" for each, _, _ in FOUND],
+    ids=[f"{each.autopilot}-{each.faults[0].kind}-{each.faults[0].state}" for each, _, _ in FOUND],
 )
-def test_what_a_run_found_wrong_is_right_now(found: Case, outcome: str, vehicle: str) -> None:
+def test_a_defect_found_by_a_run_stays_fixed(found: Case, outcome: str, vehicle: str) -> None:
     line = fly_case(found)
     assert line["wrong"] == []
     assert (line["outcome"], line["vehicle"]) == (outcome, vehicle)

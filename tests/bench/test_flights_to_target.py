@@ -169,7 +169,7 @@ def test_figures_beyond_the_limits_are_told() -> None:
     assert not is_within_limits({"four-parameter": {"calibrated": bad}})
 
 
-def test_an_unknown_method_or_a_missing_library_is_told_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_method_or_a_missing_library_is_reported_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SystemExit, match="There is no method annealing"):
         chosen_methods("annealing")
     monkeypatch.setattr("bench.flights_to_target.METHODS", {"tpe": SimpleNamespace(missing=("optuna",))})

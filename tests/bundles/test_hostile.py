@@ -75,7 +75,7 @@ def test_another_format_or_version_is_refused_by_its_field(
     assert list(found) == [f"manifest.json: {field}"]
 
 
-def test_a_newer_version_says_so(client: TestClient, database: Database, parts: Parts) -> None:
+def test_a_newer_version_is_reported_as_such(client: TestClient, database: Database, parts: Parts) -> None:
     manifest = {**json.loads(parts["manifest.json"]), "version": 7, "new": True}
     found = refused(client, database, zipped({**parts, "manifest.json": json.dumps(manifest).encode()}))
     assert "newer Gainline" in found["manifest.json: version"]

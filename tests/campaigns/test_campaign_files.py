@@ -73,7 +73,7 @@ def test_what_is_wrong_is_named_by_line_and_field(tmp_path: Path, text: str, nam
     assert named in [problem.field for problem in refused.value.problems]
 
 
-def test_a_file_that_is_not_there_is_said_so(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="No such file"):
         read_campaign_file(tmp_path / "absent.yaml")
 

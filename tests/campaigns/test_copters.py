@@ -36,7 +36,7 @@ def flown_by_hand(client: TestClient, database: Database) -> tuple[Json, list[Js
     return get(client, f"/api/campaigns/{campaign['id']}"), trials
 
 
-def test_a_script_gives_the_gains_and_is_told_their_errors(client: TestClient, database: Database) -> None:
+def test_a_script_submits_gains_and_gets_their_errors(client: TestClient, database: Database) -> None:
     campaign, trials = flown_by_hand(client, database)
     assert [trial["error"] for trial in trials] == pytest.approx([climb_error(each) for each in SETTLED_S], abs=1e-4)
     assert [trial["kind"] for trial in trials] == ["start", "manual", "manual"]

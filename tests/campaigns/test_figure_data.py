@@ -73,7 +73,7 @@ def test_a_flight_by_itself_is_drawn_over_the_best(client: TestClient, campaign_
     assert max(trace(drawn, "flight")["y"]) == pytest.approx(create_climb(2.0)["altitude_m"].max(), abs=1e-3)
 
 
-def test_a_campaign_that_has_not_flown_says_what_is_missing(client: TestClient, database: Database) -> None:
+def test_a_campaign_without_flights_shows_what_is_missing(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     card = get(client, f"/api/campaigns/{campaign['id']}/figures/errors")
     assert (card["state"], card["figure"]) == ("waiting", None)

@@ -97,7 +97,7 @@ def test_a_vehicles_own_safe_gains_stand_in_the_definition_that_proposals_and_ga
     assert get(client, path)["definition"] == campaign["definition"]
 
 
-def test_a_finished_campaign_says_why_it_is_over_in_the_light_of_its_flights(
+def test_a_finished_campaign_gives_the_reason_for_its_end_from_its_present_flights(
     client: TestClient, database: Database
 ) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 2}})
@@ -131,7 +131,7 @@ def test_what_an_operator_stopped_stays_stopped_by_the_operator(client: TestClie
     assert (after["outcome"], after["stop_reason"]) == ("stopped", "rain")
 
 
-def test_a_finished_campaign_without_a_proposal_says_why(client: TestClient, database: Database) -> None:
+def test_a_finished_campaign_without_a_proposal_gives_the_reason(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     path = f"/api/campaigns/{campaign['id']}"
     flown = create_flown_trial(client, database, campaign["id"])

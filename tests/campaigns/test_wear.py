@@ -62,7 +62,7 @@ def about(client: TestClient, campaign: Json, what: str) -> Json:
     return found
 
 
-def test_after_each_flight_stands_what_its_proposal_says_of_the_model(client: TestClient, database: Database) -> None:
+def test_the_findings_of_the_proposal_follow_each_flight(client: TestClient, database: Database) -> None:
     campaign = fly_campaign(client, database)
     known = about(client, campaign, "calibration")
     latest = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]

@@ -140,7 +140,7 @@ def test_what_cannot_be_flown_is_refused_by_name(arguments: tuple[str, ...], nam
 
 
 @pytest.mark.parametrize("given", [("--set", "wind_m_s=.inf"), ("--set", "step_fraction=.inf")])
-def test_a_number_that_is_not_finite_is_said_back(given: tuple[str, str]) -> None:
+def test_a_non_finite_number_is_quoted_in_the_error(given: tuple[str, str]) -> None:
     result = gainline("run", "ardrone-takeoff", *given)
     assert result.exit_code == 1
     assert "got inf" in result.stderr

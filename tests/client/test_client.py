@@ -97,7 +97,7 @@ def test_fly_and_wait(gainline: Client, database: Database) -> None:
     assert gainline.wait(trial.id).state == "valid"
 
 
-def test_an_operator_says_why_they_broke_a_flight_off(gainline: Client, database: Database) -> None:
+def test_an_operator_gives_the_cause_of_an_abort(gainline: Client, database: Database) -> None:
     campaign = gainline.create_campaign("Mine", vehicle="twin")
     run_jobs(database)
     trial = gainline.fly(campaign.id, gainline.ask(campaign.id))

@@ -65,7 +65,7 @@ def test_a_new_data_folder_is_its_users_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("wide", [0o755, 0o750, 0o701, 0o777])
-def test_a_folder_that_others_may_open_is_narrowed_and_says_so(tmp_path: Path, wide: int) -> None:
+def test_a_folder_that_others_can_open_is_restricted_and_reported(tmp_path: Path, wide: int) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
     folder.chmod(wide)

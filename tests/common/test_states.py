@@ -115,7 +115,7 @@ def test_every_lifecycle_is_drawn_in_its_docstring(kind: type[StrEnum]) -> None:
     assert not missing
 
 
-def test_a_refused_action_says_when_it_is_possible() -> None:
+def test_a_refused_action_states_when_it_is_possible() -> None:
     with pytest.raises(ConflictError, match="only while it is cancelled or failed"):
         check_action(states.JOB_ACTIONS, "retry", states.JobState.DONE, "Job 1")
     assert allowed(states.JOB_ACTIONS, states.JobState.RUNNING) == ["cancel"]

@@ -25,5 +25,7 @@ CHOICE = Option(name="bias", title="Bias", default="outside", choices=("outside"
         (CHOICE, "between", "must be one of outside, inside, got 'between'"),
     ],
 )
-def test_a_setting_says_why_it_cannot_have_a_value(option: Option, value: float | str, reason: str | None) -> None:
+def test_a_setting_gives_the_reason_for_refusing_a_value(
+    option: Option, value: float | str, reason: str | None
+) -> None:
     assert option.refusal(value) == reason

@@ -11,9 +11,7 @@ from tests.builders import create_campaign
 @pytest.mark.parametrize(
     "spoil", ["definition = '{\"experiment\": '", "name = CAST(x'4265ff' AS TEXT)"], ids=["JSON", "text"]
 )
-def test_a_row_that_was_damaged_is_told_as_a_damaged_database(
-    client: TestClient, database: Database, spoil: str
-) -> None:
+def test_a_damaged_row_is_reported_as_a_damaged_database(client: TestClient, database: Database, spoil: str) -> None:
     campaign = create_campaign(client)
     with database.write() as session:
         session.execute(text(f"UPDATE campaign SET {spoil}"))

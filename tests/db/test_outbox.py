@@ -19,12 +19,12 @@ def topics(database: Database, after: int = 0) -> list[tuple[str, int, int | Non
         return [(row.topic, row.entity_id, row.campaign_id) for row in outbox.events_after(session, after, limit=1000)]
 
 
-def test_a_new_campaign_is_told_with_its_vehicle_and_its_job(client: TestClient, database: Database) -> None:
+def test_a_new_campaign_is_published_with_its_vehicle_and_its_job(client: TestClient, database: Database) -> None:
     campaign = create_campaign(client)["id"]
     assert topics(database) == [("vehicle", 1, None), ("campaign", campaign, campaign), ("job", 1, campaign)]
 
 
-def test_a_flight_is_told_step_by_step(client: TestClient, database: Database) -> None:
+def test_the_phases_of_a_flight_are_published_one_by_one(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)["id"]
     with database.read() as session:
         before = outbox.latest_event_id(session)
@@ -45,7 +45,7 @@ def test_a_heartbeat_alone_is_no_change(database: Database) -> None:
     assert len(topics(database)) == before
 
 
-def test_a_deleted_campaign_is_told(client: TestClient, database: Database) -> None:
+def test_a_deleted_campaign_is_published(client: TestClient, database: Database) -> None:
     campaign = create_campaign(client)["id"]
     before = len(topics(database))
     client.delete(f"/api/campaigns/{campaign}?version=1")

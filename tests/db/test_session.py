@@ -89,7 +89,7 @@ def fill_up(database: Database, listen: Listen) -> None:
     listen(database.engine, "connect", limit)
 
 
-def test_a_full_disk_is_said_in_words_and_loses_nothing(database: Database, listen: Listen) -> None:
+def test_a_full_disk_is_reported_in_words_and_loses_nothing(database: Database, listen: Listen) -> None:
     with database.write() as session:
         session.add(JobRow(kind="before", state=JobState.QUEUED))
     fill_up(database, listen)
@@ -99,7 +99,7 @@ def test_a_full_disk_is_said_in_words_and_loses_nothing(database: Database, list
         assert [row.kind for row in session.query(JobRow)] == ["before"]
 
 
-def test_a_locked_database_is_said_in_words(database: Database, listen: Listen) -> None:
+def test_a_locked_database_is_reported_in_words(database: Database, listen: Listen) -> None:
     def hurry(connection: sqlite3.Connection, _entry: object) -> None:
         connection.execute("PRAGMA busy_timeout = 20")
 
@@ -111,7 +111,7 @@ def test_a_locked_database_is_said_in_words(database: Database, listen: Listen) 
             second.execute(text("SELECT 1"))
 
 
-def test_a_file_that_is_no_database_is_said_in_words(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_database_is_reported_in_words(tmp_path: Path) -> None:
     file = tmp_path / "letter.sqlite3"
     file.write_text("Dear Sir or Madam, " * 100)
     with pytest.raises(StorageError, match="is not a Gainline database"), Database(file).read() as session:

@@ -200,9 +200,7 @@ def test_what_cannot_be_compared_is_said_and_can_be_left_out(dashboard: Dashboar
     assert chosen(page) == [one, other]
 
 
-def test_a_flight_whose_campaign_was_deleted_is_said_to_be_gone(
-    dashboard: Dashboard, states: States, flown: Flown
-) -> None:
+def test_a_flight_of_a_deleted_campaign_is_reported_as_gone(dashboard: Dashboard, states: States, flown: Flown) -> None:
     page = dashboard.page
     one, other = flown.early[0], flown.early[2]
     doomed = states.campaign("import", name="Deleted soon")

@@ -332,7 +332,7 @@ def test_every_kind_of_error_has_a_story_that_provokes_it() -> None:
 
 
 @pytest.mark.parametrize("kind", sorted(PROVOKED, key=_name), ids=_name)
-def test_an_error_says_what_happened_and_what_to_do(
+def test_an_error_states_what_happened_and_what_to_do(
     dashboard: Dashboard, shared_server: Server, states: States, kind: type[GainlineError] | str
 ) -> None:
     told: list[Json] = []
@@ -368,7 +368,7 @@ def _is_told(dashboard: Dashboard, told: list[Json], title: str) -> None:
         expect(dashboard.page.locator("body")).to_contain_text(text, use_inner_text=True, ignore_case=True)
 
 
-def test_a_server_that_cannot_be_reached_is_told_with_what_became_of_the_act(
+def test_an_unreachable_server_is_reported_with_the_fate_of_the_request(
     open_dashboard: Opener, shared_server: Server
 ) -> None:
     dashboard = open_dashboard(shared_server.url, alone=True)

@@ -105,7 +105,9 @@ def test_what_changed_before_the_stream_was_there_is_shown(dashboard: Dashboard,
     expect(heading(dashboard, "Renamed meanwhile")).to_be_visible()
 
 
-def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboard: Opener, own_server: Server) -> None:
+def test_a_restarted_server_is_shown_and_its_changes_arrive_automatically(
+    open_dashboard: Opener, own_server: Server
+) -> None:
     """Pages open anyway, because they were fetched before the server was lost."""
     dashboard, other = open_dashboard(own_server.url), open_dashboard(own_server.url)
     campaign_id = dashboard.create("twin", name="Before")
@@ -131,7 +133,7 @@ def test_a_restarted_server_is_told_and_its_news_come_by_themselves(open_dashboa
     expect(dashboard.panel("Flight 1")).to_be_visible()
 
 
-def test_a_killed_worker_is_told_until_it_is_back(dashboard: Dashboard, shared_server: Server) -> None:
+def test_a_killed_worker_is_shown_until_it_is_back(dashboard: Dashboard, shared_server: Server) -> None:
     dashboard.open("/")
     os.kill(shared_server.worker_pid(), signal.SIGKILL)
     expect(dashboard.page.get_by_text("No worker is running.")).to_be_visible(timeout=LOST_MS)
@@ -182,9 +184,7 @@ def test_a_line_that_only_looks_open_is_given_up_and_a_flight_on_it_is_not_shown
     dashboard.post(f"/trials/{dashboard.trials(campaign_id)[0]['id']}/abort")
 
 
-def test_a_page_whose_code_is_gone_says_so_and_comes_on_another_try(
-    open_dashboard: Opener, shared_server: Server
-) -> None:
+def test_a_page_that_failed_to_load_says_so_and_loads_on_retry(open_dashboard: Opener, shared_server: Server) -> None:
     dashboard = open_dashboard(shared_server.url, alone=True)
     dashboard.page.route("**/assets/pages-*.js", lambda route: route.abort())
     dashboard.open("/vehicles")

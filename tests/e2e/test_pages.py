@@ -299,7 +299,7 @@ def test_nothing_can_be_uploaded_to_the_makers_of_the_charts(dashboard: Dashboar
 
 
 @pytest.mark.parametrize("path", ["/campaigns/999999", "/campaigns/abc", "/campaigns/1/flights/999999"])
-def test_an_address_that_leads_nowhere_says_so(dashboard: Dashboard, path: str) -> None:
+def test_an_unknown_address_shows_not_found(dashboard: Dashboard, path: str) -> None:
     dashboard.open(path)
     main = dashboard.page.get_by_role("main")
     expect(main.get_by_text(re.compile("^(There is no|Page not found)")).first).to_be_visible()

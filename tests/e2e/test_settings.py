@@ -87,7 +87,7 @@ def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
     assert found == ("Worth keeping",)
 
 
-def test_a_backup_that_is_refused_says_why_instead_of_failing_as_a_download(dashboard: Dashboard) -> None:
+def test_a_refused_backup_shows_the_reason_instead_of_a_failed_download(dashboard: Dashboard) -> None:
     dashboard.open("/settings")
     problem = {"title": "Storage trouble", "status": 507, "detail": "There is too little disk space for a copy.",
                "hint": "Free some disk space."}  # fmt: skip
@@ -145,7 +145,7 @@ def test_slash_leads_to_the_search_and_a_question_mark_in_it_is_a_question_mark(
     expect(dashboard.page.get_by_role("dialog", name="Keyboard shortcuts")).to_be_hidden()
 
 
-def test_a_flight_is_told_to_screen_readers_always_and_aloud_once_that_is_switched_on(
+def test_screen_readers_always_get_announcements_and_speech_only_when_switched_on(
     open_dashboard: Opener, shared_server: Server, states: States
 ) -> None:
     dashboard = open_dashboard(shared_server.url, alone=True)

@@ -35,7 +35,7 @@ def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(
     )
 
 
-def test_a_fitted_vehicle_is_told_with_its_standard_errors(dashboard: Dashboard, states: States) -> None:
+def test_fitted_parameters_are_shown_with_their_standard_errors(dashboard: Dashboard, states: States) -> None:
     campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
     dashboard.open_campaign(campaign_id)
     why = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["explanation"]

@@ -36,7 +36,7 @@ def notice(dashboard: Dashboard) -> None:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("viewport", [TABLET, PHONE], ids=["tablet", "phone"])
-def test_a_browser_that_was_not_unlocked_says_on_every_page_of_a_real_vehicle_that_it_may_only_watch(
+def test_every_page_of_a_real_vehicle_shows_that_a_locked_browser_may_only_watch(
     open_dashboard: Opener, shared_server: Server, states: States, bee: int, theme: Theme, viewport: Viewport
 ) -> None:
     campaign = states.campaign("mavlink", name="Up to 3 m", vehicle_id=bee)
@@ -71,7 +71,7 @@ def test_opening_the_link_in_another_tab_unlocks_the_page_that_one_comes_back_to
     expect(dashboard.page.get_by_text("has read-only access")).to_have_count(0)
 
 
-def test_a_spent_link_says_so_and_how_to_get_another(open_dashboard: Opener, shared_server: Server) -> None:
+def test_a_used_link_shows_how_to_get_another(open_dashboard: Opener, shared_server: Server) -> None:
     dashboard = open_dashboard(shared_server.url, unlocked=False)
     dashboard.page.goto("/unlock?token=spent")
     expect(dashboard.page.get_by_role("heading", name="This link has been used or has expired")).to_be_visible()

@@ -50,7 +50,7 @@ def test_an_invalid_flight_is_a_cross_and_never_the_best() -> None:
     assert card.summary == "Best error 0.200 m in flight 3, 33 % below flight 1."
 
 
-def test_a_flight_that_nobody_has_judged_is_no_flight_that_does_not_count() -> None:
+def test_an_unreviewed_flight_is_not_an_excluded_one() -> None:
     flights = (flight(1, 0.3), flight(2, None, outcome="lost"), flight(3, None, outcome="not yet judged"))
     card = ErrorsFigure(history(*flights)).compute()
     assert (trace(card, "not counted")["x"], trace(card, "not yet judged")["x"]) == ([2], [3])

@@ -43,7 +43,7 @@ def test_an_imported_flight_without_commands_uses_the_whole_height() -> None:
     assert layout(card)["yaxis"]["domain"] == [0.0, 1.0]
 
 
-def test_a_flight_without_a_record_says_so() -> None:
+def test_a_flight_without_a_record_is_shown_as_such() -> None:
     assert FlightFigure(replace(RECORD, curve=None)).not_ready() == "There is no record of this flight yet."
 
 

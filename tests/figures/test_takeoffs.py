@@ -47,7 +47,7 @@ def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
     assert entries == ["Set point", "Reference", "Flight 5 · best", "Earlier", "Not counted"]
 
 
-def test_a_flight_that_nobody_has_judged_is_not_drawn_like_one_that_does_not_count() -> None:
+def test_an_unreviewed_flight_is_not_drawn_like_an_excluded_one() -> None:
     card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet judged"))).compute()
     drawn = trace(card, "flight", trial=2)
     assert (drawn["name"], drawn["meta"]["standing"], drawn["line"]["dash"]) == (

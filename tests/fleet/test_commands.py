@@ -94,7 +94,7 @@ def test_the_offered_actions_are_the_possible_ones(
     assert set(seen(client, vehicle)["actions"]) == possible - ({"fly"} if real else set())
 
 
-def test_a_connection_pins_the_identity_and_tells_the_gains(client: TestClient, database: Database) -> None:
+def test_a_connection_pins_the_identity_and_reports_the_gains(client: TestClient, database: Database) -> None:
     vehicle = create_connected(client, database)
     assert (vehicle["state"], vehicle["held"], vehicle["concern"]) == ("ready", DEFAULT_GAINS, "")
     act = newest(client, vehicle)

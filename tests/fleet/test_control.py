@@ -51,7 +51,7 @@ def test_control_lasts_as_long_as_it_is_renewed(client: TestClient, database: Da
     assert seen(client, vehicle)["control"] is None
 
 
-def test_a_renewal_is_told_to_nobody(client: TestClient, database: Database) -> None:
+def test_a_renewal_is_not_published(client: TestClient, database: Database) -> None:
     vehicle = register(client)
     lease = take_control(client, vehicle).json()
     with database.read() as session:

@@ -258,7 +258,7 @@ def test_a_flight_that_no_worker_has_begun_can_be_aborted(client: TestClient, da
     assert (again.status_code, again.json()["accepted"]) == (202, True)
 
 
-def test_an_abort_that_no_worker_hears_says_so(client: TestClient, database: Database) -> None:
+def test_an_abort_that_reaches_no_worker_is_reported(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     lift_off(database)
@@ -280,7 +280,7 @@ def test_a_trial_cancelled_while_it_is_staged_does_not_lift_off(client: TestClie
     assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
 
 
-def test_a_gap_makes_a_flight_invalid_until_somebody_says_otherwise(client: TestClient, database: Database) -> None:
+def test_a_gap_makes_a_flight_invalid_until_a_person_classifies_it(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import")
     trial = create_trial(client, campaign["id"])
     uploaded = client.post(

@@ -286,7 +286,7 @@ def test_a_real_flight_keeps_its_battery_and_waits_for_a_persons_class(
     assert (flown["flight"]["battery_v_before"], flown["flight"]["battery_v_after"]) == (11.5, 10.75)
 
 
-def test_a_measurement_that_is_no_good_is_suggested_for_a_real_flight_and_said_of_a_simulated_one(
+def test_an_unusable_measurement_suggests_invalid_for_a_real_flight_and_makes_a_simulated_one_invalid(
     client: TestClient, database: Database, real: Json, planned: Json
 ) -> None:
     void = create_record(ending="invalid", reason="the clock stood still for 0.3 s")

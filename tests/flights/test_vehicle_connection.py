@@ -98,7 +98,7 @@ def told(answer: Future[str]) -> str:
     return answer.result(PATIENCE_S)
 
 
-def test_an_order_is_carried_out_when_the_process_says_so_and_not_before(tmp_path: Path) -> None:
+def test_a_command_counts_as_executed_only_once_the_process_confirms_it(tmp_path: Path) -> None:
     with session(is_busy, tmp_path) as (one, heard):
         land = one.send_command("land", "it drifts", 1.0)
         assert not land.done()

@@ -39,7 +39,7 @@ from app.vehicles.kinds import Options
 from app.vehicles.mavlink.dialects import PAPARAZZI, Message
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
-from bench.hazards.hostility import Speaker
+from bench.hazards.hostile_links import MessageForger
 from tests.vehicles.flying import SAFE, TUNED
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.test_connected import START_ENGINE, TAKE_OFF
@@ -275,7 +275,7 @@ def stops_told_s(rig: AnsweringRig) -> list[float]:
         (ActKind.RELEASE, "PARAM_SET"),
     ],
 )
-def test_an_order_is_carried_out_at_once_and_ends_the_act_under_way(
+def test_a_command_is_executed_at_once_and_ends_the_act_in_progress(
     rig: AnsweringRig, tmp_path: Path, kind: ActKind, while_it_hears: str
 ) -> None:
     line = RecordingPipe()
@@ -386,9 +386,7 @@ def left_alone(process: VehicleProcess, line: RecordingPipe, rig: AnsweringRig, 
     return rig.now_s() - begun_s
 
 
-def test_a_vehicle_that_has_not_heard_land_yet_is_told_also_after_the_worker_died(
-    rig: AnsweringRig, tmp_path: Path
-) -> None:
+def test_land_is_repeated_after_the_worker_died_until_the_vehicle_responds(rig: AnsweringRig, tmp_path: Path) -> None:
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
     in_the_air(rig, process)
@@ -398,7 +396,7 @@ def test_a_vehicle_that_has_not_heard_land_yet_is_told_also_after_the_worker_die
 
 
 @pytest.mark.parametrize("silenced", [{"deaf_until_s": math.inf}, {"muted": True}], ids=["never obeys", "falls silent"])
-def test_a_vehicle_in_the_air_that_does_not_show_that_it_obeys_is_told_for_a_minute(
+def test_a_vehicle_in_the_air_that_does_not_respond_gets_the_command_for_a_minute(
     rig: AnsweringRig, tmp_path: Path, silenced: dict[str, float | bool]
 ) -> None:
     line = RecordingPipe()
@@ -417,8 +415,8 @@ def test_one_heartbeat_that_reports_it_disarmed_does_not_end_land_after_the_work
     process = started(rig, line, tmp_path)
     in_the_air(rig, process)
     rig.deaf_until_s = math.inf
-    speaker = Speaker("paparazzi", PAPARAZZI, rig.drone, random.Random(1))
-    once = [speaker.heartbeat(speaker.codec(speaker.own, 200), armed=False, mode=(4, 0))]
+    forger = MessageForger("paparazzi", PAPARAZZI, rig.drone, random.Random(1))
+    once = [forger.heartbeat(forger.codec(forger.own, 200), armed=False, mode=(4, 0))]
     since_s = rig.now_s()
 
     def arriving(frames: list[bytes]) -> list[bytes]:

@@ -86,7 +86,7 @@ def test_a_job_that_kills_its_workers_is_failed_after_three_times(database: Data
     assert found.problem.title == "The worker stopped 3 times during this job."
 
 
-def test_a_failed_job_says_why_and_can_be_retried(client: TestClient, database: Database) -> None:
+def test_a_failed_job_shows_the_reason_and_can_be_retried(client: TestClient, database: Database) -> None:
     campaign = create_campaign(client)
     job = claim(database)
     assert job is not None

@@ -175,7 +175,7 @@ def test_an_abort_reaches_the_worker_and_its_answer_comes_back(tmp_path: Path) -
     assert asked == [(2, "too high"), (3, "too high")]
 
 
-def test_an_order_to_a_vehicle_reaches_the_worker_and_says_whether_it_has_that_vehicle(tmp_path: Path) -> None:
+def test_a_command_reaches_the_worker_which_reports_whether_it_has_that_vehicle(tmp_path: Path) -> None:
     given: list[tuple[int, VehicleCommandKind, str]] = []
 
     def order(vehicle_id: int, what: VehicleCommandKind, reason: str, _by_s: float) -> Future[str]:
@@ -194,7 +194,7 @@ def test_an_order_to_a_vehicle_reaches_the_worker_and_says_whether_it_has_that_v
     assert given == [(5, "land", "it drifts"), (6, "motors off", "it burns")]
 
 
-def test_what_comes_after_its_time_is_not_carried_out(tmp_path: Path) -> None:
+def test_a_late_command_is_not_executed(tmp_path: Path) -> None:
     """Seen: the worker stood still for 20 s, motors off was answered “could not be told”, and was carried out later."""
     done: list[str] = []
     path = tmp_path / "w.sock"
@@ -256,7 +256,7 @@ def test_an_order_is_acknowledged_once_the_vehicles_process_has_taken_it_and_hol
     asyncio.run(scenario())
 
 
-def test_an_order_that_nobody_takes_is_told_to_be_not_carried_out(
+def test_a_command_that_no_process_takes_is_reported_as_not_executed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(client_module, "ORDER_TIMEOUT_S", 0.05)
@@ -303,7 +303,7 @@ def test_a_worker_that_stands_still_is_noticed_and_one_that_goes_on_too(
     asyncio.run(scenario())
 
 
-def test_an_abort_without_a_worker_says_so_at_once(tmp_path: Path) -> None:
+def test_an_abort_without_a_worker_fails_at_once(tmp_path: Path) -> None:
     async def scenario() -> None:
         async with connected(tmp_path / "w.sock") as web:
             with pytest.raises(LinkDownError, match="no worker is running"):

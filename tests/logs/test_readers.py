@@ -98,7 +98,7 @@ def test_any_companion_is_read_or_refused_in_words(companion: bytes) -> None:
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES[1:])
-def test_a_file_that_is_not_what_its_name_says_is_refused_by_its_name(suffix: str) -> None:
+def test_a_file_with_the_wrong_extension_is_refused_by_name(suffix: str) -> None:
     for content, reason in ((b"", "is empty"), (b"time_s,altitude_m\n0,0\n", "does not start like")):
         with pytest.raises(
             TrajectoryError, match=rf"flight\{suffix} does not match its file extension. file: {reason}"

@@ -141,7 +141,7 @@ def test_other_autopilots_begin_with_the_command_that_they_accepted(
     assert any("altitude relative to the ground" in note for note in flown.notes)
 
 
-def test_a_mode_that_a_heartbeat_tells_after_the_command_does_not_end_the_flight() -> None:
+def test_a_mode_in_a_heartbeat_right_after_the_command_does_not_end_the_flight() -> None:
     log = Telemetry(ardupilotmega, autopilot=3)
     log.heartbeat(mode=0)
     log.fly(1.0, to_m=0.0)

@@ -65,7 +65,7 @@ def test_a_gain_that_is_changed_in_flight_ends_the_record() -> None:
     assert flown.begins_with == "lift-off"
 
 
-def test_dropouts_are_told() -> None:
+def test_dropouts_are_reported() -> None:
     flown = read_takeoff(io.BytesIO(small_log(after=message("O", struct.pack("<H", 300)))))
     assert "the logger dropped data 1 times, 0.30 s in total" in flown.notes
 

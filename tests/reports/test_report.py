@@ -221,7 +221,7 @@ def test_without_a_browser_the_pdf_is_refused_in_words(
     assert "HTML" in answer.json()["hint"]
 
 
-def test_a_browser_that_fails_is_told_of_in_words(
+def test_a_failing_browser_is_reported_in_words(
     client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     in_path("exit 7", monkeypatch, tmp_path)

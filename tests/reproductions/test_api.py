@@ -127,7 +127,7 @@ def test_progress_is_told_with_an_estimate(client: TestClient, database: Databas
         assert not jobs.report_progress(session, job_id, 0.5, "", worker="another", lease_s=30.0)
 
 
-def test_a_failed_run_says_why_beside_the_older_result_until_a_newer_one(
+def test_a_failed_run_shows_its_reason_beside_the_older_result_until_a_newer_one(
     client: TestClient, database: Database
 ) -> None:
     ask(client)

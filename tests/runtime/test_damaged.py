@@ -40,7 +40,7 @@ COMMANDS = {
     "table", ["campaign", *(pytest.param(one, marks=pytest.mark.complete) for one in ("event", "alembic_version"))]
 )
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_says_that_the_database_is_damaged(
+def test_every_command_reports_a_damaged_database(
     migrated_file: Path, tmp_path: Path, command: str, table: str
 ) -> None:
     damaged(migrated_file, tmp_path / "data", table)

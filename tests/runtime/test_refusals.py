@@ -71,7 +71,7 @@ def test_a_second_worker_on_the_same_database_is_refused_and_the_first_goes_on(s
     serving.trial(serving.fly(serving.campaign()), "valid")
 
 
-def test_a_worker_without_a_database_says_what_to_run(tmp_path: Path) -> None:
+def test_a_worker_without_a_database_prints_what_to_run(tmp_path: Path) -> None:
     refused = gainline("worker", "--data-dir", str(tmp_path))
     assert refused.returncode == 1
     assert "gainline serve" in refused.stderr

@@ -102,7 +102,7 @@ def test_a_vehicle_that_falls_silent_is_shown_as_gone_and_comes_back_by_itself(s
 
 
 @pytest.mark.complete
-def test_a_vehicle_whose_session_is_killed_in_the_air_is_found_armed_and_only_told_to_land(serving: Serving) -> None:
+def test_a_vehicle_whose_process_is_killed_in_the_air_is_found_armed_and_only_gets_land(serving: Serving) -> None:
     with connected(serving, "Orphan") as (vehicle, _):
         trial_id = vehicle.planned(vehicle.campaign())
         vehicle.in_the_air(trial_id)

@@ -79,7 +79,7 @@ def test_from_4_7_on_the_gains_have_other_names_and_a_tenth_of_the_value() -> No
     assert pilot.height_m() == pytest.approx(3.0, abs=0.1)
 
 
-def test_before_it_knows_where_it_is_it_refuses_to_arm_and_says_why(pilot: ArduPilot) -> None:
+def test_without_a_position_it_refuses_to_arm_and_gives_the_reason(pilot: ArduPilot) -> None:
     assert pilot.command(ARM, 1.0) == 4
     assert pilot.words() == ["Arm: Need Position Estimate"]
     pilot.arm()

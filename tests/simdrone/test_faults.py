@@ -22,7 +22,7 @@ def sequence_steps(messages: list[Heard]) -> set[int]:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_every_fault_says_what_it_does(name: str) -> None:
+def test_every_fault_has_a_description(name: str) -> None:
     assert FAULTS[name].__doc__
     assert FAULTS[name].name == name
 
@@ -187,7 +187,7 @@ def test_packets_may_come_from_another_system() -> None:
     assert systems[-1] == 31
 
 
-def test_a_deaf_drone_obeys_nothing_and_tells_on() -> None:
+def test_a_deaf_drone_ignores_all_commands_and_keeps_sending() -> None:
     ground = flying("paparazzi", faults=["deaf:4@6"])
     pilot = Pilot(ground)
     pilot.hover()

@@ -78,7 +78,7 @@ def heights(messages: list[Heard]) -> tuple[np.ndarray[tuple[int], np.dtype[np.f
 
 
 @pytest.mark.parametrize("recording", ["paparazzi_283_13_82.tlog", "paparazzi_1624_1356_195.tlog"])
-def test_a_recorded_trial_said_again_is_answered_and_flown_as_it_was(recording: str) -> None:
+def test_a_replayed_recorded_trial_gets_the_same_answers_and_flight(recording: str) -> None:
     real = recorded(recording)
     ours = replayed(recording)
     assert answers(ours) == answers(real)

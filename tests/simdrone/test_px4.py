@@ -66,7 +66,7 @@ def test_every_failsafe_is_off_until_it_is_switched_on(pilot: Px4) -> None:
     assert (integer(action.param_value), fence.param_value) == (0, 0.0)
 
 
-def test_before_it_knows_where_it_is_it_refuses_to_arm_and_says_why(pilot: Px4) -> None:
+def test_without_a_position_it_refuses_to_arm_and_gives_the_reason(pilot: Px4) -> None:
     assert pilot.command(ARM, 1.0) == 1
     assert pilot.words() == ["Arming denied: resolve system health failures first"]
 
@@ -125,7 +125,7 @@ def test_heartbeats_of_no_ground_station_do_not_keep_it_in_the_air(pilot: Px4) -
 
 
 @pytest.mark.parametrize(("action", "mode"), [(5, LANDING), (2, LOITER)])
-def test_a_breached_fence_does_what_its_action_says(action: int, mode: int, pilot: Px4) -> None:
+def test_a_breached_fence_triggers_its_action(action: int, mode: int, pilot: Px4) -> None:
     pilot.set("GF_ACTION", bytewise(action), INT32)
     pilot.set("GF_MAX_VER_DIST", 2.0)
     pilot.set("MIS_TAKEOFF_ALT", 4.0)

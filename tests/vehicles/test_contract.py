@@ -27,7 +27,7 @@ def same(one: Trajectory, other: Trajectory) -> bool:
     )
 
 
-def test_a_vehicle_says_what_it_is(kind: str, vehicle: Vehicle) -> None:
+def test_a_vehicle_reports_its_identity(kind: str, vehicle: Vehicle) -> None:
     assert vehicle.kind == kind
     assert vehicle.is_real == VEHICLE_KINDS[kind].is_real
     assert vehicle.safe_gains == PROFILES[kind].safe
@@ -70,7 +70,7 @@ def test_a_flight_leaves_known_channels_at_one_rate_past_the_scored_window(kind:
     assert flight.time_s[-1] >= PROFILES[kind].scored_until_s
 
 
-def test_a_vehicle_flies_the_experiments_it_says(kind: str) -> None:
+def test_a_vehicle_flies_the_experiments_that_it_declares(kind: str) -> None:
     assert PROFILES[kind].experiment.name in VEHICLE_KINDS[kind].experiments
 
 

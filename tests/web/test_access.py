@@ -88,7 +88,7 @@ def test_a_link_is_exchanged_for_a_cookie_that_no_script_and_no_other_site_can_u
     assert client.post("/api/vehicles", json=REAL).status_code == 201
 
 
-def test_a_spent_link_unlocks_nobody_else_and_says_how_to_get_another(
+def test_a_used_link_unlocks_no_other_browser_and_shows_how_to_get_another(
     client: TestClient, stranger: TestClient, settings: Settings
 ) -> None:
     link = new_link(settings.data_dir)
@@ -303,7 +303,7 @@ def changes(application: FastAPI) -> list[tuple[str, str]]:
     ]
 
 
-def test_every_change_that_the_api_knows_is_refused_to_a_stranger(application: FastAPI, neighbour: TestClient) -> None:
+def test_every_change_in_the_api_is_refused_to_a_stranger(application: FastAPI, neighbour: TestClient) -> None:
     found = changes(application)
     assert len(found) > 30
     for method, path in found:

@@ -36,7 +36,7 @@ def test_names_of_every_language_are_taken(client: TestClient, name: str) -> Non
     assert create_campaign(client, name=name)["name"] == name
 
 
-def test_each_control_character_is_told_once() -> None:
+def test_each_control_character_is_reported_once() -> None:
     assert find_control_characters("a\x1bb\x00c\x1b") == ("U+0000", "U+001B")
 
 

@@ -130,7 +130,7 @@ def test_a_backup_is_a_database_with_the_same_rows(client: TestClient, settings:
     assert [left.name for left in settings.data_dir.iterdir() if left.name.startswith("backup-")] == []
 
 
-def test_a_backup_taken_while_somebody_writes_holds_what_was_committed_and_stops_nobody(
+def test_a_backup_during_writes_has_the_committed_rows_and_blocks_no_writer(
     client: TestClient, database: Database, tmp_path: Path
 ) -> None:
     create_campaign(client, name="Committed")

@@ -97,7 +97,7 @@ def test_saying_that_it_was_something_else_changes_no_proposal(
     assert not proposal(client, campaign)["stale"]
 
 
-def test_a_limit_that_the_program_keeps_counts_and_nobody_says_otherwise(
+def test_an_abort_at_a_limit_always_counts_against_the_gains(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
     trial = aborted(client, database, campaign, on_request=False)

@@ -171,7 +171,7 @@ def test_trials_come_page_by_page_with_the_best_before_each(client: TestClient, 
     assert client.get(f"{path}?limit=201").status_code == 422
 
 
-def test_a_trial_tells_what_its_vehicle_and_its_record_were(client: TestClient, database: Database) -> None:
+def test_a_trial_shows_its_vehicle_and_the_source_of_its_record(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     trial = create_flown_trial(client, database, campaign["id"])
     assert trial["settings"] == {}

@@ -95,5 +95,5 @@ def test_throttle_mode_passes_the_thrust_through_and_keeps_the_last_commands() -
     assert state[[Z_REF, ZD_REF, ZDD_REF, Z_SUM_ERR]].tolist() == [-100, 5, 0, 0]
 
 
-def test_a_trace_knows_its_length() -> None:
+def test_a_trace_has_a_length() -> None:
     assert len(LoopTrace(np.zeros((5, 9), dtype=np.int64), np.zeros((5, 7), dtype=np.int64))) == 5

@@ -43,7 +43,7 @@ def test_the_other_source_comes_back_on_the_record_s_times_and_datum() -> None:
     assert apart.rms_m < 0.002
 
 
-def test_a_source_that_drifts_is_told_by_how_far_and_when_it_was_furthest_away() -> None:
+def test_a_drifting_source_is_reported_with_the_largest_difference_and_its_time() -> None:
     other_m = climb_m(VEHICLE_S) + np.interp(VEHICLE_S, (10.0, 20.0, 20.1), (0.0, -0.5, 0.0))
     apart = compare(VEHICLE_S, climb_m(VEHICLE_S), other_m)
     assert apart.largest_m == pytest.approx(0.5, abs=0.01)

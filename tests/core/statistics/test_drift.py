@@ -18,7 +18,7 @@ def test_a_change_within_the_interval_is_no_drift() -> None:
     assert not drift(hover(0.6, 0.003), hover(0.6097, 0.004)).due
 
 
-def test_a_change_beyond_the_interval_makes_a_re_tune_due_and_is_told() -> None:
+def test_a_change_beyond_the_interval_makes_a_re_tune_due_and_is_reported() -> None:
     found = drift(hover(0.6, 0.003), hover(0.6099, 0.004))
     assert (found.due, found.drifted) == (True, ("hover_throttle",))
     assert found.sentence == (

@@ -74,7 +74,7 @@ def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided
     )
 
 
-def test_an_undecided_comparison_goes_on_until_the_budget_ends_and_says_what_would_decide() -> None:
+def test_an_undecided_comparison_continues_until_the_budget_ends_and_states_what_would_decide() -> None:
     runs = [(1, 0.200), (2, 0.195), (2, 0.197), (1, 0.199)]
     found = confirm(NOISE, QuadraticExperiment(), flown(*runs), proposed("none"))
     assert found.phase == "repeat"

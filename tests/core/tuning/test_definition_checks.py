@@ -83,7 +83,7 @@ def test_each_unusable_field_is_named_with_its_reason(definition: Definition, fi
     assert [(problem.field, problem.reason) for problem in problems_of(definition)] == [(field, reason)]
 
 
-def test_all_problems_are_told_at_once() -> None:
+def test_all_problems_are_reported_at_once() -> None:
     with pytest.raises(InputError) as refusal:
         check_definition(replace(GOOD, strategy="luck", seed=-1, step_fraction=0.0))
     assert [problem.field for problem in refusal.value.problems] == ["strategy", "step_fraction", "seed"]

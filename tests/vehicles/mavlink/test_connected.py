@@ -67,7 +67,7 @@ def attend_until(vehicle: MavlinkVehicle, condition: Callable[[], bool], within_
     raise AssertionError(f"still {vehicle.condition()}")
 
 
-def test_a_connected_vehicle_tells_who_it_is_and_how_it_is() -> None:
+def test_a_connected_vehicle_reports_its_identity_and_state() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         vehicle.attend(2.0)
         condition = vehicle.condition()
@@ -132,7 +132,7 @@ def test_another_vehicle_of_the_same_make_and_version_is_only_observed_until_a_p
             assert vehicle.stage(OWN_SAFE[autopilot]) == OWN_SAFE[autopilot]
 
 
-def test_a_vehicle_that_does_not_tell_its_known_hardware_id_is_given_nothing_until_a_person_releases_it() -> None:
+def test_a_vehicle_that_does_not_report_its_known_hardware_id_gets_no_gains_until_released() -> None:
     """Another one whose answer is lost, or a firmware that tells it no more."""
     with LockstepRig("px4") as rig:
         rig.drone.autopilot.uid = 0  # type: ignore[attr-defined]
@@ -151,7 +151,7 @@ def test_a_vehicle_that_does_not_tell_its_known_hardware_id_is_given_nothing_unt
             assert not [item for item in vehicle.check() if item.name == "hardware_id"]
 
 
-def test_a_hardware_id_that_is_told_for_the_first_time_is_the_vehicles_own_from_then_on() -> None:
+def test_the_first_hardware_id_reported_is_pinned() -> None:
     """Pinned by a release that did not look at it."""
     with LockstepRig("px4") as rig:
         autopilot = rig.drone.autopilot
@@ -537,7 +537,7 @@ def test_a_flight_plan_that_lands_by_its_own_exception_is_landed_with() -> None:
         assert rig.drone.body.stands
 
 
-def test_a_log_that_cannot_be_written_is_told_and_the_one_before_goes_on(tmp_path: Path) -> None:
+def test_a_log_that_cannot_be_written_is_reported_and_the_previous_one_continues(tmp_path: Path) -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         vehicle.log_to(tmp_path / "first.tlog")
         with pytest.raises(VehicleError, match="cannot be written"):

@@ -38,7 +38,7 @@ def fly(vehicle: MavlinkVehicle, autopilot: str) -> FlightRecord:
     return vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
 
 
-def test_an_ardupilot_that_tells_nothing_unasked_flies_all_the_same() -> None:
+def test_an_ardupilot_that_sends_only_requested_messages_can_be_flown() -> None:
     """Seen on a direct link: “no voltage told”, for nobody had asked for SYS_STATUS."""
     with ready("ardupilot") as rig:
         rig.wait_s(3.0)
@@ -299,7 +299,7 @@ def test_a_persons_land_always_goes_and_is_not_repeated_to_a_vehicle_whose_motor
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
-def test_a_vehicle_whose_own_checks_do_not_pass_is_not_flown_and_the_whole_reason_is_told(autopilot: str) -> None:
+def test_a_vehicle_whose_own_checks_fail_is_not_flown_and_all_reasons_are_reported(autopilot: str) -> None:
     with LockstepRig(autopilot, faults=["arm-refused@connect"]) as rig:
         rig.switch_on_failsafes()
         with connected(rig) as vehicle:
@@ -329,7 +329,7 @@ def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events:
             assert own.hint.endswith("QGroundControl shows the reasons in full.")
 
 
-def test_a_px4_says_in_which_mode_it_would_arm() -> None:
+def test_a_px4_reports_in_which_mode_it_would_arm() -> None:
     with LockstepRig("px4") as rig, connected(rig) as vehicle:
         vehicle.attend(4.0)
         mode = next(each for each in rig.drone.autopilot.firmware.modes if each.name == "POSCTL")  # type: ignore[attr-defined]

@@ -144,7 +144,7 @@ def test_a_landing_that_is_obeyed_is_no_trouble() -> None:
         assert troubles == {""}
 
 
-def test_a_heartbeat_that_tells_home_is_a_finding_of_its_own() -> None:
+def test_a_heartbeat_in_home_mode_is_a_separate_finding() -> None:
     make = old_plan(max_distance_m=4.0, sends_mode=True)
     with LockstepRig(make=make, faults=["carried-away:3@8"]) as rig, connected(rig) as vehicle:
         record = fly(vehicle)

@@ -89,7 +89,7 @@ def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
 
 
-def test_a_flight_plan_that_lands_from_its_own_ceiling_speaks_against_the_gains() -> None:
+def test_a_flight_plan_that_lands_at_its_own_altitude_limit_counts_against_the_gains() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.climb_rate_m_s = 1.0
     walk.pass_s(1.4).hear(BlockEntered(LAND_BLOCK))
@@ -98,7 +98,7 @@ def test_a_flight_plan_that_lands_from_its_own_ceiling_speaks_against_the_gains(
     assert walk.gains_sent[0] == walk.plan.safe_gains[0]
 
 
-def test_a_flight_plan_that_goes_where_nobody_sent_it_is_told_to_land() -> None:
+def test_a_flight_plan_that_changes_block_by_itself_gets_land() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.hear(BlockEntered(STANDBY)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
@@ -210,7 +210,7 @@ def test_land_is_not_repeated_while_the_newest_heartbeat_tells_of_a_pilot(state:
     assert walk.trial.why.count("The vehicle entered mode 64.") == 1
 
 
-def test_a_record_is_not_ended_while_the_newest_heartbeat_tells_of_a_pilot() -> None:
+def test_a_record_is_not_ended_while_the_newest_heartbeat_shows_a_pilot() -> None:
     walk = TrialDriver().lift_off()
     while walk.boot_s < (walk.trial.commanded_boot_s or 0.0) + PLAN.record_s - 0.2:
         walk.pass_s(STEP_S)
@@ -293,7 +293,7 @@ def test_a_pilot_who_takes_a_vehicle_on_the_ground_has_it() -> None:
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.TAKEN_OVER)
 
 
-def test_a_vehicle_whose_second_source_is_off_before_the_command_is_not_told_to_climb() -> None:
+def test_a_vehicle_whose_second_source_differs_before_the_command_gets_no_take_off() -> None:
     walk = TrialDriver()
     walk.give(ActionDone(Action.ARM, walk.now_s))
     walk.armed = True

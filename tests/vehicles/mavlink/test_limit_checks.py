@@ -177,7 +177,7 @@ def test_a_battery_is_low_after_a_second_below_the_limit() -> None:
     assert limit_checks.find_battery(told(watch, Battery(10.6), at_s=10.9), 11.2) is None
 
 
-def test_a_battery_that_says_nothing_for_ten_seconds_counts_as_low() -> None:
+def test_a_battery_without_a_reading_for_ten_seconds_counts_as_low() -> None:
     watch = told(watch_of(3.0), Battery(12.0), at_s=10.1)
     assert limit_checks.find_battery(watch, 20.0) is None
     silent = limit_checks.find_battery(watch, 20.2)

@@ -164,7 +164,9 @@ def test_another_vehicle_with_its_system_id_on_another_host_makes_the_link_doubt
         assert becomes(lambda: bool(link.duplicate_reason))
 
 
-def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(paparazzi: FakeVehicleEndpoint) -> None:
+def test_a_vehicle_that_returns_from_another_port_is_received_and_commanded_again(
+    paparazzi: FakeVehicleEndpoint,
+) -> None:
     clock = ManualClock()
     with (
         Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
@@ -183,7 +185,7 @@ def test_a_vehicle_that_comes_back_from_another_port_is_heard_and_told_again(pap
         assert link.duplicate_reason == ""
 
 
-def test_another_component_is_handed_on_but_is_no_sign_of_the_autopilots_life(
+def test_messages_of_another_component_do_not_count_as_the_autopilots(
     paparazzi: FakeVehicleEndpoint, link: Link
 ) -> None:
     paparazzi.send(heartbeat(paparazzi, autopilot=9))
@@ -309,7 +311,7 @@ def test_overtaken_and_repeated_packets_are_not_losses() -> None:
     assert losses.lost == 1
 
 
-def test_a_program_that_does_not_listen_loses_the_oldest_and_is_told(
+def test_a_slow_reader_loses_the_oldest_packets_and_is_notified(
     paparazzi: FakeVehicleEndpoint, link: Link, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert MAX_QUEUED_MESSAGES >= 50 * 60  # a minute of telemetry at least
@@ -475,7 +477,9 @@ def test_what_was_sent_before_closing_still_leaves(paparazzi: FakeVehicleEndpoin
     link.close()  # again is harmless
 
 
-def test_a_closed_link_hands_over_what_it_heard_and_then_says_that_it_is_closed(paparazzi: FakeVehicleEndpoint) -> None:
+def test_a_closed_link_returns_what_it_received_and_then_reports_that_it_is_closed(
+    paparazzi: FakeVehicleEndpoint,
+) -> None:
     link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
     paparazzi.say("LOCAL_POSITION_NED", **position(20))
     assert becomes(lambda: link.health.received == 1)
@@ -506,7 +510,7 @@ class BrokenClock(ScaledClock):
         return super().now_s()
 
 
-def test_a_link_whose_thread_fails_says_so_to_everybody(
+def test_a_link_whose_thread_fails_reports_it_to_all_users(
     paparazzi: FakeVehicleEndpoint, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reported: list[str] = []

@@ -287,7 +287,7 @@ def test_a_command_under_way_is_no_answer_yet() -> None:
     )
 
 
-def test_a_breached_fence_is_told() -> None:
+def test_a_breached_fence_is_reported() -> None:
     known = {"breach_count": 1, "breach_type": 2, "breach_time": 0}
     assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=1, **known) == FenceBreach("its greatest altitude")
     assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=0, **known) is None
@@ -350,7 +350,7 @@ def test_motors_off_at_any_height_is_the_one_command_that_is_forced() -> None:
     assert sent(PAPARAZZI, Action.KILL, aim()) == sent(PAPARAZZI, Action.MOTORS_OFF, aim())
 
 
-def test_a_gimbal_or_a_companion_computer_on_board_does_not_speak_for_the_autopilot() -> None:
+def test_a_gimbal_or_a_companion_computer_is_not_taken_for_the_autopilot() -> None:
     said: dict[str, FieldValue] = {"base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3}
     for profile in PROFILES.values():
         for kind in (6, 18, 26, 30):
@@ -361,7 +361,7 @@ def test_a_gimbal_or_a_companion_computer_on_board_does_not_speak_for_the_autopi
 
 @pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("field", ["x", "y", "z", "vz"])
-def test_what_is_no_number_is_no_position(field: str, nothing: float) -> None:
+def test_values_that_are_not_numbers_are_not_a_position(field: str, nothing: float) -> None:
     sample: dict[str, FieldValue] = {
         "time_boot_ms": 1000,
         "x": 0.0,

@@ -68,7 +68,7 @@ def test_the_cameras_altitude_is_scored_on_their_own_times_and_the_vehicle_is_be
     assert Takeoff().error(both) == pytest.approx(Takeoff().error(own_record()), rel=0.01)
 
 
-def test_a_source_that_drifts_away_is_told_in_words_and_numbers_and_shown_as_a_glitch() -> None:
+def test_a_drifting_source_is_described_and_shown_as_a_glitch() -> None:
     drift_m = np.interp(np.arange(-2.5, 35.0, 0.01), (10.0, 14.0, 14.1), (0.0, 0.5, 0.0))
     both = add_secondary_altitude(
         own_record(), sightings(drift_m), name="motion capture", zero_s=ZERO_S, scored="vehicle"
@@ -88,7 +88,7 @@ def test_what_the_cameras_did_not_see_is_missing_where_they_are_scored_and_told_
     assert [glitch.kind for glitch in find_glitches(Takeoff(), scored.trajectory)] == ["gap"]
 
 
-def test_a_flight_that_hardly_moved_is_aligned_by_receipt_and_says_so() -> None:
+def test_a_flight_with_little_motion_is_aligned_by_arrival_and_its_record_says_so() -> None:
     low = sightings(top_m=0.1)
     both = add_secondary_altitude(own_record(0.1), low, name="motion capture", zero_s=ZERO_S, scored="vehicle")
     assert "aligned by its time of receipt alone: the two moved by less than 0.3 m" in both.remark

@@ -83,7 +83,7 @@ def test_land_is_not_sent_again_while_the_mode_says_so_and_again_once_it_is_anot
     assert sum(ordered.seconds(5, HEARTBEAT)) >= 4
 
 
-def test_a_block_that_was_told_before_the_order_does_not_answer_it() -> None:
+def test_a_block_reported_before_the_command_does_not_confirm_it() -> None:
     ordered = Ordered(autopilot="paparazzi")
     ordered.radio.seen.block, ordered.radio.seen.block_s = LANDED_BLOCK, 0.0
     assert sum(ordered.seconds(5, flying(mode="4"))) >= 4

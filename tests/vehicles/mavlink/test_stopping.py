@@ -72,7 +72,7 @@ def test_after_a_flight_the_motors_stand_whatever_a_release_calls_its_setting(se
 
 
 @pytest.mark.parametrize("setting", [KILL_SETTING, NEWER_KILL_SETTING])
-def test_a_vehicle_that_heeds_no_commands_is_stopped_by_its_setting(setting: str) -> None:
+def test_a_vehicle_that_ignores_commands_is_stopped_by_its_setting(setting: str) -> None:
     with LockstepRig(make=of(DeafToCommands, kill_setting=setting)) as rig, connected(rig) as vehicle:
         record = fly(vehicle)
         assert (record.ending, vehicle.concern, rig.drone.autopilot.armed) == ("completed", "", False)
@@ -112,7 +112,7 @@ def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_s
         assert record.reason == "Motors off was requested: people below. It confirmed that its motors have stopped."
 
 
-def test_motors_off_that_the_vehicle_does_not_heed_is_not_said_to_have_stopped_them() -> None:
+def test_motors_off_that_the_vehicle_ignores_is_not_reported_as_done() -> None:
     """Seen: recorded as stopped, while the drone hovered on."""
     slid: list[float] = []
 

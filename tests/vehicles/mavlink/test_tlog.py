@@ -157,7 +157,7 @@ def test_what_a_full_disk_did_not_take_is_stored_when_there_is_room(
     assert path.read_bytes() == b"".join(record(8 * step, b"a frame") for step in range(101))
 
 
-def test_a_full_disk_is_told_and_does_not_end_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_and_does_not_end_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
     with (
         FakeVehicleEndpoint(PAPARAZZI) as vehicle,
         Link(vehicle.address, PAPARAZZI, clock=ScaledClock(), target_system=31, tlog=Path("/dev/full")) as link,

@@ -160,7 +160,7 @@ def test_a_shift_that_the_second_source_does_not_see_is_measured_and_one_that_it
         assert walk.trial.plan.ground_m == pytest.approx(ground_m)
 
 
-def test_a_vehicle_whose_altitude_left_the_ground_before_the_command_is_not_told_to_climb() -> None:
+def test_a_vehicle_whose_altitude_rose_before_the_command_gets_no_take_off() -> None:
     walk = armed()
     rise(walk)
     commanded(walk)
@@ -520,7 +520,7 @@ def test_a_vehicle_that_lifts_off_too_late_is_landed_on_its_safe_gains() -> None
     assert walk.gains_sent == [SAFE_GAINS[0]]
 
 
-def test_a_vehicle_that_says_that_it_flies_is_landed_though_its_altitude_stays_on_the_ground() -> None:
+def test_a_vehicle_that_reports_flying_is_landed_though_its_altitude_stays_at_zero() -> None:
     """Its altitude may stand still while it climbs: then motors off would drop it."""
     walk = taking_off()
     walk.landed = False
@@ -554,7 +554,7 @@ def test_a_refused_take_off_disarms_on_the_ground() -> None:
     assert (walk.state, walk.actions[-1]) == (State.DISARM, Action.MOTORS_OFF)
 
 
-def test_a_refused_arming_disarms_restores_the_gains_and_says_why() -> None:
+def test_a_refused_arming_disarms_restores_the_gains_and_gives_the_reason() -> None:
     walk = arming()
     walk.give(ActionRefused(Action.ARM, "The vehicle refused to arm (result 4, failed).", walk.now_s))
     assert (walk.state, walk.actions) == (State.DISARM, [Action.ARM, Action.MOTORS_OFF])
@@ -563,7 +563,7 @@ def test_a_refused_arming_disarms_restores_the_gains_and_says_why() -> None:
     assert walk.trial.why == "The vehicle refused to arm (result 4, failed)."
 
 
-def test_a_vehicle_that_does_not_say_that_it_is_armed_is_not_flown() -> None:
+def test_a_vehicle_that_does_not_report_armed_is_not_flown() -> None:
     walk = TrialDriver()
     walk.pass_s(15.1)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.NOT_ARMED)
@@ -584,7 +584,7 @@ def test_a_vehicle_that_does_not_land_within_40_s_is_quarantined() -> None:
     assert "not landed within 40 s" in walk.trial.why
 
 
-def test_a_vehicle_that_stays_armed_is_told_again_and_then_quarantined() -> None:
+def test_a_vehicle_that_stays_armed_is_disarmed_again_and_then_quarantined() -> None:
     walk = disarming().pass_s(4.9)
     assert walk.state is State.DISARM
     assert len(walk.when(Action.MOTORS_OFF)) == 5
@@ -597,7 +597,7 @@ def test_safe_gains_that_cannot_be_verified_quarantine_the_vehicle() -> None:
     assert "Its safe gains could not be verified: it holds" in walk.trial.why
 
 
-def test_a_quarantine_tells_what_came_later_too() -> None:
+def test_a_quarantine_also_lists_later_concerns() -> None:
     walk = aborting()
     reboot(walk)
     walk.touch_down()
@@ -609,7 +609,7 @@ def test_a_quarantine_tells_what_came_later_too() -> None:
 
 
 @pytest.mark.parametrize("befall", [reboot, go_astray, stop_by_itself, be_one_of_two])
-def test_a_vehicle_that_nobody_understands_is_told_to_land_again_and_again_and_its_motors_are_left_alone(
+def test_a_vehicle_in_an_unknown_state_gets_land_repeatedly_and_never_motors_off(
     befall: Callable[[TrialDriver], None],
 ) -> None:
     walk = recording()

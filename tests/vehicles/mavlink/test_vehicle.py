@@ -262,7 +262,7 @@ def test_a_vehicle_that_does_not_sign_is_not_heard_where_signatures_are_wanted(t
         rig.vehicle(signing_key_file=str(key))
 
 
-def test_a_signing_key_that_cannot_be_read_is_refused_without_being_told() -> None:
+def test_an_unreadable_signing_key_is_refused_without_being_quoted() -> None:
     with LockstepRig("ardupilot") as rig, pytest.raises(InputError, match="signing key") as refusal:
         rig.vehicle(signing_key_file="nowhere/secret.txt")
     assert "secret" not in f"{refusal.value} {refusal.value.problems}"

@@ -98,7 +98,7 @@ def test_nobody_there_is_said_with_address_and_port(monkeypatch: pytest.MonkeyPa
         NatNetSource(unicast, CLOCK)
 
 
-def test_a_server_too_old_to_tell_whether_it_tracks_is_refused(unicast: NatNetAddress) -> None:
+def test_a_server_too_old_to_report_tracking_is_refused(unicast: NatNetAddress) -> None:
     old = NatNetServer(unicast, (2, 5, 0, 0))
     with (
         FakeMotive(unicast, old),

@@ -78,7 +78,7 @@ def test_a_frozen_pose_is_stale_though_some_of_its_numbers_are_missing() -> None
 
 
 @pytest.mark.parametrize("time_s", [NAN, INF])
-def test_a_time_that_is_no_number_says_nothing_new_and_spoils_nothing(time_s: float) -> None:
+def test_a_time_that_is_not_a_number_is_ignored(time_s: float) -> None:
     stream = PoseStream()
     put(stream, 1.00, 0.10)
     put(stream, time_s, 0.11, arrived_s=1.01)

@@ -1,0 +1,324 @@
+"""Checks of a trial with faults against the table of failures in docs/real-flight.md, independent of the program.
+
+The input is what happened in the simulation: the drone's timeline, the packets that reached its antenna, and the gains
+that it holds. Each time limit of the table has a tolerance for one missed heartbeat or reading and for the rig's clock.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+from bench.hazards.cases import ABORT, MOCAP, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case
+from bench.hazards.fault_trial import TrialResult
+from bench.hazards.intervals import Span, covers, longest, overlap, total
+from bench.hazards.rig import InjectedFault
+from bench.hazards.trial_states import AIR, DESCENT, LIFTED_M, State
+from bench.hazards.wire import Command
+
+GROUND: Final = (State.PREFLIGHT, State.SET_GAINS)
+SILENT: Final = ("link-lost", "wrong-system", "reboot")
+DEAF: Final = ("link-lost", "reboot")
+"""Faults in which the vehicle receives nothing either."""
+GAIN_FAILURES: Final = (ABORT, WILD_GAINS, "no-lift-off")
+HEARTBEAT_S: Final[Mapping[str, float]] = {"paparazzi": 0.5, "ardupilot": 1.0, "px4": 1.0}
+BATTERY_S: Final[Mapping[str, float]] = {"paparazzi": 1.2, "ardupilot": 0.5, "px4": 0.2}
+LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "px4": 8.0}
+
+IMPACT_M_S: Final = 1.9
+"""Speed of ground contact above which the vehicle has fallen."""
+LAND_AGAIN_S: Final[Mapping[str, float]] = {"paparazzi": 6.0, "ardupilot": 1.0, "px4": 1.0}
+"""Interval of Land after five seconds: under Paparazzi each Land restarts the landing."""
+DRIFT_M_S: Final = 0.1
+SLACK_S: Final = 0.35
+"""Tolerance for the rig's clock and for a packet in transit."""
+STANDSTILL_S: Final = 1.05
+"""Time for which the vehicle is watched on the ground right before arming."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """A failure of the table that may have occurred, the resulting outcome, and whether it must have occurred."""
+
+    failure: str
+    outcome: str
+    is_certain: bool = False
+
+
+def find_violations(case: Case, result: TrialResult) -> list[str]:
+    """Return every violation of the table; empty if there is none."""
+    return list(_Checker(case, result).find_violations())
+
+
+class _Checker:
+    def __init__(self, case: Case, result: TrialResult) -> None:
+        self.case, self.result, self.states = case, result, result.states
+        self.heartbeat_s = HEARTBEAT_S[case.autopilot]
+        self.silent = self.of(*SILENT)
+        self.beatless = self.of(*SILENT, "no-heartbeat")
+        self.armed_s = self.states.first_s(State.ARM)
+        self.took_off_s = self.states.first_s(State.TAKEOFF)
+
+    def of(self, *kinds: str) -> list[Span]:
+        return [(each.begun_s, each.ended_s) for each in self.result.injected if each.kind in kinds]
+
+    def of_flight(self, kind: str) -> list[Span]:
+        """Return the spans that begin after the take-off command; earlier ones may have no effect."""
+        return [(each.begun_s, each.ended_s) for each in self._kinds(kind) if each.state in AIR]
+
+    def within(self, spans: list[Span], *states: State) -> float:
+        return longest(spans, self.states.spans(*states))
+
+    def began_in(self, kind: str, *states: State) -> bool:
+        return any(each.kind == kind and each.state in states for each in self.result.injected)
+
+    def find_violations(self) -> Iterator[str]:
+        yield from self._outcome()
+        yield from self._vehicle()
+        yield from self._wire()
+        yield from self._time_limits()
+
+    # ---- the outcome of the trial
+
+    def _outcome(self) -> Iterator[str]:
+        causes = [*self._on_ground(), *self._while_arming(), *self._in_the_air(), *self._coming_down()]
+        outcome = self.result.outcome
+        allowed = {cause.outcome for cause in causes}
+        if not any(cause.is_certain for cause in causes):
+            allowed.add("completed")
+        if outcome not in allowed:
+            known = ", ".join(sorted(f"{cause.failure} {cause.outcome}" for cause in causes)) or "nothing"
+            yield f"the trial is {outcome}, but {known} was expected ({self.result.reason})"
+        if outcome == "completed" and self.states.first_s(State.LAND) is None:
+            yield "a completed trial has no complete record"
+        if outcome == "refused" and self.took_off_s is not None:
+            yield "a trial that took off left no record"
+        if self.result.flew_on is not None and not _same(self.result.flew_on, self.case.gains):
+            yield f"the vehicle lifted off with {dict(self.result.flew_on)}"
+
+    def _on_ground(self) -> Iterator[Cause]:
+        """Yield the failures from the first packet to arming."""
+        if self.within(self.beatless, State.CONNECT) >= 5.0 - self.heartbeat_s - SLACK_S:
+            yield Cause("F1", "refused")
+        if self.began_in("wrong-system", State.CONNECT) and not self.case.pinned:
+            yield Cause("F1", "refused")
+        for failure, kinds, shortest_s in (
+            ("preflight", SILENT, 0.15),
+            ("preflight", ("frozen-position", "jumping-position", "low-battery"), 0.0),
+            ("preflight", MOCAP, 0.0),
+            ("preflight", ("arm-refused", OTHER_LANDING), 0.0),
+            ("F2", ("param-unconfirmed",), 0.0),
+            ("F10", ("reboot", OTHER_MODE), 0.0),
+        ):
+            if self.within(self.of(*kinds), *GROUND) > shortest_s:
+                yield Cause(failure, "refused")
+        if self.within(self.beatless, *GROUND) > 2.5 * self.heartbeat_s - 0.1:
+            yield Cause("preflight", "refused")
+        if self.began_in(ABORT, State.CONNECT, *GROUND) or self.began_in(MOTORS_OFF, State.CONNECT, *GROUND):
+            yield Cause("F8", "aborted", is_certain=self.armed_s is not None)
+        for kind in (*SILENT, "frozen-position", "jumping-position", "low-battery"):
+            stale_s = STANDSTILL_S + (BATTERY_S[self.case.autopilot] if kind == "low-battery" else 0.0)
+            if self.armed_s is not None and covers(self.of(kind), (self.armed_s - stale_s, self.armed_s)):
+                yield Cause(f"preflight ({kind})", "refused", is_certain=True)
+
+    def _while_arming(self) -> Iterator[Cause]:
+        arming = (State.ARM,)
+        if self.within(self.silent, *arming) > 1.0 - SLACK_S or self.within(self.beatless, *arming) > 1.5 - SLACK_S:
+            yield Cause("F3", "refused")
+        if self.within(self.of("low-battery"), *arming) > 1.0 - SLACK_S:
+            yield Cause("F7", "refused")
+        if self.within(self.of("frozen-position", *MOCAP), *arming) > 0.15:
+            yield Cause("F9a", "refused")
+        if any(self.began_in(kind, *arming) for kind in ("reboot", OTHER_MODE)):
+            yield Cause("F10", "refused")
+        if self.began_in(ABORT, *arming) or self.began_in(MOTORS_OFF, *arming):
+            yield Cause("F8", "aborted", is_certain=True)
+        refused = [covers(self.of("arm-refused"), (at_s, at_s)) for at_s in self.states.times_of(Command.ARM)]
+        if any(refused):
+            yield Cause("F3", "refused", is_certain=all(refused))
+
+    def _in_the_air(self) -> Iterator[Cause]:
+        """Yield the failures from the take-off command to the end of the record.
+
+        A condition that lasts longer than its limit must be detected; one that is not detected leaves a complete
+        record, which the outcome shows.
+        """
+        battery_s = 1.0 + 2.0 * BATTERY_S[self.case.autopilot] + SLACK_S
+        frozen = self.of("frozen-position")
+        for failure, spans, may_s, must_s in (
+            ("F5", self.silent, 1.0 - SLACK_S, 1.0 + SLACK_S),
+            ("F5", self.beatless, 2.5 * self.heartbeat_s - 0.1, 3.5 * self.heartbeat_s + SLACK_S),
+            ("F7", self.of("low-battery"), 1.0 - SLACK_S, battery_s),
+            ("F9a", frozen, 0.15, 0.25 + SLACK_S),
+            ("F9a", self.of("mocap-frozen"), 0.15, 0.25 + SLACK_S),
+            ("F9a", self.of("mocap-lost"), 1.0 - SLACK_S, 1.0 + SLACK_S),
+            ("F9c", self.of("mocap-drift"), 2.0, 0.3 / DRIFT_M_S + 0.3 + 1.0 + SLACK_S),
+            ("F10", self.of_flight(OTHER_MODE), 0.0, 1.0 + 4.0 * self.heartbeat_s + SLACK_S),
+            ("F11", self.of_flight(OTHER_LANDING), 0.0, 1.0 + 4.0 * self.heartbeat_s + SLACK_S),
+        ):
+            watched = AIR if self.took_off_s is None else (State.ARM, *AIR)
+            lasted_s = self.within(spans, *watched)
+            if lasted_s > may_s:
+                yield Cause(failure, "invalid", is_certain=lasted_s > must_s)
+        if self.within(self.of("mocap-drift"), State.SET_GAINS, State.ARM, *AIR) > 1.0:
+            yield Cause("F9c", "invalid")
+        if self.began_in("reboot", *AIR):
+            yield Cause("F10", "invalid", is_certain=True)
+        jumped_s = total(self.of("jumping-position"), self.states.spans(State.ARM, *AIR))
+        if jumped_s > 1.3:
+            yield Cause("F9b", "invalid", is_certain=jumped_s > 3.0)
+        yield from self._counting_against_gains()
+
+    def _counting_against_gains(self) -> Iterator[Cause]:
+        """Yield the failures that count against the gains."""
+        if self.began_in(ABORT, *AIR):
+            yield Cause("F8", "aborted", is_certain=True)
+        if self.began_in(MOTORS_OFF, *AIR, *DESCENT):
+            yield Cause("motors off", "aborted", is_certain=True)
+        if self.began_in(MOTORS_OFF, State.DISARM, State.RESTORE):
+            yield Cause("motors off", "aborted")
+        motorless_s = self.within(self.of("no-lift-off"), *AIR)
+        if motorless_s > 0.0:
+            yield Cause("F4/F6", "aborted", is_certain=motorless_s > 3.0 + LIFT_OFF_S[self.case.autopilot])
+        if self._may_have_stayed_down():
+            yield Cause("F4", "aborted")
+        if self.of(OTHER_MODE):
+            yield Cause("F10", "invalid")
+        if self.of(WILD_GAINS) and self.took_off_s is not None:
+            yield Cause("F6", "aborted", is_certain=True)
+
+    def _may_have_stayed_down(self) -> bool:
+        """Whether the take-off command may not have arrived, or another command may have followed before the climb."""
+        unheard = any(covers(self.of(*DEAF), (at_s, at_s)) for at_s in self.states.times_of(Command.TAKE_OFF))
+        return unheard or bool(self.of(OTHER_MODE, OTHER_LANDING))
+
+    def _coming_down(self) -> Iterator[Cause]:
+        """Yield the failures after a complete record that can still interrupt the landing."""
+        if self.began_in(ABORT, State.LAND):
+            yield Cause("F8", "aborted")
+        if self.within(self.of("no-lift-off"), State.LAND) > 0.0:
+            yield Cause("F6", "aborted")
+        if any(self.within(self.of(kind), State.LAND) > 0.0 for kind in ("reboot", OTHER_MODE)):
+            yield Cause("F10", "invalid")
+
+    # ---- the state of the vehicle afterwards
+
+    def _vehicle(self) -> Iterator[str]:
+        match self.result.vehicle:
+            case "safe":
+                if not self.result.holds_safe:
+                    yield f"reported as holding its safe gains, but holds {dict(self.result.held)}"
+                falls = bool(self.of(MOTORS_OFF))
+                if self.result.armed or (abs(self.result.height_m) > LIFTED_M and not falls):
+                    yield f"reported as safe, but is {'armed' if self.result.armed else 'off the ground'}"
+                if any(self.began_in(kind, *AIR) for kind in ("reboot",)):
+                    yield "the autopilot restarted in the air, but the vehicle was not quarantined"
+            case "quarantined":
+                if not any(self._reasons_for_quarantine()):
+                    yield f"unnecessary quarantine ({self.result.reason})"
+            case "unopened":
+                if self.result.armed or not self._holds_no_trial():
+                    yield f"never connected, but holds {dict(self.result.held)}"
+
+    def _holds_no_trial(self) -> bool:
+        """Whether no gain is the trial's, unless it equals the safe one."""
+        return all(
+            self.result.held[name] != gain or self.case.safe[name] == gain for name, gain in self.case.gains.items()
+        )
+
+    def _reasons_for_quarantine(self) -> Iterator[bool]:
+        """Yield, for each reason that justifies quarantine, whether it applies."""
+        mute = self.of("param-unconfirmed")
+        yield any(each.state not in (State.CONNECT, *GROUND) for each in self._kinds("reboot", OTHER_MODE))
+        yield any(each.kind == OTHER_MODE for each in self.result.injected)
+        yield self.result.impact_m_s > IMPACT_M_S
+        yield bool(self.of("mocap-drift"))  # motion capture still shows it in the air
+        for lost_s, _ in self.states.spans(State.LINK_LOST):
+            yield any(end_s > lost_s + 60.0 - SLACK_S for _, end_s in self.beatless)
+        for begun_s, _ in self.states.spans(State.LAND, State.ABORT_LAND):
+            blind = [*self.silent, *self.of("frozen-position")]
+            yield any(end_s > begun_s + 20.0 and start_s < begun_s + 20.0 for start_s, end_s in blind)
+        for begun_s, _ in self.states.spans(State.DISARM):
+            deaf = [*self.beatless, *self.of("frozen-position"), *mute]
+            yield any(overlap(span, (begun_s - 0.6, begun_s + 5.5)) > 2.5 for span in deaf)
+        ended_s = self.states.ended_s
+        for begun_s, _ in self.states.spans(State.RESTORE):
+            yield any(overlap(span, (begun_s, ended_s + SLACK_S)) > 1.8 for span in [*self.silent, *mute])
+        if self.result.outcome == "refused":
+            spans = [*self.silent, *mute]
+            yield any(overlap(span, (ended_s - SLACK_S, ended_s + 15.0)) > 0.0 for span in spans)
+
+    def _kinds(self, *kinds: str) -> list[InjectedFault]:
+        return [each for each in self.result.injected if each.kind in kinds]
+
+    # ---- the packets that were sent
+
+    def _wire(self) -> Iterator[str]:
+        asked_s = min((each.begun_s for each in self._kinds(MOTORS_OFF)), default=float("inf"))
+        for stop in self.result.stops:
+            if stop.height_m > LIFTED_M and stop.at_s < asked_s:
+                yield f"motors off was sent at {stop.height_m:.2f} m"
+        if self.states.now is State.CONNECT and self.result.packets:
+            yield f"{self.result.packets} packets were sent before a heartbeat was heard"
+        for lost_s, end_s in self.states.spans(State.LINK_LOST):
+            lands = [at_s for at_s in self.states.times_of(Command.LAND) if lost_s <= at_s <= end_s]
+            gaps = [
+                later - earlier
+                for earlier, later in pairwise(lands)
+                if later - earlier > (1.0 if earlier < lost_s + 4.0 else LAND_AGAIN_S[self.case.autopilot]) + SLACK_S
+            ]
+            if gaps:
+                yield f"Land was not repeated for {max(gaps):.1f} s while the link was lost"
+            if any(lost_s <= at_s < min(end_s, asked_s) for at_s in self.states.times_of(Command.MOTORS_OFF)):
+                yield "motors off was sent while the link was lost"
+        yield from self._first_command_out_of_the_air()
+
+    def _first_command_out_of_the_air(self) -> Iterator[str]:
+        """Check that the safe gains precede Land only if the gains are suspect."""
+        left = [end_s for _, end_s in self.states.spans(*AIR) if end_s < self.states.ended_s]
+        if not left:
+            return
+        deciding = (Command.GAIN, Command.LAND, Command.MOTORS_OFF)
+        following = [
+            (at_s, command) for at_s, command in self.states.commands if at_s >= max(left) and command in deciding
+        ]
+        first = following[0][1] if following else None
+        if first is Command.MOTORS_OFF:
+            return
+        may_be_suspect = any(each.kind in GAIN_FAILURES and each.begun_s <= max(left) for each in self.result.injected)
+        may_be_suspect |= self.states.first_s(State.RECORD) is None and self._may_have_stayed_down()
+        if first is Command.GAIN and not may_be_suspect:
+            yield "the safe gains were sent before Land, though the gains were not suspect"
+        is_aborted = self.result.outcome == "aborted" and not self.of(MOTORS_OFF)
+        if is_aborted and first is Command.LAND and self.states.at(max(left)) is State.ABORT_LAND:
+            yield "Land was sent before the safe gains, though the gains were suspect"
+        lands = [at_s for at_s, command in following if command is Command.LAND]
+        if first is Command.GAIN and (not lands or lands[0] - max(left) > 0.3 + SLACK_S):
+            yield "Land did not follow the safe gains within 0.3 s"
+
+    # ---- time limits
+
+    def _time_limits(self) -> Iterator[str]:
+        for state, longest_s in (
+            (State.ARM, 18.0),
+            (State.TAKEOFF, LIFT_OFF_S[self.case.autopilot] + 3.0),
+            (State.RECORD, 34.0),
+            (State.LINK_LOST, 61.5 + self.heartbeat_s),
+            (State.DISARM, 6.0),
+        ):
+            for begun_s, end_s in self.states.spans(state):
+                if end_s - begun_s > longest_s:
+                    yield f"the state {state} lasted {end_s - begun_s:.1f} s"
+        for begun_s, end_s in self.states.spans(State.LAND, State.ABORT_LAND):
+            if end_s - begun_s > 41.5:
+                yield f"the landing lasted {end_s - begun_s:.1f} s"
+        for since_s in (each.begun_s for each in self._kinds(ABORT) if each.state in AIR):
+            left = [end_s for begun_s, end_s in self.states.spans(*AIR) if begun_s <= since_s + SLACK_S]
+            if left and max(left) - since_s > 0.05 + SLACK_S:
+                yield f"an abort took effect only after {max(left) - since_s:.2f} s"
+
+
+def _same(held: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
+    """Whether the gains are equal in single precision."""
+    return all(math.isclose(held[name], value, rel_tol=1e-6) for name, value in wanted.items())

@@ -1,0 +1,115 @@
+"""One trial with faults: connect, stage and fly with the program's own vehicle class, and record the result."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from app.vehicles.base import FlightOptions, SafeGainsError, Sample, VehicleError
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mocap.opening import open_source
+from bench.hazards.cases import Case
+from bench.hazards.rig import InjectedFault, MotorStop, Rig
+from bench.hazards.trial_states import TrialStates
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialResult:
+    """Result of a case.
+
+    `outcome` is completed, aborted, invalid (these three with a record) or refused (without a flight). `vehicle` is
+    what the program reports afterwards: safe, quarantined, or unopened (never connected). The rest is the drone's true
+    state: `flew_on` are the gains that it held at lift-off, `impact_m_s` its fastest descent within half a metre of the
+    ground.
+    """
+
+    outcome: str
+    vehicle: str
+    reason: str
+    holds_safe: bool
+    held: Mapping[str, float]
+    flew_on: Mapping[str, float] | None
+    armed: bool
+    height_m: float
+    impact_m_s: float
+    packets: int
+    stops: tuple[MotorStop, ...]
+    injected: tuple[InjectedFault, ...]
+    states: TrialStates = field(repr=False)
+
+
+def run_trial(case: Case) -> TrialResult:
+    """Run the trial of a case. An exception in the simulated drone propagates."""
+    rig = Rig(case)
+    rig.wait_s(case.powered_s)
+    rig.states.begin(rig.now_s())
+    return _connect_and_fly(rig)
+
+
+def _connect_and_fly(rig: Rig) -> TrialResult:
+    try:
+        source = open_source("odometry", rig) if rig.case.has_second_source else None
+        vehicle = MavlinkVehicle(rig.options(), rig.case.safe, is_real=False, clock=rig, source=source, transport=rig)
+    except VehicleError as error:
+        rig.states.ended_s = rig.drone.time_s
+        return _end(rig, "refused", "unopened", str(error))
+    try:
+        return _fly(rig, vehicle)
+    finally:
+        vehicle.close()
+
+
+def _fly(rig: Rig, vehicle: MavlinkVehicle) -> TrialResult:
+    try:
+        outcome, reason = _stage_and_fly(rig, vehicle)
+    except VehicleError as error:
+        outcome, reason = "refused", str(error)
+    rig.states.ended_s = rig.drone.time_s
+    left = _end(rig, outcome, "safe", reason)
+    failure = _restore_safe_gains(vehicle, rig.case.safe)
+    if outcome == "refused":
+        return _end(rig, outcome, "safe" if failure is None else "quarantined", reason)
+    return replace(left, vehicle="quarantined") if isinstance(failure, SafeGainsError) else left
+
+
+def _end(rig: Rig, outcome: str, vehicle: str, reason: str) -> TrialResult:
+    """Return the result with the present state of the drone."""
+    drone = rig.drone
+    return TrialResult(
+        outcome=outcome,
+        vehicle=vehicle,
+        reason=reason,
+        holds_safe=rig.holds(rig.case.safe),
+        held=rig.held(),
+        flew_on=rig.flew_on,
+        armed=drone.autopilot.armed,
+        height_m=drone.body.altitude_m,
+        impact_m_s=rig.impact_m_s,
+        packets=rig.packets,
+        stops=tuple(rig.stops),
+        injected=tuple(rig.injected),
+        states=rig.states,
+    )
+
+
+def _restore_safe_gains(vehicle: MavlinkVehicle, safe: Mapping[str, float]) -> VehicleError | None:
+    """Stage the safe gains again, as `open_vehicle` does on every exit, and return the error if that fails.
+
+    After a trial with a record this changes nothing: it has restored the safe gains itself or quarantined the vehicle.
+    """
+    try:
+        held = vehicle.stage(safe)
+    except VehicleError as error:
+        return error
+    return None if held == safe else SafeGainsError(f"it holds {held}", hint="")
+
+
+def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[str, str]:
+    held = vehicle.stage(rig.case.gains)
+    if held != rig.case.gains:
+        return "refused", f"it holds {held}"
+    rig.wait_s(rig.case.staged_s)
+    record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
+    return record.ending, record.reason
+
+
+def _ignore_sample(_sample: Sample) -> None:
+    pass

@@ -1,0 +1,227 @@
+"""Whole trials over a hostile link, or with a fault of the vehicle: every hazard in every state of a trial, under every
+autopilot. `hostile_checks.py` has the checks."""
+
+import random
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from app.vehicles.mocap.opening import open_source
+from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, PlannedFault, tuned_gains
+from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, TrueState, find_violations
+from bench.hazards.hostile_links import (
+    COMMAND_DELAYS_S,
+    HAZARDS,
+    LINK_HAZARDS,
+    PILOTS,
+    VEHICLE_HAZARDS,
+    LinkHazard,
+    MessageForger,
+)
+from bench.hazards.rig import InjectedFault, Rig
+from bench.hazards.trial_states import State
+from bench.hazards.wire import DIALECTS
+
+SHORT_S: Final = 1.5
+COMES_DOWN_WITHIN_S: Final = 60.0
+"""Time to land after the trial, while the program attends to the vehicle."""
+ATTENDED_S: Final = 5.0
+HEARD_S: Final = 1.0
+_STATE_TICKS: Final = 4
+_AIR: Final = (State.TAKEOFF, State.RECORD, State.LAND)
+
+
+@dataclass(frozen=True, slots=True)
+class HostileResult:
+    """Result of a case; `wrong` lists the violations."""
+
+    outcome: str
+    vehicle: str
+    reason: str
+    injected: str
+    wrong: tuple[str, ...]
+
+
+def cases(first: int = 0) -> list[Case]:
+    """Return all cases: permanent hazards in every state, short ones in the air; seeds start from `first`."""
+    whole = [(name, state, FOR_GOOD_S) for name, state in product(HAZARDS, State)]
+    brief = [(name, state, SHORT_S) for name, state in product(HAZARDS, _AIR)]
+    drawn = product(SAFE, [*whole, *brief])
+    return [_case(first + seed, autopilot, *what) for seed, (autopilot, what) in enumerate(drawn)]
+
+
+def _case(seed: int, autopilot: str, name: str, state: State, duration_s: float) -> Case:
+    chance = random.Random(seed)
+    hostile = PlannedFault(name, state, chance.uniform(0.0, 0.8), duration_s)
+    causes: dict[State, PlannedFault] = {
+        State.ABORT_LAND: PlannedFault(ABORT, State.RECORD, chance.uniform(0.3, 6.0)),
+        State.LINK_LOST: PlannedFault("link-lost", State.RECORD, chance.uniform(0.3, 6.0), 5.0),
+    }
+    return Case(
+        seed=seed,
+        autopilot=autopilot,
+        faults=(hostile, *([causes[state]] if state in causes else [])),
+        gains=tuned_gains(chance, autopilot),
+        powered_s=5.0,
+        staged_s=0.0,
+        pinned=chance.random() < 0.5,
+    )
+
+
+class HostileRig(Rig):
+    """Rig with a hostile link; `true_states` begin when the drone is switched on."""
+
+    def __init__(self, case: Case) -> None:
+        self.acting: list[tuple[LinkHazard, float]] = []
+        self.true_states: list[TrueState] = []
+        self._received_s = 0.0
+        self._pilot_seen_s: list[float] = []
+        self._overruled_s = FOR_GOOD_S
+        self._ticks = 0
+        self._delay_s, self._delayed_until_s = 0.0, 0.0
+        self._under_way: list[tuple[float, bytes]] = []
+        super().__init__(case)
+        self._forger = MessageForger(case.autopilot, DIALECTS[case.autopilot], self.drone, random.Random(case.seed))
+
+    def write(self, data: bytes) -> bool:
+        """Deliver data in the order in which it was sent, delayed or at once."""
+        delay_s = self._delay_s if self.drone.time_s < self._delayed_until_s else 0.0
+        self._under_way.append((self.drone.time_s + delay_s, data))
+        self._deliver()
+        return True
+
+    def _deliver(self) -> None:
+        while self._under_way and self._under_way[0][0] <= self.drone.time_s:
+            super().write(self._under_way.pop(0)[1])
+
+    def arriving(self, frames: list[bytes]) -> list[bytes]:
+        now_s = self.drone.time_s
+        for hostility, until_s in self.acting:
+            if now_s < until_s:
+                frames = hostility.transform(frames, now_s)
+        self._received_s = now_s if frames else self._received_s
+        self._watch_pilot(frames, now_s)
+        return frames
+
+    def _watch_pilot(self, frames: list[bytes], now_s: float) -> None:
+        """Record when heartbeats show a pilot after the take-off, and when the vehicle is taken from that pilot."""
+        flown = any(each.kind in PILOTS and each.begun_s < now_s < each.ended_s for each in self.injected)
+        if not flown or self.states.first_s(State.TAKEOFF) is None:
+            return
+        if self.drone.autopilot.is_by_hand:
+            read = (self._forger.read(frame) for frame in frames)
+            beats = any(message is not None and message.get_type() == "HEARTBEAT" for message in read)
+            self._pilot_seen_s += [now_s] if beats else []
+        elif self._pilot_seen_s:
+            self._overruled_s = min(self._overruled_s, now_s)
+
+    def tick(self) -> None:
+        super().tick()
+        self._deliver()
+        self._ticks += 1
+        if self._ticks % _STATE_TICKS == 0:
+            now_s, body = self.drone.time_s, self.drone.body
+            is_heard = now_s - self._received_s < HEARD_S
+            armed = self.drone.autopilot.armed
+            self.true_states.append(TrueState(now_s, body.altitude_m, body.climb_rate_m_s, armed, is_heard))
+
+    @property
+    def truth(self) -> GroundTruth:
+        """Ground truth up to now."""
+        return GroundTruth(
+            case=self.case,
+            states=self.states,
+            injected=self.injected,
+            sent=self.sent,
+            stops=self.stops,
+            true_states=self.true_states,
+            pilot_seen_s=self._pilot_seen_s,
+            overruled_s=self._overruled_s,
+            armed=self.drone.autopilot.armed,
+            holds_safe=self.holds(self.case.safe),
+        )
+
+    def _inject(self, planned: PlannedFault, now_s: float) -> None:
+        state = self.states.now
+        if state is None or planned.kind not in HAZARDS:
+            return super()._inject(planned, now_s)
+        fault, most_s = VEHICLE_HAZARDS.get(planned.kind, ("", FOR_GOOD_S))
+        lasts_s = min(planned.duration_s, most_s)
+        self.injected.append(InjectedFault(planned.kind, state, now_s, now_s + lasts_s))
+        if planned.kind in COMMAND_DELAYS_S:
+            self._delay_s, self._delayed_until_s = COMMAND_DELAYS_S[planned.kind], now_s + lasts_s
+        elif fault:
+            self.drone.inject_fault(fault, lasts_s)
+        else:
+            self.acting.append((LINK_HAZARDS[planned.kind](self._forger), now_s + lasts_s))
+        return None
+
+
+def run_trial(case: Case) -> HostileResult:
+    """Run the trial of a case. An exception in the simulated drone propagates."""
+    rig = HostileRig(case)
+    rig.wait_s(case.powered_s)
+    rig.states.begin(rig.now_s())
+    try:
+        source = open_source("odometry", rig) if case.has_second_source else None
+        vehicle = MavlinkVehicle(
+            rig.options(), case.safe, is_real=False, clock=rig, source=source, transport=rig, observes=True
+        )
+    except VehicleError as error:
+        rig.states.ended_s = rig.drone.time_s
+        return _result(rig, ReportedOutcome("refused", "unopened", str(error)))
+    try:
+        return _stage_and_fly(rig, vehicle)
+    finally:
+        vehicle.close()
+
+
+def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
+    record: FlightRecord | None = None
+    outcome = "refused"
+    try:
+        held = vehicle.stage(rig.case.gains)
+        if held != rig.case.gains:
+            raise VehicleError(f"it holds {held}", hint="")
+        record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
+        outcome, reason = str(record.ending), record.reason
+    except VehicleError as error:
+        reason = str(error)
+    rig.states.ended_s, concern = rig.drone.time_s, vehicle.concern
+    left = _restore_safe_gains(rig, vehicle)
+    _attend(rig, vehicle)
+    trajectory = None if record is None else record.trajectory
+    return _result(rig, ReportedOutcome(outcome, left, reason, concern or vehicle.concern, vehicle.concern, trajectory))
+
+
+def _attend(rig: HostileRig, vehicle: MavlinkVehicle) -> None:
+    """Attend to the vehicle for a while, and while it is armed or in the air, for a minute at most."""
+    until_s = rig.now_s() + COMES_DOWN_WITHIN_S
+    vehicle.attend(ATTENDED_S)
+    while rig.now_s() < until_s and (rig.truth.armed or rig.truth.flies):
+        vehicle.attend(ATTENDED_S)
+
+
+def _restore_safe_gains(rig: HostileRig, vehicle: MavlinkVehicle) -> str:
+    """Stage the safe gains, as on every exit, and return the reported state of the vehicle."""
+    try:
+        held = vehicle.stage(rig.case.safe)
+    except SafeGainsError:
+        return "quarantined"
+    except VehicleError:
+        return "safe" if not vehicle.concern else "quarantined"
+    return "safe" if held == rig.case.safe else "quarantined"
+
+
+def _result(rig: HostileRig, reported: ReportedOutcome) -> HostileResult:
+    first = rig.case.faults[0]
+    injected = f"{first.kind} from {first.state}, for {first.duration_s:g} s"
+    return HostileResult(
+        reported.outcome, reported.vehicle, reported.reason, injected, find_violations(rig.truth, reported)
+    )
+
+
+def _ignore_sample(_sample: Sample) -> None:
+    pass
