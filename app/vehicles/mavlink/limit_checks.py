@@ -2,21 +2,24 @@
 
 from typing import Final
 
-from app.vehicles.mavlink import secondary_altitude
-from app.vehicles.mavlink.failures import HEARTBEATS_MISSED, Failure, Finding, Limits
+from app.vehicles.mavlink.failures import GROUND_M, HEARTBEATS_MISSED, Failure, Finding, Limits
 from app.vehicles.mavlink.observation import (
     FRESH_S,
+    MAX_DIFFERENCE_M,
+    SecondaryAltitude,
     TrialObservation,
     has_unreliable_position,
     is_behind_climb_rate,
     is_disarmed,
     mode_of,
+    secondary_altitude_m,
 )
 
 _IN_TURN: Final = 0.8
 """Minimum interval of one vehicle's heartbeats, in periods; closer ones are of two vehicles."""
 _OWN_CEILING_M: Final = 0.5
 """Maximum distance of a vehicle's own ceiling below ours."""
+_APART_S: Final = 0.3
 _LOW_BATTERY_S: Final = 1.0
 _NO_BATTERY_S: Final = 10.0
 _IMPACT_BELOW_M: Final = 0.5
@@ -133,7 +136,45 @@ def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, s
 def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     if watch.stuck_s > limits.stuck_s:
         return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
-    return secondary_altitude.find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
+    return _find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
+
+
+def _find_blind(second: SecondaryAltitude | None, now_s: float, *, stuck_s: float, silent_s: float) -> Finding | None:
+    """Find a source whose samples have not been new for `stuck_s`, or that has sent none for `silent_s`."""
+    why = ""
+    if second is not None and second.blind_s > stuck_s:
+        why = f"The second source of altitude did not track it for more than {stuck_s:g} s."
+    elif second is not None and now_s - second.received_s > silent_s:
+        why = f"Nothing was received from the second source of altitude for {silent_s:g} s."
+    return Finding(failure=Failure.FROZEN, why=why) if why else None
+
+
+def find_disagreement(second: SecondaryAltitude | None) -> Finding | None:
+    if second is None or second.apart_since_s is None or second.received_s - second.apart_since_s <= _APART_S:
+        return None
+    why = f"They were {second.apart_m:.2f} m apart, over {MAX_DIFFERENCE_M:g} m for {_APART_S:g} s."
+    return Finding(failure=Failure.DISAGREEMENT, why=why)
+
+
+def find_departure(watch: TrialObservation, ground_m: float) -> Finding | None:
+    """Find that a vehicle without a take-off command may have left the ground, by its altitude."""
+    if watch.last is None or abs(away_m := watch.last.altitude_m - ground_m) <= GROUND_M:
+        return None
+    why = f"Its altitude changed by {away_m:+.2f} m before the take-off command, and it may have moved."
+    return Finding(failure=Failure.LOST_POSITION, why=why)
+
+
+def find_disagreement_on_ground(watch: TrialObservation, ground_shift_m: float, now_s: float) -> Finding | None:
+    """Find a disagreement between the vehicle's altitude on the ground and the second source's last one before a
+    shift."""
+    secondary_m = secondary_altitude_m(watch.second, now_s)
+    if secondary_m is None or watch.last is None:
+        return None
+    apart_m = abs(secondary_m + ground_shift_m - watch.last.altitude_m)
+    if apart_m <= MAX_DIFFERENCE_M:
+        return None
+    why = f"They were {apart_m:.2f} m apart before the take-off command."
+    return Finding(failure=Failure.DISAGREEMENT, why=why)
 
 
 def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:

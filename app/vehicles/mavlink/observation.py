@@ -8,7 +8,6 @@ one, by itself or by its clock, is doubted until more of the same kind have arri
 from dataclasses import dataclass, replace
 from typing import Final
 
-from app.vehicles.mavlink import secondary_altitude
 from app.vehicles.mavlink.events import (
     Battery,
     BlockEntered,
@@ -20,7 +19,6 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
 )
 from app.vehicles.mavlink.failures import GROUND_M, Limits
-from app.vehicles.mavlink.secondary_altitude import SecondaryAltitude
 
 RESTING_M_S: Final = 0.1
 FRESH_S: Final = 0.5
@@ -29,7 +27,8 @@ AGREED_S: Final = 1.0
 """Time for which every source must show the vehicle on the ground before its motors may be stopped."""
 
 _ATTENDED_S: Final = 0.1
-"""Longest time before a packet that it accounts for: packets delayed by a stall may arrive in any order."""
+"""Longest time before a packet or a sample that it accounts for: delayed by a stall, they may arrive at once, in any
+order."""
 _JUMP_M: Final = 0.3
 _JUMP_M_S: Final = 6.0
 _ACCELERATION_M_S2: Final = 20.0
@@ -53,6 +52,9 @@ BEHIND_M: Final = 0.5
 """An altitude that has fallen behind the integrated climb rate by more than this does not follow it."""
 _DRIFT_M: Final = 1.0
 """Greatest drift of an altitude during a flight."""
+MAX_DIFFERENCE_M: Final = 0.3
+"""Greatest difference between the second source of altitude and the vehicle's own."""
+_MAX_SECONDARY_AGE_S: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +64,18 @@ class OtherClock:
     first_s: float
     last_s: float
     last: Position
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecondaryAltitude:
+    """State of the second source; times in s by the ground's clock. `altitude_m` is on the vehicle's datum, None before
+    the first valid sample; `blind_s` is the time for which its samples have not been new."""
+
+    received_s: float
+    altitude_m: float | None = None
+    blind_s: float = 0.0
+    apart_m: float = 0.0
+    apart_since_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +191,7 @@ def update_secondary(watch: TrialObservation, sample: SecondaryAltitudeReceived)
     """Return the observation after a sample of the second source of altitude."""
     second = watch.second or SecondaryAltitude(received_s=sample.now_s)
     vehicle_m = watch.last.altitude_m if watch.last is not None and is_fresh(watch, sample.now_s) else None
-    return replace(watch, second=secondary_altitude.update(second, sample, vehicle_m))
+    return replace(watch, second=_add_secondary(second, sample, vehicle_m))
 
 
 def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObservation:
@@ -227,13 +241,20 @@ def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
 def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """Whether its own landed state or the second source shows it in the air, independent of its altitude."""
     reports_flight = watch.landed is False and now_s - watch.landed_s < AGREED_S
-    secondary_m = secondary_altitude.current_altitude_m(watch.second, now_s)
+    secondary_m = secondary_altitude_m(watch.second, now_s)
     return reports_flight or (secondary_m is not None and secondary_m - ground_m > GROUND_M)
 
 
 def may_have_landed(watch: TrialObservation, now_s: float) -> bool:
     """Whether it now reports that it is on the ground, or does not report its landed state at all."""
     return watch.landed is None or (watch.landed and now_s - watch.landed_s < AGREED_S)
+
+
+def secondary_altitude_m(second: SecondaryAltitude | None, now_s: float) -> float | None:
+    """Return the source's altitude; None while its samples are not new, or none arrive."""
+    if second is None or second.blind_s > 0.0 or now_s - second.received_s > _MAX_SECONDARY_AGE_S:
+        return None
+    return second.altitude_m
 
 
 def is_behind_climb_rate(watch: TrialObservation) -> bool:
@@ -268,7 +289,24 @@ def find_doubt_of_ground(watch: TrialObservation, now_s: float) -> str:
     return ""
 
 
-# ---- positions and heartbeats
+# ---- positions, heartbeats and the second source
+
+
+def _add_secondary(
+    second: SecondaryAltitude, sample: SecondaryAltitudeReceived, vehicle_m: float | None
+) -> SecondaryAltitude:
+    """Return the state after a sample of the source, with the vehicle's own altitude `vehicle_m` (None: unknown)."""
+    waited_s = min(max(sample.now_s - second.received_s, 0.0), _ATTENDED_S)
+    second = replace(second, received_s=max(sample.now_s, second.received_s))
+    if not sample.is_new:
+        return replace(second, blind_s=second.blind_s + waited_s)
+    apart_m = 0.0 if vehicle_m is None else abs(sample.altitude_m - vehicle_m)
+    since_s = (
+        (second.apart_since_s if second.apart_since_s is not None else sample.now_s)
+        if apart_m > MAX_DIFFERENCE_M
+        else None
+    )
+    return replace(second, altitude_m=sample.altitude_m, blind_s=0.0, apart_m=apart_m, apart_since_s=since_s)
 
 
 def _add_heartbeat(watch: TrialObservation, heartbeat: Heartbeat, now_s: float) -> TrialObservation:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from app.vehicles.mavlink import ground, limit_checks, secondary_altitude
+from app.vehicles.mavlink import limit_checks
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     AbortRequested,
@@ -43,6 +43,7 @@ from app.vehicles.mavlink.trial_transitions import (
     find_doubt_of_descent,
     find_doubt_of_ground,
     land,
+    measure_ground,
     note,
     quarantine,
     request_reply,
@@ -141,7 +142,7 @@ def _react(trial: Trial, event: Event) -> Step:
     if isinstance(event, MotorsOffRequested):
         return stop_motors(trial, event.reason, event.now_s)
     if isinstance(event, AbortRequested) and trial.state in COMMANDED:
-        trial = ground.measure(trial, event.now_s) if trial.state is State.ARM else trial
+        trial = measure_ground(trial, event.now_s) if trial.state is State.ARM else trial
         return fail(trial, Finding(failure=Failure.OPERATOR, why=event.reason), event.now_s)
     return _HANDLERS[trial.state](trial, event)
 
@@ -153,15 +154,17 @@ def _arm(trial: Trial, event: Event) -> Step:
     if trial.watch.armed and trial.armed_s is None:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
-        return fail(ground.measure(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
+        return fail(measure_ground(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
     if finding := limit_checks.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
-        return fail(ground.measure(trial, now_s), finding, now_s)
+        return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
     watch = replace(trial.watch, block="", behind_m=0.0, highest_m=last.altitude_m)
-    trial = ground.measure(replace(trial, watch=watch), now_s)
-    if finding := ground.find_departure(trial) or ground.find_disagreement(trial, now_s):
+    trial = measure_ground(replace(trial, watch=watch), now_s)
+    if finding := limit_checks.find_departure(trial.watch, trial.plan.ground_m) or (
+        limit_checks.find_disagreement_on_ground(trial.watch, trial.ground_shift_m, now_s)
+    ):
         return fail(trial, finding, now_s)
     mode, watch = trial.watch.mode, replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S)
     trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=last.time_boot_s, commanded_in=mode)
@@ -402,7 +405,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
         or limit_checks.find_own_landing(watch, plan.limits, plan.ground_m, mode_known=bool(_modes(trial)))
         or limit_checks.find_frozen(watch, plan.limits, now_s)
         or limit_checks.find_lost_position(watch, plan.limits, now_s)
-        or secondary_altitude.find_disagreement(watch.second)
+        or limit_checks.find_disagreement(watch.second)
         or limit_checks.find_battery(watch, now_s)
     )
 

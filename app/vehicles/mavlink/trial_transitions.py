@@ -2,9 +2,11 @@
 a trial and the time. `trial_machine` decides when each transition is made.
 """
 
-from collections.abc import Callable, Mapping
+import statistics
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 from typing import Final
 
 from app.vehicles.base import MOTORS_OFF_REQUESTED
@@ -21,7 +23,16 @@ from app.vehicles.mavlink.events import (
     SendGain,
     Setting,
 )
-from app.vehicles.mavlink.failures import GAIN_FAILURES, RESPONSES, Failure, Finding, Limits, Outcome, Reaction
+from app.vehicles.mavlink.failures import (
+    GAIN_FAILURES,
+    GROUND_M,
+    RESPONSES,
+    Failure,
+    Finding,
+    Limits,
+    Outcome,
+    Reaction,
+)
 from app.vehicles.mavlink.observation import TrialObservation
 
 
@@ -86,6 +97,11 @@ QUARANTINE_STATES: Final = frozenset({State.QUARANTINE, State.OBSERVE})
 
 GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
+_IN_PLACE_M: Final = 0.3
+_SHIFT_M: Final = 0.3
+"""Greatest shift of the altitude on the ground as the motors start, unless the autopilot resets it then."""
+_CLIMBED_M: Final = 0.1
+"""A vehicle that has climbed by less than this, by its climb rate, has not moved."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,6 +190,34 @@ class Trial:
             return None
         known = RESPONSES[self.failure].outcome
         return "invalid" if known == "quarantine" else known
+
+
+def measure_ground(trial: Trial, now_s: float) -> Trial:
+    """Return the trial with the ground where the vehicle stands now, because its altitude shifts as its motors start,
+    and is reset by an autopilot that counts from the ground. If it may have moved, the ground is unchanged."""
+    watch, plan, samples = trial.watch, trial.plan, trial.ground_samples
+    stood = samples[len(samples) // 2 :]
+    if not stood or watch.doubted or watching.is_said_to_fly(watch, now_s, plan.ground_m):
+        return trial
+    altitudes_m = [position.altitude_m for position in stood]
+    is_still = max(altitudes_m) - min(altitudes_m) <= GROUND_M
+    is_in_place = stood[-1].away_m(watch.origin or stood[-1]) <= _IN_PLACE_M
+    shift_m = statistics.median(altitudes_m) - plan.ground_m
+    may_shift = plan.climbs_from_ground or abs(shift_m) <= _SHIFT_M
+    if not (is_still and is_in_place and may_shift and abs(_climbed_m(samples)) <= _CLIMBED_M):
+        return trial
+    return replace(
+        trial,
+        plan=plan.on_ground_at(plan.ground_m + shift_m),
+        watch=watching.reset_altitude(watch),
+        ground_shift_m=shift_m,
+        ground_samples=(),
+    )
+
+
+def _climbed_m(samples: Sequence[Position]) -> float:
+    """Return the climb by climb rate alone, m."""
+    return sum(later.climb_rate_m_s * (later.time_boot_s - earlier.time_boot_s) for earlier, later in pairwise(samples))
 
 
 Step = tuple[Trial, tuple[Command, ...]]

@@ -26,15 +26,14 @@ from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, Altitud
 from app.vehicles.mavlink.events import Action, PacketReceived, RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.opening import limits_of, open_radio
-from app.vehicles.mavlink.parameters import GainStore, written
+from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
 from app.vehicles.mavlink.preflight import Ground
+from app.vehicles.mavlink.radio import StatusReader
 from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
-from app.vehicles.mavlink.status import StatusReader
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
 from app.vehicles.mavlink.trial_machine import Plan, Trial
-from app.vehicles.mavlink.trial_parameters import TrialParameters, files_for
 from app.vehicles.mavlink.trial_transitions import QUARANTINE_STATES, TRANSITIONS, State
 
 STANDSTILL_S: Final = 1.0
