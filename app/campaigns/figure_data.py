@@ -25,7 +25,7 @@ from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
 from app.figures.flight import FlightFigure, FlightRecordData
-from app.figures.many_flights import select_individual_flights
+from app.figures.overlays import select_individual_flights
 from app.figures.theme import ThemeName
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}

@@ -134,28 +134,6 @@ def reading(title: str, unit: str, note: str = "", *, form: str = ".3f") -> str:
     return f"<b>{title}</b><br>{values}{note}<extra></extra>"
 
 
-def off_scale(label: str, curve: Curve, low: float, high: float, colour: str, *, trial: int, text: str) -> Trace:
-    """A triangle at the edge where a flight leaves the scale `low` … `high`, labelled with its peak value."""
-    values = curve.values
-    up = bool(values.max() - high >= low - values.min())
-    peak = int(values.argmax() if up else values.argmin())
-    name = f"{text} reaches {values[peak]:.2f}"
-    return scatter(
-        name,
-        ([round(float(curve.time_s[peak]), 3)], [high if up else low]),
-        role="off scale",
-        about={"trial": trial},
-        mode="markers+text",
-        text=[f"{label} {'↑' if up else '↓'} {values[peak]:.1f}"],
-        textposition="bottom center" if up else "top center",
-        marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
-        textfont={"color": colour},
-        showlegend=False,
-        cliponaxis=False,
-        hovertemplate=f"{name}<extra></extra>",
-    )
-
-
 def table_of_curves(times_s: Sequence[float], digits: int, curves: Sequence[tuple[Column, Curve]]) -> Table:
     """The curves' values at these times, of which `digits` decimals are shown."""
     rows = []

@@ -6,8 +6,9 @@ from typing import ClassVar, Final
 import numpy as np
 
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, literal, off_scale, reading, ready, scatter, table_of_curves
+from app.figures.base import Card, Column, Table, Trace, literal, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve
+from app.figures.overlays import off_scale
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
 from app.figures import theme
-from app.figures.annotations import off_scale_traces
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.data import History, Range, last_number
-from app.figures.many_flights import MANY
+from app.figures.overlays import MANY, off_scale_traces
 from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
 

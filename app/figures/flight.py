@@ -7,9 +7,9 @@ from typing import ClassVar, Final
 import numpy as np
 
 from app.figures import theme
-from app.figures.annotations import band_traces, glitch_traces
 from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Band, Curve, Range
+from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 

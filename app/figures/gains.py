@@ -8,7 +8,7 @@ from app.core.policy import Gain
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, ready, scatter
 from app.figures.data import History, last_number
-from app.figures.many_flights import MANY
+from app.figures.overlays import MANY
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 GAP = 0.09

@@ -6,10 +6,18 @@ from typing import Any, ClassVar, Final
 
 from app.core.formatting import count
 from app.figures import theme
-from app.figures.annotations import band_traces, glitch_traces
-from app.figures.base import Card, Column, Table, Trace, off_scale, reading, ready, scatter, table_of_curves
+from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, History
-from app.figures.many_flights import PERCENTILES, Envelope, envelope_of, envelope_traces, select_individual_flights
+from app.figures.overlays import (
+    PERCENTILES,
+    Envelope,
+    band_traces,
+    envelope_of,
+    envelope_traces,
+    glitch_traces,
+    off_scale,
+    select_individual_flights,
+)
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 

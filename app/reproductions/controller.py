@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.paparazzi import OUTPUTS, RATE_HZ, LoopTrace, compared, replayed
+from app.core.control.paparazzi import OUTPUTS, RATE_HZ, LoopTrace, Replay, compared, replayed
 from app.figures.panels import Panel, Plot
 from app.logs.loop_trace import read_loop_trace
 from app.reproductions.results import Progress, Result, Row, curve
@@ -35,10 +35,10 @@ def run_controller(on_progress: Progress, trace_file: Path = RECORDED_TAKEOFF) -
             measured=float(difference),
             reference=0.0,
             digits=0,
-            note=_span(trace, signal),
+            note=f"recorded {recorded.min()} … {recorded.max()}",
             numbers={"rows": float(replay.rows)},
         )
-        for signal, difference in replay.largest_difference.items()
+        for (signal, difference), recorded in zip(replay.largest_difference.items(), trace.outputs.T, strict=True)
     )
     on_progress(1.0, "compared")
     verdict = (
@@ -48,7 +48,7 @@ def run_controller(on_progress: Progress, trace_file: Path = RECORDED_TAKEOFF) -
     )
     return Result(
         rows=rows,
-        figures={name: _plot(title, signals, trace, computed) for name, (title, signals) in _PANELS.items()},
+        figures={name: _plot(title, signals, trace, computed, replay) for name, (title, signals) in _PANELS.items()},
         notes=(
             (
                 f"{verdict}. The paper's own copy of the controller differs visibly at the start of the feedback "
@@ -58,15 +58,9 @@ def run_controller(on_progress: Progress, trace_file: Path = RECORDED_TAKEOFF) -
     )
 
 
-def _span(trace: LoopTrace, signal: str) -> str:
-    values = trace.outputs[:, OUTPUTS.index(signal)]
-    return f"recorded {values.min()} … {values.max()}"
-
-
-def _plot(title: str, signals: tuple[str, ...], trace: LoopTrace, computed: NDArray[np.int64]) -> Plot:
+def _plot(title: str, signals: tuple[str, ...], trace: LoopTrace, computed: NDArray[np.int64], replay: Replay) -> Plot:
     time_s = np.arange(len(trace)) / RATE_HZ
-    differences = {signal: int(np.abs(computed - trace.outputs)[:, OUTPUTS.index(signal)].max()) for signal in signals}
-    largest = max(differences.values())
+    largest = max(replay.largest_difference[signal] for signal in signals)
     finding = "no difference anywhere" if largest == 0 else f"largest difference {largest} counts"
     return Plot(
         title=title,

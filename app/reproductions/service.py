@@ -1,6 +1,6 @@
 """Services for reproductions: request a run, read its result."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from pydantic import TypeAdapter, ValidationError
@@ -82,15 +82,7 @@ def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> C
     if result is None or figure_name not in result.figures:
         return Card(name=figure_name, title=title, state="waiting", reason="Run this reproduction to see its figures.")
     card = card_of(PanelsFigure(result.figures[figure_name], theme))
-    return Card(
-        name=figure_name,
-        title=f"{title}: {card.title}",
-        state=card.state,
-        summary=card.summary,
-        reason=card.reason,
-        figure=card.figure,
-        table=card.table,
-    )
+    return replace(card, name=figure_name, title=f"{title}: {card.title}")
 
 
 def _registered(name: str) -> Reproduction:

@@ -8,7 +8,7 @@ import pytest
 from app.figures.data import Curve, FlightData, Range
 from app.figures.error_history import ErrorsFigure
 from app.figures.gains import GainsFigure
-from app.figures.many_flights import MANY, MAX_INDIVIDUAL_FLIGHTS, envelope_of, select_individual_flights
+from app.figures.overlays import MANY, MAX_INDIVIDUAL_FLIGHTS, envelope_of, select_individual_flights
 from app.figures.scale import thinned
 from app.figures.takeoffs import TrajectoriesFigure
 from tests.figures.builders import TIME_S, climb, flight, history, trace, traces

@@ -1,0 +1,232 @@
+"""What several figures draw over or instead of single flights: a prediction's band, glitches, triangles at the edge for
+flights that leave the scale, and for many flights the envelope that represents those not drawn individually.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.records.trajectory import Samples
+from app.figures import theme
+from app.figures.base import Trace, reading, scatter
+from app.figures.data import Band, Curve, FlightData, History, Range
+from app.figures.scale import thin_by_bends, thinned
+from app.figures.theme import Palette
+
+GLITCH_POINTS: Final = 60
+
+
+def band_traces(palette: Palette, band: Band | None) -> list[Trace]:
+    """The predicted band of a flight: two traces (`meta` role band, edge lower and upper), none without a band."""
+    if band is None:
+        return []
+    quiet: dict[str, Any] = {
+        "line": theme.line(theme.with_opacity(palette.prediction, 0.35), 0.75),
+        "legendgroup": "band",
+        "legendrank": 900,
+    }
+    lower, upper = (thin_by_bends(curve.time_s, curve.values) for curve in (band.lower, band.upper))
+    fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.prediction, 0.14)}
+    return [
+        scatter("Likely, lower edge", lower, role="band", about={"edge": "lower"}, showlegend=False, **quiet),
+        scatter("Likely", upper, role="band", about={"edge": "upper"}, **fill, **quiet),
+    ]
+
+
+def glitch_traces(
+    palette: Palette, number: int, curve: Curve | None, glitches: Sequence[Range], unit: str
+) -> list[Trace]:
+    """The glitches of a flight's record, over its curve: one trace, or none."""
+    if curve is None or not glitches:
+        return []
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for glitch in glitches:
+        time_s, values = _stretch(curve, glitch)
+        x, y = [*x, *time_s, None], [*y, *values, None]
+    return [
+        scatter(
+            f"Flight {number}, glitch",
+            (x[:-1], y[:-1]),
+            role="glitch",
+            about={"trial": number},
+            mode="lines+markers",
+            line=theme.line(palette.bad, 5),
+            marker={"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": palette.bad}},
+            opacity=0.85,
+            showlegend=False,
+            hovertemplate=reading(f"Flight {number}, glitch", unit),
+        )
+    ]
+
+
+def _stretch(curve: Curve, part: Range) -> tuple[list[float], list[float]]:
+    """Part of a curve, with the samples just before and after it, so that a gap is visible."""
+    first, end = part.slice_of(curve.time_s)
+    return thinned(curve.time_s[first:end], curve.values[first:end], GLITCH_POINTS)
+
+
+PRINT: Final = 0.18
+"""Width of a printed error on a phone, as a share of the axis."""
+
+
+def off_scale_traces(
+    palette: Palette, flights: Sequence[FlightData], top: float, unit: str, *, last: int, crowded: bool
+) -> list[Trace]:
+    """Marks at height `top` of an axis that ends with flight `last`.
+
+    If there are few flights, with the errors that have room.
+    """
+    if crowded:
+        return [_together(palette, flights, top, unit)] if flights else []
+    printed = set(_with_room([flight.number for flight in flights], PRINT * last))
+    return [_alone(palette, flight, top, unit, in_print=flight.number in printed) for flight in flights]
+
+
+def _with_room(numbers: Sequence[int], room: float) -> Iterator[int]:
+    """Of ascending numbers, those at least `room` away from the last one selected."""
+    free = 0.0
+    for number in numbers:
+        if number >= free:
+            free = number + room
+            yield number
+
+
+def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_print: bool) -> Trace:
+    text = f"Flight {flight.number}: {flight.error:.2f} {unit}"
+    return scatter(
+        text,
+        ([flight.number], [top]),
+        role="off scale",
+        about={"trial": flight.number},
+        mode="markers+text" if in_print else "markers",
+        text=[f"↑ {flight.error:.2f}" if in_print else ""],
+        textposition="bottom center",
+        showlegend=False,
+        marker={"symbol": "triangle-up", "size": 12, "color": palette.bad},
+        textfont={"color": palette.bad},
+        cliponaxis=False,
+        hovertemplate=f"{text}<extra></extra>",
+    )
+
+
+def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit: str) -> Trace:
+    """Many flights in one trace, without printed errors."""
+    return scatter(
+        "Off scale",
+        ([flight.number for flight in flights], [top] * len(flights)),
+        role="off scale",
+        mode="markers",
+        text=[f"{flight.error:.2f} {unit}" for flight in flights],
+        marker={"symbol": "triangle-up", "size": 8, "color": palette.bad},
+        cliponaxis=False,
+        hovertemplate="<b>Flight %{x}</b><br>error %{text}<extra></extra>",
+    )
+
+
+def off_scale(label: str, curve: Curve, low: float, high: float, colour: str, *, trial: int, text: str) -> Trace:
+    """A triangle at the edge where a flight leaves the scale `low` … `high`, labelled with its peak value."""
+    values = curve.values
+    up = bool(values.max() - high >= low - values.min())
+    peak = int(values.argmax() if up else values.argmin())
+    name = f"{text} reaches {values[peak]:.2f}"
+    return scatter(
+        name,
+        ([round(float(curve.time_s[peak]), 3)], [high if up else low]),
+        role="off scale",
+        about={"trial": trial},
+        mode="markers+text",
+        text=[f"{label} {'↑' if up else '↓'} {values[peak]:.1f}"],
+        textposition="bottom center" if up else "top center",
+        marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
+        textfont={"color": colour},
+        showlegend=False,
+        cliponaxis=False,
+        hovertemplate=f"{name}<extra></extra>",
+    )
+
+
+MAX_INDIVIDUAL_FLIGHTS: Final = 30
+"""Up to this number, every flight is drawn individually."""
+MANY: Final = 120
+"""With more flights than this, marks over the flight numbers are small, without error bars or labels."""
+NEAR_BEST: Final = 5
+LATEST: Final = 3
+PERCENTILES: Final = (10.0, 50.0, 90.0)
+_EVENLY: Final = 160
+_EARLY: Final = 80
+_EARLY_SHARE: Final = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Envelope:
+    """The band that contains 80 % of `flights` at each time, and their median curve."""
+
+    band: Band
+    median: Curve
+    flights: int
+
+
+def select_individual_flights(history: History, chosen: int | None = None) -> frozenset[int]:
+    """Numbers of the flights drawn as individual curves.
+
+    All, if there are few; of many, the first, the best and the next best, the latest, and the `chosen` one.
+    """
+    if len(history.flights) <= MAX_INDIVIDUAL_FLIGHTS:
+        return frozenset(flight.number for flight in history.flights)
+    ranked = sorted(history.valid, key=lambda flight: (flight.error, flight.number))
+    emphasised = [*history.flights[:1], *history.flights[-LATEST:], *ranked[: NEAR_BEST + 1]]
+    asked = [flight for flight in history.flights if flight.number == chosen]
+    return frozenset(flight.number for flight in (*emphasised, *asked))
+
+
+def envelope_of(flights: Sequence[FlightData], until_s: float) -> Envelope | None:
+    """Envelope of the valid flights' curves from the command to `until_s`; None without any.
+
+    Times are denser while the flights climb; after the end of a record its last value holds.
+    """
+    curves = [flight.curve for flight in flights if flight.outcome == "valid" and flight.curve is not None]
+    curves = [curve for curve in curves if len(curve.time_s)]
+    if not curves:
+        return None
+    instants = _instants(until_s)
+    table: NDArray[np.float64] = np.array([np.interp(instants, curve.time_s, curve.values) for curve in curves])
+    lower, middle, upper = np.percentile(table, PERCENTILES, axis=0)
+    band = Band(lower=Curve(instants, lower), upper=Curve(instants, upper))
+    return Envelope(band=band, median=Curve(instants, middle), flights=len(curves))
+
+
+def envelope_traces(palette: Palette, envelope: Envelope | None, unit: str) -> list[Trace]:
+    """Two edges with the band between them, and the median (`meta` role envelope, edge lower, upper and middle)."""
+    if envelope is None:
+        return []
+    edge: dict[str, Any] = {"line": theme.line(palette.earlier, 0.75), "legendgroup": "envelope", "legendrank": 800}
+    fill: dict[str, Any] = {"fill": "tonexty", "fillcolor": theme.with_opacity(palette.earlier, 0.3)}
+    name = f"80\u00a0% of {envelope.flights} flights"
+    lower, upper, median = map(_points, (envelope.band.lower, envelope.band.upper, envelope.median))
+    return [
+        scatter("Lower edge", lower, role="envelope", about={"edge": "lower"}, showlegend=False, **edge),
+        scatter(name, upper, role="envelope", about={"edge": "upper"}, **fill, **edge),
+        scatter(
+            "Median",
+            median,
+            role="envelope",
+            about={"edge": "middle"},
+            line=theme.line(palette.earlier, 1.5, "longdash"),
+            legendgroup="median",
+            legendrank=800,
+            hovertemplate=reading(f"Median of {envelope.flights} flights", unit),
+        ),
+    ]
+
+
+def _instants(until_s: float) -> Samples:
+    early = np.linspace(0.0, _EARLY_SHARE * until_s, _EARLY, endpoint=False)
+    return np.concatenate([early, np.linspace(_EARLY_SHARE * until_s, until_s, _EVENLY)])
+
+
+def _points(curve: Curve) -> tuple[list[float], list[float]]:
+    return [round(at, 3) for at in curve.time_s.tolist()], [round(value, 4) for value in curve.values.tolist()]
