@@ -13,7 +13,7 @@ SPIKE = Glitch(kind="acceleration", start_s=1.0, end_s=1.1, sentence="The altitu
 
 
 def test_a_low_battery_ends_a_campaign_whose_flights_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The twin's battery holds 11.1 V; every record has a glitch, and there is nobody to look at it."""
+    """The twin's battery holds 11.1 V; every record has a glitch, and no person reviews it."""
 
     def always_one(_experiment: Experiment, _record: Trajectory) -> tuple[Glitch, ...]:
         return (SPIKE,)
