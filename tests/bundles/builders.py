@@ -1,4 +1,4 @@
-"""A second installation with a database of its own, and bundles between it and the first."""
+"""A second installation with its own database, and bundles between it and the first."""
 
 import hashlib
 import json

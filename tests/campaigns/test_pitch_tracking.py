@@ -1,4 +1,4 @@
-"""A campaign of the F-16 over HTTP: defined, flown by its vehicle, judged and drawn."""
+"""A campaign of the F-16 over HTTP: defined, flown, evaluated and drawn."""
 
 from typing import Any
 

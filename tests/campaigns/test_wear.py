@@ -1,5 +1,5 @@
 """What a vehicle's campaigns tell of it, over HTTP: campaigns with the calibrated model on one shared simulation, whose
-flights the simple model makes with parameters of its own."""
+flights the simple model makes with its own parameters."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""`gainline sim-drone`: the real command, as a process of its own."""
+"""`gainline sim-drone`: the real command, as a separate process."""
 
 import signal
 import socket

@@ -116,7 +116,7 @@ def browser(chromium: str) -> Browser:
 
 
 class Server:
-    """`gainline serve` in a process of its own."""
+    """`gainline serve` in a separate process."""
 
     def __init__(self, data_dir: Path, port: int = 0, *options: str) -> None:
         self.data_dir = data_dir

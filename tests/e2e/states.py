@@ -105,7 +105,7 @@ class States:
         return self._fly(campaign_id, {"variant": "repeat"})
 
     def plan(self, campaign_id: int, gains: Mapping[str, float]) -> int:
-        """A trial that nobody has flown; its id."""
+        """Make a trial that has not been flown and return its id."""
         return self._write(lambda session: trials.create_trial(session, campaign_id, NewTrial(gains=dict(gains))).id)
 
     def take_record(self, campaign_id: int, csv: Callable[[Mapping[str, float]], bytes]) -> int:
@@ -160,7 +160,7 @@ class States:
     # ---- the rest
 
     def vehicle(self, name: str, **fields: object) -> int:
-        """A registered vehicle that nobody has connected yet."""
+        """A registered vehicle that has never been connected."""
         new = NewVehicle.model_validate({"name": name, "kind": "mavlink", **fields})
         return self._write(lambda session: registration.register_vehicle(session, new, LOCAL_CLI).id)
 

@@ -1,4 +1,4 @@
-"""Flights of several campaigns side by side: chosen, drawn, judged, sent to somebody, and taken along as files."""
+"""Comparison of flights of several campaigns: selection, figure, verdict, shared address and exported files."""
 
 import csv
 import re

@@ -40,7 +40,7 @@ from tests.logs.recorded import recorded
 AT_START: Final = {app.common.errors.SchemaError, app.common.errors.AlreadyRunningError, app.common.errors.AddressError}
 """These end the program before it answers anybody."""
 FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unexpected")
-"""What is refused before our own code, or by nobody on purpose."""
+"""Responses that do not come from the application's own code."""
 RETRIED_MS: Final = 40_000
 """A read that failed at the server is tried three times more before the page says so."""
 
@@ -356,7 +356,7 @@ def _is_told(dashboard: Dashboard, told: list[Json], title: str) -> None:
     expect(dashboard.page.get_by_role("alert").first).to_be_visible(timeout=RETRIED_MS)
 
     def shown() -> list[Json]:
-        """Of several reads that failed, the page tells one."""
+        """The page shows one of several failed reads."""
         open_details(dashboard.page)
         text = dashboard.page.locator("body").inner_text()
         return [one for one in told if one["title"] == title and one["detail"] in text]

@@ -1,4 +1,4 @@
-"""A whole flight-test day with a REAL vehicle as one story, as docs/guide.md tells it and with its pictures."""
+"""A whole flight-test day with a REAL vehicle as in docs/guide.md, whose pictures it takes."""
 
 import os
 import re

@@ -53,7 +53,7 @@ def dashboard(open_dashboard: Opener, shared_server: Server) -> Dashboard:
 
 @pytest.fixture
 def trial_id(dashboard: Dashboard, states: States, vehicle_id: int) -> Iterator[int]:
-    """A trial of gains other than the safe ones, in a campaign of its own, the fly screen open."""
+    """A trial of gains other than the safe ones, in a separate campaign, the fly screen open."""
     in_state(dashboard, vehicle_id, "ready")
     once = {"kind": "budget", "max_flights": 1}
     campaign_id = states.campaign("mavlink", name="Up to 3 m", vehicle_id=vehicle_id, stop=once)

@@ -1,4 +1,4 @@
-"""What is lost and comes back: the page says so, shows nothing old as current, and catches up without a click."""
+"""Lost connections: the page shows them, never shows old values as current, and recovers without a click."""
 
 import os
 import re

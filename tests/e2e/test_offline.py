@@ -12,7 +12,7 @@ from tests.e2e.unplugged import pages
 
 
 def own_network() -> list[str]:
-    """The command that runs another one in a network namespace of its own, where this user may have one."""
+    """The command that runs another one in a separate network namespace, where this user may have one."""
     if shutil.which("unshare") is None:
         pytest.skip("there is no `unshare` here to unplug the network with")
     for command in (["unshare", "--net"], ["unshare", "--map-root-user", "--net"]):

@@ -106,7 +106,7 @@ class Pages:
 
     @cached_property
     def vehicle_id(self) -> int:
-        """A vehicle that nobody has connected yet."""
+        """A vehicle that has never been connected."""
         return self._states.vehicle("Bee", options={"address": "udp:127.0.0.1:14997@14996", "simulated": True})
 
     @cached_property
@@ -124,7 +124,7 @@ class Pages:
 
     @cached_property
     def fly(self) -> str:
-        """A flight that nobody has begun."""
+        """A flight that has not begun."""
         return f"/fly/{self._states.plan(self._states.campaign(seed=5), GAINS)}"
 
     @cached_property

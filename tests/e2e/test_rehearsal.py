@@ -13,7 +13,7 @@ REAL: Final = {
     "safe_gains_confirmed": True,
     "statement": "Ada has seen it fly on these",
 }
-"""Nobody has switched it on."""
+"""An address without a vehicle."""
 
 
 def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(

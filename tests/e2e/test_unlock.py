@@ -1,4 +1,4 @@
-"""A browser that has opened no link: it watches a REAL vehicle, says so, and is unlocked by the terminal's link."""
+"""A browser that has opened no link: it may only watch a REAL vehicle, and the terminal's link unlocks it."""
 
 import os
 import re
@@ -24,7 +24,7 @@ def picture(page: Page, name: str) -> None:
 
 @pytest.fixture
 def bee(empty_server: Server, states: States) -> int:
-    """A REAL vehicle that nobody has connected."""
+    """A REAL vehicle that has never been connected."""
     return states.vehicle("Bee", safe_gains_confirmed=True, statement="Ada has seen it fly on these")
 
 

@@ -106,7 +106,7 @@ def test_a_campaign_with_a_registered_vehicle_has_its_experiment(dashboard: Dash
 
 
 def left_in_the_air(dashboard: Dashboard, server: Server, states: States, drone: Drone, name: str) -> int:
-    """A vehicle that nobody flies any more: its session was killed while it flew."""
+    """A vehicle whose process was killed in flight."""
     vehicle_id = states.vehicle(name, options={"address": drone.address, "simulated": True})
     dashboard.post(f"/vehicles/{vehicle_id}/connect")
     until_in_state(dashboard, vehicle_id, "ready")

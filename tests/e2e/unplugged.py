@@ -1,4 +1,4 @@
-"""Server and browser on a machine without any network: run inside a network namespace of its own, by `test_offline`.
+"""Server and browser on a machine without any network: run inside a separate network namespace, by `test_offline`.
 
 Writes what it saw as JSON to its standard output: per page its address, its heading, and what it asked elsewhere.
 """

@@ -1,4 +1,4 @@
-"""A line between browser and server that can be lost: nothing passes, and nobody is told."""
+"""A connection between browser and server that can be lost without notice."""
 
 import socket
 from collections.abc import Iterator

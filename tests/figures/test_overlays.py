@@ -18,7 +18,7 @@ RANDOM = np.random.default_rng(5)
 
 
 def rugged(number: int, error: float) -> FlightData:
-    """A flight with an overshoot of its own."""
+    """A flight with its own overshoot."""
     return replace(flight(number, error), curve=climb(float(RANDOM.uniform(0.0, 0.8))))
 
 

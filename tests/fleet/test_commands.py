@@ -420,7 +420,7 @@ def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
 def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(
     client: TestClient, database: Database
 ) -> None:
-    """Paparazzi tells its version every few seconds: often after it was connected."""
+    """Paparazzi sends its version every few seconds, often only after the connection."""
     vehicle = register(client)
 
     def connected_as(version: str, concern: str = "") -> str:

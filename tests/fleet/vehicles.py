@@ -63,7 +63,7 @@ def create_campaign_on(
 
 
 def put_rehearsal(client: httpx2.Client, database: Database, campaign: Json) -> None:
-    """One that passed, with flights that nobody has flown."""
+    """A rehearsal that passed, with made-up flights."""
     made = client.post(f"/api/campaigns/{campaign['id']}/rehearsal")
     assert made.status_code == 201, made.text
     run_jobs(database)

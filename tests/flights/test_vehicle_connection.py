@@ -49,7 +49,7 @@ def dies_of_it(pipe: Connection, _call: ConnectionRequest) -> None:
 
 
 def goes_on(pipe: Connection, _call: ConnectionRequest) -> None:
-    """Tells how its vehicle is, then nothing until an order comes; then it goes on."""
+    """Report the state of the vehicle, then send nothing until a command arrives, then continue."""
     pipe.send(OPENED)
     pipe.send(STATUS)
     ordered = pipe.recv()

@@ -164,7 +164,7 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
 
 
 def test_a_take_off_that_comes_too_late_does_not_take_place(rig: AnsweringRig, tmp_path: Path) -> None:
-    """Seen: the process stood still for 20 s, and the vehicle took off when nobody expected it any more."""
+    """Observed defect: the process was suspended for 20 s, and the vehicle took off unexpectedly afterwards."""
     line = RecordingPipe()
     process = started(rig, line, tmp_path)
     line.workers_end.send(TakeOffCommand(by_s=time.monotonic() - 0.001))

@@ -20,7 +20,7 @@ PATIENCE_S = 40.0
 
 
 def environment(**more: str) -> dict[str, str]:
-    """This process's, without settings of its own."""
+    """This process's, without its own settings."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("GAINLINE_")}
     return {**kept, **more}
 

@@ -77,6 +77,6 @@ def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
 
 
 def test_a_process_that_reads_a_file_loads_neither_the_web_nor_the_database() -> None:
-    """Each file has one of its own: what it loads, whoever sends the file waits for."""
+    """Each file has a separate process, whose start the sender of the file waits for."""
     for function in (read_content, examine_content):
         assert not imported(f"import {function.__module__}").intersection(("fastapi", "plotly", *DATABASE))

@@ -67,7 +67,7 @@ class LockstepWire:
 
 
 class UdpWire:
-    """A socket of this computer, bound to a port of its own."""
+    """A socket of this computer, bound to its own port."""
 
     def __init__(self, drone: tuple[str, int]) -> None:
         self._drone = drone
@@ -206,7 +206,7 @@ def switched_on(
 
 @contextlib.contextmanager
 def served(autopilot: str, link: str, *, clock: Clock | None = None, **settings: Any) -> Iterator[Drone]:
-    """A drone on this link, in a thread of its own, with the settings of `switched_on`."""
+    """A drone on this link, in a separate thread, with the settings of `switched_on`."""
     drone = switched_on(autopilot, **settings)
     transport = open_transport(parse(link))
     server = Server(drone, transport, clock or ScaledClock(SPEED))

@@ -1,4 +1,4 @@
-"""A ground station that nobody here wrote, MAVSDK, against the simulated PX4 and ArduPilot.
+"""MAVSDK, an independent ground station, against the simulated PX4 and ArduPilot.
 
 Its time-outs are seconds of this computer's clock; the drones live faster.
 """

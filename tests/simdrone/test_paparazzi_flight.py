@@ -184,7 +184,7 @@ def test_failsafe_descends_at_one_point_three_metres_a_second(pilot: Pilot) -> N
 
 
 def test_with_a_silent_ground_it_hovers_until_the_blocks_own_limit_lands_it(pilot: Pilot) -> None:
-    """45 s in the block, and nobody has said a word since."""
+    """After 45 s in the block without any message from the ground."""
     pilot.take_off()
     assert heights_m(pilot.ground.listen(42.0))[-1] > 2.8
     assert pilot.ground.expect("SCRIPT_CURRENT", lambda message: message.seq > TAKEOFF, within_s=10.0).seq in (

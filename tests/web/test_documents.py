@@ -1,4 +1,4 @@
-"""docs/api.md says what the API does, and its scripts work as they stand there."""
+"""docs/api.md agrees with the API, and its scripts run as printed."""
 
 import re
 import subprocess

@@ -129,7 +129,7 @@ def test_nobody_overrules_the_gate_on_a_real_vehicle(client: TestClient, databas
 
 
 def test_own_gains_are_judged_over_what_the_flights_have_shown(client: TestClient, database: Database) -> None:
-    """Before any proposal, the data sheet; then what the latest proposal was judged over, as it was stored."""
+    """Before any proposal, the data sheet; then the distribution stored with the latest proposal."""
     campaign = create_ready_campaign(client, database, definition=OPEN)
     experiment = get_experiment("takeoff")
     create_flown_trial(client, database, campaign["id"])

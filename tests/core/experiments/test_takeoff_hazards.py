@@ -52,7 +52,7 @@ GOOD = [
 
 
 def around(hover: float, *, lag_s: float = 0.05, within: float = 0.3) -> ParameterDistribution:
-    """A vehicle known about as well as one flight tells."""
+    """Parameter distribution typical after one flight."""
     mean = TAKEOFF.nominal_model
     mean[0], mean[2] = hover, lag_s
     sd = np.array([within * parameter.known_within / 2.0 for parameter in TAKEOFF.model_parameters])
@@ -244,7 +244,7 @@ def test_what_is_astray_and_what_only_takes_its_time(
 
 
 def test_uncompiled_one_short_takeoff_is_judged() -> None:
-    """A tenth of the flight on two vehicles: not to be judged by, but by the same code."""
+    """A tenth of a flight on two vehicles: the same code, too short for a verdict."""
     answers = check_flights(
         np.array([4000, 0, 0]),
         SAFE_COUNTS,

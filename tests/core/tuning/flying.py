@@ -19,7 +19,7 @@ compiled_only = pytest.mark.skipif(
     bool(vars(config)["DISABLE_JIT"]), reason="flies hundreds of takeoffs; the kernels have their own tests uncompiled"
 )
 ARDRONE = (0.6315, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 0.0)
-"""Close to the simulated AR.Drone: errors within 4 % of its own at every gain set of the paper's Table 1."""
+"""Model close to the simulated AR.Drone: its errors are within 4 % at every gain set of the paper's Table 1."""
 TWIN = (0.61, 0.3, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0)
 """The twin of the paper's real flights, without scatter."""
 

@@ -16,7 +16,7 @@ SOON_S: Final = 5.0
 
 
 class FakeVehicleEndpoint:
-    """A vehicle's end over UDP: says what it is told to, and keeps what it hears."""
+    """The vehicle's end of a UDP link: sends given messages and records what it receives."""
 
     def __init__(
         self,

@@ -98,7 +98,7 @@ def test_the_version_is_asked_of_autopilots_that_answer_and_a_new_one_is_a_conce
 
 
 def test_a_new_version_that_is_told_only_later_is_a_concern_until_a_person_has_looked() -> None:
-    """Paparazzi tells its version every few seconds, unasked."""
+    """Paparazzi sends its version every few seconds without a request."""
     with LockstepRig() as rig, connected(rig, replace(PINNED, version="5.8.0")) as vehicle:
         attend_until(vehicle, lambda: bool(vehicle.concern))
         assert vehicle.concern == f"Its firmware has changed from version 5.8.0 to {vehicle.identity.version}."
@@ -133,7 +133,7 @@ def test_another_vehicle_of_the_same_make_and_version_is_only_observed_until_a_p
 
 
 def test_a_vehicle_that_does_not_report_its_known_hardware_id_gets_no_gains_until_released() -> None:
-    """Another one whose answer is lost, or a firmware that tells it no more."""
+    """Another vehicle whose answer is lost, or a firmware that no longer reports the id."""
     with LockstepRig("px4") as rig:
         rig.drone.autopilot.uid = 0  # type: ignore[attr-defined]
         pin = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0000000000000007")
@@ -190,7 +190,7 @@ def test_a_vehicle_that_is_swapped_while_the_link_stays_open_is_asked_who_it_is_
 
 
 class LossyRig(LockstepRig):
-    """Loses what the drone tells of itself before `lost_until_s`."""
+    """Transport that loses the drone's identity messages before `lost_until_s`."""
 
     lost_until_s = 0.0
 

@@ -39,7 +39,7 @@ def fly(vehicle: MavlinkVehicle, autopilot: str) -> FlightRecord:
 
 
 def test_an_ardupilot_that_sends_only_requested_messages_can_be_flown() -> None:
-    """Seen on a direct link: “no voltage told”, for nobody had asked for SYS_STATUS."""
+    """Observed on a direct link: no voltage was reported, because SYS_STATUS had not been requested."""
     with ready("ardupilot") as rig:
         rig.wait_s(3.0)
         kinds = {message.get_type() for message in _heard(rig)}
@@ -315,7 +315,7 @@ def test_a_vehicle_whose_own_checks_fail_is_not_flown_and_all_reasons_are_report
 
 @pytest.mark.parametrize("tells_events", [True, False])
 def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events: bool) -> None:
-    """It told at its start, when nobody listened yet, and tells again when something changes or somebody asks."""
+    """It sent them at its start, before anyone listened, and sends them again after a change or on request."""
     with LockstepRig("px4", faults=["arm-refused@connect"]) as rig:
         if not tells_events:
             rig.drone.autopilot._send_check_events = lambda: None  # type: ignore[attr-defined]  # as before release 1.14

@@ -9,7 +9,7 @@ import pytest
 from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
 
 Packet = tuple[float, int, bytes, float]
-"""When it comes, its sequence number, its frame, the vehicle's time that it tells."""
+"""Time of arrival, sequence number, frame, and the vehicle's time in it."""
 
 
 def said(

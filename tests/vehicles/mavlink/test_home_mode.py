@@ -29,7 +29,7 @@ def old_plan(*, max_distance_m: float = 5.5, sends_mode: bool = False) -> Make:
 
 
 class Flickering(Paparazzi):
-    """Every other one of its heartbeats tells a pilot's mode, as nobody's does who flies it."""
+    """Every other heartbeat shows a pilot's mode, which a real pilot would not cause."""
 
     first = 0
     _beats = 0

@@ -264,7 +264,7 @@ def test_what_is_missing_in_the_sequence_is_counted_as_lost(paparazzi: FakeVehic
 
 
 def test_a_newer_message_is_not_handed_over_yet_counts_in_the_sequence() -> None:
-    """PX4 sends ids that the dialect does not know; their checksums cannot be judged, so they are no sign of life."""
+    """PX4 sends ids unknown to the dialect. Their checksums cannot be verified, so they are no sign of life."""
     with (
         FakeVehicleEndpoint(COMMON, system=1) as vehicle,
         Link(vehicle.address, COMMON, clock=CLOCK, target_system=1) as link,

@@ -1,4 +1,4 @@
-"""How a vehicle's motors are stopped, and how it comes down when it is told to land in its first seconds."""
+"""Motors off, and Land in the first seconds of a flight."""
 
 from contextlib import closing
 

@@ -24,7 +24,7 @@ GAIN: dict[str, FieldValue] = {
 
 
 def read(path: Path, dialect: Dialect, monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, Message]]:
-    """Every message of a log with its Unix time, s. The library's reader speaks what the environment tells it to."""
+    """Every message of a log with its Unix time, s. The library's reader takes its dialect from the environment."""
     for name in ("MAVLINK20", "MAVLINK09"):
         monkeypatch.delenv(name, raising=False)
     if dialect.mavlink == 2:
@@ -117,7 +117,7 @@ def test_a_frame_is_in_the_file_soon_though_the_log_is_open(tmp_path: Path) -> N
 
 
 def test_a_disk_that_stalls_keeps_nothing_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A pipe that nobody reads takes 64 kB, and then no more."""
+    """A pipe without a reader accepts only 64 kB."""
     monkeypatch.setattr("app.vehicles.mavlink.tlog.STORED_WITHIN_S", 0.2)
     path = tmp_path / "stalled.tlog"
     os.mkfifo(path)

@@ -1,4 +1,4 @@
-"""Whole flights that cameras watch, in real time eight times over: NatNet is heard in a thread of its own."""
+"""Whole flights with motion capture, at eight times real time: NatNet is received in a separate thread."""
 
 import threading
 from collections.abc import Sequence
@@ -76,7 +76,7 @@ def test_cameras_that_see_nothing_new_land_the_vehicle_and_void_the_flight(fault
 
 @pytest.mark.complete
 def test_cameras_that_drift_away_land_the_vehicle_and_the_record_says_by_how_much() -> None:
-    """On the ground the cameras still see it in the air: nobody but a person stops its motors."""
+    """Motion capture still shows it in the air, so only a person may stop its motors."""
     record = flown(natnet(free_port()), ["mocap-drift@4"], concern="It has not landed within 40 s.")
     assert record.ending == "invalid"
     assert "Two sources of altitude disagree." in record.reason

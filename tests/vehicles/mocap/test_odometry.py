@@ -1,4 +1,4 @@
-"""Odometry over real MAVLink packets, on a link of its own and on the vehicle's."""
+"""Odometry over real MAVLink packets, on a separate link and on the vehicle's."""
 
 import math
 import socket

@@ -1,4 +1,4 @@
-"""MAVProxy, a ground station that nobody here wrote, as a process of its own that is typed to and read from."""
+"""MAVProxy, an independent ground station, as a separate process that is typed to and read from."""
 
 import os
 import re

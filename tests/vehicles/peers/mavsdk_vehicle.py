@@ -1,4 +1,4 @@
-"""A vehicle that nobody here wrote: MAVSDK's vehicle-side plugins, flying the simplest body that there is.
+"""An independent vehicle: MAVSDK's vehicle-side plugins with the simplest possible flight model.
 
 On the wire it has PX4's modes, parameters and answers; all of it is MAVSDK's own. Its time is this computer's.
 """

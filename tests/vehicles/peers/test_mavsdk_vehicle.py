@@ -1,4 +1,4 @@
-"""Our ground side meets a vehicle that nobody here wrote, MAVSDK's own, over real UDP and in real time."""
+"""The program's ground side with MAVSDK's independent vehicle, over real UDP and in real time."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

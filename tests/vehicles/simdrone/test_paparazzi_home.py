@@ -92,7 +92,7 @@ def test_its_heartbeat_looks_like_nav_unless_its_release_tells_the_modes_number(
 
 
 def test_the_plan_lands_it_before_that() -> None:
-    """At the shipped plan's own distance, with nobody on the link."""
+    """At the distance of the delivered plan, without a ground station on the link."""
     ground = flying("paparazzi", faults=["carried-away:6@6"])
     Pilot(ground).take_off()
     assert ground.expect("SCRIPT_CURRENT", lambda message: message.seq in (LAND_HERE, LAND), within_s=20.0)
