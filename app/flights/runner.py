@@ -22,7 +22,6 @@ from app.flights import queue
 from app.flights.abort import AbortFlag, AbortRegistry
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import (
-    FlightBackend,
     FlightFailure,
     FlightLanded,
     FlightRequest,
@@ -31,6 +30,7 @@ from app.flights.process_messages import (
     SafeGainsRestored,
 )
 from app.flights.record_spool import Spool
+from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.vehicles.base import FlightRecord, VehicleError
 from app.vehicles.registry import get_kind
@@ -61,14 +61,14 @@ class FlightOutcome:
     restored: dict[str, float] | None = None
 
 
-def _refuse_session(_vehicle_id: int) -> FlightBackend:
+def _refuse_session(_vehicle_id: int) -> FlightProcess:
     raise VehicleError("There is no link to the vehicle.", hint="Connect it, then try again.")
 
 
 class FlightRunner:
     """Claims flights and carries them out. `closing` ends the retries while the database accepts no writes.
 
-    `session(vehicle_id)` returns the backend of a vehicle that keeps its connection between flights; other vehicles are
+    `session(vehicle_id)` returns the process of a vehicle that keeps its connection between flights; other vehicles are
     opened for each flight in a process of the pool.
     """
 
@@ -81,7 +81,7 @@ class FlightRunner:
         *,
         worker: str,
         closing: threading.Event,
-        session: Callable[[int], FlightBackend] = _refuse_session,
+        session: Callable[[int], FlightProcess] = _refuse_session,
         clock: Clock = REAL_TIME,
     ) -> None:
         self._database = database
@@ -152,14 +152,14 @@ class FlightRunner:
         finally:
             flag.add_listener(lambda _reason: None)
 
-    def _acquire_backend(self, request: FlightRequest) -> FlightBackend:
+    def _acquire_backend(self, request: FlightRequest) -> FlightProcess:
         """Return the process that flies the vehicle. Raises VehicleError when the vehicle needs a connection and has
         none."""
         if get_kind(request.vehicle_kind).connect is not None:
             return self._session(request.vehicle_id)
         return self._process_pool.acquire()
 
-    def _fly_on_backend(self, backend: FlightBackend, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
+    def _fly_on_backend(self, backend: FlightProcess, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
         """Fly the vehicle; whatever happens, release its process and return an outcome."""
         ended = FlightOutcome()
         try:
@@ -185,12 +185,12 @@ class FlightRunner:
         except Exception as error:  # noqa: BLE001 - an internal error must not leave the trial without an end
             backend.close()
             return replace(ended, problem=_describe_error(error), unheard=True)
-        if isinstance(backend, FlightProcess):
+        if not isinstance(backend, VehicleConnection):
             self._process_pool.release(backend)
         return ended
 
     def _staged(
-        self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend, read_back: dict[str, float]
+        self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess, read_back: dict[str, float]
     ) -> FlightOutcome:
         """Command the take-off if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
@@ -210,7 +210,7 @@ class FlightRunner:
             backend.cancel_take_off()
         return ended
 
-    def _await_takeoff_clearance(self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend) -> str | None:
+    def _await_takeoff_clearance(self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess) -> str | None:
         """Wait until the vehicle may take off: at once, or on its operator's request. Returns None, or why it must
         not."""
         if request.mode == "fly":

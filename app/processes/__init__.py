@@ -71,6 +71,11 @@ class ChildProcess:
     def alive(self) -> bool:
         return self._process.is_alive()
 
+    @property
+    def exit_code(self) -> int | None:
+        """The exit code; None while the process runs, and the negative number of the signal that ended it."""
+        return self._process.exitcode
+
     def send(self, message: object) -> None:
         """Send a message. Raises OSError when the process is dead."""
         self.pipe.send(message)
@@ -80,12 +85,8 @@ class ChildProcess:
         try:
             return self.pipe.recv()
         except (EOFError, OSError) as error:
-            raise self.death() from error
-
-    def death(self) -> ProcessDiedError:
-        """The error of a process whose pipe is closed."""
-        self.join()
-        return ProcessDiedError(self._process.exitcode)
+            self.join()
+            raise ProcessDiedError(self.exit_code) from error
 
     def join(self) -> None:
         """Wait until the process ends, for at most DEATH_TIMEOUT_S."""

@@ -33,7 +33,7 @@ from app.fleet import registration
 from app.fleet.schemas import NewVehicle
 from app.flights import queue
 from app.flights import service as flights
-from app.flights.process_messages import mark_if_requested
+from app.flights.flight_loop import mark_if_requested
 from app.jobs import service as jobs
 from app.reproductions import service as reproductions
 from app.reproductions.registry import get_reproduction
