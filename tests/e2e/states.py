@@ -254,8 +254,7 @@ def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> Non
         )
         record = mark_if_requested(record, set() if stop is None else {stop.reason})
         restored = restore_safe_gains(vehicle)
-    queue.record_landing(session, task.flight_id, record)
-    queue.record_restored(session, task.flight_id, restored)
+    queue.record_outcome(session, task.flight_id, queue.FlightOutcome(record=record, restored=restored))
 
 
 def _propose(session: Session, campaign_id: int) -> None:
