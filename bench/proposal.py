@@ -68,7 +68,7 @@ def fly(database: Database, campaign_id: int) -> bool:
     with database.write() as session:
         queue.record_staged(session, task.flight_id, read_back)
         queue.record_lift_off(session, task.flight_id)
-        queue.record_landing(session, task.flight_id, record)
+        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(record=record))
     return True
 
 

@@ -164,4 +164,4 @@ def lift_off(database: Database) -> FlightRequest:
 
 def land(database: Database, task: FlightRequest, record: FlightRecord) -> None:
     with database.write() as session:
-        queue.record_landing(session, task.flight_id, record)
+        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(record=record))

@@ -206,7 +206,7 @@ class _Campaign:
         self._display.planned(planned.number, request.gains)
         record = self._fly(request)
         with self._database.write() as session:
-            queue.record_landing(session, request.flight_id, record)
+            queue.record_outcome(session, request.flight_id, queue.FlightOutcome(record=record))
             trial = history.trial_row(session, request.trial_id)
             if trial.state == TrialState.CAPTURED:
                 reason = " ".join(glitch["sentence"] for glitch in trial.glitches or ())

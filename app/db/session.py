@@ -5,10 +5,11 @@ another connection wrote in between; one that takes the write lock first waits f
 """
 
 import sqlite3
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from pydantic_core import from_json
 from sqlalchemy import Connection, Engine, create_engine, event
@@ -18,7 +19,10 @@ from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from app.common.errors import StorageError
+from app.core.clock import Clock
 from app.db import outbox
+
+T = TypeVar("T")
 
 _BUSY_TIMEOUT_MS: Final = 5000
 _BEGIN: Final = "gainline_begin"
@@ -98,6 +102,25 @@ class Database:
 
     def close(self) -> None:
         self.engine.dispose()
+
+
+RETRY_S: Final = 1.0
+
+
+def retry_until_stored(
+    work: Callable[[], T], refused: Callable[[StorageError], object], *, closing: threading.Event, clock: Clock
+) -> T | None:
+    """Result of `work`, called until the database accepts it; None when `closing` is set before that.
+
+    `refused` hears why it did not, each time. Whatever else `work` raises, this raises.
+    """
+    while True:
+        try:
+            return work()
+        except StorageError as error:
+            refused(error)
+        if closing.wait(clock.wall_s(RETRY_S)):
+            return None
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from app.common.errors import ConflictError, StorageError
 from app.common.states import GIVES_GAINS, ActKind
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
-from app.db.session import Database
+from app.db.session import Database, retry_until_stored
 from app.fleet import commands
 from app.fleet.commands import ActTask, LinkedVehicle
 from app.flights.abort import AbortRegistry
@@ -31,7 +31,6 @@ from app.vehicles.base import SafeGainsError, VehicleError
 
 T = TypeVar("T")
 
-RETRY_S: Final = 1.0
 YIELD_POLL_S: Final = 0.1
 MAX_CONCURRENT: Final = 16
 
@@ -326,17 +325,19 @@ class VehicleConnectionManager:
     def _store_with_retry(self, work: Callable[[Transaction], T]) -> T | None:
         """Result of `work`, retried until the database accepts it; None if the database refuses it or the worker
         closes."""
-        while True:
-            try:
-                with self._database.write() as transaction:
-                    return work(transaction)
-            except StorageError as error:
-                _log.error("vehicle state not stored yet", why=str(error))
-                if self._closing.wait(self._clock.wall_s(RETRY_S)):
-                    return None
-            except GainlineError as error:
-                _log.error("vehicle state conflicts with the database", why=str(error))
-                return None
+
+        def store() -> T:
+            with self._database.write() as transaction:
+                return work(transaction)
+
+        def refused(error: StorageError) -> None:
+            _log.error("vehicle state not stored yet", why=str(error))
+
+        try:
+            return retry_until_stored(store, refused, closing=self._closing, clock=self._clock)
+        except GainlineError as error:
+            _log.error("vehicle state conflicts with the database", why=str(error))
+            return None
 
 
 def _connected(transaction: Transaction, task: ActTask, opened: ConnectionOpened) -> None:

@@ -6,31 +6,14 @@
 `CancelFlight` may come at any moment; `FlightFailure` takes the place of the messages that do not come.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, Protocol
-
-import numpy as np
 
 from app.common.states import ActKind, FlightMode
 from app.core.clock import REAL_TIME, Clock
-from app.core.errors import GainlineError
-from app.core.experiments.base import Experiment
-from app.live.messages import FlightPhase, Phase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
-from app.processes.locks import LockedError, exclusive
-from app.vehicles.base import (
-    MOTORS_OFF_REQUESTED,
-    CheckItem,
-    FlightOptions,
-    FlightRecord,
-    Identity,
-    OptionValue,
-    SafeGainsError,
-    Sample,
-    VehicleError,
-)
+from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
+from app.vehicles.base import CheckItem, FlightOptions, FlightRecord, Identity, OptionValue
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,84 +107,6 @@ FlightMessage = (
 )
 
 
-class FlightBackend(Protocol):
-    """The worker's handle of a process that flies. Everything but `fly` may be called from any thread."""
-
-    @property
-    def alive(self) -> bool: ...
-
-    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
-        """Send the request and yield the process's messages until it is free again.
-
-        The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
-        """
-        ...
-
-    def take_off(self) -> None: ...
-    def cancel_take_off(self) -> None: ...
-    def cancel_flight(self, trial_id: int, reason: str) -> None: ...
-    def close(self) -> None:
-        """Let the process end: a running flight is aborted and the vehicle left with its safe gains."""
-        ...
-
-
-def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
-    """Return the record with `on_request` set: whether the flight was aborted for one of these reasons, which were sent
-    by the worker, and not for a limit."""
-    stated = record.reason.removeprefix(MOTORS_OFF_REQUESTED)
-    asked = record.ending == "aborted" and any(stated.startswith(reason) for reason in reasons)
-    return replace(record, on_request=asked)
-
-
-def process_died_error(exit_code: int | None) -> VehicleError:
-    return VehicleError(
-        f"The flight process died (exit code {exit_code}).",
-        hint="Inspect the vehicle and the worker's log, then fly again.",
-    )
-
-
-def failure_from(error: GainlineError) -> FlightFailure:
-    """Build the failure message of an error.
-
-    If the error followed from a refusal to fly, the refusal comes first.
-    """
-    refusals = [each for each in _chain(error) if isinstance(each, VehicleError) and each.not_flown]
-    what = " ".join(dict.fromkeys(str(each) for each in (*refusals, error)))
-    return FlightFailure(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
-
-
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """The error and its chain of contexts: those that were being handled when it was raised."""
-    while error is not None:
-        yield error
-        error = error.__context__
-
-
-def internal_error(error: Exception) -> FlightFailure:
-    """Failure message of an internal error, so that the trial gets a definite end."""
-    return FlightFailure(f"Internal error ({type(error).__name__}: {error}).", unsafe=False)
-
-
-@contextmanager
-def hold_vehicle_lock(
-    lock: Path, *, within_s: float, wanted: Callable[[], bool] = lambda: True, clock: Clock = REAL_TIME
-) -> Iterator[None]:
-    """Hold the vehicle's lock, so that this process has the vehicle to itself.
-
-    Another process whose worker was killed may still be landing the vehicle: waits for its lock for at most `within_s`
-    seconds and while `wanted()`. Raises VehicleError when the lock is not free by then.
-    """
-    deadline_s = clock.now_s() + within_s
-    try:
-        with exclusive(lock, keep_waiting=lambda: wanted() and clock.now_s() < deadline_s, clock=clock):
-            yield
-    except LockedError as error:
-        raise VehicleError(
-            f"The vehicle is still under the control of {error.holder or 'another process'}.",
-            hint="Wait until that process has landed it, or end the process; then fly again.",
-        ) from error
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionRequest:
     """What the process needs to connect to a vehicle.
@@ -276,73 +181,4 @@ class CommandForwarded:
 FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | FlightMessage
 ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
 
-
-MESSAGES_PER_S: Final = 25
-
 Publish = Callable[[PublishedMessage], None]
-
-
-class FlightMonitor:
-    """Collects one flight's samples and publishes them in at most 25 messages a second, with the error so far.
-
-    The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample (its integral
-    where the experiment's error is one), within the time that the experiment scores. The flight's own error is computed
-    from its full-rate record.
-    """
-
-    def __init__(
-        self, campaign_id: int, trial_id: int, experiment: Experiment, publish: Publish, clock: Clock = REAL_TIME
-    ) -> None:
-        self._campaign_id = campaign_id
-        self._trial_id = trial_id
-        self._experiment = experiment
-        self._columns: list[str] = []
-        self._scored_until_s = float(experiment.grid_s[-1])
-        self._publish = publish
-        self._clock = clock
-        self._rows: list[list[float]] = []
-        self._due_s = 0.0
-        self._last: tuple[float, float] | None = None
-        self._integral = 0.0
-
-    def phase(self, phase: Phase, note: str = "") -> None:
-        self._publish(FlightPhase(campaign_id=self._campaign_id, trial_id=self._trial_id, phase=phase, note=note))
-
-    def sample(self, sample: Sample) -> None:
-        output = self._experiment.output
-        set_point = float(self._experiment.set_point(np.array([sample.time_s]))[0])
-        self._score(sample.time_s, abs(set_point - sample[output]))
-        others = [name for name in sample.channels if name != output]
-        self._columns = ["time_s", output, *others]
-        self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
-        now_s = self._clock.now_s()
-        if now_s >= self._due_s:
-            self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
-            self.flush()
-
-    def flush(self) -> None:
-        """Publish the collected samples."""
-        if self._rows:
-            rows, self._rows = self._rows, []
-            self._publish(
-                Telemetry(
-                    campaign_id=self._campaign_id,
-                    trial_id=self._trial_id,
-                    time_s=rows[-1][0],
-                    columns=self._columns,
-                    samples=rows,
-                    error_so_far=self.error_so_far,
-                )
-            )
-
-    @property
-    def error_so_far(self) -> float | None:
-        if self._last is None or self._last[0] <= 0.0:
-            return None
-        return self._integral if self._experiment.integrates else self._integral / self._last[0]
-
-    def _score(self, time_s: float, deviation: float) -> None:
-        if 0.0 <= time_s <= self._scored_until_s:
-            before_s, before = self._last if self._last is not None else (0.0, deviation)
-            self._integral += (time_s - before_s) * (before + deviation) / 2.0
-            self._last = (time_s, deviation)

@@ -1,28 +1,23 @@
 """States of a flight in the database, as the worker that carries it out records them.
 
-    claim_flight → record_staged → record_lift_off → record_landing
-                       │                  ├→ record_loss
-                       │                  └→ record_failure   (no take-off command was sent: it would not arm)
-                       ├→ record_failure      (not flown: the vehicle refused, or read back other gains)
-                       └→ record_withdrawal   (not flown: it was ended before lift-off)
+    claim_flight → record_staged → record_lift_off → record_outcome
 
-A flight of mode `stage` waits between record_staged and record_lift_off, for `take_off_wanted` or `stand_down_wanted`.
-`record_restored` records that the safe gains were read back, whatever came before. `give_up_flight` may be called at
-any stage: before lift-off the flight was not flown, after it the flight is lost.
+A flight of mode `stage` waits between record_staged and record_lift_off, for what `clearance_of` says. `record_outcome`
+and `give_up_flight` may be called at any stage: a flight whose take-off was not commanded was not flown.
 
 What is sent to the vehicle is stored in the flight row before it is sent; what the vehicle answers, as soon as it is
-known.
+known. Each function is for a transaction of its own, and reads the flight's rows in one statement.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import timedelta
 from typing import Final
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, joinedload
 
 from app.campaigns import proposals
-from app.campaigns import service as campaigns
 from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
@@ -34,25 +29,6 @@ from app.fleet import service as fleet
 from app.flights.process_messages import FlightRequest
 from app.vehicles.base import FlightRecord
 
-
-def get_flight(session: Session, flight_id: int) -> FlightRow:
-    """Raises NotFoundError."""
-    if (row := session.get(FlightRow, flight_id)) is None:
-        raise NotFoundError("flight", flight_id)
-    return row
-
-
-def first_requested(session: Session) -> FlightRow | None:
-    """The oldest requested flight."""
-    return session.scalar(
-        select(FlightRow).where(FlightRow.state == FlightState.REQUESTED).order_by(FlightRow.id).limit(1)
-    )
-
-
-def running(session: Session) -> Sequence[FlightRow]:
-    return session.scalars(select(FlightRow).where(FlightRow.state == FlightState.RUNNING).order_by(FlightRow.id)).all()
-
-
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 
@@ -60,14 +36,61 @@ _WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "th
 _NOT_VERIFIED: Final = "its process ended before the safe gains were read back; the gains on the vehicle are unknown"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightOutcome:
+    """Outcome of a flight, as far as the worker knows.
+
+    With a `record` the flight took place. Without one, `lifted_off` says whether a take-off command was sent, and
+    `withdrawn` whether the flight was ended before that. `concern`: the safe gains could not be verified afterwards.
+    `unheard`: the flight's process ended without reporting whether they are restored. `restored`: they were read back.
+    """
+
+    record: FlightRecord | None = None
+    lifted_off: bool = False
+    withdrawn: bool = False
+    problem: str = ""
+    concern: str = ""
+    unheard: bool = False
+    restored: Mapping[str, float] | None = None
+
+
+_WITH_ALL: Final = (
+    select(FlightRow, CampaignRow)
+    .join(CampaignRow, CampaignRow.id == FlightRow.campaign_id)
+    .options(joinedload(FlightRow.trial, innerjoin=True), joinedload(FlightRow.vehicle, innerjoin=True))
+    .order_by(FlightRow.id)
+)
+"""Flights with their trials, vehicles and campaigns."""
+
+
+def _read(session: Session, flight_id: int) -> tuple[FlightRow, CampaignRow]:
+    if (found := session.execute(_WITH_ALL.where(FlightRow.id == flight_id)).one_or_none()) is None:
+        raise NotFoundError("flight", flight_id)
+    flight, campaign = found
+    return flight, campaign
+
+
+def _read_running(session: Session, flight_id: int) -> tuple[FlightRow, CampaignRow]:
+    flight, campaign = _read(session, flight_id)
+    if flight.state != FlightState.RUNNING:
+        raise ConflictError(f"Flight {flight_id} is {flight.state}, not running.", hint="It must not continue.")
+    return flight, campaign
+
+
+def _first_requested(session: Session) -> tuple[FlightRow, CampaignRow] | None:
+    found = session.execute(_WITH_ALL.where(FlightRow.state == FlightState.REQUESTED).limit(1)).one_or_none()
+    return None if found is None else (found[0], found[1])
+
+
 def claim_flight(session: Session, worker: str) -> FlightRequest | None:
     """Claim the oldest requested flight for this worker; None when there is none.
 
     A flight must begin when its operator expects it: a request older than REQUEST_TIMEOUT is withdrawn.
     """
-    while (flight := first_requested(session)) is not None:
+    while (found := _first_requested(session)) is not None:
+        flight, campaign = found
         if utc_now() - flight.requested_at <= REQUEST_TIMEOUT:
-            return _claimed(session, flight, worker)
+            return _claimed(flight, campaign, worker)
         _withdraw(flight, f"it could not be started within {REQUEST_TIMEOUT.total_seconds():g} s")
     return None
 
@@ -76,7 +99,8 @@ def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
     """Withdraw all requested flights at a worker's start, because nothing may take off that was requested while no
     worker ran. Returns their ids."""
     withdrawn: list[int] = []
-    while (flight := first_requested(session)) is not None:
+    while (found := _first_requested(session)) is not None:
+        flight, _ = found
         _withdraw(flight, reason)
         withdrawn.append(flight.id)
     return withdrawn
@@ -88,14 +112,13 @@ def _withdraw(flight: FlightRow, reason: str) -> None:
     )
 
 
-def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightRequest:
+def _claimed(flight: FlightRow, campaign: CampaignRow, worker: str) -> FlightRequest:
     set_flight_state(flight, FlightState.RUNNING)
     flight.worker, flight.claimed_at = worker, utc_now()
-    trial, campaign = flight.trial, campaigns.get_row(session, flight.campaign_id)
     flight.safe_gains = dict(flight.vehicle.safe_gains)
     return FlightRequest(
         flight_id=flight.id,
-        trial_id=trial.id,
+        trial_id=flight.trial_id,
         campaign_id=campaign.id,
         experiment=campaign.experiment,
         vehicle_id=flight.vehicle_id,
@@ -103,7 +126,7 @@ def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightRequest:
         vehicle_options=fleet.options_of(campaign),
         safe_gains=dict(flight.safe_gains),
         gains=dict(flight.gains),
-        seed=trial.seed,
+        seed=flight.trial.seed,
         speed=flight.speed,
         mode=flight.mode,
     )
@@ -111,29 +134,31 @@ def _claimed(session: Session, flight: FlightRow, worker: str) -> FlightRequest:
 
 def record_staged(session: Session, flight_id: int, read_back: dict[str, float]) -> None:
     """Record the gains that the vehicle read back. Raises ConflictError when the trial was cancelled."""
-    flight = _running(session, flight_id)
+    flight, _ = _read_running(session, flight_id)
     flight.read_back = flight.trial.read_back = read_back
     fleet.hold_gains(flight.vehicle, read_back)
     set_trial_state(flight.trial, TrialState.STAGED)
     fleet.set_vehicle_state(flight.vehicle, VehicleState.STAGED)
 
 
-def take_off_wanted(session: Session, flight_id: int) -> bool:
-    """Whether the operator of a staged flight has requested its take-off within REQUEST_TIMEOUT (10 s).
+def clearance_of(session: Session, flight_id: int) -> tuple[bool, str | None]:
+    """Whether a staged flight may take off now, and why it must not take place at all; (False, None) while it waits.
 
-    Nothing takes off later than its operator expects. False also for a flight that is to stand down or is not running.
+    It may once its operator has requested the take-off, for REQUEST_TIMEOUT (10 s): nothing takes off later than its
+    operator expects. It must not when it was unstaged, its trial was cancelled, or the take-off could not begin in
+    time; the worker then restores the safe gains and records the flight as withdrawn for this reason.
     """
-    flight = get_flight(session, flight_id)
-    return _may_take_off(flight) and stand_down_wanted(session, flight_id) is None
+    flight, _ = _read(session, flight_id)
+    return _clearance(flight)
 
 
-def stand_down_wanted(session: Session, flight_id: int) -> str | None:
-    """Why a staged flight must not take place; None while it may.
+def _clearance(flight: FlightRow) -> tuple[bool, str | None]:
+    if (reason := _stand_down_reason(flight)) is not None:
+        return False, reason
+    return _may_take_off(flight), None
 
-    Reasons: it was unstaged, its trial was cancelled, or its take-off was requested and could not begin in time. The
-    worker then restores the safe gains and calls `record_withdrawal` with this reason.
-    """
-    flight = get_flight(session, flight_id)
+
+def _stand_down_reason(flight: FlightRow) -> str | None:
     if flight.state != FlightState.RUNNING:
         return f"the flight is {flight.state}"
     if flight.stand_down:
@@ -158,10 +183,11 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     the trial was cancelled or unstaged, when the gains read back are not the trial's, or when the operator of a staged
     flight has not requested the take-off.
     """
-    flight = _running(session, flight_id)
+    flight, campaign = _read_running(session, flight_id)
     trial = flight.trial
-    if not take_off_wanted(session, flight_id):
-        why = stand_down_wanted(session, flight_id) or "its take-off has not been requested"
+    may_take_off, reason = _clearance(flight)
+    if not may_take_off:
+        why = reason or "its take-off has not been requested"
         raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
     if trial.read_back != trial.gains:
         raise ConflictError(
@@ -171,82 +197,37 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     set_trial_state(trial, TrialState.FLYING, reason="")
     trial.flown_at = utc_now()
     fleet.set_vehicle_state(flight.vehicle, VehicleState.FLYING)
-    proposals.start_flying(campaigns.get_row(session, trial.campaign_id))
+    proposals.start_flying(campaign)
 
 
-def record_landing(session: Session, flight_id: int, record: FlightRecord) -> None:
-    """Store the record, classify the flight (a simulated one at once), and have the next gains computed.
+def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> None:
+    """Record how a running flight ended; of one that is over, only what is known of the safe gains.
 
-    Idempotent. Raises TrajectoryError when the record cannot be stored.
+    A record is stored, a simulated flight is classified at once, and the next gains are computed. Without a record, the
+    trial of a flight that lifted off is lost, and the operator decides about it; otherwise it is planned again. A
+    vehicle whose safe gains could not be verified stays grounded until a person releases it. Raises TrajectoryError
+    when the record cannot be stored.
     """
-    flight = get_flight(session, flight_id)
-    if flight.state != FlightState.RUNNING:
-        return
-    campaign = campaigns.get_row(session, flight.campaign_id)
-    _capture(session, campaign, flight, record)
-    aborted = record.ending == "aborted"
-    _end(flight, FlightState.ABORTED if aborted else FlightState.LANDED, problem=record.reason)
-    proposals.finish_flying(session, campaign)
+    flight, campaign = _read(session, flight_id)
+    if flight.state == FlightState.RUNNING:
+        if outcome.record is not None:
+            _land(session, campaign, flight, outcome.record)
+        elif outcome.lifted_off:
+            _lose(session, campaign, flight, outcome.problem or "its process ended without a record")
+        else:
+            state = FlightState.CANCELLED if outcome.withdrawn else FlightState.FAILED
+            _end_unflown(session, campaign, flight, state, outcome.problem)
+    if outcome.restored is not None:
+        flight.restored, flight.restored_at = dict(outcome.restored), utc_now()
+        fleet.hold_gains(flight.vehicle, outcome.restored)
+    _record_doubts(flight, outcome)
 
 
-def record_loss(session: Session, flight_id: int, problem: str) -> None:
-    """Record that it is unknown how the flight ended. A real vehicle is quarantined; the operator decides about it."""
-    flight = get_flight(session, flight_id)
-    if flight.state != FlightState.RUNNING:
-        return
-    set_trial_state(flight.trial, TrialState.LOST, reason=problem)
-    _end(flight, FlightState.LOST, problem=problem)
-    doubt_vehicle(session, flight_id)
-    proposals.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
-
-
-def record_failure(session: Session, flight_id: int, problem: str) -> None:
-    """Record that the flight did not take place; its trial is planned again.
-
-    The vehicle could not be opened, refused, read back other gains, or was sent no take-off command.
-    """
-    _not_flown(session, flight_id, FlightState.FAILED, problem)
-
-
-def record_withdrawal(session: Session, flight_id: int, reason: str) -> None:
-    """Record that the flight was ended before lift-off; its trial is planned again."""
-    _not_flown(session, flight_id, FlightState.CANCELLED, reason)
-
-
-def quarantine_vehicle(session: Session, flight_id: int, concern: str) -> None:
-    """Quarantine the vehicle after a flight whose safe gains could not be verified; it stays grounded until a person
-    releases it."""
-    fleet.set_state_after_flight(get_flight(session, flight_id).vehicle, concern=concern)
-
-
-def doubt_vehicle(session: Session, flight_id: int) -> None:
-    """Quarantine a real vehicle after a flight that ended without a report that the safe gains are restored.
-
-    A simulated vehicle starts afresh with every flight.
-    """
-    if get_flight(session, flight_id).vehicle.is_real:
-        quarantine_vehicle(session, flight_id, _NOT_VERIFIED)
-
-
-def record_restored(session: Session, flight_id: int, held: Mapping[str, float]) -> None:
-    """Record the safe gains that the vehicle read back after a flight, however the flight ended."""
-    flight = get_flight(session, flight_id)
-    flight.restored, flight.restored_at = dict(held), utc_now()
-    fleet.hold_gains(flight.vehicle, held)
-
-
-def give_up_flight(session: Session, flight_id: int, problem: str) -> bool:
-    """End a flight that no more messages will come from: lost if it had lifted off, else not flown.
-
-    Returns whether it is lost.
-    """
-    lifted_off = get_flight(session, flight_id).trial.state == TrialState.FLYING
-    if lifted_off:
-        record_loss(session, flight_id, problem)
-    else:
-        record_failure(session, flight_id, problem)
-    doubt_vehicle(session, flight_id)
-    return lifted_off
+def give_up_flight(session: Session, flight_id: int, outcome: FlightOutcome, problem: str) -> None:
+    """End a flight whose outcome cannot be stored: lost if it had lifted off, else not flown."""
+    flight, campaign = _read(session, flight_id)
+    _give_up(session, campaign, flight, problem)
+    _record_doubts(flight, outcome)
 
 
 def lose_running_flights(session: Session) -> list[int]:
@@ -256,8 +237,8 @@ def lose_running_flights(session: Session) -> list[int]:
     """
     return [
         flight.trial_id
-        for flight in running(session)
-        if give_up_flight(session, flight.id, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
+        for flight, campaign in session.execute(_WITH_ALL.where(FlightRow.state == FlightState.RUNNING)).all()
+        if _give_up(session, campaign, flight, _WORKER_ENDED[flight.trial.state == TrialState.FLYING])
     ]
 
 
@@ -266,12 +247,63 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
 
     Raises TrajectoryError when it cannot be stored.
     """
-    flight = get_flight(session, flight_id)
+    flight, campaign = _read(session, flight_id)
     if flight.trial.state != TrialState.LOST:
         return
-    campaign = campaigns.get_row(session, flight.campaign_id)
     _capture(session, campaign, flight, record)
     proposals.history_changed(session, campaign)
+
+
+def _land(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
+    _capture(session, campaign, flight, record)
+    _end(flight, FlightState.ABORTED if record.ending == "aborted" else FlightState.LANDED, problem=record.reason)
+    proposals.finish_flying(session, campaign)
+
+
+def _lose(session: Session, campaign: CampaignRow, flight: FlightRow, problem: str) -> None:
+    """Record that it is unknown how the flight ended."""
+    set_trial_state(flight.trial, TrialState.LOST, reason=problem)
+    _end(flight, FlightState.LOST, problem=problem)
+    _doubt_vehicle(flight)
+    proposals.finish_flying(session, campaign)
+
+
+def _end_unflown(session: Session, campaign: CampaignRow, flight: FlightRow, state: FlightState, problem: str) -> None:
+    was_flying = flight.trial.state == TrialState.FLYING
+    if flight.trial.state in {TrialState.STAGED, TrialState.FLYING}:
+        set_trial_state(flight.trial, TrialState.PLANNED, reason=problem)
+        flight.trial.flown_at = None
+    _end(flight, state, problem=problem)
+    if was_flying:
+        proposals.finish_flying(session, campaign)
+
+
+def _give_up(session: Session, campaign: CampaignRow, flight: FlightRow, problem: str) -> bool:
+    """End a flight that no more messages will come from. Returns whether it is lost."""
+    lifted_off = flight.trial.state == TrialState.FLYING
+    if flight.state == FlightState.RUNNING:
+        if lifted_off:
+            _lose(session, campaign, flight, problem)
+        else:
+            _end_unflown(session, campaign, flight, FlightState.FAILED, problem)
+    _doubt_vehicle(flight)
+    return lifted_off
+
+
+def _record_doubts(flight: FlightRow, outcome: FlightOutcome) -> None:
+    if outcome.concern:
+        fleet.set_state_after_flight(flight.vehicle, concern=outcome.concern)
+    elif outcome.unheard:
+        _doubt_vehicle(flight)
+
+
+def _doubt_vehicle(flight: FlightRow) -> None:
+    """Quarantine a real vehicle after a flight that ended without a report that the safe gains are restored.
+
+    A simulated vehicle starts afresh with every flight.
+    """
+    if flight.vehicle.is_real:
+        fleet.set_state_after_flight(flight.vehicle, concern=_NOT_VERIFIED)
 
 
 def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
@@ -287,26 +319,6 @@ def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record:
     flight.trial.settings = dict(record.settings)
     flight.battery_v_before = starting_battery_v(record.trajectory)
     flight.battery_v_after = landing_battery_v(record.trajectory)
-
-
-def _running(session: Session, flight_id: int) -> FlightRow:
-    flight = get_flight(session, flight_id)
-    if flight.state != FlightState.RUNNING:
-        raise ConflictError(f"Flight {flight_id} is {flight.state}, not running.", hint="It must not continue.")
-    return flight
-
-
-def _not_flown(session: Session, flight_id: int, state: FlightState, problem: str) -> None:
-    flight = get_flight(session, flight_id)
-    if flight.state != FlightState.RUNNING:
-        return
-    was_flying = flight.trial.state == TrialState.FLYING
-    if flight.trial.state in {TrialState.STAGED, TrialState.FLYING}:
-        set_trial_state(flight.trial, TrialState.PLANNED, reason=problem)
-        flight.trial.flown_at = None
-    _end(flight, state, problem=problem)
-    if was_flying:
-        proposals.finish_flying(session, campaigns.get_row(session, flight.campaign_id))
 
 
 def _end(flight: FlightRow, state: FlightState, *, problem: str = "") -> None:

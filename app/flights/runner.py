@@ -7,7 +7,7 @@ landing; a record goes to the spool first, and from there into the database.
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -17,12 +17,11 @@ from sqlalchemy.orm import Session
 from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
 from app.core.clock import REAL_TIME, Clock
-from app.db.session import Database
+from app.db.session import RETRY_S, Database, retry_until_stored
 from app.flights import queue
 from app.flights.abort import AbortFlag, AbortRegistry
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import (
-    FlightBackend,
     FlightFailure,
     FlightLanded,
     FlightRequest,
@@ -30,12 +29,13 @@ from app.flights.process_messages import (
     Publish,
     SafeGainsRestored,
 )
+from app.flights.queue import FlightOutcome
 from app.flights.record_spool import Spool
+from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import FlightPhase, Phase, Telemetry
 from app.vehicles.base import FlightRecord, VehicleError
 from app.vehicles.registry import get_kind
 
-RETRY_S: Final = 1.0
 STAGED_FOR_S: Final = 600.0
 """How long a vehicle with a trial's gains on it waits for its operator's take-off request."""
 POLL_INTERVAL_S: Final = 0.05
@@ -43,32 +43,14 @@ POLL_INTERVAL_S: Final = 0.05
 _log = structlog.get_logger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FlightOutcome:
-    """Outcome of a flight, as far as this process knows.
-
-    With a `record` the flight took place. Without one, `lifted_off` says whether a take-off command was sent, and
-    `withdrawn` whether the flight was ended before that. `concern`: the safe gains could not be verified afterwards.
-    `unheard`: the flight's process ended without reporting whether they are restored. `restored`: they were read back.
-    """
-
-    record: FlightRecord | None = None
-    lifted_off: bool = False
-    withdrawn: bool = False
-    problem: str = ""
-    concern: str = ""
-    unheard: bool = False
-    restored: dict[str, float] | None = None
-
-
-def _refuse_session(_vehicle_id: int) -> FlightBackend:
+def _refuse_session(_vehicle_id: int) -> FlightProcess:
     raise VehicleError("There is no link to the vehicle.", hint="Connect it, then try again.")
 
 
 class FlightRunner:
     """Claims flights and carries them out. `closing` ends the retries while the database accepts no writes.
 
-    `session(vehicle_id)` returns the backend of a vehicle that keeps its connection between flights; other vehicles are
+    `session(vehicle_id)` returns the process of a vehicle that keeps its connection between flights; other vehicles are
     opened for each flight in a process of the pool.
     """
 
@@ -81,7 +63,7 @@ class FlightRunner:
         *,
         worker: str,
         closing: threading.Event,
-        session: Callable[[int], FlightBackend] = _refuse_session,
+        session: Callable[[int], FlightProcess] = _refuse_session,
         clock: Clock = REAL_TIME,
     ) -> None:
         self._database = database
@@ -152,14 +134,14 @@ class FlightRunner:
         finally:
             flag.add_listener(lambda _reason: None)
 
-    def _acquire_backend(self, request: FlightRequest) -> FlightBackend:
+    def _acquire_backend(self, request: FlightRequest) -> FlightProcess:
         """Return the process that flies the vehicle. Raises VehicleError when the vehicle needs a connection and has
         none."""
         if get_kind(request.vehicle_kind).connect is not None:
             return self._session(request.vehicle_id)
         return self._process_pool.acquire()
 
-    def _fly_on_backend(self, backend: FlightBackend, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
+    def _fly_on_backend(self, backend: FlightProcess, request: FlightRequest, flag: AbortFlag) -> FlightOutcome:
         """Fly the vehicle; whatever happens, release its process and return an outcome."""
         ended = FlightOutcome()
         try:
@@ -185,12 +167,12 @@ class FlightRunner:
         except Exception as error:  # noqa: BLE001 - an internal error must not leave the trial without an end
             backend.close()
             return replace(ended, problem=_describe_error(error), unheard=True)
-        if isinstance(backend, FlightProcess):
+        if not isinstance(backend, VehicleConnection):
             self._process_pool.release(backend)
         return ended
 
     def _staged(
-        self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend, read_back: dict[str, float]
+        self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess, read_back: dict[str, float]
     ) -> FlightOutcome:
         """Command the take-off if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
@@ -210,7 +192,7 @@ class FlightRunner:
             backend.cancel_take_off()
         return ended
 
-    def _await_takeoff_clearance(self, request: FlightRequest, flag: AbortFlag, backend: FlightBackend) -> str | None:
+    def _await_takeoff_clearance(self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess) -> str | None:
         """Wait until the vehicle may take off: at once, or on its operator's request. Returns None, or why it must
         not."""
         if request.mode == "fly":
@@ -224,10 +206,9 @@ class FlightRunner:
                 return "the vehicle's process ended"
             try:
                 with self._database.read() as session:
-                    if (reason := queue.stand_down_wanted(session, request.flight_id)) is not None:
-                        return reason
-                    if queue.take_off_wanted(session, request.flight_id):
-                        return None
+                    may_take_off, reason = queue.clearance_of(session, request.flight_id)
+                if may_take_off or reason is not None:
+                    return reason
             except StorageError as error:
                 _log.error("the take-off request cannot be read", why=str(error))
                 self._clock.wait_s(RETRY_S)
@@ -243,15 +224,18 @@ class FlightRunner:
         Only the end of the worker leaves a flight in state running.
         """
         _log.info("flight over", recorded=ended.record is not None, problem=ended.problem, concern=ended.concern)
+        flight_id = request.flight_id
         if ended.record is not None:
             self._spool_record(request, ended.record)
         try:
-            stored = self._store_with_retry(request, lambda session: _record(session, request, ended))
+            stored = self._store_with_retry(request, lambda session: queue.record_outcome(session, flight_id, ended))
         except Exception as error:  # noqa: BLE001 - whatever is wrong with the outcome, it must not block the vehicle
             problem = self._refused(request, ended, error)
-            stored = self._store_with_retry(request, lambda session: _give_up(session, request, ended, problem))
+            stored = self._store_with_retry(
+                request, lambda session: queue.give_up_flight(session, flight_id, ended, problem)
+            )
         if stored:
-            self._spool.delete(request.flight_id)
+            self._spool.delete(flight_id)
             self._phase(request, "ended")
 
     def _refused(self, request: FlightRequest, ended: FlightOutcome, error: Exception) -> str:
@@ -263,16 +247,16 @@ class FlightRunner:
 
     def _store_with_retry(self, request: FlightRequest, work: Callable[[Session], None]) -> bool:
         """Retry until the database accepts it; False when the worker closes meanwhile (the spool keeps the record)."""
-        while True:
-            try:
-                self._store(work)
-            except StorageError as error:
-                _log.error("outcome not stored yet", why=str(error))
-                self._phase(request, "landed", f"The outcome is not stored yet; storing is retried: {error}")
-                if self._closing.wait(self._clock.wall_s(RETRY_S)):
-                    return False
-            else:
-                return True
+
+        def store() -> bool:
+            self._store(work)
+            return True
+
+        def refused(error: StorageError) -> None:
+            _log.error("outcome not stored yet", why=str(error))
+            self._phase(request, "landed", f"The outcome is not stored yet; storing is retried: {error}")
+
+        return retry_until_stored(store, refused, closing=self._closing, clock=self._clock) is not None
 
     def _spool_record(self, request: FlightRequest, record: FlightRecord) -> None:
         try:
@@ -322,29 +306,3 @@ def _describe_error(error: Exception) -> str:
         return str(error)
     _log.error("internal error", exc_info=error)
     return f"Internal error ({type(error).__name__}); see the worker's log."
-
-
-def _record(session: Session, request: FlightRequest, ended: FlightOutcome) -> None:
-    if ended.record is not None:
-        queue.record_landing(session, request.flight_id, ended.record)
-    elif ended.lifted_off:
-        queue.record_loss(session, request.flight_id, ended.problem or "its process ended without a record")
-    elif ended.withdrawn:
-        queue.record_withdrawal(session, request.flight_id, ended.problem)
-    else:
-        queue.record_failure(session, request.flight_id, ended.problem)
-    if ended.restored is not None:
-        queue.record_restored(session, request.flight_id, ended.restored)
-    _record_doubts(session, request, ended)
-
-
-def _give_up(session: Session, request: FlightRequest, ended: FlightOutcome, problem: str) -> None:
-    queue.give_up_flight(session, request.flight_id, problem)
-    _record_doubts(session, request, ended)
-
-
-def _record_doubts(session: Session, request: FlightRequest, ended: FlightOutcome) -> None:
-    if ended.concern:
-        queue.quarantine_vehicle(session, request.flight_id, ended.concern)
-    elif ended.unheard:
-        queue.doubt_vehicle(session, request.flight_id)

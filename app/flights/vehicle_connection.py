@@ -12,8 +12,7 @@ import os
 import queue
 import socket
 import threading
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
@@ -21,29 +20,18 @@ from multiprocessing.connection import Connection
 from typing import Final
 
 from app.common.states import ActKind
+from app.flights.flight_process import FlightProcess, process_died_error
 from app.flights.process_messages import (
-    CancelFlight,
-    CancelTakeOff,
     CommandForwarded,
     ConnectionOpened,
     ConnectionRequest,
     FlightFailure,
-    FlightFinished,
-    FlightLanded,
-    FlightMessage,
-    FlightRequest,
     FromVehicleProcess,
-    GainsStaged,
-    SafeGainsRestored,
-    TakeOffCommand,
-    ToVehicleProcess,
     VehicleCommand,
     VehicleRequest,
     VehicleResponse,
-    process_died_error,
 )
-from app.live.messages import NO_LINK, FlightPhase, Telemetry, VehicleCommandKind, VehicleStatus
-from app.processes import process_context
+from app.live.messages import NO_LINK, VehicleCommandKind, VehicleStatus
 from app.vehicles.base import SafeGainsError, VehicleError
 
 _ENDED: Final = (
@@ -58,7 +46,6 @@ NOT_ANSWERING: Final = (
 )
 MAX_UNANSWERED_ORDERS: Final = 50
 """Far fewer than fill the pipe of a process that does not read, so that sending a command never blocks."""
-SHUTDOWN_TIMEOUT_S: Final = 5.0
 RECONNECT_INTERVAL_S: Final = 2.0
 """How often a vehicle that is wanted connected is looked for."""
 TAKE_OFF_TIMEOUT_S: Final = 2.0
@@ -68,42 +55,33 @@ TAKE_OFF_TIMEOUT_S: Final = 2.0
 MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 
 
-class VehicleConnection:
-    """The worker's handle of such a process: a FlightBackend for flights, and a link to the vehicle in between.
+class VehicleConnection(FlightProcess):
+    """The worker's handle of such a process: a FlightProcess with a link to the vehicle between flights.
 
     `hear` is called on a thread of the connection with the vehicle's status and the outcome of commands; while the
     process does not answer, every two seconds with a status that says so. One flight or act at a time; commands may be
     sent at any moment, from any thread.
     """
 
+    _take_off_timeout_s = TAKE_OFF_TIMEOUT_S
+
     def __init__(
         self, call: ConnectionRequest, run: Callable[[Connection, ConnectionRequest], None], *, hear: MessageHandler
     ) -> None:
+        super().__init__(run, call, name=f"session {call.name}")
         self.call: Final = call
         self._hear_of = hear
-        context = process_context()
-        self._pipe, theirs = context.Pipe()
-        self._sending = threading.Lock()
         self._messages: queue.SimpleQueue[FromVehicleProcess | None] = queue.SimpleQueue()
-        self._process = context.Process(target=run, args=(theirs, call), name=f"session {call.name}", daemon=True)
-        self._process.start()
-        theirs.close()
         self._numbers = itertools.count(1)
         self._orders: dict[int, Future[str]] = {}
         """Commands that the process has not answered, by their numbers."""
         self._ended = threading.Event()
         self._open = False
-        self.trial_id: int | None = None
-        """Trial of the running flight."""
         threading.Thread(target=self._listen, name=f"session {call.name}", daemon=True).start()
 
     @property
     def alive(self) -> bool:
         return not self._ended.is_set()
-
-    @property
-    def pid(self) -> int | None:
-        return self._process.pid
 
     def wait_until_open(self) -> ConnectionOpened:
         """Wait until the link is open.
@@ -127,28 +105,6 @@ class VehicleConnection:
         assert isinstance(response, VehicleResponse), response
         return response
 
-    def fly(self, orders: FlightRequest) -> Iterator[FlightMessage]:
-        """See `FlightBackend.fly`."""
-        self.trial_id = orders.trial_id
-        try:
-            self._post(orders)
-            while not isinstance(message := self._next(), FlightFinished):
-                assert isinstance(
-                    message, GainsStaged | Telemetry | FlightPhase | FlightLanded | SafeGainsRestored | FlightFailure
-                ), message
-                yield message
-        finally:
-            self.trial_id = None
-
-    def take_off(self) -> None:
-        self._post(TakeOffCommand(by_s=time.monotonic() + TAKE_OFF_TIMEOUT_S))
-
-    def cancel_take_off(self) -> None:
-        self._post(CancelTakeOff())
-
-    def cancel_flight(self, trial_id: int, reason: str) -> None:
-        self._post(CancelFlight(trial_id, reason))
-
     def send_command(self, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
         """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was."""
         answer: Future[str] = Future()
@@ -168,19 +124,19 @@ class VehicleConnection:
 
     def request_close(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
-        with suppress(OSError), socket.socket(fileno=os.dup(self._pipe.fileno())) as end:
+        with suppress(OSError), socket.socket(fileno=os.dup(self._child.pipe.fileno())) as end:
             end.shutdown(socket.SHUT_RDWR)  # unlike closing the pipe, this wakes the listening thread
 
     def close(self) -> None:
-        """Request the close and wait for the process to end, for at most SHUTDOWN_TIMEOUT_S."""
+        """Request the close and wait a few seconds for the process to end."""
         self.request_close()
-        self._process.join(SHUTDOWN_TIMEOUT_S)
+        self._child.join()
 
     def _next(self) -> FromVehicleProcess:
-        """Return the process's next flight or act message. Raises VehicleError when the process is dead."""
+        """Wait for the process's next flight or act message. Raises VehicleError when the process is dead."""
         if (received := self._messages.get()) is None:
             self._messages.put(None)
-            raise process_died_error(self._process.exitcode)
+            raise process_died_error(self._child.exit_code)
         return received
 
     def _listen(self) -> None:
@@ -188,9 +144,9 @@ class VehicleConnection:
         patience_s: float | None = None
         try:
             while True:
-                while not self._pipe.poll(patience_s):
+                while not self._child.pipe.poll(patience_s):
                     self._hear_of(replace(status, state="not answering", at=status_time(), trouble=NOT_ANSWERING))
-                match self._pipe.recv():
+                match self._child.pipe.recv():
                     case VehicleStatus() as status:
                         self._hear_of(status)
                     case CommandForwarded(number, problem=problem) as forwarded:
@@ -202,25 +158,14 @@ class VehicleConnection:
                     case message:
                         self._messages.put(message)
         except (EOFError, OSError):
-            self._process.join(SHUTDOWN_TIMEOUT_S)
+            self._child.join()
         finally:
             self._ended.set()
             self._messages.put(None)
             for number in tuple(self._orders):
                 self._answer_order(number, _ENDED)
             with self._sending:
-                self._pipe.close()
-
-    def _post(self, message: ToVehicleProcess) -> bool:
-        try:
-            self._send(message)
-        except OSError:  # the process is dead: the listening thread reports it
-            return False
-        return True
-
-    def _send(self, message: ToVehicleProcess) -> None:
-        with self._sending:
-            self._pipe.send(message)
+                self._child.pipe.close()
 
 
 def status_time() -> str:

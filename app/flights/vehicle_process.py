@@ -5,7 +5,6 @@ are dropped when the worker does not read them, so that a flight never waits for
 """
 
 import os
-import signal
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,38 +15,36 @@ from typing import Final
 from app.common.data_folder import telemetry_log, trial_parameters_folder, vehicle_lock
 from app.common.states import ActKind
 from app.core.errors import GainlineError
-from app.core.experiments import get_experiment
+from app.flights.flight_loop import (
+    FlightLoop,
+    PipeClosedError,
+    WorkerPipe,
+    failure_from,
+    hold_vehicle_lock,
+    internal_error,
+)
 from app.flights.process_messages import (
-    CancelFlight,
-    CancelTakeOff,
     CommandForwarded,
     ConnectionOpened,
     ConnectionRequest,
-    FlightFinished,
-    FlightLanded,
-    FlightMonitor,
     FlightRequest,
-    GainsStaged,
     SafeGainsRestored,
     TakeOffCommand,
     ToVehicleProcess,
     VehicleCommand,
     VehicleRequest,
     VehicleResponse,
-    failure_from,
-    hold_vehicle_lock,
-    internal_error,
-    mark_if_requested,
 )
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
-from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
+from app.processes import ignore_stop_signals
 from app.vehicles.base import (
     ConnectedVehicle,
     FlightRecord,
     InterruptedByOrderError,
     SafeGainsError,
     StopRequest,
+    Vehicle,
     VehicleError,
 )
 from app.vehicles.registry import get_kind, restore_safe_gains
@@ -66,8 +63,7 @@ _EXPIRED: Final = "The command reached the vehicle's process too late and was no
 
 def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
     """Main function of the process, from connecting until the worker closes the pipe or dies, or the link fails."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
+    ignore_stop_signals()
     line = WorkerPipe(pipe)
     try:
         with hold_vehicle_lock(
@@ -89,21 +85,19 @@ def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
         os._exit(0)
 
 
-class VehicleProcess:
+class VehicleProcess(FlightLoop):
     """One connected vehicle, and the requests that it carries out."""
 
     def __init__(self, line: WorkerPipe, call: ConnectionRequest) -> None:
         """Connect to the vehicle. Raises VehicleError when it does not answer."""
-        self._line, self._call = line, call
+        super().__init__(line, call.clock)
+        self._call = call
         self._speed = float(call.options.get("clock_speed", 1.0))
         self._is_open = self._may_interrupt = False
         self._take_off_by_s: float | None = None
         self._vehicle = self._open_vehicle()
         self._is_open = True
         self._show_due_s = 0.0
-        self._trial_id: int | None = None
-        self._stop: StopRequest | None = None
-        self._is_worker_gone = False
         line.send(ConnectionOpened(identity=self._vehicle.identity, concern=self._vehicle.concern, held=self._held()))
 
     def run(self) -> None:
@@ -112,26 +106,22 @@ class VehicleProcess:
         Raises PipeClosedError when the worker closes the pipe or dies, VehicleError when the link fails.
         """
         try:
-            while True:
-                self._carry_out(self._next())
+            super().run()
         except PipeClosedError:
             self._finish_order()
             raise
 
     def _carry_out(self, asked: ToVehicleProcess) -> None:
-        match asked:
-            case FlightRequest() as request:
-                self._fly(request)
-            case VehicleRequest():
-                self._line.send(self._act(asked))
-            case _:
-                pass  # belongs to a flight that is over
+        if isinstance(asked, VehicleRequest):
+            self._line.send(self._act(asked))
+        else:
+            super()._carry_out(asked)
 
     def _finish_order(self) -> None:
         """Repeat a land or motors off command after the worker's end until telemetry confirms it, for at most
         STANDING_ORDER_TIMEOUT_S."""
-        until_s = self._call.clock.now_s() + STANDING_ORDER_TIMEOUT_S
-        while self._vehicle.has_standing_order and self._call.clock.now_s() < until_s:
+        until_s = self._clock.now_s() + STANDING_ORDER_TIMEOUT_S
+        while self._vehicle.has_standing_order and self._clock.now_s() < until_s:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
 
     def close(self) -> None:
@@ -148,7 +138,7 @@ class VehicleProcess:
                     raise
             for _ in range(round(RECONNECT_INTERVAL_S / POLL_INTERVAL_S)):
                 self._line.receive()
-                self._call.clock.wait_s(POLL_INTERVAL_S)
+                self._clock.wait_s(POLL_INTERVAL_S)
 
     def _connect(self) -> ConnectedVehicle:
         call = self._call
@@ -216,7 +206,7 @@ class VehicleProcess:
         return not problem
 
     def _publish_status(self) -> None:
-        now_s = self._call.clock.now_s()
+        now_s = self._clock.now_s()
         if now_s >= self._show_due_s:
             self._show_due_s = max(self._show_due_s + STATUS_INTERVAL_S, now_s)
             self._line.send_if_ready(self._status())
@@ -281,44 +271,17 @@ class VehicleProcess:
 
     # ---- flights
 
-    def _fly(self, request: FlightRequest) -> None:
-        self._trial_id, self._stop = request.trial_id, None
-        try:
-            self._require_safe_gains(request.safe_gains)
-            with self._logged(request):
-                try:
-                    self._line.send(GainsStaged(self._stage(request.gains)))
-                    if (cleared := self._await_takeoff_clearance()) is not None:
-                        self._line.send(FlightLanded(self._take_off(request, cleared)))
-                finally:
-                    self._line.send(SafeGainsRestored(restore_safe_gains(self._vehicle)))
-        except GainlineError as error:
-            self._line.send(failure_from(error))
-        except PipeClosedError:
-            raise
-        except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
-            self._line.send(internal_error(error))
-        finally:
-            self._trial_id = None
-        self._line.send(FlightFinished())
-
     @contextmanager
-    def _logged(self, request: FlightRequest) -> Iterator[None]:
+    def _vehicle_for(self, request: FlightRequest) -> Iterator[ConnectedVehicle]:
+        self._require_safe_gains(request.safe_gains)
         self._vehicle.log_to(telemetry_log(self._call.data_dir, request.flight_id))
         try:
-            yield
+            try:
+                yield self._vehicle
+            finally:
+                self._line.send(SafeGainsRestored(restore_safe_gains(self._vehicle)))
         finally:
             self._vehicle.log_to(None)
-
-    def _stage(self, gains: Mapping[str, float]) -> dict[str, float]:
-        with self._interruptible():
-            return self._vehicle.stage(gains)
-
-    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
-        """Wait for the worker's decision, attending to the vehicle. Raises PipeClosedError."""
-        while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
-            self._note(answer)
-        return answer if isinstance(answer, TakeOffCommand) else None
 
     def _require_in_time(self) -> None:
         """Check the take-off deadline until the vehicle arms. Every wait on the ground extends it, so that only a
@@ -330,49 +293,24 @@ class VehicleProcess:
         if now_s > by_s:
             raise _late_take_off_error()
 
-    def _take_off(self, request: FlightRequest, cleared: TakeOffCommand) -> FlightRecord:
-        experiment = get_experiment(request.experiment)
-        monitor = FlightMonitor(request.campaign_id, request.trial_id, experiment, self._publish, self._call.clock)
-        asked: set[str] = set()
-
-        def should_stop() -> StopRequest | None:
-            self._require_in_time()
-            self._end_interruptions()
-            stop = self._should_stop()
-            if stop is not None:
-                asked.add(stop.reason)
-            return stop
-
+    def _take_off(self, vehicle: Vehicle, request: FlightRequest, cleared: TakeOffCommand) -> FlightRecord:
         with self._interruptible():
             self._take_off_by_s = cleared.by_s
             self._require_in_time()
-            monitor.phase("flying")
-            record = self._vehicle.fly(
-                request.options(self._call.clock), on_sample=monitor.sample, should_stop=should_stop
-            )
-        monitor.flush()
-        monitor.phase("landed")
-        return mark_if_requested(record, asked)
+            return super()._take_off(vehicle, request, cleared)
 
-    def _publish(self, message: Telemetry | FlightPhase | VehicleStatus) -> None:
+    def _publish(self, message: Telemetry | FlightPhase) -> None:
         (self._line.send if isinstance(message, FlightPhase) else self._line.send_if_ready)(message)
 
     def _should_stop(self) -> StopRequest | None:
-        """Stop callback, called every few milliseconds in the air."""
+        self._require_in_time()
+        self._end_interruptions()
         self._publish_status()
-        try:
-            while not self._is_worker_gone and (message := self._line.receive()) is not None:
-                self._note(message)
-        except PipeClosedError:
-            self._is_worker_gone = True
-            self._stop = self._stop or StopRequest("the worker has exited")
-        return self._stop
+        return super()._should_stop()
 
     def _note(self, message: ToVehicleProcess) -> None:
         """Note a reason to end the flight: the first one counts, but motors off overrides it."""
         match message:
-            case CancelFlight(trial_id, reason) if trial_id == self._trial_id:
-                self._stop = self._stop or StopRequest(reason)
             case VehicleCommand(number, order, reason) if _has_expired(message):
                 self._line.send(CommandForwarded(number, order, reason, _EXPIRED))
             case VehicleCommand(number, order, reason):
@@ -381,7 +319,7 @@ class VehicleProcess:
                 self._stop = self._stop or StopRequest(reason)
                 self._line.send(CommandForwarded(number, order, reason))
             case _:
-                pass
+                super()._note(message)
 
 
 def _has_expired(ordered: VehicleCommand) -> bool:

@@ -5,14 +5,25 @@ and only forks, so that a fork never copies a held lock. Where forking a process
 safe (macOS), each process is a new interpreter.
 """
 
+import os
+import signal
 import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.forkserver import ensure_running
-from typing import Final
+from traceback import format_exc
+from types import TracebackType
+from typing import Any, Final, Generic, Self, TypeVar
 
 PRELOADED: Final = ("__main__", "app.runtime.preload")
+DEATH_TIMEOUT_S: Final = 5.0
+"""How long a process whose end of the pipe is closed may take to end."""
+
+T = TypeVar("T")
 
 
 @cache
@@ -29,3 +40,116 @@ def start_loading() -> None:
     """Start the fork server, so that it imports while this process continues."""
     if process_context().get_start_method() == "forkserver":
         ensure_running()
+
+
+class ProcessDiedError(Exception):
+    """A child process ended without an answer."""
+
+    def __init__(self, exit_code: int | None) -> None:
+        super().__init__(f"exit code {exit_code}")
+        self.exit_code = exit_code
+
+
+class ChildProcess:
+    """A process of its own that calls `target(pipe, *args)`, and this end of the pipe to it.
+
+    As a context manager, it is killed at the end, whatever its state.
+    """
+
+    def __init__(self, target: Callable[..., None], *args: object, name: str) -> None:
+        context = process_context()
+        self.pipe, theirs = context.Pipe()
+        self._process = context.Process(target=target, args=(theirs, *args), name=name, daemon=True)
+        self._process.start()
+        theirs.close()
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        return self._process.is_alive()
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit code; None while the process runs, and the negative number of the signal that ended it."""
+        return self._process.exitcode
+
+    def send(self, message: object) -> None:
+        """Send a message. Raises OSError when the process is dead."""
+        self.pipe.send(message)
+
+    def receive(self) -> Any:
+        """Wait for the next message. Raises ProcessDiedError."""
+        try:
+            return self.pipe.recv()
+        except (EOFError, OSError) as error:
+            self.join()
+            raise ProcessDiedError(self.exit_code) from error
+
+    def join(self) -> None:
+        """Wait until the process ends, for at most DEATH_TIMEOUT_S."""
+        self._process.join(DEATH_TIMEOUT_S)
+
+    def kill(self) -> None:
+        """Kill the process. The pipe stays open, because another thread may be reading it."""
+        self._process.kill()
+        self._process.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.kill()
+        self.pipe.close()
+
+
+@dataclass(frozen=True, slots=True)
+class TaskResult(Generic[T]):
+    result: T
+
+
+@dataclass(frozen=True, slots=True)
+class TaskError:
+    """An exception that the task raised; its note has the traceback."""
+
+    error: Exception
+
+
+def perform(task: Callable[[], T]) -> TaskResult[T] | TaskError:
+    """Call a task in the child process, and return what to send to the parent."""
+    try:
+        return TaskResult(task())
+    except Exception as error:  # noqa: BLE001 - outermost frame of the process
+        error.add_note(format_exc())
+        return TaskError(error)
+
+
+def result_of(outcome: TaskResult[T] | TaskError) -> T:
+    """The result that a child process has sent. Raises what the task raised."""
+    if isinstance(outcome, TaskError):
+        raise outcome.error
+    return outcome.result
+
+
+def follow_parent(niceness: int) -> None:
+    """Set up a child process that computes: it runs with this niceness, leaves Ctrl-C to its parent, and ends at once
+    when the parent ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(niceness)
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
+
+
+def _exit_with_parent() -> None:
+    if (parent := parent_process()) is not None:
+        parent.join()
+        os._exit(0)
+
+
+def ignore_stop_signals() -> None:
+    """Set up a child process that holds a vehicle: it ends when its pipe is closed, never in the middle of a flight."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)

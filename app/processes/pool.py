@@ -2,69 +2,23 @@
 process starts quickly.
 """
 
-import os
 import queue
-import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
-from multiprocessing import parent_process
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
-from traceback import format_exc
 from types import TracebackType
-from typing import Final, Generic, ParamSpec, Self, TypeVar
+from typing import Final, ParamSpec, Self, TypeVar
 
 import structlog
 
 from app.core.errors import GainlineError
-from app.processes import process_context
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class TaskResult(Generic[T]):
-    result: T
-
-
-@dataclass(frozen=True, slots=True)
-class TaskError:
-    """An exception that the task raised; its note has the traceback."""
-
-    error: Exception
-
-
-def run_tasks(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
-    """Perform one task after another in the new process. Leaves Ctrl-C to the parent, and runs with the given
-    niceness."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(niceness)
-    threading.Thread(target=_shut_down_with_parent, daemon=True).start()
-    prepare()
-    with suppress(EOFError, OSError):  # the parent has closed the pipe or died
-        while True:
-            pipe.send(_outcome(pipe.recv()))
-
-
-def _outcome(task: Callable[[], T]) -> TaskResult[T] | TaskError:
-    try:
-        return TaskResult(task())
-    except Exception as error:  # noqa: BLE001 - outermost frame of the process
-        error.add_note(format_exc())
-        return TaskError(error)
-
-
-def _shut_down_with_parent() -> None:
-    if (parent := parent_process()) is not None:
-        parent.join()
-        os._exit(0)
-
+from app.processes import ChildProcess, ProcessDiedError, TaskError, TaskResult, follow_parent, perform, result_of
 
 P = ParamSpec("P")
+T = TypeVar("T")
 
 ATTEMPTS: Final = 2
 
@@ -114,7 +68,7 @@ class ComputePool:
             computer = self._free.get()
             try:
                 return computer.perform(task)
-            except _ProcessDiedError:
+            except ProcessDiedError:
                 _log.warning("computing process died", task=function.__qualname__)
             finally:
                 self._free.put(computer)
@@ -124,66 +78,48 @@ class ComputePool:
         )
 
 
-class _ProcessDiedError(Exception):
-    """The process died without a result."""
-
-
 class _ComputeProcess:
-    """A process, started when it is needed, and the pipe to it. Performs tasks for one thread at a time; any thread may
-    close it."""
+    """A process, started when it is needed. Performs tasks for one thread at a time; any thread may close it."""
 
     def __init__(self, prepare: Callable[[], object], niceness: int) -> None:
         self._prepare = prepare
         self._niceness = niceness
         self._lock = threading.Lock()
         self._closed = False
-        self._running: tuple[BaseProcess, Connection] | None = None
+        self._running: ChildProcess | None = None
 
     def perform(self, task: Callable[[], T]) -> T:
-        """Perform a task. Raises what the task raises, _ProcessDiedError, and CancelledError once it is closed."""
-        pipe = self._pipe()
-        try:
-            pipe.send(task)
-            outcome: TaskResult[T] | TaskError = pipe.recv()
-        except (EOFError, OSError) as error:
-            self._discard()
-            raise _ProcessDiedError from error
-        if isinstance(outcome, TaskError):
-            raise outcome.error
-        return outcome.result
-
-    def close(self) -> None:
-        with self._lock:
-            self._closed = True
-            self._kill()
-
-    def _pipe(self) -> Connection:
+        """Perform a task. Raises what the task raises, ProcessDiedError, and CancelledError once it is closed."""
         with self._lock:
             if self._closed:
                 raise CancelledError
             if self._running is None:
-                self._running = self._start()
-            return self._running[1]
+                self._running = ChildProcess(run_tasks, self._prepare, self._niceness, name="computing")
+            child = self._running
+        try:
+            with suppress(OSError):  # the process is dead: `receive` says so
+                child.send(task)
+            outcome: TaskResult[T] | TaskError = child.receive()
+        except ProcessDiedError:
+            with self._lock:
+                if self._closed:
+                    raise CancelledError from None
+                child.kill()
+                self._running = None
+            raise
+        return result_of(outcome)
 
-    def _start(self) -> tuple[BaseProcess, Connection]:
-        context = process_context()
-        ours, theirs = context.Pipe()
-        process = context.Process(
-            target=run_tasks, args=(theirs, self._prepare, self._niceness), name="computing", daemon=True
-        )
-        process.start()
-        theirs.close()
-        return process, ours
-
-    def _discard(self) -> None:
+    def close(self) -> None:
         with self._lock:
-            if self._closed:
-                raise CancelledError
-            self._kill()
-            self._running = None
+            self._closed = True
+            if self._running is not None:
+                self._running.kill()
 
-    def _kill(self) -> None:
-        if self._running is not None:
-            process, _ = self._running
-            process.kill()
-            process.join()
+
+def run_tasks(pipe: Connection, prepare: Callable[[], object], niceness: int) -> None:
+    """Perform one task after another in the new process."""
+    follow_parent(niceness)
+    prepare()
+    with suppress(EOFError, OSError):  # the parent has closed the pipe or died
+        while True:
+            pipe.send(perform(pipe.recv()))

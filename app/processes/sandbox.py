@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Final, ParamSpec, TypeVar
 
 from app.common.errors import InputError, Problem, UnavailableError
-from app.processes import process_context
-from app.processes.pool import TaskError, TaskResult
+from app.processes import ChildProcess, ProcessDiedError, TaskError, TaskResult, perform, result_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -57,29 +56,20 @@ def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwarg
 
 
 def _run(limits: Limits, task: Callable[[], T]) -> T:
-    context = process_context()
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_perform, args=(theirs, limits, task), name="reading", daemon=True)
-    with ours:
-        process.start()
-        theirs.close()
+    with ChildProcess(_perform, limits, task, name="reading") as child:
+        if not child.pipe.poll(limits.wall_s):
+            raise _too_much(limits)
         try:
-            if not ours.poll(limits.wall_s):
-                raise _too_much(limits)
-            outcome: TaskResult[T] | TaskError = ours.recv()
-        except EOFError as error:  # the processor time was used up, or the system ran out of memory
+            outcome: TaskResult[T] | TaskError = child.receive()
+        except ProcessDiedError as error:  # the processor time was used up, or the system ran out of memory
             raise _too_much(limits) from error
-        finally:
-            process.kill()
-            process.join()
-    if isinstance(outcome, TaskError):
-        if isinstance(outcome.error, MemoryError):
-            raise _too_much(limits) from outcome.error
-        raise outcome.error
-    return outcome.result
+    try:
+        return result_of(outcome)
+    except MemoryError as error:
+        raise _too_much(limits) from error
 
 
-def _perform(pipe: Connection, limits: Limits, task: Callable[[], T]) -> None:
+def _perform(pipe: Connection, limits: Limits, task: Callable[[], object]) -> None:
     """Main function of the new process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_CPU, (limits.processor_s, limits.processor_s + 1))
@@ -87,10 +77,7 @@ def _perform(pipe: Connection, limits: Limits, task: Callable[[], T]) -> None:
     with suppress(OSError, ValueError):  # where the system has no such limit, the time limit applies
         most = _address_space() + limits.memory_bytes
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    try:
-        outcome: TaskResult[T] | TaskError = TaskResult(task())
-    except Exception as error:  # noqa: BLE001 - outermost frame of the process
-        outcome = TaskError(error)
+    outcome = perform(task)
     with suppress(OSError):  # the parent no longer waits
         pipe.send(outcome)
 

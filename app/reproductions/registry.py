@@ -5,11 +5,15 @@ The modules that run them are imported on use, so that listing them needs none.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from types import MappingProxyType
 from typing import Final
 
 from app.core.errors import InputError, Problem
+from app.processes import follow_parent, perform
 from app.reproductions.results import Progress, Result
+
+NICENESS: Final = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,3 +134,19 @@ def get_reproduction(name: str) -> Reproduction:
             problems=(Problem("name", f"unknown name {name!r}"),),
         )
     return REPRODUCTIONS[name]
+
+
+@dataclass(frozen=True, slots=True)
+class ProgressReport:
+    """Message of the process that computes: the share done, 0 … 1, and the current activity."""
+
+    share: float
+    doing: str
+
+
+def reproduce(pipe: Connection, name: str, full: bool) -> None:
+    """Main function of a low-priority process: compute one reproduction, and send ProgressReports, then the outcome."""
+    follow_parent(NICENESS)
+    pipe.send(
+        perform(lambda: get_reproduction(name).run(lambda share, doing: pipe.send(ProgressReport(share, doing)), full))
+    )

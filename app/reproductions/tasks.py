@@ -7,18 +7,11 @@ from typing import Final, NoReturn
 
 import structlog
 
-from app.common.errors import GainlineError
 from app.db.session import Database
 from app.jobs import service as jobs
-from app.jobs.runner import ClaimedJob, internal_error
-from app.reproductions.process import (
-    InternalFailure,
-    ProcessDiedError,
-    Progress,
-    StudyError,
-    StudyMessage,
-    StudyProcess,
-)
+from app.jobs.runner import ClaimedJob
+from app.processes import ChildProcess, ProcessDiedError, TaskError, TaskResult, result_of
+from app.reproductions.registry import ProgressReport, reproduce
 from app.reproductions.results import Result
 from app.reproductions.service import read_order
 
@@ -43,11 +36,11 @@ class ReproductionJob:
         Raises GainlineError for errors to be shown to a person, and CancelledError when the worker ends.
         """
         order, started_s = read_order(job.order), monotonic()
-        with StudyProcess(order.name, full=order.full) as process:
+        with ChildProcess(reproduce, order.name, order.full, name=f"reproduction {order.name}") as process:
             try:
                 result = self._watch(job, process)
             except ProcessDiedError as death:
-                _log.warning("the computing process died", name=order.name, exit_code=death.args[0])
+                _log.warning("the computing process died", name=order.name, exit_code=death.exit_code)
                 with self._database.write() as session:
                     jobs.requeue_or_fail_job(session, job.id, worker=self._worker)
                 return
@@ -58,16 +51,16 @@ class ReproductionJob:
             jobs.finish_job(session, job.id, worker=self._worker, result=result.as_json())
         _log.info("reproduction stored", name=order.name, seconds=round(monotonic() - started_s, 1))
 
-    def _watch(self, job: ClaimedJob, process: StudyProcess) -> Result | None:
+    def _watch(self, job: ClaimedJob, process: ChildProcess) -> Result | None:
         """Wait for the result and store the progress; None if the job was cancelled meanwhile."""
-        latest, stored = Progress(0.0, "starting"), Progress(0.0, "")
+        latest, stored = ProgressReport(0.0, "starting"), ProgressReport(0.0, "")
         due_s = 0.0
         while True:
-            message = process.listen(max(due_s - monotonic(), 0.0))
-            if isinstance(message, Progress):
+            if process.pipe.poll(max(due_s - monotonic(), 0.0)):
+                message: ProgressReport | TaskResult[Result] | TaskError = process.receive()
+                if not isinstance(message, ProgressReport):
+                    return result_of(message)
                 latest = message
-            elif message is not None:
-                return _checked(message)
             if monotonic() < due_s:
                 continue
             due_s = monotonic() + LOOK_S
@@ -82,7 +75,7 @@ class ReproductionJob:
             jobs.requeue_job(session, job.id, worker=self._worker)
         raise CancelledError
 
-    def _still_wanted(self, job: ClaimedJob, latest: Progress, *, is_news: bool) -> bool:
+    def _still_wanted(self, job: ClaimedJob, latest: ProgressReport, *, is_news: bool) -> bool:
         """Whether the job still belongs to this worker; new progress is stored, which also notifies the browsers."""
         with self._database.write() as session:
             if not is_news:
@@ -90,17 +83,3 @@ class ReproductionJob:
             return jobs.report_progress(
                 session, job.id, latest.share, latest.doing, worker=self._worker, lease_s=self._lease_s
             )
-
-
-def _checked(answer: StudyMessage) -> Result:
-    """The result. Raises GainlineError if the process reported an error."""
-    match answer:
-        case Result():
-            return answer
-        case StudyError(message, hint, problems):
-            raise GainlineError(message, hint=hint, problems=problems)
-        case InternalFailure(what, traceback):
-            _log.error("internal error in the computing process", exception=traceback)
-            raise internal_error(what)
-        case Progress():
-            raise AssertionError

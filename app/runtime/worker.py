@@ -33,7 +33,7 @@ from app.common.settings import Settings, is_loopback
 from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
-from app.db.session import Database
+from app.db.session import RETRY_S, Database, retry_until_stored
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
@@ -55,7 +55,6 @@ LOOK_ANYWAY_S: Final = 1.0
 SWITCH_EVERY_S: Final = 0.001
 """Maximum time for which a thread that writes to the database keeps the one that forwards aborts waiting for the
 interpreter lock; Python's default of 5 ms adds up over several threads."""
-RETRY_S: Final = 1.0
 
 _log = structlog.get_logger(__name__)
 
@@ -267,14 +266,11 @@ class Worker:
             runner.heartbeat()
 
     def _until_stored(self, work: Callable[[], None]) -> None:
-        while not self._ending.event.is_set():
-            try:
-                work()
-            except StorageError as error:
-                _log.error("the worker cannot start", why=str(error))
-                self._ending.event.wait(self._clock.wall_s(RETRY_S))
-            else:
-                return
+        def refused(error: StorageError) -> None:
+            _log.error("the worker cannot start", why=str(error))
+
+        if not self._ending.event.is_set():
+            retry_until_stored(work, refused, closing=self._ending.event, clock=self._clock)
 
     def _hello(self) -> WorkerHello:
         return WorkerHello(pid=os.getpid(), version=__version__, flying=self._abort_registry.trial_ids())

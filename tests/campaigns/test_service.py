@@ -34,7 +34,7 @@ def test_a_vehicles_ledger_outlives_the_wish_to_delete_a_campaign(client: TestCl
     create_trial(client, campaign["id"], fly={"speed": None})
     task = claim(database)
     with database.write() as session:
-        queue.record_failure(session, task.flight_id, "the vehicle did not answer")
+        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(problem="the vehicle did not answer"))
     answer = client.delete(f"{path}?version=1")
     assert answer.status_code == 409
     assert "ledger" in answer.json()["detail"]

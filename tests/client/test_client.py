@@ -113,7 +113,7 @@ def test_a_flight_that_did_not_take_place_is_raised(gainline: Client, database: 
     trial = gainline.fly(campaign.id, gainline.ask(campaign.id))
     task = claim(database)
     with database.write() as session:
-        queue.record_failure(session, task.flight_id, "the vehicle did not answer.")
+        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(problem="the vehicle did not answer."))
     with pytest.raises(RefusedError, match="was not flown: the vehicle did not answer"):
         gainline.wait(trial.id)
 

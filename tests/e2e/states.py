@@ -33,7 +33,7 @@ from app.fleet import registration
 from app.fleet.schemas import NewVehicle
 from app.flights import queue
 from app.flights import service as flights
-from app.flights.process_messages import mark_if_requested
+from app.flights.flight_loop import mark_if_requested
 from app.jobs import service as jobs
 from app.reproductions import service as reproductions
 from app.reproductions.registry import get_reproduction
@@ -254,8 +254,7 @@ def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> Non
         )
         record = mark_if_requested(record, set() if stop is None else {stop.reason})
         restored = restore_safe_gains(vehicle)
-    queue.record_landing(session, task.flight_id, record)
-    queue.record_restored(session, task.flight_id, restored)
+    queue.record_outcome(session, task.flight_id, queue.FlightOutcome(record=record, restored=restored))
 
 
 def _propose(session: Session, campaign_id: int) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from playwright.sync_api import expect
 
-from app.reproductions.process import NICENESS
+from app.reproductions.registry import NICENESS
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States

@@ -11,7 +11,8 @@ import pytest
 
 from app.common.data_folder import vehicle_lock
 from app.core.experiments import get_experiment
-from app.flights.flight_process import LOCK_TIMEOUT_S, FlightProcess
+from app.flights.flight_loop import LOCK_TIMEOUT_S
+from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import FlightPhase, Telemetry
 from app.processes.locks import exclusive
@@ -37,9 +38,14 @@ def flight_of(*, kind: str = "twin", speed: float | None = None, trial_id: int =
     )
 
 
+def start(data_dir: Path) -> FlightProcess:
+    data_dir.mkdir(exist_ok=True)
+    return FlightProcessPool(data_dir, spare=0).acquire()
+
+
 @pytest.fixture(scope="module")
 def flight_process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FlightProcess]:
-    one = FlightProcess(tmp_path_factory.mktemp("data"))
+    one = start(tmp_path_factory.mktemp("data"))
     yield one
     one.close()
 
@@ -136,11 +142,7 @@ def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(
 
 
 def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
-    def start(name: str) -> FlightProcess:
-        (tmp_path / name).mkdir()
-        return FlightProcess(tmp_path / name)
-
-    alone, together = start("alone"), [start("one"), start("other")]
+    alone, together = start(tmp_path / "alone"), [start(tmp_path / "one"), start(tmp_path / "other")]
     records: dict[int, FlightLanded] = {}
 
     def one(number: int) -> None:
@@ -162,11 +164,11 @@ def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: 
 
 
 def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) -> None:
-    flight_process = FlightProcess(tmp_path)
+    flight_process = start(tmp_path)
 
     def kill(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
-            os.kill(flight_process._process.pid or 0, signal.SIGKILL)
+            os.kill(flight_process.pid or 0, signal.SIGKILL)
 
     with pytest.raises(VehicleError, match=r"exit code -9"):
         fly(flight_process, flight_of(speed=1.0), kill)
@@ -174,7 +176,7 @@ def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) 
 
 
 def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_path: Path) -> None:
-    flight_process = FlightProcess(tmp_path)
+    flight_process = start(tmp_path)
     heard: list[FlightMessage] = []
     with exclusive(vehicle_lock(tmp_path, "twin")):
         thread = threading.Thread(target=lambda: heard.extend(fly(flight_process, flight_of())))

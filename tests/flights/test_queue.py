@@ -8,6 +8,7 @@ from app.core.definition import flight_seed
 from app.db.session import Database
 from app.flights import queue
 from app.flights.process_messages import FlightRequest
+from app.flights.queue import FlightOutcome
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
@@ -98,7 +99,7 @@ def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, databa
     with pytest.raises(ConflictError, match="must not fly"), database.write() as session:
         queue.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        queue.record_failure(session, task.flight_id, "the vehicle did not take the gains")
+        queue.record_outcome(session, task.flight_id, FlightOutcome(problem="the vehicle did not take the gains"))
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
     assert after["flight"]["problem"] == "the vehicle did not take the gains"
@@ -231,7 +232,8 @@ def test_unverified_safe_gains_quarantine_even_a_vehicle_that_landed(client: Tes
     task = lift_off(database)
     land(database, task, create_record())
     with database.write() as session:
-        queue.quarantine_vehicle(session, task.flight_id, "the safe gains did not read back")
+        outcome = FlightOutcome(record=create_record(), concern="the safe gains did not read back")
+        queue.record_outcome(session, task.flight_id, outcome)
     vehicle = get(client, f"/api/vehicles/{campaign['vehicle']['id']}")
     assert (vehicle["state"], vehicle["concern"]) == ("quarantined", "the safe gains did not read back")
 
@@ -275,7 +277,7 @@ def test_a_trial_cancelled_while_it_is_staged_does_not_lift_off(client: TestClie
     with pytest.raises(ConflictError), database.write() as session:
         queue.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        queue.record_failure(session, task.flight_id, "cancelled")
+        queue.record_outcome(session, task.flight_id, FlightOutcome(problem="cancelled"))
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "cancelled"
     assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
 

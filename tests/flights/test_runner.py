@@ -52,7 +52,7 @@ class RunnerFixture:
 
     def kill_processes(self) -> None:
         for process in self.runner._process_pool._waiting:
-            os.kill(process._process.pid or 0, signal.SIGKILL)
+            os.kill(process.pid or 0, signal.SIGKILL)
 
     def _hear(self, said: PublishedMessage) -> None:
         self.heard.append(said)

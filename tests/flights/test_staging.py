@@ -14,6 +14,7 @@ from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import commands
 from app.flights import queue
+from app.flights.queue import FlightOutcome
 from app.main import create_app
 from app.vehicles.base import FlightRecord
 from tests.builders import (
@@ -74,7 +75,7 @@ def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
     """Whether its worker may take off, and why it is to stand down."""
     with database.read() as session:
         flight_id = staged["flight"]["id"]
-        return queue.take_off_wanted(session, flight_id), queue.stand_down_wanted(session, flight_id)
+        return queue.clearance_of(session, flight_id)
 
 
 def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
@@ -184,8 +185,8 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
         f"Trial {staged['number']} is being unstaged: unstaged by the operator.",
     )
     with database.write() as session:
-        queue.record_withdrawal(session, staged["flight"]["id"], "unstaged by the operator")
-        queue.record_restored(session, staged["flight"]["id"], DEFAULT_GAINS)
+        outcome = FlightOutcome(withdrawn=True, problem="unstaged by the operator", restored=DEFAULT_GAINS)
+        queue.record_outcome(session, staged["flight"]["id"], outcome)
     after = trial(client, staged)
     assert (after["state"], after["flight"]["state"], after["actions"][0]) == ("planned", "cancelled", "stage")
     assert seen(client, real)["state"] == "ready"
@@ -264,8 +265,8 @@ def fly(client: TestClient, database: Database, vehicle: Json, planned: Json, re
     with database.write() as session:
         queue.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        queue.record_landing(session, task.flight_id, record)
-        queue.record_restored(session, task.flight_id, task.safe_gains)
+        outcome = FlightOutcome(record=record, restored=dict(task.safe_gains))
+        queue.record_outcome(session, task.flight_id, outcome)
     return trial(client, planned)
 
 
@@ -338,9 +339,8 @@ def test_safe_gains_that_did_not_come_back_stand_in_the_ledger_as_they_were_read
 ) -> None:
     wrong = {"kp": 283, "ki": 0, "kd": 82}
     with database.write() as session:
-        queue.record_failure(session, staged["flight"]["id"], "refused")
-        queue.record_restored(session, staged["flight"]["id"], wrong)
-        queue.quarantine_vehicle(session, staged["flight"]["id"], "ki was read back as 0")
+        outcome = FlightOutcome(problem="refused", restored=wrong, concern="ki was read back as 0")
+        queue.record_outcome(session, staged["flight"]["id"], outcome)
     line = get(client, f"/api/vehicles/{real['id']}/ledger")["items"][0]
     assert (line["asked"], line["read_back"], line["outcome"]) == (DEFAULT_GAINS, wrong, "failed")
     assert seen(client, real)["state"] == "quarantined"

@@ -15,6 +15,7 @@ import pytest
 from app.common.data_folder import telemetry_log
 from app.common.states import ActKind
 from app.flights import vehicle_process as vehicle_process_module
+from app.flights.flight_loop import PipeClosedError, WorkerPipe
 from app.flights.process_messages import (
     CancelFlight,
     CancelTakeOff,
@@ -33,7 +34,6 @@ from app.flights.process_messages import (
     VehicleRequest,
 )
 from app.flights.vehicle_process import VehicleProcess
-from app.flights.worker_pipe import PipeClosedError, WorkerPipe
 from app.vehicles.base import Identity
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.dialects import PAPARAZZI, Message

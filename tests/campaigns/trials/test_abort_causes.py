@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from app.db.models import TrialRow
 from app.db.session import Database
-from app.flights.process_messages import mark_if_requested
+from app.flights.flight_loop import mark_if_requested
 from app.flights.record_spool import Spool
 from tests.builders import (
     Json,

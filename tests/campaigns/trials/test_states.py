@@ -10,6 +10,7 @@ from app.common.errors import ConflictError
 from app.common.states import TRIAL_TRANSITIONS, TrialState
 from app.db.session import Database
 from app.flights import queue
+from app.flights.queue import FlightOutcome
 from tests.builders import Json, create_csv, create_record, get, upload
 from tests.campaigns.trials.states import create_trial_in
 
@@ -89,18 +90,24 @@ def test_the_offered_actions_are_those_that_work(client: TestClient, database: D
 
 
 Step = Callable[[Session, int], object]
+
+
+def ends(outcome: FlightOutcome) -> Step:
+    return lambda session, flight: queue.record_outcome(session, flight, outcome)
+
+
 STEPS: dict[str, Step] = {
     "staged": lambda session, flight: queue.record_staged(session, flight, {"kp": 283, "ki": 13, "kd": 82}),
     "lift-off": queue.record_lift_off,
-    "landing": lambda session, flight: queue.record_landing(session, flight, create_record()),
-    "short landing": lambda session, flight: queue.record_landing(session, flight, create_record(until_s=9.0)),
-    "abort": lambda session, flight: queue.record_landing(session, flight, create_record(ending="aborted")),
-    "loss": lambda session, flight: queue.record_loss(session, flight, "gone"),
-    "failure": lambda session, flight: queue.record_failure(session, flight, "refused"),
-    "withdrawal": lambda session, flight: queue.record_withdrawal(session, flight, "ended"),
+    "landing": ends(FlightOutcome(record=create_record())),
+    "short landing": ends(FlightOutcome(record=create_record(until_s=9.0))),
+    "abort": ends(FlightOutcome(record=create_record(ending="aborted"))),
+    "loss": ends(FlightOutcome(lifted_off=True, problem="gone")),
+    "failure": ends(FlightOutcome(problem="refused")),
+    "withdrawal": ends(FlightOutcome(withdrawn=True, problem="ended")),
     "restart": lambda session, _flight: queue.lose_running_flights(session),
     "recovery": lambda session, flight: queue.recover_record(session, flight, create_record()),
-    "quarantine": lambda session, flight: queue.quarantine_vehicle(session, flight, "not verified"),
+    "quarantine": ends(FlightOutcome(record=create_record(), concern="not verified")),
 }
 
 

@@ -1,0 +1,354 @@
+"""The process that holds a vehicle and flies it for the worker: the flights, whatever the vehicle, and the simulations.
+
+A flight has a process of its own because JSBSim holds the interpreter lock while it computes, cannot run in two threads
+at once, and must not take the worker down when it crashes. The process never touches the database. When the worker
+dies, the pipe between them breaks; the flight is then aborted and the vehicle left with its safe gains.
+"""
+
+import os
+import select
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from app.common.data_folder import vehicle_lock
+from app.core.clock import REAL_TIME, Clock
+from app.core.errors import GainlineError
+from app.core.experiments import get_experiment
+from app.flights.process_messages import (
+    CancelFlight,
+    CancelTakeOff,
+    FlightFailure,
+    FlightFinished,
+    FlightLanded,
+    FlightRequest,
+    FromVehicleProcess,
+    GainsStaged,
+    TakeOffCommand,
+    ToVehicleProcess,
+    VehicleCommand,
+)
+from app.live.messages import FlightPhase, Phase, Telemetry
+from app.processes import ignore_stop_signals
+from app.processes.locks import LockedError, exclusive
+from app.vehicles.base import (
+    MOTORS_OFF_REQUESTED,
+    FlightRecord,
+    SafeGainsError,
+    Sample,
+    StopRequest,
+    Vehicle,
+    VehicleError,
+)
+from app.vehicles.jsbsim import prepare
+from app.vehicles.registry import open_vehicle
+
+LOCK_TIMEOUT_S: Final = 10.0
+"""How long a simulation waits for another process that still holds it, such as one that is landing it after its worker
+was killed."""
+MESSAGES_PER_S: Final = 25
+
+
+class PipeClosedError(Exception):
+    """The pipe is broken: the worker has closed it or died."""
+
+
+class WorkerPipe:
+    """The process's end of the pipe. Once it is broken, `receive` raises; `send` and `send_if_ready` drop the
+    message."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._received: deque[ToVehicleProcess] = deque()
+
+    def receive(self, timeout_s: float | None = 0.0) -> ToVehicleProcess | None:
+        """Return the next message; None when there is none within that time, s (None: any). Raises PipeClosedError."""
+        return self._received.popleft() if self._received else self._read(timeout_s)
+
+    def receive_command(self) -> VehicleCommand | None:
+        """Return the next command ahead of other messages; None when there is none, or the pipe is broken."""
+        with suppress(PipeClosedError):
+            while (message := self._read(0.0)) is not None:
+                self._received.append(message)
+        found = next((each for each in self._received if isinstance(each, VehicleCommand)), None)
+        if found is not None:
+            self._received.remove(found)
+        return found
+
+    def _read(self, timeout_s: float | None) -> ToVehicleProcess | None:
+        try:
+            return self._pipe.recv() if self._pipe.poll(timeout_s) else None
+        except (EOFError, OSError) as error:
+            raise PipeClosedError from error
+
+    def is_open(self) -> bool:
+        """Return True while the pipe is open; discards a waiting message. Raises PipeClosedError instead of returning
+        False."""
+        self.receive()
+        return True
+
+    def send(self, message: FromVehicleProcess) -> None:
+        with suppress(OSError):
+            self._pipe.send(message)
+
+    def send_if_ready(self, message: FromVehicleProcess) -> None:
+        """Send the message unless that would block."""
+        with suppress(OSError, ValueError):
+            if select.select([], [self._pipe], [], 0.0)[1]:
+                self._pipe.send(message)
+
+
+class FlightLoop(ABC):
+    """Carries out flights, one after another, for the worker at the other end of the pipe."""
+
+    def __init__(self, line: WorkerPipe, clock: Clock) -> None:
+        self._line = line
+        self._clock = clock
+        self._trial_id: int | None = None
+        self._stop: StopRequest | None = None
+        self._is_worker_gone = False
+
+    def run(self) -> None:
+        """Carry out requests. Raises PipeClosedError when the worker closes the pipe or dies."""
+        while True:
+            self._carry_out(self._next())
+
+    @abstractmethod
+    def _next(self) -> ToVehicleProcess:
+        """Wait for the worker's next message. Raises PipeClosedError."""
+
+    @abstractmethod
+    def _publish(self, message: Telemetry | FlightPhase) -> None:
+        """Send telemetry and phases of the flight."""
+
+    @abstractmethod
+    def _vehicle_for(self, request: FlightRequest) -> AbstractContextManager[Vehicle]:
+        """The vehicle for one flight; however the flight ends, it is left with its safe gains, read back."""
+
+    def _carry_out(self, asked: ToVehicleProcess) -> None:
+        if isinstance(asked, FlightRequest):  # anything else belongs to a flight that is over
+            self._fly(asked)
+
+    def _fly(self, request: FlightRequest) -> None:
+        self._trial_id, self._stop = request.trial_id, None
+        try:
+            with self._vehicle_for(request) as vehicle:
+                self._line.send(GainsStaged(self._stage(vehicle, request.gains)))
+                if (cleared := self._await_takeoff_clearance()) is not None:
+                    self._line.send(FlightLanded(self._take_off(vehicle, request, cleared)))
+        except GainlineError as error:
+            self._line.send(failure_from(error))
+        except PipeClosedError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever a vehicle raises, its trial must get a definite end
+            self._line.send(internal_error(error))
+        finally:
+            self._trial_id = None
+        self._line.send(FlightFinished())
+
+    def _stage(self, vehicle: Vehicle, gains: Mapping[str, float]) -> dict[str, float]:
+        with self._interruptible():
+            return vehicle.stage(gains)
+
+    def _interruptible(self) -> AbstractContextManager[None]:
+        """Context that a command for the vehicle interrupts; a simulation gets none."""
+        return nullcontext()
+
+    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
+        """Wait for the worker's decision. Raises PipeClosedError."""
+        while not isinstance(answer := self._next(), TakeOffCommand | CancelTakeOff):
+            self._note(answer)
+        return answer if isinstance(answer, TakeOffCommand) else None
+
+    def _take_off(self, vehicle: Vehicle, request: FlightRequest, _cleared: TakeOffCommand) -> FlightRecord:
+        monitor = FlightMonitor(request, self._publish, self._clock)
+        asked: set[str] = set()
+
+        def should_stop() -> StopRequest | None:
+            if (stop := self._should_stop()) is not None:
+                asked.add(stop.reason)
+            return stop
+
+        monitor.phase("flying")
+        record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=should_stop)
+        monitor.flush()
+        monitor.phase("landed")
+        return mark_if_requested(record, asked)
+
+    def _should_stop(self) -> StopRequest | None:
+        """Stop callback, called every few milliseconds in the air; polling the pipe takes microseconds."""
+        try:
+            while not self._is_worker_gone and (message := self._line.receive()) is not None:
+                self._note(message)
+        except PipeClosedError:
+            self._is_worker_gone = True
+            self._stop = self._stop or StopRequest("the worker has exited")
+        return self._stop
+
+    def _note(self, message: ToVehicleProcess) -> None:
+        """Note a reason to end the flight: the first one counts."""
+        if isinstance(message, CancelFlight) and message.trial_id == self._trial_id:
+            self._stop = self._stop or StopRequest(message.reason)
+
+
+class SimulationLoop(FlightLoop):
+    """Opens a simulation for each flight."""
+
+    def __init__(self, line: WorkerPipe, data_dir: Path, clock: Clock) -> None:
+        super().__init__(line, clock)
+        self._data_dir = data_dir
+
+    def _next(self) -> ToVehicleProcess:
+        message = self._line.receive(timeout_s=None)
+        assert message is not None
+        return message
+
+    def _publish(self, message: Telemetry | FlightPhase) -> None:
+        self._line.send(message)
+
+    @contextmanager
+    def _vehicle_for(self, request: FlightRequest) -> Iterator[Vehicle]:
+        lock = vehicle_lock(self._data_dir, request.vehicle_kind)
+        with (
+            hold_vehicle_lock(lock, within_s=LOCK_TIMEOUT_S, clock=self._clock),
+            open_vehicle(request.vehicle_kind, request.vehicle_options, safe_gains=request.safe_gains) as vehicle,
+        ):
+            yield vehicle
+
+
+def run_simulations(pipe: Connection, data_dir: Path, clock: Clock) -> None:
+    """Main function of the process, until the worker closes the pipe or dies.
+
+    Imports what the most common vehicle needs while it waits for the first request.
+    """
+    ignore_stop_signals()
+    if not pipe.poll():
+        with suppress(GainlineError, ImportError):  # reported by the flight that needs it
+            prepare()
+    try:
+        SimulationLoop(WorkerPipe(pipe), data_dir, clock).run()
+    except PipeClosedError:
+        os._exit(0)
+
+
+def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
+    """Return the record with `on_request` set: whether the flight was aborted for one of these reasons, which were sent
+    by the worker, and not for a limit."""
+    stated = record.reason.removeprefix(MOTORS_OFF_REQUESTED)
+    asked = record.ending == "aborted" and any(stated.startswith(reason) for reason in reasons)
+    return replace(record, on_request=asked)
+
+
+def failure_from(error: GainlineError) -> FlightFailure:
+    """Build the failure message of an error.
+
+    If the error followed from a refusal to fly, the refusal comes first.
+    """
+    refusals = [each for each in _chain(error) if isinstance(each, VehicleError) and each.not_flown]
+    what = " ".join(dict.fromkeys(str(each) for each in (*refusals, error)))
+    return FlightFailure(what, unsafe=isinstance(error, SafeGainsError), not_flown=bool(refusals))
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """The error and its chain of contexts: those that were being handled when it was raised."""
+    while error is not None:
+        yield error
+        error = error.__context__
+
+
+def internal_error(error: Exception) -> FlightFailure:
+    """Failure message of an internal error, so that the trial gets a definite end."""
+    return FlightFailure(f"Internal error ({type(error).__name__}: {error}).", unsafe=False)
+
+
+@contextmanager
+def hold_vehicle_lock(
+    lock: Path, *, within_s: float, wanted: Callable[[], bool] = lambda: True, clock: Clock = REAL_TIME
+) -> Iterator[None]:
+    """Hold the vehicle's lock, so that this process has the vehicle to itself.
+
+    Another process whose worker was killed may still be landing the vehicle: waits for its lock for at most `within_s`
+    seconds and while `wanted()`. Raises VehicleError when the lock is not free by then.
+    """
+    deadline_s = clock.now_s() + within_s
+    try:
+        with exclusive(lock, keep_waiting=lambda: wanted() and clock.now_s() < deadline_s, clock=clock):
+            yield
+    except LockedError as error:
+        raise VehicleError(
+            f"The vehicle is still under the control of {error.holder or 'another process'}.",
+            hint="Wait until that process has landed it, or end the process; then fly again.",
+        ) from error
+
+
+class FlightMonitor:
+    """Collects one flight's samples and publishes them in at most 25 messages a second, with the error so far.
+
+    The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample (its integral
+    where the experiment's error is one), within the time that the experiment scores. The flight's own error is computed
+    from its full-rate record.
+    """
+
+    def __init__(
+        self, request: FlightRequest, publish: Callable[[Telemetry | FlightPhase], None], clock: Clock
+    ) -> None:
+        self._campaign_id = request.campaign_id
+        self._trial_id = request.trial_id
+        self._experiment = get_experiment(request.experiment)
+        self._columns: list[str] = []
+        self._scored_until_s = float(self._experiment.grid_s[-1])
+        self._publish = publish
+        self._clock = clock
+        self._rows: list[list[float]] = []
+        self._due_s = 0.0
+        self._last: tuple[float, float] | None = None
+        self._integral = 0.0
+
+    def phase(self, phase: Phase) -> None:
+        self._publish(FlightPhase(campaign_id=self._campaign_id, trial_id=self._trial_id, phase=phase))
+
+    def sample(self, sample: Sample) -> None:
+        output = self._experiment.output
+        set_point = float(self._experiment.set_point(np.array([sample.time_s]))[0])
+        self._score(sample.time_s, abs(set_point - sample[output]))
+        others = [name for name in sample.channels if name != output]
+        self._columns = ["time_s", output, *others]
+        self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
+        now_s = self._clock.now_s()
+        if now_s >= self._due_s:
+            self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
+            self.flush()
+
+    def flush(self) -> None:
+        """Publish the collected samples."""
+        if self._rows:
+            rows, self._rows = self._rows, []
+            self._publish(
+                Telemetry(
+                    campaign_id=self._campaign_id,
+                    trial_id=self._trial_id,
+                    time_s=rows[-1][0],
+                    columns=self._columns,
+                    samples=rows,
+                    error_so_far=self.error_so_far,
+                )
+            )
+
+    @property
+    def error_so_far(self) -> float | None:
+        if self._last is None or self._last[0] <= 0.0:
+            return None
+        return self._integral if self._experiment.integrates else self._integral / self._last[0]
+
+    def _score(self, time_s: float, deviation: float) -> None:
+        if 0.0 <= time_s <= self._scored_until_s:
+            before_s, before = self._last if self._last is not None else (0.0, deviation)
+            self._integral += (time_s - before_s) * (before + deviation) / 2.0
+            self._last = (time_s, deviation)
