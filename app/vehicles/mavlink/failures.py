@@ -103,8 +103,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "two sources more than 0.3 m apart for 0.3 s", "land", "invalid", "Two sources of altitude disagree."
         ),
         Failure.LOST_POSITION: Response(
-            "no plausible position for 0.5 s, more than 15 implausible ones a second, "
-            "or an altitude that stays 0.5 m behind the climb rate during take-off",
+            "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
+            "an altitude that jumps, or stays 0.5 m behind the climb rate during take-off",
             "land",
             "invalid",
             "The vehicle's position was lost.",
