@@ -4090,6 +4090,14 @@ export type CreateCampaignResponse = CreateCampaignResponses[keyof CreateCampaig
 
 export type DeleteCampaignData = {
     body?: never;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
     path: {
         /**
          * Campaign Id
@@ -4157,6 +4165,14 @@ export type GetCampaignResponse = GetCampaignResponses[keyof GetCampaignResponse
 
 export type EditCampaignData = {
     body: CampaignEdit;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
     path: {
         /**
          * Campaign Id
@@ -4197,6 +4213,12 @@ export type FinishCampaignData = {
          * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
@@ -4235,6 +4257,12 @@ export type ArchiveCampaignData = {
          * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
