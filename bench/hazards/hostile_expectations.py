@@ -82,10 +82,12 @@ EXPECTED: Final[Mapping[str, Expected]] = {
     "late by 2 s": Expected(reasons=(*_DOUBLED, *_NO_POSITION), ends_in=AIR, may_quarantine=True),
     "copies after 2 s": Expected(reasons=(*_DOUBLED, *_NO_POSITION), may_quarantine=True),
     **dict.fromkeys(("an hour ahead", "reboot once", "ground once", "ceiling once"), _ONCE),
-    "ground every second": Expected(reasons=("samples had to be dropped", _MOVED), ends_in=AIR),
+    "ground every second": Expected(
+        reasons=("samples had to be dropped", _MOVED, *_DOUBLED), ends_in=AIR, may_quarantine=True
+    ),
     **dict.fromkeys(("disarmed once", "disarmed every second", "by hand once"), HARMLESS),
     "no HEARTBEAT": Expected(
-        reasons=("link was lost", "Heartbeat: ", "No heartbeat", "did not arm", "not confirmed within"),
+        reasons=(*_LOST, "did not arm", "not confirmed within", "heartbeats do not confirm"),
         ends_in=AIR,
         may_quarantine=True,
     ),

@@ -42,6 +42,8 @@ class DuplicateDetector:
         self._used: dict[int, _Used] = {}
         self._rate = _Rate()
         self._count = 0
+        self._at_instant = (float("-inf"), 0)
+        self._burst_s = float("-inf")
         self._latest = -1
         self._clocks: dict[int, tuple[float, float]] = {}
         self._clock = 0
@@ -72,6 +74,7 @@ class DuplicateDetector:
     def _add_number(self, frame: bytes, number: int, now_s: float) -> bool:
         """Process a sequence number; return whether the packet is in order, neither repeated nor late."""
         self._count += 1
+        self._note_burst(now_s)
         used = self._used.get(number)
         is_taken = used is not None and self._is_of_this_round(used, now_s)
         if used is not None and is_taken and used.frame == frame:
@@ -88,8 +91,16 @@ class DuplicateDetector:
             self._repeated_numbers.append(now_s)
         return not is_late
 
+    def _note_burst(self, now_s: float) -> None:
+        """Note when more packets arrive at one instant than are sent at once: it is not known when they were sent."""
+        last_s, packets = self._at_instant
+        self._at_instant = (now_s, packets + 1 if now_s == last_s else 1)
+        self._burst_s = now_s if self._at_instant[1] > _AT_ONCE else self._burst_s
+
     def _is_of_this_round(self, used: _Used, now_s: float) -> bool:
         """Whether the sequence numbers cannot have completed a cycle since this one was used."""
+        if used.at_s <= self._burst_s:
+            return False
         round_s = _OF_A_ROUND * NUMBERS / self._rate.number_hz
         return self._count - used.count < _OF_A_ROUND * NUMBERS and now_s - used.at_s < round_s
 

@@ -104,7 +104,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.LOST_POSITION: Response(
             "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
-            "an altitude that jumps, or stays 0.5 m behind the climb rate during take-off",
+            "an altitude that jumps by 0.5 m, or stays 0.5 m behind the climb rate during take-off",
             "land",
             "invalid",
             "The vehicle's position was lost.",

@@ -63,6 +63,13 @@ def test_a_stream_that_begins_fast_and_loses_some_is_no_second_vehicle() -> None
     assert heard(packet for packet in chain(before, at_once, stream) if packet[1] % 5)[0] == ""
 
 
+def test_packets_that_were_held_up_and_many_lost_ones_are_no_second_vehicle() -> None:
+    """Seen: five seconds of packets came at once, then no positions; the numbers came round after 230 packets."""
+    held_up = [(5.0, *rest) for _, *rest in said("one", seconds=5.0, rate_hz=55.0)]
+    following = said("one on", seconds=10.0, rate_hz=55.0, number=275 % 256, boot_s=55.0, at_s=5.0)
+    assert heard([*held_up, *(packet for packet in following if packet[1] % 20 == 0)])[0] == ""  # type: ignore[list-item]
+
+
 def test_packets_that_come_twice_are_no_second_vehicle() -> None:
     again = [(at_s + 0.3, *rest) for at_s, *rest in said("one")[::2]]
     assert heard(chain(said("one"), again))[0] == ""  # type: ignore[arg-type]
