@@ -132,10 +132,12 @@ def _with_fall(trial: Trial) -> Trial:
 
 
 def _with_jump(trial: Trial) -> Trial:
-    """Note in any state a jump after which the vehicle's identity is uncertain."""
+    """Note in any state a jump after which the vehicle's identity is uncertain. An earlier failure of its limits may
+    have been one of false positions."""
     if trial.commanded_s is None or trial.doubt or trial.watch.jumped_m <= _OTHER_M:
         return trial
-    return replace(trial, doubt=f"Its altitude jumped by {trial.watch.jumped_m:.1f} m.")
+    failure = Failure.LOST_POSITION if trial.failure is Failure.ENVELOPE else trial.failure
+    return replace(trial, failure=failure, doubt=f"Its altitude jumped by {trial.watch.jumped_m:.1f} m.")
 
 
 def _react(trial: Trial, event: Event) -> Step:

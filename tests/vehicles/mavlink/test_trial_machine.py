@@ -698,6 +698,19 @@ def test_an_altitude_that_is_on_the_ground_after_a_gap_ends_the_record_and_stops
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
 
 
+def test_a_descent_that_was_none_does_not_count_against_the_gains() -> None:
+    """Seen: for 1.5 s its altitude stayed on the ground as it lifted off; then it was at 2.9 m."""
+    walk = TrialDriver().arm().pass_s(0.3)
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(0.2)
+    walk.altitude_m, walk.climb_rate_m_s = GROUND_M + 0.05, 0.0
+    walk.pass_s(1.2)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
+    walk.altitude_m = 2.9
+    walk.pass_s(0.2)
+    assert (walk.state, walk.trial.outcome) == (State.ABORT_LAND, "invalid")
+
+
 def test_a_vehicle_whose_altitude_jumped_by_metres_is_not_said_to_be_safe_though_it_disarms_itself() -> None:
     """Seen: another vehicle with its ids stood on the ground and answered in its stead."""
     walk = recording()
