@@ -61,7 +61,7 @@ _COMMANDS_DELAYED: Final = Expected(
     reasons=(*_BY_HAND, *_NO_GAINS, "could not be set up", "not confirmed within"), may_abort=True, may_quarantine=True
 )
 _UNSEEN: Final = Expected(reasons=("second source of altitude", "Second source of altitude: "), ends_in=AIR)
-_ONCE: Final = Expected(reasons=(_MOVED, "Vehicle clock: "))
+_ONCE: Final = Expected(reasons=(_MOVED, "Vehicle clock: ", "Position: "))
 _SHIFTED: Final = Expected(reasons=(_MOVED, _NOT_LANDED), may_quarantine=True)
 _PILOT: Final = Expected(reasons=_BY_HAND, ends_in=AIR, may_abort=True, may_quarantine=True)
 
@@ -93,7 +93,9 @@ EXPECTED: Final[Mapping[str, Expected]] = {
     ),
     "no LOCAL_POSITION_NED": _BLIND,
     "no SYS_STATUS": Expected(reasons=("No battery voltage", "no voltage reported"), ends_in=AIR),
-    "no COMMAND_ACK": Expected(reasons=("could not be set up", "did not arm", "did not lift off", "Motors off: ")),
+    "no COMMAND_ACK": Expected(
+        reasons=("could not be set up", "did not arm", "did not lift off", "Motors off: "), may_quarantine=True
+    ),
     "no EXTENDED_SYS_STATE": HARMLESS,
     **{f"altitude {by_m:+g} m": _SHIFTED for by_m in SHIFTS_M},
     **dict.fromkeys(("mocap nan", "mocap frozen", "mocap silent"), _UNSEEN),

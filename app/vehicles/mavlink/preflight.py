@@ -192,7 +192,7 @@ def require_disarmed(radio: AutopilotLink) -> None:
     """Wait until two heartbeats agree that the vehicle is disarmed. Raises SafeGainsError if it is armed, because only
     Land may be sent to it then, or if they do not agree within 5 s or are of two vehicles."""
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
-    while not radio.is_disarmed and not is_armed(radio) and radio.clock.now_s() < until_s:
+    while not radio.is_disarmed and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
     if is_armed(radio):
         raise SafeGainsError(ARMED, hint=_LAND_FIRST)

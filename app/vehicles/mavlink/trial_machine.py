@@ -98,7 +98,8 @@ def _confirm_take_off(trial: Trial, event: Event) -> Step:
     last = trial.watch.last
     if not trial.may_take_off or last is None:
         return trial, ()
-    if isinstance(event, PacketReceived) and isinstance(event.measurement, Parameter):
+    measurement = event.measurement if isinstance(event, PacketReceived) else None
+    if isinstance(measurement, Parameter) and measurement.name == trial.plan.safe_gains[0].parameter:
         return replace(trial, confirmed_boot_s=last.time_boot_s, resting_since_s=None), ()
     return request_reply(trial, event.now_s) if event.now_s - trial.requested_s >= _REPLY_S else (trial, ())
 
@@ -258,8 +259,14 @@ def _landing(trial: Trial, event: Event) -> Step:
     return trial, ()
 
 
+def _is_airborne(trial: Trial, now_s: float) -> bool:
+    return watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+
+
 def _is_land_due(trial: Trial, now_s: float) -> bool:
     every_s = land_every_s(now_s - trial.since_s, trial.plan.land_again_s)
+    if trial.watch.block in trial.plan.limits.landing_blocks and not _is_airborne(trial, now_s):
+        every_s = trial.plan.land_again_s  # else its landing would begin again every second
     return now_s - trial.repeated_s >= every_s and not _may_be_by_hand(trial, now_s)
 
 
@@ -459,7 +466,7 @@ def _blocks(trial: Trial) -> frozenset[str]:
 def _confirms_landing(trial: Trial, now_s: float) -> bool:
     """Whether telemetry confirms that the vehicle is landing: it descends, or is near the ground."""
     last = trial.watch.last
-    if last is None or trial.may_take_off or not watching.is_fresh(trial.watch, now_s):
+    if last is None or not watching.is_fresh(trial.watch, now_s):
         return False
-    near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    near = not _is_airborne(trial, now_s) and not find_doubt_of_descent(trial, now_s)
     return near or last.climb_rate_m_s < DESCENDING_M_S

@@ -12,6 +12,7 @@ from app.vehicles.mavlink.events import (
     Action,
     ActionDone,
     ActionRefused,
+    BlockEntered,
     CommandReply,
     DuplicateVehicleDetected,
     FenceBreach,
@@ -741,6 +742,26 @@ def test_motors_are_not_stopped_while_the_take_off_command_may_still_be_under_wa
     walk.pass_s(1.0)
     assert Action.MOTORS_OFF not in walk.actions
     walk.pass_s(2.5)
+    assert walk.actions[-1] is Action.MOTORS_OFF
+
+
+def test_land_is_repeated_on_the_ground_until_the_flight_plan_reports_the_landing() -> None:
+    """Seen: one Land that was lost left it in "Takeoff", armed, with its integrator winding up, for 40 s."""
+    limits = replace(
+        PLAN.limits,
+        blocks={4: "Takeoff", 14: "land", 15: "landed"},
+        flying_blocks=frozenset({"Takeoff"}),
+        landing_blocks=frozenset({"land", "landed"}),
+        landed_blocks=frozenset({"landed"}),
+    )
+    walk = TrialDriver(plan=replace(PLAN, limits=limits, land_again_s=6.0)).arm()
+    walk.hear(BlockEntered(4)).pass_s(6.0)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.NO_LIFT_OFF)
+    assert len(walk.when(Action.LAND)) >= 4
+    before = len(walk.when(Action.LAND))
+    walk.hear(BlockEntered(14)).pass_s(3.5)
+    assert len(walk.when(Action.LAND)) == before
+    walk.hear(BlockEntered(15)).pass_s(0.1)
     assert walk.actions[-1] is Action.MOTORS_OFF
 
 

@@ -26,7 +26,7 @@ TAKE_OFF: Final = "Takeoff"
 LAND: Final = "land here"
 AFTER_LAND: Final = ("land", "flare", "landed")
 """Blocks after "land here" in stock plans. That is left at once, so the vehicle reports the first of these."""
-BLOCKS: Final = (HOLDING, START_ENGINE, TAKE_OFF, LAND)
+BLOCKS: Final = (HOLDING, START_ENGINE, TAKE_OFF, LAND, AFTER_LAND[-1])
 
 _LOCAL_ENU: Final = 4
 _WAYPOINT: Final = 16
