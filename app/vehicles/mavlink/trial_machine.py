@@ -259,14 +259,8 @@ def _landing(trial: Trial, event: Event) -> Step:
     return trial, ()
 
 
-def _is_airborne(trial: Trial, now_s: float) -> bool:
-    return watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
-
-
 def _is_land_due(trial: Trial, now_s: float) -> bool:
     every_s = land_every_s(now_s - trial.since_s, trial.plan.land_again_s)
-    if trial.watch.block in trial.plan.limits.landing_blocks and not _is_airborne(trial, now_s):
-        every_s = trial.plan.land_again_s  # else its landing would begin again every second
     return now_s - trial.repeated_s >= every_s and not _may_be_by_hand(trial, now_s)
 
 
@@ -468,5 +462,6 @@ def _confirms_landing(trial: Trial, now_s: float) -> bool:
     last = trial.watch.last
     if last is None or not watching.is_fresh(trial.watch, now_s):
         return False
-    near = not _is_airborne(trial, now_s) and not find_doubt_of_descent(trial, now_s)
-    return near or last.climb_rate_m_s < DESCENDING_M_S
+    lands = trial.watch.block in trial.plan.limits.landing_blocks  # another Land would begin its landing again
+    near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    return (near and (lands or not find_doubt_of_descent(trial, now_s))) or last.climb_rate_m_s < DESCENDING_M_S
