@@ -56,7 +56,10 @@ class RepeatedCommand:
 
     def _is_in_pilots_mode(self) -> bool:
         heartbeat = self._radio.seen.heartbeat
-        return heartbeat is not None and heartbeat.mode not in self._radio.profile.automatic_modes
+        return heartbeat is not None and self._is_pilots(heartbeat)
+
+    def _is_pilots(self, heartbeat: Heartbeat) -> bool:
+        return heartbeat.mode not in self._radio.profile.automatic_modes
 
     def _may_be_by_hand(self, now_s: float) -> bool:
         """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
@@ -68,7 +71,7 @@ class RepeatedCommand:
         if self._action is Action.KILL:
             self._answered = self._answered or confirms_motors_off(packet.measurement, profile.stop_settings)
         elif isinstance(packet.measurement, Heartbeat):
-            if packet.measurement.mode in profile.automatic_modes:
+            if not self._is_pilots(packet.measurement):
                 self._by_hand_since_s = None
             elif self._by_hand_since_s is None:
                 self._by_hand_since_s = packet.now_s
