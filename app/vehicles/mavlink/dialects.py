@@ -17,6 +17,8 @@ from app.vehicles.mavlink import signing
 
 FieldValue = float | int | str | bytes | Sequence[float]
 
+GROUND_STATION: Final = 255
+"""System id of this program."""
 BAD_DATA: Final = "BAD_DATA"
 UNKNOWN: Final = "UNKNOWN_"
 NO_AUTOPILOT: Final = 8

@@ -23,7 +23,7 @@ _APART_S: Final = 0.3
 _LOW_BATTERY_S: Final = 1.0
 _NO_BATTERY_S: Final = 10.0
 _IMPACT_BELOW_M: Final = 0.5
-_JUMP_M: Final = 0.5
+_JUMP_ENDS_RECORD_M: Final = 0.5
 """A single false sample near the ground causes smaller jumps."""
 _CLIMBED_WITHIN_M: Final = 1.0
 """PX4 hovers from 0.8 m below its set point on (NAV_MC_ALT_RAD)."""
@@ -193,7 +193,7 @@ def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) ->
 
 def find_jump(watch: TrialObservation) -> Finding | None:
     """Find a jump of the altitude in flight: it, or the earlier altitude, is not the vehicle's."""
-    if watch.jumped_m <= _JUMP_M:
+    if watch.jumped_m <= _JUMP_ENDS_RECORD_M:
         return None
     return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude jumped by {watch.jumped_m:.1f} m.")
 

@@ -17,6 +17,7 @@ from app.core.clock import Clock
 from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.dialects import (
     BAD_DATA,
+    GROUND_STATION,
     NO_AUTOPILOT,
     Codec,
     Dialect,
@@ -35,8 +36,6 @@ from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_tra
 
 __all__ = ["Link", "LinkError", "LinkHealth", "LossCounter", "Received"]
 
-GROUND_STATION: Final = 255
-"""System id of this program."""
 HEARTBEAT_EVERY_S: Final = 1.0
 UNATTENDED_AFTER_S: Final = 3.0
 """If `receive` has not been called for this long, the program hangs. No more heartbeats are sent then, so that the

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message, number
+from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
-from app.vehicles.mavlink.link import GROUND_STATION
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
 
