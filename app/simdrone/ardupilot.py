@@ -60,6 +60,7 @@ SCALE_4_7: Final = 0.1
 _COMMON: Final = (
     Parameter("ARMING_CHECK", Kind.INT32, 1),
     Parameter("DISARM_DELAY", Kind.INT8, 10),
+    Parameter("FS_EKF_ACTION", Kind.INT8, 1),
     Parameter("FS_GCS_ENABLE", Kind.INT8, 0),
     real("FS_GCS_TIMEOUT", 5.0),
     Parameter("FENCE_ENABLE", Kind.INT8, 0),

@@ -104,7 +104,7 @@ def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(data_dir: 
     folder = data_dir / "trial-parameters"
     with UdpRig("px4") as rig:
         autopilot = rig.drone.autopilot
-        for name, value in {"NAV_DLL_ACT": 3, "GF_ACTION": 3, "GF_MAX_VER_DIST": 10}.items():
+        for name, value in {"NAV_DLL_ACT": 3, "GF_ACTION": 5, "GF_MAX_VER_DIST": 10}.items():
             autopilot.parameters[name] = value  # type: ignore[attr-defined]
         with flying_run(rig) as process:
             until(lambda: rig.drone.body.altitude_m > 1.0)

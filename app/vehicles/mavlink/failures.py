@@ -128,7 +128,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.",
         ),
         Failure.INTERRUPTED: Response(
-            "one heartbeat in a manual mode, and the next in another",
+            "one heartbeat in a manual mode, and the next in another; under ArduCopter and PX4 also a record that "
+            "never came within 1 m of the set point",
             "note",
             "invalid",
             "A pilot may have flown the vehicle briefly.",

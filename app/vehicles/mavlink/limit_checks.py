@@ -87,6 +87,14 @@ def find_interrupted_climb(watch: TrialObservation, limits: Limits) -> Finding |
     return Finding(failure=Failure.UNEXPECTED, why=why)
 
 
+def find_incomplete_climb(watch: TrialObservation, limits: Limits) -> Finding | None:
+    """Find at the end of a record that the vehicle has never been near its set point: a change of mode that no
+    heartbeat reported may have ended its climb."""
+    if watch.highest_m >= limits.set_point_m - _CLIMBED_WITHIN_M:
+        return None
+    return Finding(failure=Failure.INTERRUPTED, why=f"It did not come within {_CLIMBED_WITHIN_M:g} m of its set point.")
+
+
 def _named(mode: str, limits: Limits) -> str:
     return limits.mode_names.get(mode, mode)
 

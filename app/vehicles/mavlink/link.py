@@ -49,9 +49,11 @@ MAX_SEQUENCE_LEAD: Final = 128
 GONE_AFTER_S: Final = 1.5
 """A peer that has sent nothing for this long may have moved to another port of the same host."""
 DUPLICATE_TIMEOUT_S: Final = 3.0
-"""Time for which a heartbeat of another peer with the vehicle's system id counts."""
+"""Time for which a message of another peer with the vehicle's ids counts."""
 UNKNOWN_PEER_INTERVAL_S: Final = 0.2
-"""Interval at which a datagram of another peer is parsed, so that a flood of them costs nothing."""
+"""Interval at which a datagram of another host is parsed, so that a flood of them costs nothing."""
+_MAX_UNKNOWN_HOSTS: Final = 32
+"""Greatest number of other hosts of which a datagram is parsed in that interval."""
 
 MAV_TYPE_GCS: Final = 6
 MAV_STATE_ACTIVE: Final = 4
@@ -144,7 +146,8 @@ class Link:
         self._vehicle_system, self._make = target_system, make
         self._vehicle_component: int | None = None
         self._duplicates = DuplicateDetector()
-        self._checked_s = self._duplicate_s = float("-inf")
+        self._checked_s: dict[str, float] = {}
+        self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
         self._received = self._bad = self._foreign = self._overrun = self._sent = self._unsent = 0
@@ -324,10 +327,7 @@ class Link:
             self._process_unknown_peer(data, peer)
         else:
             self._foreign += 1
-            now_s = self._clock.now_s()
-            if now_s - self._checked_s >= UNKNOWN_PEER_INTERVAL_S:
-                self._checked_s = now_s
-                self._check_other_peer(data, peer, now_s, moved=peer[0] == remote[0])
+            self._process_other_peer(data, peer, is_same_host=peer[0] == remote[0])
 
     def _process_unknown_peer(self, data: bytes, peer: Peer) -> None:
         """Process a datagram with a separate codec, because data of an unknown peer must not interfere with the
@@ -339,17 +339,27 @@ class Link:
         else:
             self._foreign += 1
 
-    def _check_other_peer(self, data: bytes, peer: Peer, now_s: float, *, moved: bool) -> None:
-        """Find out whether the vehicle has moved to another port of its host, if it may have, or another one uses its
-        system id."""
-        if not any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
-            return
+    def _process_other_peer(self, data: bytes, peer: Peer, *, is_same_host: bool) -> None:
+        """Adopt the vehicle's new port after a silence; before, find out whether another vehicle uses its ids."""
+        now_s = self._clock.now_s()
         since_s = self._last_packet_s if self._last_packet_s is not None else self._opened_s
-        if now_s - since_s > GONE_AFTER_S:
-            if moved:
+        is_gone = now_s - since_s > GONE_AFTER_S
+        if is_gone and is_same_host:
+            if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
                 self._transport.adopt(peer)
-        elif self._last_packet_s is not None:
-            self._duplicate_s = now_s
+        elif not is_gone and self._last_packet_s is not None and self._may_check(peer[0], now_s):
+            ids = (self._vehicle_system, self._vehicle_component)
+            messages = filter(is_known, self._new_codec().parse(data))
+            if any((source_system(each), source_component(each)) == ids for each in messages):
+                self._duplicate_s = now_s
+
+    def _may_check(self, host: str, now_s: float) -> bool:
+        """Whether to parse a datagram of another host now. Each has its own interval: none can hide another."""
+        recent_s = {each: at_s for each, at_s in self._checked_s.items() if now_s - at_s < UNKNOWN_PEER_INTERVAL_S}
+        if host in recent_s or len(recent_s) >= _MAX_UNKNOWN_HOSTS:
+            return False
+        self._checked_s = {**recent_s, host: now_s}
+        return True
 
     def _is_vehicle(self, message: Message) -> bool:
         """Whether the message identifies its sender as the vehicle of this link."""

@@ -245,9 +245,9 @@ def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bo
     return reports_flight or (secondary_m is not None and secondary_m - ground_m > GROUND_M)
 
 
-def may_have_landed(watch: TrialObservation, now_s: float) -> bool:
-    """Whether it now reports that it is on the ground, or does not report its landed state at all."""
-    return watch.landed is None or (watch.landed and now_s - watch.landed_s < AGREED_S)
+def reports_landing(watch: TrialObservation, now_s: float) -> bool:
+    """Whether it now reports that it is on the ground."""
+    return watch.landed is True and now_s - watch.landed_s < AGREED_S
 
 
 def secondary_altitude_m(second: SecondaryAltitude | None, now_s: float) -> float | None:

@@ -306,7 +306,7 @@ def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     if trial.may_take_off:
         return "it has not replied since the take-off command, which may still be under way"
     is_unseen = trial.commanded_s is not None and (watch.unseen or not watch.lifted)
-    may_fly = watch.block not in landed_blocks if landed_blocks else not watching.may_have_landed(watch, now_s)
+    may_fly = watch.block not in landed_blocks if landed_blocks else not watching.reports_landing(watch, now_s)
     return "its descent was not observed, and it has not reported a landing" if is_unseen and may_fly else ""
 
 

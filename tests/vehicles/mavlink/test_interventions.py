@@ -314,6 +314,22 @@ PX4 = replace(
 )
 
 
+@pytest.mark.parametrize(("reached_m", "failure"), [(1.8, Failure.INTERRUPTED), (2.0, None)])
+def test_a_climb_that_ended_without_any_heartbeat_of_another_mode_makes_the_record_invalid(
+    reached_m: float, failure: Failure | None
+) -> None:
+    """Seen: between two heartbeats an ArduCopter was set to Guided again at 0.19 m, where it hovered to the end."""
+    walk = TrialDriver(plan=replace(PLAN, climbs_from_ground=True)).arm()
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(reached_m)
+    walk.climb_rate_m_s = 0.0
+    while walk.state is not State.LAND:
+        walk.pass_s(STEP_S)
+    assert walk.trial.failure is failure
+    walk.pass_s(0.5).touch_down().disarm().restore()
+    assert walk.trial.outcome == (None if failure is None else "invalid")
+
+
 def test_a_vehicle_that_hovers_before_it_has_climbed_was_stopped_by_somebody() -> None:
     """Seen: a pilot let go of a PX4 at 0.3 m; there it hovered through its whole record, and the flight counted."""
     walk = TrialDriver(plan=PX4, mode="take-off").arm()

@@ -164,6 +164,26 @@ def test_another_vehicle_with_its_system_id_on_another_host_makes_the_link_doubt
         assert becomes(lambda: bool(link.duplicate_reason))
 
 
+def test_another_vehicle_is_found_by_any_of_its_messages_beside_a_host_that_floods_the_link(
+    paparazzi: FakeVehicleEndpoint,
+) -> None:
+    """One interval was shared by all hosts, and only a heartbeat counted: a flood hid the other vehicle."""
+    clock = ManualClock()
+    with (
+        Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
+        FakeVehicleEndpoint(PAPARAZZI, component=190, host="127.0.0.2") as other,
+        FakeVehicleEndpoint(PAPARAZZI, component=7, host="127.0.0.3") as noisy,
+    ):
+        paparazzi.send(heartbeat(paparazzi, autopilot=9))
+        collect(link, 1)
+        other.ground = noisy.ground = paparazzi.ground
+        noisy.say("LOCAL_POSITION_NED", **position(20))
+        assert becomes(lambda: link.health.foreign == 1)
+        assert link.duplicate_reason == ""
+        other.say("LOCAL_POSITION_NED", **position(20))
+        assert becomes(lambda: bool(link.duplicate_reason))
+
+
 def test_a_vehicle_that_returns_from_another_port_is_received_and_commanded_again(
     paparazzi: FakeVehicleEndpoint,
 ) -> None:

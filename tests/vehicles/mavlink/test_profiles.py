@@ -438,15 +438,16 @@ def test_paparazzi_tells_every_change_of_block() -> None:
         (ARDUPILOT, "SYSID_MYGCS", {255.0}, {0.0, 1.0, 254.0}),
         (ARDUPILOT, "FENCE_ENABLE", {1.0}, {0.0}),
         (ARDUPILOT, "FENCE_TYPE", {1.0, 3.0, 7.0}, {0.0, 2.0, 6.0}),
-        (ARDUPILOT, "FENCE_ACTION", {1.0, 2.0, 3.0, 4.0, 5.0}, {0.0}),
+        (ARDUPILOT, "FENCE_ACTION", {2.0, 4.0}, {0.0, 1.0, 3.0, 5.0}),
         (ARDUPILOT, "FENCE_ALT_MAX", {5.0, 10.0}, {0.0, 100.0}),
+        (ARDUPILOT, "FS_EKF_ACTION", {1.0, 3.0}, {0.0, 2.0}),
         (PX4, "NAV_DLL_ACT", {3.0}, {0.0, 1.0, 5.0, 6.0}),
         (PX4, "COM_DL_LOSS_T", {5.0, 15.0}, {0.0, 300.0}),
-        (PX4, "GF_ACTION", {2.0, 3.0, 5.0}, {0.0, 1.0, 4.0}),
+        (PX4, "GF_ACTION", {2.0, 5.0}, {0.0, 1.0, 3.0, 4.0}),
         (PX4, "GF_MAX_VER_DIST", {5.0, 10.0}, {0.0, 120.0}),
     ],
 )
-def test_only_a_failsafe_that_brings_the_vehicle_down_with_its_motors_running_will_do(
+def test_only_a_failsafe_that_brings_the_vehicle_down_without_climbing_or_stopping_its_motors_will_do(
     profile: Profile, parameter: str, protects: set[float], does_not: set[float]
 ) -> None:
     requirement = next(each for each in profile.requirements if each.parameter == parameter)

@@ -536,7 +536,7 @@ def test_a_vehicle_that_reports_flying_is_landed_though_its_altitude_stays_at_ze
 
 def test_an_altitude_that_stays_behind_its_climb_rate_is_lost_and_stops_no_motors() -> None:
     walk = taking_off()
-    ground_m = walk.altitude_m
+    ground_m, walk.landed = walk.altitude_m, True
     for _ in range(50):
         walk.altitude_m, walk.climb_rate_m_s = ground_m - STEP_S, 1.0
         walk.pass_s(STEP_S)
@@ -547,6 +547,14 @@ def test_an_altitude_that_stays_behind_its_climb_rate_is_lost_and_stops_no_motor
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
     assert "Its motors were not commanded to stop: its altitude did not follow its climb rate." in walk.trial.why
+
+
+def test_motors_are_not_stopped_by_position_alone_if_it_was_never_seen_in_the_air_nor_reports_a_landing() -> None:
+    """A vehicle that sends no landed state counted as one that reports it."""
+    walk = TrialDriver(without_landed_state=True).arm()
+    walk.pass_s(60.0)
+    assert (walk.state, walk.trial.failure) == (State.QUARANTINE, Failure.NO_LIFT_OFF)
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
 
 
 def test_a_refused_take_off_disarms_on_the_ground() -> None:
@@ -665,7 +673,7 @@ def test_an_altitude_that_leaps_to_the_ground_stops_no_motors() -> None:
     walk = recording()
     press_abort(walk)
     walk.pass_s(0.5)
-    walk.altitude_m, walk.climb_rate_m_s = GROUND_M, 0.0
+    walk.altitude_m, walk.climb_rate_m_s, walk.landed = GROUND_M, 0.0, True
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
@@ -704,7 +712,7 @@ def test_a_descent_that_was_none_does_not_count_against_the_gains() -> None:
     walk = TrialDriver().arm().pass_s(0.3)
     walk.climb_rate_m_s = 1.0
     walk.pass_s(0.2)
-    walk.altitude_m, walk.climb_rate_m_s = GROUND_M + 0.05, 0.0
+    walk.altitude_m, walk.climb_rate_m_s, walk.landed = GROUND_M + 0.05, 0.0, True
     walk.pass_s(1.2)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
     walk.altitude_m = 2.9

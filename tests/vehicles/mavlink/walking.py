@@ -52,6 +52,7 @@ class TrialDriver:
     boot_s: float = 40.0
     altitude_m: float = GROUND_M
     climb_rate_m_s: float = 0.0
+    climbed_m: float = 0.0
     north_m: float = 0.0
     armed: bool = False
     mode: str = "4"
@@ -61,6 +62,8 @@ class TrialDriver:
     blind: bool = False
     tempo: float = 1.0
     landed: bool | None = None
+    """The landed state that it reports; None: the true one."""
+    without_landed_state: bool = False
     heartless: bool = False
     deaf: bool = False
     told: list[tuple[float, Command]] = field(default_factory=list)
@@ -109,6 +112,7 @@ class TrialDriver:
             self.now_s += STEP_S
             self.boot_s += STEP_S * self.tempo * (not self.frozen)
             self.altitude_m += self.climb_rate_m_s * STEP_S
+            self.climbed_m = max(self.climbed_m + self.climb_rate_m_s * STEP_S, 0.0)
             if not self.mute:
                 self._speak()
                 self._reply()
@@ -118,8 +122,8 @@ class TrialDriver:
     def _speak(self) -> None:
         here = Position(round(self.boot_s, 6), self.altitude_m, self.climb_rate_m_s, self.north_m)
         self.hear(None if self.blind else here)
-        if self.landed is not None:
-            self.hear(LandedState(self.landed))
+        if not self.without_landed_state:
+            self.hear(LandedState(self.climbed_m < 0.1 if self.landed is None else self.landed))
         if self.steps % 25 == 0 and not self.heartless:
             self.hear(Heartbeat(9, self.armed, self.mode))
         if self.steps % 50 == 0:

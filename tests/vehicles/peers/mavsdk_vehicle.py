@@ -29,7 +29,7 @@ GAINS: Final[Mapping[str, float]] = {
     "MPC_Z_VEL_I_ACC": 2.0,
 }
 FLOATS: Final[Mapping[str, float]] = {**GAINS, "MIS_TAKEOFF_ALT": 2.5, "GF_MAX_VER_DIST": 10.0}
-INTEGERS: Final[Mapping[str, int]] = {"NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 10, "GF_ACTION": 3}
+INTEGERS: Final[Mapping[str, int]] = {"NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 10, "GF_ACTION": 5}
 GROUND_M: Final = 0.5
 STEP_S: Final = 0.01
 """Twice as often as is asked for, so that enough is left on a busy machine."""

@@ -82,8 +82,9 @@ class ArduPilot:
         ),
         Requirement("FENCE_ENABLE", "keep inside its fence (1)"),
         Requirement("FENCE_TYPE", "have a fence for altitude (bit 0)", bits=1),
-        Requirement("FENCE_ACTION", "land or return at its fence (1 to 5)", frozenset({1.0, 2.0, 3.0, 4.0, 5.0})),
+        Requirement("FENCE_ACTION", "land or brake at its fence (2 or 4)", frozenset({2.0, 4.0})),
         Requirement("FENCE_ALT_MAX", "have its fence at 10 m or below", most=10.0),
+        Requirement("FS_EKF_ACTION", "land when its position is lost (1 or 3)", frozenset({1.0, 3.0})),
     )
 
     def measure(self, message: Message) -> Measurement | None:

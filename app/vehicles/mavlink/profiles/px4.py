@@ -68,9 +68,7 @@ class Px4:
     requirements: Final = (
         Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)", frozenset({3.0})),
         Requirement("COM_DL_LOSS_T", "land within 15 s of losing it", most=15.0),
-        Requirement(
-            "GF_ACTION", "hold, return or land when it leaves its fence (2, 3 or 5)", frozenset({2.0, 3.0, 5.0})
-        ),
+        Requirement("GF_ACTION", "hold or land when it leaves its fence (2 or 5)", frozenset({2.0, 5.0})),
         Requirement("GF_MAX_VER_DIST", "have a fence at 10 m or less above home", most=10.0),
     )
 
