@@ -10,7 +10,7 @@ from fastapi.routing import APIRoute
 from starlette.middleware.gzip import GZipMiddleware
 
 from app import __version__
-from app.accounts.keyring import Keyring
+from app.accounts.keys_and_links import Keyring
 from app.bundles.router import router as bundles
 from app.campaigns import catalogue
 from app.campaigns.router import figures_router, landscape_router, vehicles_router

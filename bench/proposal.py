@@ -24,7 +24,7 @@ from app.campaigns.trials.schemas import FlightOrder, NewTrial
 from app.db.migrate import migrate
 from app.db.session import Database
 from app.fleet.schemas import VehicleChoice
-from app.flights import queue
+from app.flights import flight_rows
 from app.flights import service as flights
 from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
@@ -60,15 +60,15 @@ def fly(database: Database, campaign_id: int) -> bool:
         if following is None or "plan" not in campaigns.get_campaign(session, campaign_id).actions:
             return False
         flights.plan_trial(session, campaign_id, NewTrial(proposal_id=following.id, fly=FlightOrder(speed=None)))
-        task = queue.claim_flight(session, WORKER)
+        task = flight_rows.claim_flight(session, WORKER)
     assert task is not None
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
         read_back = vehicle.stage(task.gains)
         record = vehicle.fly(Order(seed=task.seed), on_sample=lambda _: None, should_stop=lambda: None)
     with database.write() as session:
-        queue.record_staged(session, task.flight_id, read_back)
-        queue.record_lift_off(session, task.flight_id)
-        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(record=record))
+        flight_rows.record_staged(session, task.flight_id, read_back)
+        flight_rows.record_lift_off(session, task.flight_id)
+        flight_rows.record_outcome(session, task.flight_id, flight_rows.FlightOutcome(record=record))
     return True
 
 

@@ -36,7 +36,7 @@ from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialResult
-from app.vehicles.mavlink.trial_transitions import Plan
+from app.vehicles.mavlink.trial_reactions import Plan
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.campaigns import computation, proposals
 from app.core.records.trajectory import Trajectory
 from app.db.session import Database
-from app.flights import queue
+from app.flights import flight_rows
 from app.flights.process_messages import FlightRequest
 from app.jobs import service as jobs
 from app.vehicles.base import Ending, FlightRecord
@@ -141,7 +141,7 @@ def run_jobs(database: Database) -> int:
 def claim(database: Database) -> FlightRequest:
     """The flight that waits."""
     with database.write() as session:
-        task = queue.claim_flight(session, WORKER)
+        task = flight_rows.claim_flight(session, WORKER)
     assert task is not None
     return task
 
@@ -150,7 +150,7 @@ def stage(database: Database) -> FlightRequest:
     """Claim the flight that waits and have the vehicle take its gains."""
     task = claim(database)
     with database.write() as session:
-        queue.record_staged(session, task.flight_id, dict(task.gains))
+        flight_rows.record_staged(session, task.flight_id, dict(task.gains))
     return task
 
 
@@ -158,10 +158,10 @@ def lift_off(database: Database) -> FlightRequest:
     """Claim, stage and begin the flight that waits."""
     task = stage(database)
     with database.write() as session:
-        queue.record_lift_off(session, task.flight_id)
+        flight_rows.record_lift_off(session, task.flight_id)
     return task
 
 
 def land(database: Database, task: FlightRequest, record: FlightRecord) -> None:
     with database.write() as session:
-        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(record=record))
+        flight_rows.record_outcome(session, task.flight_id, flight_rows.FlightOutcome(record=record))

@@ -7,7 +7,7 @@ import httpx2
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from app.accounts.keyring import Keyring
+from app.accounts.keys_and_links import Keyring
 
 HERE: Final = ("127.0.0.1", 50000)
 """Where a request comes from that a browser or script on this computer sends."""

@@ -1,5 +1,5 @@
 """Permissions: the one table that routes and services consult. Pure decisions; `app.web.origin` reads the caller from a
-request, `app.accounts.keyring` holds the secret behind the keys.
+request, `app.accounts.keys_and_links` holds the secret behind the keys.
 
 A caller is on this computer or elsewhere, and holds a key or none. A forwarded request counts as from elsewhere: a
 proxy or tunnel on this computer connects from loopback on behalf of remote clients.

@@ -11,6 +11,7 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
+from app.common.conflict_checks import check_transition
 from app.common.errors import NotFoundError, StorageError
 from app.common.states import (
     ACTIVE_FLIGHT_STATES,
@@ -24,7 +25,6 @@ from app.common.states import (
     FlightState,
     TrialState,
 )
-from app.common.transition_checks import check_transition
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory

@@ -30,10 +30,10 @@ from app.campaigns.schemas import (
 )
 from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
+from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
-from app.common.transition_checks import check_action, check_version
 from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
 from app.core.formatting import format_gains, percent

@@ -25,9 +25,9 @@ from app.campaigns.schemas import (
     TrialCounts,
 )
 from app.campaigns.statistics import best_trial, standing_of
+from app.common.conflict_checks import allowed
 from app.common.schemas import Gate, Interval, Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
-from app.common.transition_checks import allowed
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
 from app.core.tuning.strategy import Explanation

@@ -41,7 +41,7 @@ from app.db.session import Database
 from app.fleet import service as fleet
 from app.fleet.registration import register_vehicle
 from app.fleet.schemas import NewVehicle, VehicleChoice
-from app.flights import queue
+from app.flights import flight_rows
 from app.flights.process_messages import FlightRequest
 from app.flights.service import plan_trial
 from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError
@@ -201,12 +201,12 @@ class _Campaign:
         """Fly one trial and classify it. A flight with glitches does not count, because no person reviews it."""
         with self._database.write() as session:
             planned = plan_trial(session, self._id, new)
-            request = queue.claim_flight(session, "gainline run")
+            request = flight_rows.claim_flight(session, "gainline run")
             assert request is not None
         self._display.planned(planned.number, request.gains)
         record = self._fly(request)
         with self._database.write() as session:
-            queue.record_outcome(session, request.flight_id, queue.FlightOutcome(record=record))
+            flight_rows.record_outcome(session, request.flight_id, flight_rows.FlightOutcome(record=record))
             trial = history.trial_row(session, request.trial_id)
             if trial.state == TrialState.CAPTURED:
                 reason = " ".join(glitch["sentence"] for glitch in trial.glitches or ())
@@ -232,8 +232,8 @@ class _Campaign:
                         hint="Read its gains back manually before it flies again.",
                     )
                 with self._database.write() as session:
-                    queue.record_staged(session, request.flight_id, held)
-                    queue.record_lift_off(session, request.flight_id)
+                    flight_rows.record_staged(session, request.flight_id, held)
+                    flight_rows.record_lift_off(session, request.flight_id)
                 return vehicle.fly(
                     request.options(REAL_TIME), on_sample=self._display.sampled, should_stop=lambda: None
                 )

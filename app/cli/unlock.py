@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import httpx2
 from pydantic import BaseModel, ValidationError
 
-from app.accounts.keyring import LINK_VALID_S, Keyring
+from app.accounts.keys_and_links import LINK_VALID_S, Keyring
 from app.accounts.permissions import Key
 from app.common.errors import UnavailableError
 from app.common.settings import Settings

@@ -17,9 +17,9 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, RequestContext
+from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import ConflictError
 from app.common.states import ACT_TRANSITIONS, GIVES_GAINS, VEHICLE_ACTIONS, ActKind, ActState, VehicleState
-from app.common.transition_checks import check_action, check_transition
 from app.core.policy import Gains
 from app.db.models import JsonObject, VehicleActRow, VehicleRow
 from app.db.types import utc_now

@@ -9,10 +9,10 @@ from typing import Final
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, RequestContext, require
+from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
-from app.common.transition_checks import check_action, check_version
 from app.core.experiments import get_experiment
 from app.core.formatting import format_gains
 from app.core.policy import PolicySpace

@@ -9,10 +9,10 @@ from typing import TypedDict
 
 from sqlalchemy.orm import Session
 
+from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import BusyError, ConflictError, InputError, Problem
 from app.common.schemas import Page, decode_cursor, encode_cursor
 from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, VehicleState
-from app.common.transition_checks import check_action, check_transition
 from app.core.policy import Gains
 from app.db.models import VehicleRow
 from app.db.types import utc_now

@@ -4,9 +4,9 @@ from typing import Final
 
 from sqlalchemy.orm import Session
 
+from app.common.conflict_checks import allowed
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.states import VEHICLE_ACTIONS, VehicleState
-from app.common.transition_checks import allowed
 from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.fleet import repository
 from app.fleet.control import control_of

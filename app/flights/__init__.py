@@ -1,1 +1,1 @@
-"""What flies: the queue of requested flights, the runner, vehicle processes, abort, and the record spool."""
+"""What flies: the rows of requested flights, the runner, vehicle processes, abort, and the record spool."""

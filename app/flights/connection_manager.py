@@ -23,9 +23,9 @@ from app.db.session import Database, retry_until_stored
 from app.fleet import commands
 from app.fleet.commands import ActTask, LinkedVehicle
 from app.flights.abort import AbortRegistry
+from app.flights.connection_process import run_connection_process
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection, status_time
-from app.flights.vehicle_process import run_vehicle_process
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
 from app.vehicles.base import SafeGainsError, VehicleError
 
@@ -277,7 +277,7 @@ class VehicleConnectionManager:
             clock=self._clock,
         )
         session = slot.reconnecting = VehicleConnection(
-            call, run_vehicle_process, hear=partial(self._on_message, slot, vehicle_id)
+            call, run_connection_process, hear=partial(self._on_message, slot, vehicle_id)
         )
         try:
             if self._closing.is_set():

@@ -18,9 +18,10 @@ from app.common.data_folder import telemetry_log
 from app.common.errors import GainlineError, StorageError
 from app.core.clock import REAL_TIME, Clock
 from app.db.session import RETRY_S, Database, retry_until_stored
-from app.flights import queue
+from app.flights import flight_rows
 from app.flights.abort import AbortFlag, AbortRegistry
 from app.flights.flight_process import FlightProcess, FlightProcessPool
+from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import (
     FlightFailure,
     FlightLanded,
@@ -29,7 +30,6 @@ from app.flights.process_messages import (
     Publish,
     SafeGainsRestored,
 )
-from app.flights.queue import FlightOutcome
 from app.flights.record_spool import Spool
 from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import FlightPhase, Phase, Telemetry
@@ -88,9 +88,11 @@ class FlightRunner:
         are withdrawn. Raises StorageError.
         """
         with self._database.write() as session:
-            for flight_id in queue.withdraw_requested_flights(session, "no worker was running when it was requested"):
+            for flight_id in flight_rows.withdraw_requested_flights(
+                session, "no worker was running when it was requested"
+            ):
                 _log.warning("flight withdrawn: it was requested before this worker started", flight_id=flight_id)
-            for trial_id in queue.lose_running_flights(session):
+            for trial_id in flight_rows.lose_running_flights(session):
                 _log.warning("flight lost: the worker stopped during it", trial_id=trial_id)
         for flight_id in self._spool.flight_ids():
             self._recover_record(flight_id)
@@ -100,7 +102,7 @@ class FlightRunner:
         """Claim the oldest requested flight for this worker; None when there is none. Raises StorageError."""
         with ExitStack() as undo:
             with self._database.write() as session:
-                if (request := queue.claim_flight(session, self._worker)) is not None:
+                if (request := flight_rows.claim_flight(session, self._worker)) is not None:
                     self._abort_registry.register(
                         request.trial_id
                     )  # before a client can see that it runs, and abort it
@@ -177,13 +179,13 @@ class FlightRunner:
         """Command the take-off if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
         try:
-            self._store(lambda session: queue.record_staged(session, request.flight_id, read_back))
+            self._store(lambda session: flight_rows.record_staged(session, request.flight_id, read_back))
             if (problem := describe_mismatch(request.gains, read_back)) is not None:
                 ended = FlightOutcome(problem=problem)
             elif (withdrawn := self._await_takeoff_clearance(request, flag, backend)) is not None:
                 ended = FlightOutcome(withdrawn=True, problem=withdrawn)
             else:
-                self._store(lambda session: queue.record_lift_off(session, request.flight_id))
+                self._store(lambda session: flight_rows.record_lift_off(session, request.flight_id))
         except GainlineError as error:
             ended = FlightOutcome(problem=f"It was not flown, because its start could not be recorded: {error}")
         if ended.lifted_off:
@@ -206,7 +208,7 @@ class FlightRunner:
                 return "the vehicle's process ended"
             try:
                 with self._database.read() as session:
-                    may_take_off, reason = queue.clearance_of(session, request.flight_id)
+                    may_take_off, reason = flight_rows.clearance_of(session, request.flight_id)
                 if may_take_off or reason is not None:
                     return reason
             except StorageError as error:
@@ -228,11 +230,13 @@ class FlightRunner:
         if ended.record is not None:
             self._spool_record(request, ended.record)
         try:
-            stored = self._store_with_retry(request, lambda session: queue.record_outcome(session, flight_id, ended))
+            stored = self._store_with_retry(
+                request, lambda session: flight_rows.record_outcome(session, flight_id, ended)
+            )
         except Exception as error:  # noqa: BLE001 - whatever is wrong with the outcome, it must not block the vehicle
             problem = self._refused(request, ended, error)
             stored = self._store_with_retry(
-                request, lambda session: queue.give_up_flight(session, flight_id, ended, problem)
+                request, lambda session: flight_rows.give_up_flight(session, flight_id, ended, problem)
             )
         if stored:
             self._spool.delete(flight_id)
@@ -276,7 +280,7 @@ class FlightRunner:
             self._set_record_aside(flight_id, error)
             return
         try:
-            self._store(lambda session: queue.recover_record(session, flight_id, record))
+            self._store(lambda session: flight_rows.recover_record(session, flight_id, record))
         except StorageError:
             raise
         except GainlineError as error:

@@ -1,4 +1,4 @@
-"""Requests for flights, from the first to the operator's take-off request. The worker's side is in `queue`."""
+"""Requests for flights, from the first to the operator's take-off request. The worker's side is in `flight_rows`."""
 
 from contextlib import suppress
 
@@ -12,9 +12,9 @@ from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, NewTrial, Trial
 from app.campaigns.trials.service import check_own_gains
 from app.campaigns.trials.views import trial_view
+from app.common.conflict_checks import check_action
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.states import HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
-from app.common.transition_checks import check_action
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now

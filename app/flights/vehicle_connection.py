@@ -1,6 +1,6 @@
 """Connection to a vehicle: a process of its own that keeps the link open between flights.
 
-This is the worker's side; the process itself is in `vehicle_process`. It never touches the database. When the worker
+This is the worker's side; the process itself is in `connection_process`. It never touches the database. When the worker
 dies, the pipe between them breaks. A flight is then aborted: the vehicle lands and is left with its safe gains. A land
 or motors off command outside a flight is repeated until the vehicle obeys, for at most 60 s. Then the process ends; the
 next worker's connection waits for that.

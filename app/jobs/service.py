@@ -14,10 +14,10 @@ from pydantic import BaseModel, Field
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
+from app.common.conflict_checks import allowed, check_action, check_transition
 from app.common.logging import lines_of_job
 from app.common.schemas import Page, Trouble, decode_cursor, encode_cursor
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
-from app.common.transition_checks import allowed, check_action, check_transition
 from app.core.errors import GainlineError
 from app.db.models import JobRow, JsonObject
 from app.db.types import utc_now

@@ -14,7 +14,7 @@ from typing import Final
 import structlog
 import uvicorn
 
-from app.accounts.keyring import Keyring
+from app.accounts.keys_and_links import Keyring
 from app.common.settings import Settings, is_loopback
 from app.core.clock import REAL_TIME
 from app.db.outbox import latest_event_id

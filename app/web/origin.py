@@ -3,7 +3,7 @@
 These checks address three attacks: a page of another site makes a browser send a change to a server on loopback; a
 foreign host name is pointed at this machine, so that its pages count as ours; a proxy or tunnel on this machine
 connects from loopback on behalf of remote clients. Headers alone prove nothing, so a request that commands a real
-vehicle must also present a key (`app.accounts.keyring`).
+vehicle must also present a key (`app.accounts.keys_and_links`).
 """
 
 import ipaddress
@@ -16,7 +16,7 @@ from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.accounts.keyring import Keyring
+from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Caller, Key, Permission, RequestOrigin, require
 from app.common.errors import GainlineError, NotAllowedError
 from app.common.settings import is_loopback

@@ -7,7 +7,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from pydantic import BaseModel
 from starlette.responses import Response
 
-from app.accounts.keyring import LINK_VALID_S, Keyring
+from app.accounts.keys_and_links import LINK_VALID_S, Keyring
 from app.accounts.permissions import UNLOCK_HINT, Caller, Key, Permission, RequestOrigin, is_allowed
 from app.web.origin import caller_of
 

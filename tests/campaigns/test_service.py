@@ -11,7 +11,7 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.proposals import read_history
 from app.db.models import CampaignRow, FlightRow
 from app.db.session import Database
-from app.flights import queue
+from app.flights import flight_rows
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
@@ -34,7 +34,9 @@ def test_a_vehicles_ledger_outlives_the_wish_to_delete_a_campaign(client: TestCl
     create_trial(client, campaign["id"], fly={"speed": None})
     task = claim(database)
     with database.write() as session:
-        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(problem="the vehicle did not answer"))
+        flight_rows.record_outcome(
+            session, task.flight_id, flight_rows.FlightOutcome(problem="the vehicle did not answer")
+        )
     answer = client.delete(f"{path}?version=1")
     assert answer.status_code == 409
     assert "ledger" in answer.json()["detail"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from app.accounts.keyring import Keyring
+from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Key
 from app.campaigns.schemas import Definition, StopRule
 from app.campaigns.trials.schemas import Classification
@@ -21,7 +21,7 @@ from app.client import (
 )
 from app.common.settings import Settings
 from app.db.session import Database
-from app.flights import queue
+from app.flights import flight_rows
 from tests.builders import claim, climb_error, create_climb, create_csv, create_record, land, lift_off, run_jobs
 from tests.fleet.vehicles import create_campaign_on, create_connected
 from tests.logs.recorded import TLOGS, recorded
@@ -113,7 +113,9 @@ def test_a_flight_that_did_not_take_place_is_raised(gainline: Client, database: 
     trial = gainline.fly(campaign.id, gainline.ask(campaign.id))
     task = claim(database)
     with database.write() as session:
-        queue.record_outcome(session, task.flight_id, queue.FlightOutcome(problem="the vehicle did not answer."))
+        flight_rows.record_outcome(
+            session, task.flight_id, flight_rows.FlightOutcome(problem="the vehicle did not answer.")
+        )
     with pytest.raises(RefusedError, match="was not flown: the vehicle did not answer"):
         gainline.wait(trial.id)
 

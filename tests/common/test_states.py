@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from app.common import states
+from app.common.conflict_checks import allowed, check_action, check_transition, check_version
 from app.common.errors import ConflictError
-from app.common.transition_checks import allowed, check_action, check_transition, check_version
 
 # What the domain allows, written apart from the program's tables: "from: to, to". Back from flying to planned is
 # docs/decisions/0020.

@@ -31,7 +31,7 @@ from app.db.models import Base, EventRow, ProposalRow
 from app.db.session import Database
 from app.fleet import registration
 from app.fleet.schemas import NewVehicle
-from app.flights import queue
+from app.flights import flight_rows
 from app.flights import service as flights
 from app.flights.flight_loop import mark_if_requested
 from app.jobs import service as jobs
@@ -241,12 +241,12 @@ def _proposed(session: Session, campaign_id: int) -> ProposalRow:
 
 def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> None:
     """What a worker does with the flight that was asked for, which `stop` ends after two seconds."""
-    task = queue.claim_flight(session, WORKER)
+    task = flight_rows.claim_flight(session, WORKER)
     assert task is not None
     assert task.trial_id == trial_id, "another flight waits"
     with open_vehicle(task.vehicle_kind, task.vehicle_options, safe_gains=task.safe_gains) as vehicle:
-        queue.record_staged(session, task.flight_id, vehicle.stage(task.gains))
-        queue.record_lift_off(session, task.flight_id)
+        flight_rows.record_staged(session, task.flight_id, vehicle.stage(task.gains))
+        flight_rows.record_lift_off(session, task.flight_id)
         order = FlightOptions(seed=task.seed)
         seen = count()
         record = vehicle.fly(
@@ -254,7 +254,7 @@ def _carry_out(session: Session, trial_id: int, stop: StopRequest | None) -> Non
         )
         record = mark_if_requested(record, set() if stop is None else {stop.reason})
         restored = restore_safe_gains(vehicle)
-    queue.record_outcome(session, task.flight_id, queue.FlightOutcome(record=record, restored=restored))
+    flight_rows.record_outcome(session, task.flight_id, flight_rows.FlightOutcome(record=record, restored=restored))
 
 
 def _propose(session: Session, campaign_id: int) -> None:

@@ -16,8 +16,8 @@ from app.common.states import FlightState, TrialState
 from app.db.models import FlightRow
 from app.db.session import Database
 from app.flights.abort import AbortRegistry
+from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
-from app.flights.queue import REQUEST_TIMEOUT
 from app.flights.runner import FlightRunner
 from app.live.messages import FlightPhase, PublishedMessage
 from tests.builders import create_ready_campaign, create_record, create_trial, get, stage

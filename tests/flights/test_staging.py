@@ -13,8 +13,8 @@ from app.db.models import FlightRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import commands
-from app.flights import queue
-from app.flights.queue import FlightOutcome
+from app.flights import flight_rows
+from app.flights.flight_rows import FlightOutcome
 from app.main import create_app
 from app.vehicles.base import FlightRecord
 from tests.builders import (
@@ -75,7 +75,7 @@ def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
     """Whether its worker may take off, and why it is to stand down."""
     with database.read() as session:
         flight_id = staged["flight"]["id"]
-        return queue.clearance_of(session, flight_id)
+        return flight_rows.clearance_of(session, flight_id)
 
 
 def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
@@ -84,7 +84,7 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
     assert staged["actions"] == ["take-off", "unstage", "cancel", "abort", "note"]
     assert is_wanted(database, staged) == (False, None)
     with pytest.raises(ConflictError, match="its take-off has not been requested"), database.write() as session:
-        queue.record_lift_off(session, staged["flight"]["id"])
+        flight_rows.record_lift_off(session, staged["flight"]["id"])
 
     status, sentence = take_off(client, staged, {})
     assert (status, sentence) == (
@@ -105,7 +105,7 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
         f"The take-off of trial {staged['number']} has already been requested.",
     )
     with database.write() as session:
-        queue.record_lift_off(session, staged["flight"]["id"])
+        flight_rows.record_lift_off(session, staged["flight"]["id"])
     assert trial(client, staged)["state"] == "flying"
     assert seen(client, real)["state"] == "flying"
 
@@ -142,7 +142,7 @@ def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
     why = "the take-off did not start within 10 s of the operator's request"
     assert is_wanted(database, staged) == (False, why)
     with pytest.raises(ConflictError, match=why), database.write() as session:
-        queue.record_lift_off(session, staged["flight"]["id"])
+        flight_rows.record_lift_off(session, staged["flight"]["id"])
 
 
 def test_a_real_vehicle_is_never_flown_in_one_go(client: TestClient, planned: Json) -> None:
@@ -186,7 +186,7 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
     )
     with database.write() as session:
         outcome = FlightOutcome(withdrawn=True, problem="unstaged by the operator", restored=DEFAULT_GAINS)
-        queue.record_outcome(session, staged["flight"]["id"], outcome)
+        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
     after = trial(client, staged)
     assert (after["state"], after["flight"]["state"], after["actions"][0]) == ("planned", "cancelled", "stage")
     assert seen(client, real)["state"] == "ready"
@@ -198,7 +198,7 @@ def test_a_take_off_does_not_pass_an_unstaging(
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     client.post(f"/api/trials/{staged['id']}/unstage")
     with pytest.raises(ConflictError, match="unstaged by the operator"), database.write() as session:
-        queue.record_lift_off(session, staged["flight"]["id"])
+        flight_rows.record_lift_off(session, staged["flight"]["id"])
 
 
 def test_a_cancelled_trial_stands_its_vehicle_down(client: TestClient, database: Database, staged: Json) -> None:
@@ -211,7 +211,7 @@ def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
 ) -> None:
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     with database.write() as session:
-        assert queue.lose_running_flights(session) == []
+        assert flight_rows.lose_running_flights(session) == []
     assert is_wanted(database, staged) == (False, "the flight is failed")
     after = trial(client, staged)
     assert (after["state"], after["flight"]["problem"]) == ("planned", "the worker stopped before lift-off")
@@ -243,7 +243,7 @@ def test_a_simulated_vehicle_is_staged_by_a_script_too(client: TestClient, datab
     assert seen(client, vehicle)["held"] == task.gains
     assert take_off(client, planned, {}) == (202, "")
     with database.write() as session:
-        queue.record_lift_off(session, task.flight_id)
+        flight_rows.record_lift_off(session, task.flight_id)
 
 
 def test_a_shared_simulation_is_not_staged(client: TestClient, database: Database) -> None:
@@ -263,10 +263,10 @@ def fly(client: TestClient, database: Database, vehicle: Json, planned: Json, re
     task = stage_claimed(database)
     take_off(client, planned, {**OUR_PAGE, **control_header(client, vehicle)})
     with database.write() as session:
-        queue.record_lift_off(session, task.flight_id)
+        flight_rows.record_lift_off(session, task.flight_id)
     with database.write() as session:
         outcome = FlightOutcome(record=record, restored=dict(task.safe_gains))
-        queue.record_outcome(session, task.flight_id, outcome)
+        flight_rows.record_outcome(session, task.flight_id, outcome)
     return trial(client, planned)
 
 
@@ -340,7 +340,7 @@ def test_safe_gains_that_did_not_come_back_stand_in_the_ledger_as_they_were_read
     wrong = {"kp": 283, "ki": 0, "kd": 82}
     with database.write() as session:
         outcome = FlightOutcome(problem="refused", restored=wrong, concern="ki was read back as 0")
-        queue.record_outcome(session, staged["flight"]["id"], outcome)
+        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
     line = get(client, f"/api/vehicles/{real['id']}/ledger")["items"][0]
     assert (line["asked"], line["read_back"], line["outcome"]) == (DEFAULT_GAINS, wrong, "failed")
     assert seen(client, real)["state"] == "quarantined"

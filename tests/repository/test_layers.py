@@ -20,7 +20,11 @@ VIOLATIONS = {
         "import app.vehicles.mavlink.radio",
         "The trial",
     ),
-    "a vehicle's process knows the database": ("flights/vehicle_process.py", "import app.db.models", "Processes that"),
+    "a vehicle's process knows the database": (
+        "flights/connection_process.py",
+        "import app.db.models",
+        "Processes that",
+    ),
     "a vehicle reads logs": ("vehicles/base.py", "import app.logs", "Vehicles, logs and figures"),
     "a figure reads the database": ("figures/base.py", "import app.db.models", "Vehicles, logs and figures"),
     "the simulated drone reads the database": ("simdrone/drone.py", "import app.db.models", "The simulated drone"),

@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from app.accounts.keyring import Keyring
+from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Key
 from tests.runtime.processes import Serving, environment
 

@@ -7,7 +7,7 @@ import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from app.accounts.keyring import Keyring
+from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Key
 from app.common.settings import Settings
 from app.db.session import Database

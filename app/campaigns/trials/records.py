@@ -20,10 +20,10 @@ from app.campaigns.trials.schemas import NewTrial, Trial
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.campaigns.trials.service import check_flown_gains, create_trial, require_open
 from app.campaigns.trials.views import trajectory_view, trial_view
+from app.common.conflict_checks import check_action
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
 from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, Ending, TrialState
-from app.common.transition_checks import check_action
 from app.core.errors import TrajectoryError
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment

@@ -9,9 +9,9 @@ from app.campaigns.history import set_trial_state
 from app.campaigns.trials.records import score
 from app.campaigns.trials.schemas import AbortJudgement, Classification, Trial
 from app.campaigns.trials.views import trial_view
+from app.common.conflict_checks import check_action, check_transition, check_version
 from app.common.errors import ConflictError, InputError, Problem
 from app.common.states import CAMPAIGN_ACTIONS, TRIAL_ACTIONS, TRIAL_TRANSITIONS, TrialState
-from app.common.transition_checks import check_action, check_transition, check_version
 from app.core.experiments import get_experiment
 from app.db.models import CampaignRow, TrialRow
 from app.fleet.control import require_may

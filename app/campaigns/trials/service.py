@@ -1,4 +1,4 @@
-"""Operations on trials for clients: people and scripts. The worker's side of a flight is in `app.flights.queue`.
+"""Operations on trials for clients: people and scripts. The worker's side of a flight is in `app.flights.flight_rows`.
 
 Every gain set passes the gate before it becomes a trial; an operator may overrule some of its refusals.
 """
@@ -19,10 +19,10 @@ from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.trials.schemas import NewTrial, Trial, TrialEdit, Variant
 from app.campaigns.trials.views import trial_view, trial_views
+from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, GainlineError, InputError, Problem
 from app.common.schemas import Page, decode_cursor, encode_cursor
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
-from app.common.transition_checks import check_action, check_version
 from app.core.definition import flight_seed
 from app.core.experiments import experiment_of
 from app.core.policy import Gains

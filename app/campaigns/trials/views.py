@@ -13,9 +13,9 @@ from app.campaigns import history, repository
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
+from app.common.conflict_checks import allowed
 from app.common.schemas import Gate, Interval
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
-from app.common.transition_checks import allowed
 from app.core.definition import Flight
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Scatter

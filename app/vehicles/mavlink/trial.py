@@ -30,7 +30,7 @@ from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_transitions import LANDING, State
+from app.vehicles.mavlink.trial_reactions import LANDING, State
 
 LISTEN_S: Final = 0.01
 """Longest delay before the loop processes an abort."""

@@ -30,7 +30,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, Finding, land_every_s
 from app.vehicles.mavlink.observation import TrialObservation
-from app.vehicles.mavlink.trial_transitions import (
+from app.vehicles.mavlink.trial_reactions import (
     COMMANDED,
     Plan,
     State,

@@ -34,7 +34,7 @@ from app.vehicles.mavlink.repeated_command import RepeatedCommand
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
 from app.vehicles.mavlink.trial_machine import Plan, Trial
-from app.vehicles.mavlink.trial_transitions import QUARANTINE_STATES, TRANSITIONS, State
+from app.vehicles.mavlink.trial_reactions import QUARANTINE_STATES, TRANSITIONS, State
 
 STANDSTILL_S: Final = 1.0
 """Observation before arming, because a long time may have passed since the gains were staged."""

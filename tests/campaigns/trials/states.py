@@ -5,7 +5,7 @@ from fastapi.testclient import TestClient
 from app.common.states import TrialState
 from app.db.models import VehicleRow
 from app.db.session import Database
-from app.flights import queue
+from app.flights import flight_rows
 from tests.builders import Json, create_ready_campaign, create_record, create_trial, csv_of, land, lift_off, stage
 
 
@@ -47,7 +47,7 @@ def _fly(state: TrialState, database: Database) -> None:
     match state:
         case TrialState.LOST:
             with database.write() as session:
-                queue.lose_running_flights(session)
+                flight_rows.lose_running_flights(session)
         case TrialState.ABORTED:
             land(database, task, create_record(ending="aborted", reason="by hand", until_s=4.0))
         case TrialState.INVALID:

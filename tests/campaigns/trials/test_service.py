@@ -6,7 +6,7 @@ from fastapi.testclient import TestClient
 from app.common.states import TrialState
 from app.db.models import TrialRow
 from app.db.session import Database
-from app.flights import queue
+from app.flights import flight_rows
 from tests.builders import (
     claim,
     create_csv,
@@ -77,7 +77,7 @@ def test_a_lost_flight_outdates_nothing(client: TestClient, database: Database) 
     client.post(f"/api/trials/{lost['id']}/fly", json={"speed": None})
     lift_off(database)
     with database.write() as session:
-        queue.lose_running_flights(session)
+        flight_rows.lose_running_flights(session)
     assert get(client, f"/api/trials/{lost['id']}")["state"] == "lost"
     assert get(client, f"/api/trials/{waiting['id']}")["state"] == "planned"
 

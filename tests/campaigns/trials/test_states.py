@@ -9,8 +9,8 @@ from sqlalchemy.orm import Session
 from app.common.errors import ConflictError
 from app.common.states import TRIAL_TRANSITIONS, TrialState
 from app.db.session import Database
-from app.flights import queue
-from app.flights.queue import FlightOutcome
+from app.flights import flight_rows
+from app.flights.flight_rows import FlightOutcome
 from tests.builders import Json, create_csv, create_record, get, upload
 from tests.campaigns.trials.states import create_trial_in
 
@@ -93,20 +93,20 @@ Step = Callable[[Session, int], object]
 
 
 def ends(outcome: FlightOutcome) -> Step:
-    return lambda session, flight: queue.record_outcome(session, flight, outcome)
+    return lambda session, flight: flight_rows.record_outcome(session, flight, outcome)
 
 
 STEPS: dict[str, Step] = {
-    "staged": lambda session, flight: queue.record_staged(session, flight, {"kp": 283, "ki": 13, "kd": 82}),
-    "lift-off": queue.record_lift_off,
+    "staged": lambda session, flight: flight_rows.record_staged(session, flight, {"kp": 283, "ki": 13, "kd": 82}),
+    "lift-off": flight_rows.record_lift_off,
     "landing": ends(FlightOutcome(record=create_record())),
     "short landing": ends(FlightOutcome(record=create_record(until_s=9.0))),
     "abort": ends(FlightOutcome(record=create_record(ending="aborted"))),
     "loss": ends(FlightOutcome(lifted_off=True, problem="gone")),
     "failure": ends(FlightOutcome(problem="refused")),
     "withdrawal": ends(FlightOutcome(withdrawn=True, problem="ended")),
-    "restart": lambda session, _flight: queue.lose_running_flights(session),
-    "recovery": lambda session, flight: queue.recover_record(session, flight, create_record()),
+    "restart": lambda session, _flight: flight_rows.lose_running_flights(session),
+    "recovery": lambda session, flight: flight_rows.recover_record(session, flight, create_record()),
     "quarantine": ends(FlightOutcome(record=create_record(), concern="not verified")),
 }
 

@@ -13,7 +13,7 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
 )
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.trial_transitions import State
+from app.vehicles.mavlink.trial_reactions import State
 from tests.vehicles.mavlink.test_trial_machine import STAGES
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 

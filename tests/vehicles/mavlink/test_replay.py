@@ -26,7 +26,7 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import Limits
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_transitions import State
+from app.vehicles.mavlink.trial_reactions import State
 from tests.vehicles.mavlink.replaying import FLOWN, Recorded, messages, recorded
 
 PAPARAZZI = PROFILES["paparazzi"]

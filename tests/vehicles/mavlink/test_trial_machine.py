@@ -27,7 +27,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_machine import Plan
-from app.vehicles.mavlink.trial_transitions import TRANSITIONS, State
+from app.vehicles.mavlink.trial_reactions import TRANSITIONS, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
 ABORT = "the operator pressed Abort"

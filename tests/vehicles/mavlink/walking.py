@@ -27,7 +27,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import Limits
 from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
-from app.vehicles.mavlink.trial_transitions import State
+from app.vehicles.mavlink.trial_reactions import State
 
 GROUND_M = 0.1
 STEP_S = 0.02

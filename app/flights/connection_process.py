@@ -61,7 +61,7 @@ lock."""
 _EXPIRED: Final = "The command reached the vehicle's process too late and was not sent; the caller was informed."
 
 
-def run_vehicle_process(pipe: Connection, call: ConnectionRequest) -> None:
+def run_connection_process(pipe: Connection, call: ConnectionRequest) -> None:
     """Main function of the process, from connecting until the worker closes the pipe or dies, or the link fails."""
     ignore_stop_signals()
     line = WorkerPipe(pipe)

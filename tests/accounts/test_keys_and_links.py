@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.accounts.keyring import LINK_VALID_S, Keyring
+from app.accounts.keys_and_links import LINK_VALID_S, Keyring
 from app.accounts.permissions import Key, RequestOrigin
 from app.common.errors import StorageError
 

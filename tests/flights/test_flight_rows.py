@@ -6,9 +6,9 @@ from fastapi.testclient import TestClient
 from app.common.errors import ConflictError
 from app.core.definition import flight_seed
 from app.db.session import Database
-from app.flights import queue
+from app.flights import flight_rows
+from app.flights.flight_rows import FlightOutcome
 from app.flights.process_messages import FlightRequest
-from app.flights.queue import FlightOutcome
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
@@ -38,7 +38,7 @@ def test_a_claimed_flight_carries_everything_that_the_worker_needs(client: TestC
     assert (task.vehicle_kind, task.vehicle_options["scatter"], task.speed) == ("twin", 1.0, 10.0)
     assert task.seed == flight_seed(7, 1)
     with database.write() as session:
-        assert queue.claim_flight(session, "another") is None
+        assert flight_rows.claim_flight(session, "another") is None
 
 
 def test_a_landed_flight_is_scored_as_it_is_stored_and_classed_by_the_program(
@@ -64,7 +64,7 @@ def test_the_definition_is_frozen_with_its_digest_at_lift_off(client: TestClient
     stage(database)
     assert get(client, f"/api/campaigns/{campaign['id']}")["definition_digest"] is None
     with database.write() as session:
-        queue.record_lift_off(session, 1)
+        flight_rows.record_lift_off(session, 1)
     flying = get(client, f"/api/campaigns/{campaign['id']}")
     assert flying["state"] == "flying"
     assert len(flying["definition_digest"]) == 64
@@ -95,11 +95,11 @@ def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, databa
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     task = claim(database)
     with database.write() as session:
-        queue.record_staged(session, task.flight_id, {"kp": 282, "ki": 13, "kd": 82})
+        flight_rows.record_staged(session, task.flight_id, {"kp": 282, "ki": 13, "kd": 82})
     with pytest.raises(ConflictError, match="must not fly"), database.write() as session:
-        queue.record_lift_off(session, task.flight_id)
+        flight_rows.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        queue.record_outcome(session, task.flight_id, FlightOutcome(problem="the vehicle did not take the gains"))
+        flight_rows.record_outcome(session, task.flight_id, FlightOutcome(problem="the vehicle did not take the gains"))
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
     assert after["flight"]["problem"] == "the vehicle did not take the gains"
@@ -139,8 +139,8 @@ def test_a_worker_that_died_leaves_a_lost_flight_that_is_not_flown_again(
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     lift_off(database)
     with database.write() as session:
-        assert queue.lose_running_flights(session) == [trial["id"]]
-        assert queue.claim_flight(session, "the next worker") is None
+        assert flight_rows.lose_running_flights(session) == [trial["id"]]
+        assert flight_rows.claim_flight(session, "the next worker") is None
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flight"]["state"]) == ("lost", "lost")
     assert "fly" not in after["actions"]
@@ -153,7 +153,7 @@ def test_a_worker_that_died_before_lift_off_leaves_a_planned_trial(client: TestC
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     stage(database)
     with database.write() as session:
-        assert queue.lose_running_flights(session) == []
+        assert flight_rows.lose_running_flights(session) == []
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
     assert client.post(f"/api/trials/{trial['id']}/fly").status_code == 202
@@ -164,10 +164,10 @@ def test_the_record_of_a_lost_flight_can_be_recovered_once(client: TestClient, d
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     task = lift_off(database)
     with database.write() as session:
-        queue.lose_running_flights(session)
+        flight_rows.lose_running_flights(session)
     for _ in range(2):
         with database.write() as session:
-            queue.recover_record(session, task.flight_id, create_record(2.0))
+            flight_rows.recover_record(session, task.flight_id, create_record(2.0))
     after = get(client, f"/api/trials/{trial['id']}")
     assert after["state"] == "valid"
     assert after["error"] == pytest.approx(climb_error(2.0), rel=1e-4)
@@ -212,7 +212,7 @@ def test_a_real_vehicle_whose_flight_was_lost_is_quarantined_until_a_person_rele
     trial = create_trial(client, campaign["id"], fly={"speed": None})
     lift_off(database)
     with database.write() as session:
-        queue.lose_running_flights(session)
+        flight_rows.lose_running_flights(session)
     vehicle = f"/api/vehicles/{campaign['vehicle']['id']}"
     assert get(client, vehicle)["state"] == "quarantined"
     client.post(f"/api/trials/{trial['id']}/classify", json={"version": 1, "outcome": "invalid", "reason": "crashed"})
@@ -233,7 +233,7 @@ def test_unverified_safe_gains_quarantine_even_a_vehicle_that_landed(client: Tes
     land(database, task, create_record())
     with database.write() as session:
         outcome = FlightOutcome(record=create_record(), concern="the safe gains did not read back")
-        queue.record_outcome(session, task.flight_id, outcome)
+        flight_rows.record_outcome(session, task.flight_id, outcome)
     vehicle = get(client, f"/api/vehicles/{campaign['vehicle']['id']}")
     assert (vehicle["state"], vehicle["concern"]) == ("quarantined", "the safe gains did not read back")
 
@@ -275,9 +275,9 @@ def test_a_trial_cancelled_while_it_is_staged_does_not_lift_off(client: TestClie
     task = stage(database)
     assert client.post(f"/api/trials/{trial['id']}/cancel").status_code == 200
     with pytest.raises(ConflictError), database.write() as session:
-        queue.record_lift_off(session, task.flight_id)
+        flight_rows.record_lift_off(session, task.flight_id)
     with database.write() as session:
-        queue.record_outcome(session, task.flight_id, FlightOutcome(problem="cancelled"))
+        flight_rows.record_outcome(session, task.flight_id, FlightOutcome(problem="cancelled"))
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "cancelled"
     assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
 

@@ -14,7 +14,8 @@ import pytest
 
 from app.common.data_folder import telemetry_log
 from app.common.states import ActKind
-from app.flights import vehicle_process as vehicle_process_module
+from app.flights import connection_process as vehicle_process_module
+from app.flights.connection_process import VehicleProcess
 from app.flights.flight_loop import PipeClosedError, WorkerPipe
 from app.flights.process_messages import (
     CancelFlight,
@@ -33,7 +34,6 @@ from app.flights.process_messages import (
     VehicleCommand,
     VehicleRequest,
 )
-from app.flights.vehicle_process import VehicleProcess
 from app.vehicles.base import Identity
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink.dialects import PAPARAZZI, Message

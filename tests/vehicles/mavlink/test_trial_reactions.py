@@ -1,4 +1,4 @@
-from app.vehicles.mavlink.trial_transitions import COMMANDED, OVER, TRANSITIONS, State
+from app.vehicles.mavlink.trial_reactions import COMMANDED, OVER, TRANSITIONS, State
 
 
 def reachable(start: State) -> set[State]:
