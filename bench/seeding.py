@@ -147,7 +147,7 @@ def _propose(database: Database, campaign_id: int, takeoffs: Takeoffs, number: i
         row = ProposalRow(
             campaign_id=campaign_id,
             history_digest=history.history_digest(
-                session, campaign_id, definition_of(campaign), history.trials_of(session, campaign_id)
+                session, campaign, definition_of(campaign), history.trials_of(session, campaign_id)
             ),
             kind="step",
             gains=gains,

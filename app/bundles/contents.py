@@ -173,6 +173,7 @@ class Campaign(_Strict):
     definition: Annotated[JsonObject, _fits(Definition)]
     definition_digest: Digest | None
     safe_gains: Gains | None
+    open_until_flight: Annotated[int, Field(ge=0, le=10_000)] = 0
     vehicle: Vehicle
     vehicle_options: Options
     created_at: AwareDatetime

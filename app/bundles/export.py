@@ -127,6 +127,7 @@ class Packer:
             definition=row.definition,
             definition_digest=row.definition_digest,
             safe_gains=row.safe_gains,
+            open_until_flight=row.open_until_flight,
             vehicle=_vehicle(row.vehicle),
             vehicle_options=row.vehicle_options,
             created_at=row.created_at,

@@ -81,6 +81,7 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
         definition=definition,
         definition_digest=source.definition_digest,
         safe_gains=source.safe_gains or (source.vehicle.safe_gains if source.vehicle.registered else None),
+        open_until_flight=source.open_until_flight,
         vehicle=vehicle,
         vehicle_options=options,
         created_at=source.created_at,

@@ -1,6 +1,6 @@
 """Computation of a proposal: pure and without the database, for compute processes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
@@ -18,7 +18,8 @@ class CampaignHistory:
     """All that a proposal is computed from. `digest` changes as soon as any of it does.
 
     `donor` is the flight that a warm start uses; the definition holds the checksum of its record. `battery_v`
-    is the battery voltage, V, at the end of the last flight, including one that does not count.
+    is the battery voltage, V, at the end of the last flight, including one that does not count. `open_until_flight` is
+    the number of flights for which the campaign was reopened, 0 if it was not.
     """
 
     campaign_id: int
@@ -27,6 +28,7 @@ class CampaignHistory:
     digest: str
     donor: Flight | None = None
     battery_v: float | None = None
+    open_until_flight: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,10 +50,12 @@ def compute(past: CampaignHistory) -> ProposalComputation:
 
     Takes up to a second; call it outside of any transaction.
     """
-    definition, flights = past.definition, past.flights
+    definition, flights = _with_reopening(past), past.flights
     experiment = experiment_of(definition)
     proposal = next_proposal(definition, flights, past.donor)
-    stop_verdict = evaluate_stop_rule(definition, flights, proposal, battery_v=past.battery_v)
+    stop_verdict = evaluate_stop_rule(
+        definition, flights, proposal, battery_v=past.battery_v, open_until_flight=past.open_until_flight
+    )
     spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
     gate = check_policy(
         definition,
@@ -71,6 +75,12 @@ def compute(past: CampaignHistory) -> ProposalComputation:
         stop_verdict=stop_verdict,
         advice=advise(definition, experiment, flights, proposal, stop_verdict),
     )
+
+
+def _with_reopening(past: CampaignHistory) -> Definition:
+    """The definition with a budget that includes the flights for which the campaign was reopened."""
+    stop = past.definition.stop
+    return replace(past.definition, stop=replace(stop, max_flights=max(stop.max_flights, past.open_until_flight)))
 
 
 def warm_up() -> None:

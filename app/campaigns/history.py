@@ -98,13 +98,13 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
     return max(flown, key=lambda found: found[:2])[2].landing_battery_v if flown else None
 
 
-def history_digest(session: Session, campaign_id: int, definition: Definition, trials: Sequence[TrialRow]) -> str:
+def history_digest(session: Session, campaign: CampaignRow, definition: Definition, trials: Sequence[TrialRow]) -> str:
     """SHA-256 over everything that a proposal is computed from, including the checksums of the trials' records.
 
-    Whether an abort counts against its gains is included only where it does not count, so that digests made before that
-    was recorded stay the same.
+    Whether an abort counts against its gains is included only where it does not count, and a reopening only where there
+    was one, so that digests made before these were recorded stay the same.
     """
-    checksums = repository.checksums(session, campaign_id)
+    checksums = repository.checksums(session, campaign.id)
     flights = [
         [
             row.number,
@@ -119,7 +119,8 @@ def history_digest(session: Session, campaign_id: int, definition: Definition, t
         for row in in_history(trials)
     ]
     battery = [] if definition.stop.min_battery_v is None else [last_battery_v(trials)]
-    content = json.dumps([definition.digest(), flights, *battery], sort_keys=True, separators=(",", ":"))
+    reopened = [] if not campaign.open_until_flight else [["open until flight", campaign.open_until_flight]]
+    content = json.dumps([definition.digest(), flights, *battery, *reopened], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()
 
 

@@ -36,9 +36,6 @@ _OUTCOMES: Final[dict[Reason, Outcome]] = {
     "told from noise": Outcome.CONVERGED,
     "battery low": Outcome.BUDGET,
 }
-_UNSUPPORTED: Final = (
-    "The campaign is finished, but with the present classification of its flights the stop rule is no longer met:"
-)
 
 
 def read_history(session: Session, campaign_id: int) -> CampaignHistory:
@@ -49,9 +46,10 @@ def read_history(session: Session, campaign_id: int) -> CampaignHistory:
         campaign_id=campaign_id,
         definition=definition,
         flights=history.flights_of(session, campaign_id),
-        digest=history.history_digest(session, campaign_id, definition, trials),
+        digest=history.history_digest(session, row, definition, trials),
         donor=_donor(session, definition),
         battery_v=history.last_battery_v(trials),
+        open_until_flight=row.open_until_flight,
     )
 
 
@@ -106,10 +104,6 @@ def _apply_to_campaign(session: Session, campaign: CampaignRow, verdict: StopVer
         set_campaign_state(campaign, CampaignState.READY)
     elif campaign.state == CampaignState.DECIDING and verdict.reason is not None:
         end_campaign(session, campaign, _OUTCOMES[verdict.reason], verdict.why)
-    elif campaign.state == CampaignState.FINISHED and campaign.outcome != Outcome.STOPPED:
-        # A flight was reclassified: the reason for the end is updated.
-        campaign.outcome = None if verdict.reason is None else _OUTCOMES[verdict.reason]
-        campaign.stop_reason = verdict.why if verdict.reason is not None else f"{_UNSUPPORTED} {verdict.why}"
 
 
 def request_proposal(session: Session, campaign: CampaignRow) -> None:
@@ -144,7 +138,7 @@ def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalR
 
 def is_stale(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> bool:
     """Whether the campaign's history has changed since the proposal was computed."""
-    return row.history_digest != history.history_digest(session, campaign.id, definition_of(campaign), trials)
+    return row.history_digest != history.history_digest(session, campaign, definition_of(campaign), trials)
 
 
 def cancel_outdated(session: Session, campaign: CampaignRow) -> None:
@@ -208,6 +202,12 @@ def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reas
     notify_rehearsed_campaign(session, campaign)
     flight = history.flight_under_way(session, campaign.id)
     cancel_unflown(history.trials_of(session, campaign.id), flight, "the campaign was finished")
+
+
+def reopen(campaign: CampaignRow) -> None:
+    """Continue a finished campaign. Its stop rule ends it again with the next proposal, where it is still met."""
+    set_campaign_state(campaign, CampaignState.DECIDING)
+    campaign.outcome, campaign.stop_reason = None, ""
 
 
 def gate_json(gate: GateResult) -> JsonObject:

@@ -115,6 +115,12 @@ class Finish(Request):
     reason: Text = "stopped by the operator"
 
 
+class Reopening(Request):
+    """For how many more flights a finished campaign is reopened; its stop rule applies again after them."""
+
+    flights: Annotated[int, Field(strict=True, ge=1, le=50)] = 3
+
+
 class Promotion(Request):
     """Who makes the best gains the vehicle's safe gains, and why; `version` is the vehicle's."""
 
@@ -165,6 +171,9 @@ class Rehearsal(BaseModel):
     reason: str
 
 
+Standing = Literal["candidate", "confirmed", "not confirmed"]
+
+
 class Campaign(BaseModel):
     """One vehicle, one experiment, one strategy, and the results."""
 
@@ -184,6 +193,13 @@ class Campaign(BaseModel):
     rehearses: Annotated[int | None, Field(description="the campaign that this one rehearses")]
     best: BestTrial | None
     verdict: Annotated[Verdict | None, Field(description=VERDICT)]
+    standing: Annotated[
+        Standing | None,
+        Field(
+            description="of the best gains of a finished campaign: candidate until they and the first gains were flown "
+            "at least twice, then confirmed if they are better"
+        ),
+    ]
     trials: TrialCounts
     flying: FlyingTrial | None
     next_action: str

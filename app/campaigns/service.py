@@ -13,7 +13,7 @@ from app.accounts.permissions import Permission, RequestContext
 from app.campaigns import history, repository
 from app.campaigns.definitions import check_campaign, fill_in_donor, stored
 from app.campaigns.history import cancel_unflown, notify_rehearsed_campaign, set_campaign_state
-from app.campaigns.proposals import end_campaign, request_proposal, safe_gains_changed
+from app.campaigns.proposals import end_campaign, history_changed, reopen, request_proposal, safe_gains_changed
 from app.campaigns.rehearsals import rehearsal_of
 from app.campaigns.schemas import (
     Campaign,
@@ -211,6 +211,16 @@ def finish_campaign(session: Session, campaign_id: int, reason: str, context: Re
     check_action(CAMPAIGN_ACTIONS, "finish", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
     end_campaign(session, row, Outcome.STOPPED, reason)
+    return campaign_view(session, row)
+
+
+def reopen_campaign(session: Session, campaign_id: int, flights: int, context: RequestContext) -> Campaign:
+    """Reopen a finished campaign for this many more flights. Raises ConflictError unless it is finished."""
+    row = _get_permitted(session, campaign_id, context)
+    check_action(CAMPAIGN_ACTIONS, "reopen", row.state, f"Campaign {row.id}")
+    reopen(row)
+    row.open_until_flight = len(history.in_history(history.trials_of(session, row.id))) + flights
+    history_changed(session, row)
     return campaign_view(session, row)
 
 

@@ -21,6 +21,7 @@ from app.campaigns.schemas import (
     Proposal,
     Rehearsal,
     SparkCurve,
+    Standing,
     StopVerdict,
     TrialCounts,
 )
@@ -67,6 +68,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         rehearses=repository.rehearsed_id(session, row.id),
         best=best_trial(trials, now),
         verdict=_verdict(now),
+        standing=_standing(row, now),
         trials=_counts(trials),
         flying=_flying(flight, trials),
         next_action=_next_action(row, trials, rehearsal),
@@ -187,6 +189,14 @@ def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[s
 
 def _verdict(now: ComparisonState | None) -> Verdict | None:
     return None if now is None or now.comparison is None else now.comparison.verdict
+
+
+def _standing(row: CampaignRow, now: ComparisonState | None) -> Standing | None:
+    if row.outcome is None or now is None or now.comparison is None:
+        return None
+    if not now.looks:
+        return "candidate"
+    return "confirmed" if now.comparison.verdict == "better" else "not confirmed"
 
 
 def _counts(trials: Sequence[TrialRow]) -> TrialCounts:

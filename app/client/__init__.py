@@ -29,7 +29,7 @@ from typing import Final, Literal, Self, TypeVar
 import httpx2
 from pydantic import BaseModel, ValidationError
 
-from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal
+from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal, Reopening
 from app.campaigns.trials.schemas import (
     AbortAnswer,
     AbortJudgement,
@@ -163,6 +163,10 @@ class Client:
     def finish(self, campaign_id: int) -> Campaign:
         """Finish a campaign between flights."""
         return self._post(f"/api/campaigns/{campaign_id}/finish", Campaign)
+
+    def reopen(self, campaign_id: int, *, flights: int = 3) -> Campaign:
+        """Reopen a finished campaign for more flights, for instance to confirm its best gains."""
+        return self._post(f"/api/campaigns/{campaign_id}/reopen", Campaign, Reopening(flights=flights))
 
     def ask(self, campaign_id: int, *, timeout_s: float = 60.0) -> Proposal:
         """The next gain set for the flights so far; waits while it is computed.

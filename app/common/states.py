@@ -10,11 +10,12 @@ from typing import Final, Literal
 class CampaignState(StrEnum):
     """States of a campaign.
 
-            draft ──→ ready ──→ flying ←──→ deciding ──→ finished ──→ archived
+            draft ──→ ready ──→ flying ←──→ deciding ←──→ finished ──→ archived
 
     draft: its first gains are not computed yet. ready: they are, and nothing has flown; the definition may still
     change. flying: a trial is in the air. deciding: the next gains are being computed, or a review is due. finished:
-    converged, out of flights, or stopped by the operator; see `Outcome`.
+    converged, out of flights, or stopped by the operator, see `Outcome`; it is reopened by the operator, or, unless
+    the operator stopped it, when the class of one of its flights changes.
     """
 
     DRAFT = "draft"
@@ -38,7 +39,7 @@ CAMPAIGN_TRANSITIONS: Final[Mapping[CampaignState, frozenset[CampaignState]]] = 
     CampaignState.READY: frozenset({CampaignState.FLYING}),
     CampaignState.FLYING: frozenset({CampaignState.DECIDING}),
     CampaignState.DECIDING: frozenset({CampaignState.FLYING, CampaignState.FINISHED}),
-    CampaignState.FINISHED: frozenset({CampaignState.ARCHIVED}),
+    CampaignState.FINISHED: frozenset({CampaignState.DECIDING, CampaignState.ARCHIVED}),
     CampaignState.ARCHIVED: frozenset(),
 }
 
@@ -52,6 +53,7 @@ CAMPAIGN_ACTIONS: Final[Mapping[str, frozenset[CampaignState]]] = {
     "plan": frozenset({CampaignState.READY, CampaignState.DECIDING}),
     "propose": frozenset({CampaignState.DRAFT, CampaignState.READY, CampaignState.DECIDING}),
     "finish": frozenset({CampaignState.DECIDING}),
+    "reopen": frozenset({CampaignState.FINISHED}),
     "archive": frozenset({CampaignState.FINISHED}),
     "clone": _ALL_CAMPAIGN_STATES,
     "judge": _ALL_CAMPAIGN_STATES - {CampaignState.ARCHIVED},

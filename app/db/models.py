@@ -179,7 +179,8 @@ class CampaignRow(Base, Reported):
     """One vehicle, one experiment, one strategy.
 
     `version` counts people's edits. `safe_gains` are the vehicle's at the first flight, after which they are part of
-    the frozen definition.
+    the frozen definition. `open_until_flight` is the number of flights up to which the stop rule does not end it, after
+    a reopening.
     """
 
     __tablename__ = "campaign"
@@ -201,6 +202,7 @@ class CampaignRow(Base, Reported):
     definition: Mapped[JsonObject]
     definition_digest: Mapped[str | None]
     safe_gains: Mapped[GainsJson | None]
+    open_until_flight: Mapped[int] = mapped_column(default=0, server_default="0")
     vehicle_id: Mapped[int] = mapped_column(ForeignKey("vehicle.id"), index=True)
     vehicle_options: Mapped[OptionsJson]
     parent_id: Mapped[int | None] = mapped_column(ForeignKey("campaign.id", ondelete="SET NULL"), index=True)

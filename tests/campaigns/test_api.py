@@ -179,7 +179,7 @@ def test_the_budget_ends_a_campaign_and_nothing_more_is_flown(client: TestClient
     assert done["stop_reason"] == "All 2 flights of the budget have been flown."
     assert get(client, f"{path}/proposal")["proposal"]["recommended"] == "stop"
     assert client.post(f"{path}/trials", json={"gains": first["gains"]}).status_code == 409
-    assert done["actions"] == ["rename", "archive", "clone", "judge"]
+    assert done["actions"] == ["rename", "reopen", "archive", "clone", "judge"]
 
 
 def test_a_campaign_can_be_stopped_archived_and_continued_as_a_clone(client: TestClient, database: Database) -> None:

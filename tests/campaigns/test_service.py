@@ -99,7 +99,7 @@ def test_a_vehicles_own_safe_gains_stand_in_the_definition_that_proposals_and_ga
     assert get(client, path)["definition"] == campaign["definition"]
 
 
-def test_a_finished_campaign_gives_the_reason_for_its_end_from_its_present_flights(
+def test_marking_a_flight_invalid_reopens_a_campaign_and_marking_it_valid_ends_it_again(
     client: TestClient, database: Database
 ) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 2}})
@@ -111,15 +111,63 @@ def test_a_finished_campaign_gives_the_reason_for_its_end_from_its_present_fligh
     assert classify(client, last["id"], "invalid") == 200
     run_jobs(database)
     after = get(client, path)
-    assert (after["state"], after["outcome"]) == ("finished", None)
-    assert after["stop_reason"] == (
-        "The campaign is finished, but with the present classification of its flights the stop rule is no longer "
-        "met: 1 of 2 flights are left."
-    )
+    assert (after["state"], after["outcome"], after["stop_reason"]) == ("deciding", None, "")
+    assert get(client, f"{path}/proposal")["state"] == "ready"
     assert classify(client, last["id"], "valid") == 200
     run_jobs(database)
     again = get(client, path)
-    assert (again["outcome"], again["stop_reason"]) == ("budget", done["stop_reason"])
+    assert (again["state"], again["outcome"], again["stop_reason"]) == ("finished", "budget", done["stop_reason"])
+
+
+def test_a_finished_campaign_is_reopened_for_more_flights_and_ends_after_them(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 2}})
+    path = f"/api/campaigns/{campaign['id']}"
+    create_flown_trial(client, database, campaign["id"], 2.0)
+    create_flown_trial(client, database, campaign["id"], 1.0)
+    assert get(client, path)["actions"] == ["rename", "reopen", "archive", "clone", "judge"]
+    reopened = client.post(f"{path}/reopen", json={"flights": 2}).json()
+    assert (reopened["state"], reopened["outcome"], reopened["stop_reason"]) == ("deciding", None, "")
+    run_jobs(database)
+    told = get(client, f"{path}/proposal")["proposal"]["stop_verdict"]
+    assert (told["stop"], told["sentence"]) == (False, "2 of 4 flights are left.")
+    create_flown_trial(client, database, campaign["id"], 1.1)
+    assert get(client, path)["state"] == "deciding"
+    create_flown_trial(client, database, campaign["id"], 1.2)
+    done = get(client, path)
+    assert (done["state"], done["outcome"]) == ("finished", "budget")
+    assert client.post(f"{path}/trials", json={"variant": "repeat"}).status_code == 409
+
+
+def test_a_campaign_that_its_rule_would_end_at_once_stays_open_for_the_flights_asked_for(
+    client: TestClient, database: Database
+) -> None:
+    rule = {"stop": {"kind": "paper", "max_flights": 9}}
+    campaign = create_ready_campaign(client, database, definition=rule)
+    path = f"/api/campaigns/{campaign['id']}"
+    create_flown_trial(client, database, campaign["id"])
+    assert (get(client, path)["outcome"], get(client, path)["standing"]) == ("converged", None)
+    assert client.post(f"{path}/reopen").json()["state"] == "deciding"
+    run_jobs(database)
+    told = get(client, f"{path}/proposal")["proposal"]["stop_verdict"]
+    assert (told["stop"], told["sentence"]) == (False, "Reopened for 3 more flights.")
+
+
+@pytest.mark.parametrize(("flights", "status"), [(0, 422), (51, 422), (2.5, 422), ("3", 422)])
+def test_a_campaign_is_reopened_for_one_to_fifty_flights(
+    client: TestClient, database: Database, flights: float | str, status: int
+) -> None:
+    campaign = create_ready_campaign(client, database, definition=PATIENT)
+    answer = client.post(f"/api/campaigns/{campaign['id']}/reopen", json={"flights": flights})
+    assert (answer.status_code, answer.json()["problems"][0]["field"]) == (status, "flights")
+
+
+def test_a_campaign_that_is_not_finished_is_not_reopened(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition=PATIENT)
+    answer = client.post(f"/api/campaigns/{campaign['id']}/reopen")
+    assert answer.status_code == 409
+    assert "“reopen” is possible only while it is finished" in answer.json()["detail"]
 
 
 def test_what_an_operator_stopped_stays_stopped_by_the_operator(client: TestClient, database: Database) -> None:

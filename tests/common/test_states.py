@@ -29,7 +29,7 @@ draft: ready
 ready: flying
 flying: deciding
 deciding: flying, finished
-finished: archived
+finished: deciding, archived
 archived:
 """
 JOB = """

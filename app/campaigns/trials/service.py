@@ -146,7 +146,7 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
     """Raise ConflictError unless the campaign can take another trial now; trials in `spent_by` use up its budget."""
     check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
     trials = history.trials_of(session, campaign.id)
-    budget = definition_of(campaign).stop.max_flights
+    budget = max(definition_of(campaign).stop.max_flights, campaign.open_until_flight)
     if sum(row.state in spent_by for row in trials) >= budget:
         raise ConflictError(
             f"All {budget} flights in the budget of campaign {campaign.id} are flown or planned.",

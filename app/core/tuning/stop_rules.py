@@ -1,11 +1,11 @@
 """Stop rules: when a campaign ends automatically."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from app.core.definition import Definition, Flight, StopRule
-from app.core.formatting import percent
+from app.core.formatting import count, percent
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.strategy import Kind, Proposal
 
@@ -30,19 +30,34 @@ class StopVerdict:
 
 
 def evaluate_stop_rule(
-    definition: Definition, flights: Sequence[Flight], proposal: Proposal, *, battery_v: float | None = None
+    definition: Definition,
+    flights: Sequence[Flight],
+    proposal: Proposal,
+    *,
+    battery_v: float | None = None,
+    open_until_flight: int = 0,
 ) -> StopVerdict:
     """Apply the campaign's stop rule to its flights and the proposal computed from them.
 
-    `battery_v` is the voltage, V, at which the last flight ended, whether or not that flight counts.
+    Flights that repeat earlier gains count towards the budget only: they are not expected to improve. `battery_v` is
+    the voltage, V, at which the last flight ended, whether or not that flight counts. Up to `open_until_flight` flights
+    no rule ends the campaign, because it was reopened for them.
     """
-    return decide_stop(
+    verdict = decide_stop(
         definition.stop,
-        [flight.error for flight in flights],
+        [None if _is_repeat(flights, place) else flight.error for place, flight in enumerate(flights)],
         proposal.kind,
         battery_v=battery_v,
         because=proposal.explanation.summary,
     )
+    if not verdict.stop or len(flights) >= open_until_flight:
+        return verdict
+    left = count(open_until_flight - len(flights), "more flight")
+    return replace(verdict, stop=False, reason=None, why=f"Reopened for {left}.")
+
+
+def _is_repeat(flights: Sequence[Flight], place: int) -> bool:
+    return any(earlier.gains == flights[place].gains for earlier in flights[:place])
 
 
 def landing_battery_v(record: Trajectory) -> float | None:
@@ -70,8 +85,8 @@ def decide_stop(
 ) -> StopVerdict:
     """Apply a stop rule to the errors of the flights so far, in order.
 
-    None stands for a flight without an error (aborted): it counts towards the budget, but not as an improvement or a
-    failure. `battery_v` is the voltage at which the last flight ended.
+    None stands for a flight without an error (aborted) or with gains flown before: it counts towards the budget, but
+    not as an improvement or a failure. `battery_v` is the voltage at which the last flight ended.
 
     `paper` is the paper's rule, literally: stop when the error fails twice in a row to improve by more than 5 % on the
     best so far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error is

@@ -21,6 +21,7 @@ import {
   type NewTrial,
   promoteBest,
   rehearseCampaign,
+  reopenCampaign,
   type Trial,
   uploadTrajectory,
 } from "./generated";
@@ -187,6 +188,26 @@ export function usePromote({ id, vehicle }: Campaign) {
         queries.invalidateQueries({ queryKey: ["vehicle", vehicle.id] }),
       ]),
   });
+}
+
+/** Continue a finished campaign for some flights, of which `plan` lists those that are planned at once, in order. */
+export function useReopen({ id, vehicle }: Campaign) {
+  const settled = useSettled();
+  return useMutation({
+    mutationFn: async ({ flights, plan }: Reopening) => {
+      const reopened = await answer(reopenCampaign({ path: { campaign_id: id }, body: { flights } }));
+      for (const variant of plan) {
+        await answer(createTrial({ path: { campaign_id: id }, body: { variant }, headers: controlHeader(vehicle.id) }));
+      }
+      return reopened;
+    },
+    onSettled: () => settled.ofCampaign(id),
+  });
+}
+
+interface Reopening {
+  flights: number;
+  plan: readonly NonNullable<NewTrial["variant"]>[];
 }
 
 export function useArchive(campaignId: number) {

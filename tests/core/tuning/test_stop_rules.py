@@ -101,10 +101,30 @@ def test_the_battery_is_read_at_both_ends_of_a_record() -> None:
     assert landing_battery_v(recorded) == pytest.approx(10.4)
 
 
+STEP = Proposal(kind="step", gains={}, predicted=None, predicted_error=None, explanation=Explanation(summary="A step."))
+
+
+def test_repeats_and_baselines_are_no_failures_to_improve() -> None:
+    """Seen: “the last 2 flights did not improve” after the two repeats that the program itself had asked for."""
+    flights = [fly(1, 90, 90), fly(2, 30, 40), fly(3, 30, 40), fly(4, 90, 90)]
+    definition = Definition(stop=StopRule(max_flights=9))
+    assert evaluate_stop_rule(definition, flights, STEP).failures == 0
+    worse = [*flights, fly(5, 50, 50), fly(6, 50, 50)]
+    assert evaluate_stop_rule(definition, worse, STEP).failures == 1
+    assert evaluate_stop_rule(definition, [*worse, fly(7, 60, 50)], STEP).reason == "not improving"
+
+
+@pytest.mark.parametrize("flown", [2, 3])
+def test_no_rule_ends_a_campaign_before_the_flights_it_was_reopened_for(flown: int) -> None:
+    flights = [fly(number, 30, 40) for number in range(1, flown + 1)]
+    definition = Definition(stop=StopRule(kind="budget", max_flights=1))
+    verdict = evaluate_stop_rule(definition, flights, STEP, open_until_flight=3)
+    assert (verdict.stop, verdict.reason) == ((False, None) if flown < 3 else (True, "flight budget"))
+    assert verdict.why.startswith("Reopened for 1 more flight." if flown < 3 else "All 1 flights")
+
+
 def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
-    proposal = Proposal(
-        kind="step", gains={}, predicted=None, predicted_error=None, explanation=Explanation(summary="A step.")
-    )
+    proposal = STEP
     definition = Definition(stop=StopRule(min_battery_v=10.5))
     for flights in ([], [fly(1, 30, 40)]):
         assert evaluate_stop_rule(definition, flights, proposal).reason is None

@@ -230,6 +230,12 @@ export type Campaign = {
      * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
      */
     verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
+    /**
+     * Standing
+     *
+     * of the best gains of a finished campaign: candidate until they and the first gains were flown at least twice, then confirmed if they are better
+     */
+    standing: 'candidate' | 'confirmed' | 'not confirmed' | null;
     trials: TrialCounts;
     flying: FlyingTrial | null;
     /**
@@ -278,11 +284,12 @@ export type CampaignEdit = {
  *
  * States of a campaign.
  *
- * draft ──→ ready ──→ flying ←──→ deciding ──→ finished ──→ archived
+ * draft ──→ ready ──→ flying ←──→ deciding ←──→ finished ──→ archived
  *
  * draft: its first gains are not computed yet. ready: they are, and nothing has flown; the definition may still
  * change. flying: a trial is in the air. deciding: the next gains are being computed, or a review is due. finished:
- * converged, out of flights, or stopped by the operator; see `Outcome`.
+ * converged, out of flights, or stopped by the operator, see `Outcome`; it is reopened by the operator, or, unless
+ * the operator stopped it, when the class of one of its flights changes.
  */
 export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finished' | 'archived';
 
@@ -2526,6 +2533,18 @@ export type Release = {
 };
 
 /**
+ * Reopening
+ *
+ * For how many more flights a finished campaign is reopened; its stop rule applies again after them.
+ */
+export type Reopening = {
+    /**
+     * Flights
+     */
+    flights?: number;
+};
+
+/**
  * RepeatGroup
  *
  * The valid flights of one gain set.
@@ -4247,6 +4266,53 @@ export type FinishCampaignResponses = {
 };
 
 export type FinishCampaignResponse = FinishCampaignResponses[keyof FinishCampaignResponses];
+
+export type ReopenCampaignData = {
+    /**
+     * Body
+     */
+    body?: Reopening | null;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/reopen';
+};
+
+export type ReopenCampaignErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ReopenCampaignError = ReopenCampaignErrors[keyof ReopenCampaignErrors];
+
+export type ReopenCampaignResponses = {
+    /**
+     * Successful Response
+     */
+    200: Campaign;
+};
+
+export type ReopenCampaignResponse = ReopenCampaignResponses[keyof ReopenCampaignResponses];
 
 export type ArchiveCampaignData = {
     body?: never;

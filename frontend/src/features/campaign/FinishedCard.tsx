@@ -1,6 +1,6 @@
 import { Button, Stack } from "@mantine/core";
-import { IconArchive } from "@tabler/icons-react";
-import { useArchive } from "../../api/mutations";
+import { IconArchive, IconRepeat } from "@tabler/icons-react";
+import { useArchive, useReopen } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { against, percentChange, withUnit } from "../../ui/format";
@@ -17,6 +17,15 @@ import { bestOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
 import { VERDICTS } from "./verdict";
 
+const FURTHER_FLIGHTS = 3;
+const CONFIRMATION = ["repeat", "baseline", "repeat"] as const;
+
+const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meaning: string }> = {
+  candidate: { word: "Candidate", meaning: "not yet confirmed by repeat flights." },
+  confirmed: { word: "Confirmed", meaning: "better than the first gains in repeat flights." },
+  "not confirmed": { word: "Not confirmed", meaning: "repeat flights do not show that they are better." },
+};
+
 interface Props {
   campaign: Campaign;
   trials: readonly Trial[];
@@ -26,6 +35,8 @@ interface Props {
 /** The campaign's result, and its next actions. */
 export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const archive = useArchive(campaign.id);
+  const reopen = useReopen(campaign);
+  const isCandidate = campaign.standing === "candidate";
   const experiment = campaign.definition.experiment ?? "";
   const unit = useUnits(experiment).error;
   const best = bestOf(campaign, trials);
@@ -51,8 +62,29 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
                 {campaign.verdict && <strong> · {VERDICTS[campaign.verdict].toLowerCase()}</strong>}
               </p>
             )}
+            {campaign.standing !== null && (
+              <p>
+                <strong>{STANDINGS[campaign.standing].word}</strong>: {STANDINGS[campaign.standing].meaning}
+              </p>
+            )}
           </Aside>
         )}
+        {isCandidate && (
+          <Note fz="body">
+            Two repeats of the best gains and one flight of the first gains show whether they are better.
+          </Note>
+        )}
+        {campaign.actions.includes("reopen") && (
+          <Button
+            variant={isCandidate ? "filled" : "default"}
+            leftSection={<IconRepeat size={20} aria-hidden />}
+            loading={reopen.isPending}
+            onClick={() => reopen.mutate({ flights: FURTHER_FLIGHTS, plan: isCandidate ? CONFIRMATION : [] })}
+          >
+            {isCandidate ? `Confirm with ${FURTHER_FLIGHTS} flights` : `Reopen for ${FURTHER_FLIGHTS} more flights`}
+          </Button>
+        )}
+        <ErrorNotice error={reopen.error} />
         {best !== null && (
           <Button variant="default" onClick={() => onChoose(best.number)}>
             Show flight {best.number}
@@ -60,8 +92,8 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
         )}
         <PromoteGains campaign={campaign} />
         <Note fz="body">
-          This campaign has no more flights. To continue, clone it. With “Start from flight” on, the clone starts from
-          the best gains found here.
+          A clone is a new campaign with the same settings. With “Start from flight” on, it starts from the best gains
+          found here.
         </Note>
         <CloneForm {...campaign} experiment={experiment} />
         {campaign.actions.includes("archive") && (

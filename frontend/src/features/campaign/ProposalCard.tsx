@@ -183,7 +183,7 @@ function Expectation({ campaignId, variant }: { campaignId: number; variant: Var
   );
 }
 
-/** Ends the campaign between flights, after a confirmation because it cannot be undone. */
+/** Ends the campaign between flights, after a confirmation because planned trials are cancelled. */
 function StopCampaign({ campaignId }: { campaignId: number }) {
   const [asking, setAsking] = useState(false);
   const finish = useFinish(campaignId);
@@ -196,7 +196,7 @@ function StopCampaign({ campaignId }: { campaignId: number }) {
   }
   return (
     <Stack gap={14}>
-      <Note fz="body">Stop this campaign? It cannot be resumed. Its flights are kept, and it can be cloned.</Note>
+      <Note fz="body">Stop this campaign? Its flights are kept, and it can be reopened.</Note>
       <div className={classes["row"]}>
         <Button variant="default" onClick={() => setAsking(false)}>
           Continue

@@ -51,6 +51,7 @@ export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props)
         </div>
       )}
       <Button
+        variant="default"
         leftSection={<IconCopy size={20} aria-hidden />}
         loading={clone.isPending}
         onClick={() =>
