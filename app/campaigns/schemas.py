@@ -10,6 +10,7 @@ from app.common.schemas import Gains, Gate, Interval, Name, Number, OptionValue,
 from app.common.states import CampaignState, Outcome
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.proposals import AdviceKind
+from app.core.tuning.strategies import recommended_strategy
 from app.core.tuning.strategy import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
 
@@ -61,6 +62,10 @@ class StopRule(Request):
     min_battery_v: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)] | None = None
 
 
+def _recommended_strategy(definition: dict[str, object]) -> str:
+    return recommended_strategy(str(definition.get("experiment", "")))
+
+
 class Definition(Request):
     """Everything besides the flights that a proposal depends on. Frozen at the first flight.
 
@@ -71,7 +76,9 @@ class Definition(Request):
 
     experiment: Key = "takeoff"
     experiment_options: dict[str, OptionValue] = Field(default_factory=dict)
-    strategy: Key = "gradient"
+    strategy: Annotated[Key, Field(description="by default the first of the catalogue for the experiment")] = Field(
+        default_factory=_recommended_strategy
+    )
     options: dict[str, OptionValue] = Field(default_factory=dict)
     start: Start = Field(default_factory=Start)
     bounds: dict[str, tuple[Number, Number]] = Field(default_factory=dict)

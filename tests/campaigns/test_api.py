@@ -3,6 +3,7 @@
 import pytest
 from fastapi.testclient import TestClient
 
+from app.campaigns.schemas import Definition
 from app.db.models import CampaignRow, ProposalRow, TrajectoryRow
 from app.db.session import Database
 from tests.builders import (
@@ -26,7 +27,7 @@ def test_a_campaign_needs_nothing_but_a_name(client: TestClient) -> None:
     assert answer.status_code == 201
     campaign = answer.json()
     assert (campaign["name"], campaign["state"], campaign["version"]) == ("Mine", "draft", 1)
-    assert (campaign["vehicle"]["kind"], campaign["definition"]["strategy"]) == ("jsbsim", "gradient")
+    assert (campaign["vehicle"]["kind"], campaign["definition"]["strategy"]) == ("jsbsim", "calibrated")
     assert campaign["definition"]["stop"] == {
         "kind": "paper",
         "max_flights": 7,
@@ -257,3 +258,16 @@ def test_an_imported_campaign_cannot_be_flown_from_here(client: TestClient, data
     answer = client.post(f"/api/trials/{trial['id']}/fly")
     assert answer.status_code == 409
     assert "upload the flight record" in answer.json()["hint"]
+
+
+@pytest.mark.parametrize(
+    ("experiment", "strategy"),
+    [("takeoff", "calibrated"), ("pitch-tracking", "gradient"), ("takeoff-px4", "manual"), ("landing", "calibrated")],
+)
+def test_a_definition_without_a_strategy_has_the_first_of_the_catalogue_for_its_experiment(
+    client: TestClient, experiment: str, strategy: str
+) -> None:
+    assert Definition(experiment=experiment).strategy == strategy
+    listed = get(client, "/api/catalogue")["strategies"]
+    fitting = [each["name"] for each in listed if experiment in each["experiments"]]
+    assert fitting[:1] in ([strategy], [])

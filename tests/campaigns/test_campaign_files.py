@@ -40,7 +40,11 @@ def test_the_gain_sets_of_a_file_are_complete_and_in_the_experiments_order(tmp_p
 
 def test_a_name_is_all_that_a_campaign_file_needs(tmp_path: Path) -> None:
     file = read_campaign_file(written(tmp_path, "name: Tuesday\n"))
-    assert (file.vehicle.kind, file.definition.strategy, file.definition.stop.max_flights) == ("jsbsim", "gradient", 7)
+    assert (file.vehicle.kind, file.definition.strategy, file.definition.stop.max_flights) == (
+        "jsbsim",
+        "calibrated",
+        7,
+    )
 
 
 @pytest.mark.parametrize(
@@ -55,7 +59,10 @@ def test_a_name_is_all_that_a_campaign_file_needs(tmp_path: Path) -> None:
         ("name: x\nvehicle:\n  kind: twin\n  options: {wind: 3}\n", "line 4, vehicle.options.wind"),
         ("name: x\ndefinition: {strategy: manual}\ngains:\n  - {kp: 283, ki: 13}\n", "line 4, gains.0.kd"),
         ("name: x\ndefinition: {strategy: gradient}\ngains:\n  - {kp: 1, ki: 1, kd: 1}\n", "line 3, gains"),
-        ("name: x\nvehicle: {kind: mavlink}\ndefinition: {experiment: takeoff-px4}\n", "line 3, definition.strategy"),
+        (
+            "name: x\nvehicle: {kind: mavlink}\ndefinition: {experiment: takeoff-px4, strategy: gradient}\n",
+            "line 3, definition.strategy",
+        ),
         (
             "name: x\nvehicle:\n  kind: mavlink\n  options: {autopilot: px4}\n",
             "line 1, definition.experiment",

@@ -58,7 +58,8 @@ def test_gains_that_the_gate_refused_spoil_it() -> None:
 @pytest.fixture
 def campaign(client: TestClient, database: Database) -> Json:
     """On a real vehicle that is connected; nothing rehearsed."""
-    return create_campaign_on(client, database, create_connected(client, database, real=True), rehearsed=False)
+    drone = create_connected(client, database, real=True)
+    return create_campaign_on(client, database, drone, rehearsed=False, definition={"strategy": "gradient"})
 
 
 def rehearse(client: TestClient, campaign: Json) -> Json:

@@ -169,7 +169,7 @@ class Dashboard:
     def create(self, vehicle: str = "twin", *, name: str = "", **definition: object) -> int:
         """A campaign whose first gains are computed."""
         made = self.post("/campaigns", {"name": name or f"On {vehicle}", "vehicle": {"kind": vehicle},
-                                        "definition": definition})  # fmt: skip
+                                        "definition": {"strategy": "gradient", **definition}})  # fmt: skip
         return self.when_ready(int(made["id"]))
 
     def when_ready(self, campaign_id: int) -> int:

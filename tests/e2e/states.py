@@ -75,7 +75,7 @@ class States:
             {
                 "name": name or f"On {vehicle}",
                 "vehicle": {"kind": vehicle, "options": dict(options or {}), "id": vehicle_id},
-                "definition": definition,
+                "definition": {"strategy": "gradient", **definition},
             }
         )
 

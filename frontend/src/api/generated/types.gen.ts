@@ -863,6 +863,8 @@ export type DefinitionInput = {
     };
     /**
      * Strategy
+     *
+     * by default the first of the catalogue for the experiment
      */
     strategy?: string;
     /**
@@ -922,6 +924,8 @@ export type DefinitionOutput = {
     };
     /**
      * Strategy
+     *
+     * by default the first of the catalogue for the experiment
      */
     strategy: string;
     /**
