@@ -106,8 +106,9 @@ delivers something false:
 
 - values that are not numbers, in each field; the wrong value of a parameter; an altitude that is suddenly shifted;
 - messages of another component, which may pose as the autopilot;
-- a second vehicle with the same ids, whose clock is ahead by the time in the table;
-- packets that are late, duplicated, or from the future;
+- a second vehicle with the same ids, whose clock is ahead by the time in the table, on the ground or flying beside it
+  (`flying twin`), or answering in its place (`replaced`); positions that show the ground after a gap;
+- packets that are late, later and later, duplicated, or from the future; commands that arrive late;
 - a false heartbeat or position in the vehicle's name, once or every second;
 - no messages of one kind;
 - a second source of altitude that jumps, freezes, falls silent or sends values that are not numbers.

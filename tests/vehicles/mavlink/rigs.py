@@ -134,12 +134,14 @@ class LockstepRig(Lockstep, _Heard):
 
 
 class UdpRig(_Heard):
-    """The same behind a socket; `speed` is its time's."""
+    """The same behind a socket. `speed` is its time's, unless the machine is busy: only a ground in this process waits
+    with it."""
 
-    speed: Final = _SPEED
-
-    def __init__(self, autopilot: str = "paparazzi", faults: Sequence[str] = (), *, mocap: str = "") -> None:
+    def __init__(
+        self, autopilot: str = "paparazzi", faults: Sequence[str] = (), *, mocap: str = "", speed: float = _SPEED
+    ) -> None:
         super().__init__(autopilot)
+        self._speed = speed
         self._outlet = open_outlet(parse_source(mocap)) if mocap else None
         self.drone = switched_on(autopilot, options={"scatter": 0.0}, faults=faults, outlet=self._outlet)
         self._ports = free_port(), free_port()
@@ -176,7 +178,7 @@ class UdpRig(_Heard):
         time.sleep(max(self.wall_s(seconds), 0.0))
 
     def wall_s(self, seconds: float) -> float:
-        return seconds / _SPEED
+        return seconds / self._speed
 
     # ---- the ground side
 
@@ -204,7 +206,7 @@ class UdpRig(_Heard):
                     self._lookers[looker] = False
                 for frame in frames:
                     self._transport.write(frame)
-                time.sleep(_TICKS_AT_ONCE * TICK_S / _SPEED)
+                time.sleep(_TICKS_AT_ONCE * TICK_S / self._speed)
                 if frames:
                     self._wait_for_lookers()
         except BaseException as error:  # noqa: BLE001 - told by the other thread

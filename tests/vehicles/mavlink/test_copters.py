@@ -253,8 +253,8 @@ def test_a_vehicle_that_is_connected_as_the_program_does_it_keeps_that_file(tmp_
     folder = tmp_path / "parameters"
     folder.write_text("no folder")
     assert MAVLINK.connect is not None
-    with UdpRig("px4") as rig:
-        options = rig.options(clock_speed=rig.speed)
+    with UdpRig("px4", speed=3.0) as rig:
+        options = rig.options()
         identity = Identity(system_id=1, autopilot="px4", version="")
         vehicle = MAVLINK.connect(options, SAFE["px4"], identity, folder, lambda: None)
         with closing(vehicle):
