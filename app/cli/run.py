@@ -44,7 +44,7 @@ from app.fleet.schemas import NewVehicle, VehicleChoice
 from app.flights import flight_rows
 from app.flights.process_messages import FlightRequest
 from app.flights.service import plan_trial
-from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError
+from app.vehicles.base import FlightRecord, OptionValue, SafeGainsError, Sample, VehicleError, find_mismatch
 from app.vehicles.registry import get_kind, open_vehicle
 
 
@@ -226,9 +226,9 @@ class _Campaign:
                 opened = True
                 self._display.hold(None)
                 held = vehicle.stage(request.gains)
-                if held != request.gains:
+                if mismatch := find_mismatch(held, request.gains):
                     raise VehicleError(
-                        f"The vehicle has the gains {held} instead of {request.gains}; nothing was flown.",
+                        f"The vehicle did not accept the gains: {mismatch}. It was not flown.",
                         hint="Read its gains back manually before it flies again.",
                     )
                 with self._database.write() as session:

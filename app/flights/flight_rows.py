@@ -27,7 +27,7 @@ from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.flights.process_messages import FlightRequest
-from app.vehicles.base import FlightRecord
+from app.vehicles.base import FlightRecord, find_mismatch
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
@@ -189,9 +189,9 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     if not may_take_off:
         why = reason or "its take-off has not been requested"
         raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
-    if trial.read_back != trial.gains:
+    if mismatch := find_mismatch(trial.read_back or {}, trial.gains):
         raise ConflictError(
-            f"Trial {trial.number} must not fly: the vehicle has the gains {trial.read_back}.",
+            f"Trial {trial.number} must not fly: of the vehicle's gains {mismatch}.",
             hint="Stage it again. If this happens again, check the vehicle's link.",
         )
     set_trial_state(trial, TrialState.FLYING, reason="")

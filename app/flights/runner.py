@@ -5,7 +5,7 @@ landing; a record goes to the spool first, and from there into the database.
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +33,7 @@ from app.flights.process_messages import (
 from app.flights.record_spool import Spool
 from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import FlightPhase, Phase, Telemetry
-from app.vehicles.base import FlightRecord, VehicleError
+from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
 from app.vehicles.registry import get_kind
 
 STAGED_FOR_S: Final = 600.0
@@ -180,8 +180,8 @@ class FlightRunner:
         ended = FlightOutcome(lifted_off=True)
         try:
             self._store(lambda session: flight_rows.record_staged(session, request.flight_id, read_back))
-            if (problem := describe_mismatch(request.gains, read_back)) is not None:
-                ended = FlightOutcome(problem=problem)
+            if mismatch := find_mismatch(read_back, request.gains):
+                ended = FlightOutcome(problem=f"The vehicle did not accept the gains: {mismatch}. It was not flown.")
             elif (withdrawn := self._await_takeoff_clearance(request, flag, backend)) is not None:
                 ended = FlightOutcome(withdrawn=True, problem=withdrawn)
             else:
@@ -292,16 +292,6 @@ class FlightRunner:
     def _set_record_aside(self, flight_id: int, error: GainlineError) -> None:
         kept_as = self._spool.set_aside(flight_id)
         _log.error("a flight's record cannot be recovered", flight_id=flight_id, kept_as=kept_as, why=str(error))
-
-
-def describe_mismatch(asked: Mapping[str, float], read_back: Mapping[str, float]) -> str | None:
-    """Sentence on the gains that were read back with other values than sent, or None."""
-    wrong = [
-        f"{name} is {read_back.get(name, 'missing')} instead of {value:g}"
-        for name, value in asked.items()
-        if read_back.get(name) != value
-    ]
-    return f"The vehicle did not accept the gains: {'; '.join(wrong)}. It was not flown." if wrong else None
 
 
 def _describe_error(error: Exception) -> str:

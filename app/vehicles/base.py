@@ -256,3 +256,18 @@ class InterruptedByOrderError(VehicleError):
 
 class SafeGainsError(VehicleError):
     """The safe gains could not be verified on the vehicle; it must not fly until a person has inspected it."""
+
+
+def find_mismatch(held: Gains, wanted: Gains) -> str:
+    """Return how gains that were read back differ from the wanted ones, "kp is 283 instead of 300"; empty if they are
+    equal."""
+    names = [*wanted, *(name for name in held if name not in wanted)]
+    different = [name for name in names if held.get(name) != wanted.get(name)]
+    return ", ".join(
+        f"{name} is {_shown(held.get(name), 'missing')} instead of {_shown(wanted.get(name), 'none')}"
+        for name in different
+    )
+
+
+def _shown(value: float | None, without: str) -> str:
+    return without if value is None else f"{value:.9g}"

@@ -8,7 +8,7 @@ from typing import Final, NoReturn
 
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
-from app.vehicles.base import OptionValue, SafeGainsError, Vehicle, VehicleError
+from app.vehicles.base import OptionValue, SafeGainsError, Vehicle, VehicleError, find_mismatch
 from app.vehicles.f16 import LTI
 from app.vehicles.jsbsim import JSBSIM
 from app.vehicles.kinds import Options, VehicleKind
@@ -91,6 +91,6 @@ def restore_safe_gains(vehicle: Vehicle) -> dict[str, float]:
         held = vehicle.stage(wanted)
     except Exception as error:
         raise SafeGainsError(f"The vehicle's safe gains {wanted} could not be set: {error}", hint=hint) from error
-    if held != wanted:
-        raise SafeGainsError(f"The vehicle holds {held} instead of its safe gains {wanted}.", hint=hint)
+    if mismatch := find_mismatch(held, wanted):
+        raise SafeGainsError(f"The vehicle does not hold its safe gains: {mismatch}.", hint=hint)
     return held

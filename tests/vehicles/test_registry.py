@@ -7,7 +7,7 @@ import pytest
 import app.vehicles.registry as opening
 from app.core.errors import InputError
 from app.core.policy import Gains
-from app.vehicles.base import SafeGainsError, Vehicle, VehicleError
+from app.vehicles.base import SafeGainsError, Vehicle, VehicleError, find_mismatch
 from app.vehicles.kinds import Options, VehicleKind
 from app.vehicles.registry import VEHICLE_KINDS, check_options, get_kind, open_vehicle
 from app.vehicles.simulated import SimulatedVehicle, Simulation
@@ -49,7 +49,7 @@ def test_a_vehicle_that_keeps_experimental_gains_is_reported_loudly(monkeypatch:
     monkeypatch.setattr(opening, "VEHICLE_KINDS", {**VEHICLE_KINDS, "stubborn": STUBBORN})
     held: list[Vehicle] = []
     with (
-        pytest.raises(SafeGainsError, match="instead of its safe gains"),
+        pytest.raises(SafeGainsError, match="does not hold its safe gains"),
         open_vehicle("stubborn", {}, safe_gains=SAFE) as vehicle,
     ):
         held.append(vehicle)
@@ -134,3 +134,16 @@ def test_safe_gains_that_cannot_even_be_sent_are_reported_as_loudly(monkeypatch:
     ):
         vehicle.stage(TUNED)
     assert "Do not fly it" in loud.value.hint
+
+
+@pytest.mark.parametrize(
+    ("held", "mismatch"),
+    [
+        ({"kp": 283, "ki": 0.123456789}, ""),
+        ({"kp": 300, "ki": 0.12345678}, "kp is 300 instead of 283, ki is 0.12345678 instead of 0.123456789"),
+        ({"kp": 283}, "ki is missing instead of 0.123456789"),
+        ({"kp": 283, "ki": 0.123456789, "kd": 1}, "kd is 1 instead of none"),
+    ],
+)
+def test_gains_that_were_read_back_are_compared_by_name(held: dict[str, float], mismatch: str) -> None:
+    assert find_mismatch(held, {"kp": 283, "ki": 0.123456789}) == mismatch

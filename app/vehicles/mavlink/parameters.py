@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from app.core.policy import Gains
-from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError
+from app.vehicles.base import CheckItem, Identity, InterruptedByOrderError, VehicleError, find_mismatch
 from app.vehicles.mavlink.addresses import Address
 from app.vehicles.mavlink.events import Measurement, PacketReceived, Parameter, Setting
 from app.vehicles.mavlink.failures import RESPONSES, Failure
@@ -183,7 +183,8 @@ class GainStore:
             held = self.restore()
         except VehicleError as error:
             return str(error)
-        return "" if held == self.safe else f"it holds {written(held)} instead of {written(self.safe)}."
+        mismatch = find_mismatch(held, self.safe)
+        return mismatch and f"{mismatch}."
 
     @property
     def wanted(self) -> Gains:
