@@ -3,6 +3,7 @@
 import io
 import mmap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import BinaryIO, Final
 
@@ -63,17 +64,44 @@ def rows_of(table: Table, clock: str, *names: str) -> Iterator[tuple[float, ...]
 PAPARAZZI: Final[Mapping[str, str]] = MappingProxyType({"gui_v_kp": "kp", "gui_v_ki": "ki", "gui_v_kd": "kd"})
 """Its MAVLink parameters, and the names of these gains in the takeoff experiment."""
 
-PAPARAZZI_SETS: Final = (GAINS,)
 
-ARDUPILOT_SETS: Final = (
-    ("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D"),
-    ("PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I", "PSC_D_ACC_D"),
+@dataclass(frozen=True, slots=True)
+class LoggedGain:
+    """A gain of an experiment by its name in the log, with the `factor` from the gain to the value in the log."""
+
+    name: str
+    gain: str
+    factor: float = 1.0
+
+    def value(self, logged: float) -> float:
+        """The gain for a value in the log, to the seven digits of single precision."""
+        return logged if self.factor == 1.0 else float(f"{logged / self.factor:.7g}")
+
+
+GainSets = Sequence[Sequence[LoggedGain]]
+
+
+def _own_names(*names: str) -> Sequence[LoggedGain]:
+    return tuple(LoggedGain(name, name) for name in names)
+
+
+PAPARAZZI_SETS: Final[GainSets] = (_own_names(*GAINS),)
+
+ARDUPILOT_SETS: Final[GainSets] = (
+    _own_names("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D"),
+    (
+        LoggedGain("PSC_D_POS_P", "PSC_POSZ_P"),
+        LoggedGain("PSC_D_VEL_P", "PSC_VELZ_P"),
+        LoggedGain("PSC_D_ACC_P", "PSC_ACCZ_P", 0.1),
+        LoggedGain("PSC_D_ACC_I", "PSC_ACCZ_I", 0.1),
+        LoggedGain("PSC_D_ACC_D", "PSC_ACCZ_D", 0.1),
+    ),
 )
 """Until 4.6, and from 4.7 on."""
 
-PX4_SETS: Final = (("MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC"),)
+PX4_SETS: Final[GainSets] = (_own_names("MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC"),)
 
 
-def names_in(sets: Sequence[Sequence[str]]) -> frozenset[str]:
-    """All names in these sets."""
-    return frozenset(name for names in sets for name in names)
+def names_in(sets: GainSets) -> frozenset[str]:
+    """All names in these sets, as in the log."""
+    return frozenset(gain.name for gains in sets for gain in gains)

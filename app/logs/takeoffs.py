@@ -17,6 +17,7 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.formatting import format_gains
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
+from app.logs.base import GainSets
 
 NEAR_GROUND_M: Final = 0.15
 HIGHEST_HOP_M: Final = 0.5
@@ -65,7 +66,7 @@ class FlightLog:
     """Contents of any log, in seconds of the log's own `clock` (`vehicle` or `ground`), altitude up.
 
     `time_s` has shape (n,) and may repeat or step back. `channels`, each of shape (n,) with NaN for missing values,
-    include `altitude_m`. `gain_sets` are alternative sets of gain names; the first one whose names are all known
+    include `altitude_m`. `gain_sets` are alternative sets of gains; the first one whose names are all known
     applies. `from_ground`: measure the altitude from where the vehicle stood. `starts` (takeoff commands),
     `ends` (commands that end the flight) and `landings` (reported by the autopilot) may be empty. `in_air` are the
     intervals from lift-off to touchdown, `armed` those with the motors armed, both as reported by the autopilot and in
@@ -77,7 +78,7 @@ class FlightLog:
     time_s: Samples
     channels: Mapping[str, Samples]
     from_ground: bool
-    gain_sets: Sequence[Sequence[str]] = ()
+    gain_sets: GainSets = ()
     settings: Sequence[Setting] = ()
     starts: Sequence[LogEvent] = ()
     ends: Sequence[LogEvent] = ()
@@ -286,7 +287,8 @@ class _GainsAt:
 
     def __init__(self, log: FlightLog, at_s: float) -> None:
         known = {setting.name for setting in log.settings}
-        names = next((names for names in log.gain_sets if known.issuperset(names)), ())
+        logged = next((gains for gains in log.gain_sets if known.issuperset(gain.name for gain in gains)), ())
+        names = [gain.name for gain in logged]
         settings = sorted((each for each in log.settings if each.name in names), key=lambda each: each.time_s)
         gains: dict[str, float] = {}
         for each in settings:
@@ -295,7 +297,7 @@ class _GainsAt:
         self.learned_late = sorted(set(names) - set(gains))
         for each in settings:
             gains.setdefault(each.name, each.value)
-        self.gains: Gains = {name: gains[name] for name in names}
+        self.gains: Gains = {gain.gain: gain.value(gains[gain.name]) for gain in logged}
         self.changes = [
             LogEvent(each.time_s, f"{each.name} becoming {each.value:g}")
             for each in settings

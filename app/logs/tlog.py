@@ -8,7 +8,7 @@ import importlib
 import re
 import struct
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType, ModuleType
 from typing import BinaryIO, Final, Protocol
@@ -16,7 +16,17 @@ from typing import BinaryIO, Final, Protocol
 import numpy as np
 
 from app.core.records.trajectory import Samples
-from app.logs.base import ARDUPILOT_SETS, PAPARAZZI, PAPARAZZI_SETS, PX4_SETS, Contents, contents, names_in, refused
+from app.logs.base import (
+    ARDUPILOT_SETS,
+    PAPARAZZI,
+    PAPARAZZI_SETS,
+    PX4_SETS,
+    Contents,
+    GainSets,
+    contents,
+    names_in,
+    refused,
+)
 from app.logs.takeoffs import FlightLog, LogEvent, Setting
 
 _STAMP_BYTES: Final = 8
@@ -55,7 +65,7 @@ class _Autopilot:
 
     title: str
     dialect_module: str
-    gain_sets: Sequence[Sequence[str]]
+    gain_sets: GainSets
     parameters: Mapping[str, str]
     from_ground: bool
     keeps_whole_numbers: bool = False
@@ -67,7 +77,7 @@ class _Autopilot:
         return importlib.import_module(f"pymavlink.dialects.{self.dialect_module}")
 
 
-def _own_names(sets: Sequence[Sequence[str]]) -> Mapping[str, str]:
+def _own_names(sets: GainSets) -> Mapping[str, str]:
     return {name: name for name in names_in(sets)}
 
 

@@ -143,14 +143,15 @@ def test_without_a_database_the_command_to_make_one_is_told(tmp_path: Path) -> N
     assert "gainline serve" in result.stderr
 
 
-def test_an_ardupilot_log_imports_with_its_own_gains(settings: Settings, campaign: Json, tmp_path: Path) -> None:
+def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
+    settings: Settings, campaign: Json, tmp_path: Path
+) -> None:
     log = tmp_path / "flight.bin"
     log.write_bytes(recorded("arducopter_takeoff.bin"))
-    result = run(settings, log, "--campaign", "Garage", "--yes", "--json", "-")
-    assert result.exit_code == 0, result.stderr
-    stored = json.loads(result.stdout)
-    assert stored["read_back"]["PSC_VELZ_P"] == 5.0
-    assert "must cover 0 … 32.6 s" in stored["reason"]
+    result = run(settings, log, "--campaign", "Garage", "--yes")
+    assert result.exit_code == 1
+    assert "The log has the gains PSC_POSZ_P" in result.stderr
+    assert "this campaign tunes kp, ki, kd" in result.stderr
 
 
 COPTERS = [

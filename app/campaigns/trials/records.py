@@ -48,12 +48,19 @@ _SINGLE_PRECISION: Final = 1e-6
 def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
     """Set the trial's gains to those in the log.
 
-    A log without gains leaves them as planned. Where the sets differ and that is `confirmed`, the trial takes the gains
-    that were flown and loses the prediction for the planned ones; gains under other names are stored as read back only.
-    Raises UnconfirmedError that names both sets, GainsError when the flown gains are outside the campaign's bounds.
+    A log without gains leaves them as planned. Where the values differ and that is `confirmed`, the trial takes the
+    gains that were flown and loses the prediction for the planned ones. Raises InputError for a log with other gains
+    than those of the experiment, UnconfirmedError that names both sets, GainsError when the flown gains are outside the
+    campaign's bounds.
     """
     if not flown.gains:
         return
+    if row.gains.keys() != flown.gains.keys():
+        raise InputError(
+            f"The log has the gains {', '.join(flown.gains)}; this campaign tunes {', '.join(row.gains)}.",
+            hint="It is a log of another autopilot. Upload it to a campaign whose experiment has these gains.",
+            problems=(Problem("file", f"does not contain the gains {', '.join(row.gains)}"),),
+        )
     if _same(row.gains, flown.gains):
         row.read_back = row.read_back or dict(row.gains)
         return
@@ -61,34 +68,22 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
         raise UnconfirmedError(
             f"The log was flown with {format_gains(flown.gains)}; trial {row.number} was planned with "
             f"{format_gains(row.gains)}.",
-            hint=f"Choose the log of this trial, or confirm that {_consequence(row.gains, flown.gains)}.",
+            hint="Choose the log of this trial, or confirm that the trial takes the gains in the log.",
             problems=(
                 Problem("confirm", f"the gains in the log, {format_gains(flown.gains)}, differ from the trial's"),
             ),
         )
     row.read_back = dict(flown.gains)
-    if _alike(row.gains, flown.gains):
-        judged = check_flown_gains(session, campaign, flown.gains)
-        row.gains, row.gate, row.kind = judged.gains, judged.gate, "manual"
-        row.predicted_error = row.predicted_interval = None
-
-
-def _alike(planned: Gains, flown: Gains) -> bool:
-    """Whether both sets have the same gain names."""
-    return planned.keys() == flown.keys()
+    judged = check_flown_gains(session, campaign, flown.gains)
+    row.gains, row.gate, row.kind = judged.gains, judged.gate, "manual"
+    row.predicted_error = row.predicted_interval = None
 
 
 def _same(planned: Gains, flown: Gains) -> bool:
-    return _alike(planned, flown) and all(
+    return all(
         math.isclose(value, flown[name], rel_tol=_SINGLE_PRECISION, abs_tol=_SINGLE_PRECISION)
         for name, value in planned.items()
     )
-
-
-def _consequence(planned: Gains, flown: Gains) -> str:
-    if _alike(planned, flown):
-        return "the trial takes the gains in the log"
-    return "the flight counts for the planned gains, which are not in this log"
 
 
 CURVE_POINTS: Final = 48

@@ -69,18 +69,32 @@ def test_confirmed_gains_become_the_trial_s_and_what_was_predicted_for_others_go
     assert (flown["predicted_error"], flown["predicted_interval"]) == (None, None)
 
 
-def test_gains_under_names_of_another_autopilot_are_kept_beside_the_planned_ones(
-    client: TestClient, trial: Json
+EXPERIMENTS = {
+    "takeoff": {"paparazzi_283_13_82.tlog", "paparazzi_1624_1356_195.tlog"},
+    "takeoff-ardupilot": {"arducopter_takeoff.bin", "arducopter_steps.bin"},
+    "takeoff-px4": {"px4_takeoff.ulg"},
+}
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+@pytest.mark.parametrize("log", sorted(set().union(*EXPERIMENTS.values())))
+def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
+    client: TestClient, database: Database, experiment: str, log: str
 ) -> None:
-    log = recorded("px4_takeoff.ulg")
-    refused = client.post(path_of(trial), content=log, headers=ANY)
-    assert refused.status_code == 409
-    assert "MPC_Z_VEL_P_ACC 4.2" in refused.json()["detail"]
-    flown = client.post(f"{path_of(trial)}?confirm=true", content=log, headers=ANY).json()
-    assert flown["gains"] == TLOGS[DEFAULT]
-    assert flown["read_back"]["MPC_Z_VEL_P_ACC"] == pytest.approx(4.2)
-    assert flown["state"] == "invalid"
-    assert "must cover 0 … 32.6 s" in flown["reason"]
+    """Seen: logs of ArduCopter and PX4 in a campaign of Paparazzi, stored with the planned gains."""
+    definition = {"experiment": experiment, "strategy": "manual"}
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=definition)
+    trial = create_trial(client, campaign["id"])
+    path = f"{path_of(trial)}?confirm=true&takeoff=1"
+    answer = client.post(path, content=recorded(log), headers=ANY)
+    if log in EXPERIMENTS[experiment]:
+        assert answer.status_code == 201, answer.text
+        assert answer.json()["gains"] == answer.json()["read_back"]
+    else:
+        assert answer.status_code == 422
+        assert set(problems_of(answer)) == {"file"}
+        assert "this campaign tunes" in answer.json()["detail"]
+        assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
 
 
 def test_of_a_log_with_two_takeoffs_the_one_that_is_asked_for_is_stored(client: TestClient, trial: Json) -> None:
