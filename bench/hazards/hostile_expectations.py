@@ -33,7 +33,15 @@ _NOT_LANDED: Final = "It has not landed within 40 s"
 _NO_POSITION: Final = ("froze", "stood still", "position was lost", "Position: ", "Vehicle clock: ")
 _DOUBLED: Final = ("Two vehicles use", "System id: ")
 _MOVED: Final = "Standing still: "
-_NO_GAINS: Final = ("did not confirm", "could not be verified", "it holds", "failsafe", "Motors off: ", "Gains: ")
+_NO_GAINS: Final = (
+    "did not confirm",
+    "could not be verified",
+    "it holds",
+    "instead of",
+    "failsafe",
+    "Motors off: ",
+    "Gains: ",
+)
 _BY_HAND: Final = (
     "took over manual control",
     "may have flown",
