@@ -178,6 +178,14 @@ class Rehearsal(BaseModel):
     reason: str
 
 
+class Winner(BaseModel):
+    """The gains with the lowest mean error plus its standard error, which are repeated, confirmed and promoted. After
+    repeats these may be others than those of the flight with the lowest error."""
+
+    gains: Gains
+    trial_numbers: list[int]
+
+
 Standing = Literal["candidate", "confirmed", "not confirmed"]
 
 
@@ -200,11 +208,12 @@ class Campaign(BaseModel):
     rehearses: Annotated[int | None, Field(description="the campaign that this one rehearses")]
     best: BestTrial | None
     verdict: Annotated[Verdict | None, Field(description=VERDICT)]
+    winner: Winner | None
     standing: Annotated[
         Standing | None,
         Field(
-            description="of the best gains of a finished campaign: candidate until they and the first gains were flown "
-            "at least twice, then confirmed if they are better"
+            description="of the winner of a finished campaign: candidate until it and the first gains were flown "
+            "at least twice, then confirmed if it is better"
         ),
     ]
     trials: TrialCounts

@@ -24,8 +24,9 @@ from app.campaigns.schemas import (
     Standing,
     StopVerdict,
     TrialCounts,
+    Winner,
 )
-from app.campaigns.statistics import best_trial, standing_of
+from app.campaigns.statistics import best_trial, standing_of, standing_within_bounds_of
 from app.common.conflict_checks import allowed
 from app.common.schemas import Gate, Interval, Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
@@ -52,6 +53,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     trials = history.trials_of(session, row.id)
     flight = history.flight_under_way(session, row.id)
     now = standing_of(row, trials)
+    repeatable = standing_within_bounds_of(row, trials)
     rehearsal = rehearsal_of(session, row)
     return Campaign(
         id=row.id,
@@ -68,7 +70,8 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         rehearses=repository.rehearsed_id(session, row.id),
         best=best_trial(trials, now),
         verdict=_verdict(now),
-        standing=_standing(row, now),
+        winner=_winner(repeatable),
+        standing=_standing(row, repeatable),
         trials=_counts(trials),
         flying=_flying(flight, trials),
         next_action=_next_action(row, trials, rehearsal),
@@ -189,6 +192,10 @@ def _changes(now: Mapping[str, float], following: Mapping[str, float]) -> dict[s
 
 def _verdict(now: ComparisonState | None) -> Verdict | None:
     return None if now is None or now.comparison is None else now.comparison.verdict
+
+
+def _winner(now: ComparisonState | None) -> Winner | None:
+    return None if now is None else Winner(gains=dict(now.winner.gains), trial_numbers=list(now.winner.numbers))
 
 
 def _standing(row: CampaignRow, now: ComparisonState | None) -> Standing | None:

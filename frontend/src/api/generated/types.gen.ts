@@ -230,10 +230,11 @@ export type Campaign = {
      * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
      */
     verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
+    winner: Winner | null;
     /**
      * Standing
      *
-     * of the best gains of a finished campaign: candidate until they and the first gains were flown at least twice, then confirmed if they are better
+     * of the winner of a finished campaign: candidate until it and the first gains were flown at least twice, then confirmed if it is better
      */
     standing: 'candidate' | 'confirmed' | 'not confirmed' | null;
     trials: TrialCounts;
@@ -3809,6 +3810,25 @@ export type VehicleTrouble = {
      * Trouble
      */
     trouble: string;
+};
+
+/**
+ * Winner
+ *
+ * The gains with the lowest mean error plus its standard error, which are repeated, confirmed and promoted. After
+ * repeats these may be others than those of the flight with the lowest error.
+ */
+export type Winner = {
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Trial Numbers
+     */
+    trial_numbers: Array<number>;
 };
 
 /**

@@ -4,7 +4,7 @@ import { useArchive, useReopen } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { against, percentChange, withUnit } from "../../ui/format";
-import { GainList } from "../../ui/gains";
+import { GainList, gainsInBrackets, sameHeld } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
@@ -25,6 +25,13 @@ const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meani
   confirmed: { word: "Confirmed", meaning: "better than the first gains in repeat flights." },
   "not confirmed": { word: "Not confirmed", meaning: "repeat flights do not show that they are better." },
 };
+
+/** The gains that were repeated, if they are others than those of the best flight. */
+function otherWinner({ winner }: Campaign, best: Trial): string {
+  if (winner === null || sameHeld(winner.gains, best.gains)) return "";
+  const flights = winner.trial_numbers;
+  return `${gainsInBrackets(winner.gains)} of flight${flights.length > 1 ? "s" : ""} ${flights.join(", ")}, `;
+}
 
 interface Props {
   campaign: Campaign;
@@ -64,7 +71,8 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             )}
             {campaign.standing !== null && (
               <p>
-                <strong>{STANDINGS[campaign.standing].word}</strong>: {STANDINGS[campaign.standing].meaning}
+                <strong>{STANDINGS[campaign.standing].word}</strong>: {otherWinner(campaign, best)}
+                {STANDINGS[campaign.standing].meaning}
               </p>
             )}
           </Aside>

@@ -17,10 +17,10 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
   const [statement, setStatement] = useState("");
   const promote = usePromote(campaign);
   const vehicle = useVehicle(campaign.vehicle.registered ? campaign.vehicle.id : null);
-  if (vehicle === null || campaign.best === null) return null;
+  if (vehicle === null || campaign.winner === null) return null;
   const { possible, why } = promotable(campaign, vehicle);
   if (!possible) {
-    const isDone = sameHeld(vehicle.safe_gains, campaign.best.gains);
+    const isDone = sameHeld(vehicle.safe_gains, campaign.winner.gains);
     return (
       <Note fz="body">
         {why} {isDone && heldGainsNotice(vehicle)}
@@ -51,7 +51,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
       }}
     >
       <Note fz="body">
-        After every flight and abort, {vehicle.name} then gets {gainsInBrackets(campaign.best.gains)} instead of{" "}
+        After every flight and abort, {vehicle.name} then gets {gainsInBrackets(campaign.winner.gains)} instead of{" "}
         {gainsInBrackets(vehicle.safe_gains)}.
       </Note>
       <TextInput

@@ -127,10 +127,10 @@ export function standingWithout(trial: Trial, trials: readonly Trial[]): string 
 
 /** Whether the best gains may become the vehicle's safe gains; if not, the reason and the action. */
 export function promotable(
-  { best, verdict }: Pick<Campaign, "best" | "verdict">,
+  { winner, verdict }: Pick<Campaign, "winner" | "verdict">,
   { name, safe_gains: safe }: Pick<Vehicle, "name" | "safe_gains">,
 ): { possible: boolean; why: string } {
-  if (best !== null && sameHeld(safe, best.gains))
+  if (winner !== null && sameHeld(safe, winner.gains))
     return { possible: false, why: `The best gains are the safe gains of ${name}.` };
   if (verdict === "better") return { possible: true, why: "" };
   const because = verdict === null ? "no gains are better than the first yet" : `their verdict is “${verdict}”`;
