@@ -144,7 +144,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
         problem=Trouble(
             title="There is no proposal for the current flights.",
             detail="Its computation was cancelled." if cancelled else f"The campaign is {row.state}.",
-            hint="Compute it again." if row.state in CAMPAIGN_ACTIONS["propose"] else "Clone the campaign to fly more.",
+            hint="Compute it again." if row.state in CAMPAIGN_ACTIONS["propose"] else "Reopen or clone the campaign to fly more.",
         ),
     )
 

@@ -150,7 +150,7 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
     if sum(row.state in spent_by for row in trials) >= budget:
         raise ConflictError(
             f"All {budget} flights in the budget of campaign {campaign.id} are flown or planned.",
-            hint="Cancel a planned trial, or clone the campaign to fly more.",
+            hint="Cancel a planned trial, or reopen the campaign once it is finished.",
         )
     if (waiting := history.find_unreviewed(trials)) is not None:
         raise ConflictError(
