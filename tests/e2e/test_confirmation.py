@@ -7,6 +7,7 @@ from playwright.sync_api import Locator, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.states import States
 from tests.e2e.test_verdict import open_flight
 
 FINISHED = re.compile("^(Converged|Flight budget used)")
@@ -59,3 +60,24 @@ def test_a_noisy_twin_is_flown_to_a_candidate_confirmed_reviewed_and_confirmed_a
     expect(page.get_by_role("heading", name=f"Next flight: {len(trials) + 1}")).to_be_visible(timeout=30_000)
     fly_on(dashboard, campaign_id, recommended)
     expect(page.get_by_text(CONFIRMED)).to_be_visible()
+
+
+def test_the_green_button_flies_the_gains_that_stand_above_it(dashboard: Dashboard, states: States) -> None:
+    """Seen: “Repeat the best” flew 3968/922/139 while the table under it showed the step, 3911/1073/269."""
+    campaign_id = states.campaign(strategy="calibrated", flights=2)
+    proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
+    assert proposal["advice"]["kind"] == "repeat"
+    assert proposal["advice"]["gains"] != proposal["gains"]
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("Max")
+    first, second = dashboard.panel("Next flight: 3").get_by_role("table", name="Gains now and proposed").all()
+    assert [gains_in(first), gains_in(second)] == [proposal["advice"]["gains"], proposal["gains"]]
+    dashboard.button("Repeat the best").click()
+    dashboard.wait_for_flight(3)
+    assert dashboard.trials(campaign_id)[2]["gains"] == proposal["advice"]["gains"]
+
+
+def gains_in(table: Locator) -> dict[str, float]:
+    """The next gains in a table, by name."""
+    rows = table.locator("tbody tr").all()
+    return {row.locator("th").inner_text().split()[0]: float(row.locator("td").nth(1).inner_text()) for row in rows}

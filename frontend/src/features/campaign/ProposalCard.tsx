@@ -14,7 +14,7 @@ import { ManualGains } from "./ManualGains";
 import classes from "./NextFlight.module.css";
 import { speedOf } from "./nextStep";
 import { GainTable, PredictedError, ProposalExplanation, Recommendation } from "./ProposalDetails";
-import { advised, type Choice, choicesFor, expectationOf, KINDS, type Variant } from "./proposal";
+import { advised, type Choice, changesTo, choicesFor, expectationOf, KINDS, type Variant } from "./proposal";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 
 interface Props {
@@ -61,14 +61,18 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
       <Stack gap={14}>
         {trials.length > 0 && <Recommendation advice={advice} />}
         {advice.variant !== null && (
-          <div>
-            <FlyButton
-              label={advice.variant === "repeat" ? "Repeat the best" : "Fly the baseline"}
-              loading={create.isPending}
-              onClick={() => advice.variant !== null && flyVariant(advice.variant)}
-            />
-            <Expectation campaignId={campaign.id} variant={advice.variant} />
-          </div>
+          <>
+            <GainTable changes={changesTo(advice.gains, proposal)} unit={units.gains} titles={titles} />
+            <div>
+              <FlyButton
+                label={advice.variant === "repeat" ? "Repeat the best" : "Fly the baseline"}
+                loading={create.isPending}
+                onClick={() => advice.variant !== null && flyVariant(advice.variant)}
+              />
+              <Expectation campaignId={campaign.id} variant={advice.variant} />
+            </div>
+            <h3 className={classes["instead"]}>Or the proposed step</h3>
+          </>
         )}
         <GainTable changes={proposal.changes} unit={units.gains} titles={titles} />
         <PredictedError proposal={proposal} best={campaign.best?.error ?? null} unit={units.error} />

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { Campaign, CampaignStatistics, Proposal, Trial } from "../../api/types";
-import { advised, choicesFor, expectationOf, sameGains } from "./proposal";
+import { advised, changesTo, choicesFor, expectationOf, sameGains } from "./proposal";
 
 const first = { kp: 283, ki: 13, kd: 82 };
 const better = { kp: 900, ki: 200, kd: 200 };
@@ -49,17 +49,17 @@ describe("what a choice should score", () => {
     sigma: 0.0117,
     error_unit: "m",
     groups: [
-      { trial_numbers: [1], mean: 0.5283, is_best: false, is_baseline: true },
-      { trial_numbers: [2, 3], mean: 0.12845, is_best: true, is_baseline: false },
+      { gains: first, trial_numbers: [1], mean: 0.5283, is_best: false, is_baseline: true },
+      { gains: better, trial_numbers: [2, 3], mean: 0.12845, is_best: true, is_baseline: false },
     ],
   } as unknown as CampaignStatistics;
 
   test("is what the flights of the same gains scored, with the scatter of one flight", () => {
     expect(expectationOf("repeat", statistics)).toBe(
-      "Expected: 0.128 ± 0.012 m, from flights 2, 3 (± scatter of one flight).",
+      "[900 200 200], expected 0.128 ± 0.012 m, from flights 2, 3 (± scatter of one flight).",
     );
     expect(expectationOf("baseline", statistics)).toBe(
-      "Expected: 0.528 ± 0.012 m, from flight 1 (± scatter of one flight).",
+      "[283 13 82], expected 0.528 ± 0.012 m, from flight 1 (± scatter of one flight).",
     );
   });
 
@@ -74,7 +74,7 @@ describe("what a choice should score", () => {
 
 describe("what is recommended", () => {
   test("the proposal itself, where nothing else is advised", () => {
-    expect(advised(proposal())).toEqual({ kind: "step", why: "", variant: null });
+    expect(advised(proposal())).toMatchObject({ kind: "step", why: "", variant: null });
   });
 
   test("another flight of the best, where the step promises less than the noise", () => {
@@ -82,6 +82,7 @@ describe("what is recommended", () => {
     expect(advised(proposal({ advice }))).toEqual({
       kind: "repeat",
       why: "Promises less than noise.",
+      gains: better,
       variant: "repeat",
     });
   });
@@ -92,7 +93,15 @@ describe("what is recommended", () => {
   });
 
   test("an end, with the stop rule's own word", () => {
-    expect(advised(proposal({ recommended: "stop" }))).toEqual({ kind: "stop", why: "Enough.", variant: null });
+    expect(advised(proposal({ recommended: "stop" }))).toMatchObject({ kind: "stop", why: "Enough.", variant: null });
+  });
+});
+
+test("a table of changes leads to the gains of the flight that it stands beside", () => {
+  const changes = { kp: { now: 283, next: 400, delta: 117 }, kd: { now: 82, next: 90, delta: 8 } };
+  expect(changesTo({ kp: 300, kd: 82 }, { ...proposal(), changes })).toEqual({
+    kp: { now: 283, next: 300, delta: 17 },
+    kd: { now: 82, next: 82, delta: 0 },
   });
 });
 

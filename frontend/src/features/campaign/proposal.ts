@@ -1,6 +1,7 @@
 /** Alternatives to the proposed gains, and the recommended one. */
 
 import type { Campaign, CampaignStatistics, Proposal, Trial } from "../../api/types";
+import { gainsInBrackets } from "../../ui/gains";
 import { plusMinus } from "../../ui/uncertainty";
 import { bestOf } from "./nextStep";
 
@@ -34,6 +35,7 @@ export function sameGains(one: GainSet, other: GainSet): boolean {
 export interface Advised {
   kind: Recommended;
   why: string;
+  gains: GainSet;
   /** The recommended variant; null if the proposal itself or no flight is recommended. */
   variant: Variant | null;
 }
@@ -45,7 +47,17 @@ export function advised(proposal: Proposal): Advised {
   const why = advice?.why ?? (kind === "stop" ? proposal.stop_verdict.sentence : "");
   const differs = advice !== null && advice !== undefined && !sameGains(advice.gains, proposal.gains);
   const variant = differs && (kind === "repeat" || kind === "baseline") ? kind : null;
-  return { kind, why, variant };
+  return { kind, why, gains: advice?.gains ?? proposal.gains, variant };
+}
+
+/** Each gain now and as in this set, with its change. */
+export function changesTo(gains: GainSet, { changes }: Proposal): Proposal["changes"] {
+  return Object.fromEntries(
+    Object.entries(changes).map(([name, { now, next: proposed }]) => {
+      const next = gains[name] ?? proposed;
+      return [name, { now, next, delta: next - now }];
+    }),
+  );
 }
 
 export interface Choice {
@@ -89,5 +101,5 @@ export function expectationOf(variant: Variant, statistics: CampaignStatistics |
   const flights = `flight${group.trial_numbers.length === 1 ? "" : "s"} ${group.trial_numbers.join(", ")}`;
   const error = plusMinus(group.mean, statistics.sigma, statistics.error_unit);
   const meaning = statistics.sigma === null ? "scatter not known yet" : "± scatter of one flight";
-  return `Expected: ${error}, from ${flights} (${meaning}).`;
+  return `${gainsInBrackets(group.gains)}, expected ${error}, from ${flights} (${meaning}).`;
 }
