@@ -21,7 +21,7 @@ from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
 
 FORMAT: Final = "gainline-campaign"
-VERSION: Final = 2
+VERSION: Final = 3
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 

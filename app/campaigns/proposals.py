@@ -69,7 +69,7 @@ def _donor(session: Session, definition: Definition) -> Flight | None:
 
 def store_proposal(session: Session, campaign_id: int, computed: ProposalComputation) -> ProposalRow:
     """Store a proposal and update the campaign: a draft becomes ready; a campaign is finished when its stop rule says
-    so.
+    so, and reopened when the rule that finished it is no longer met.
 
     A proposal from an outdated history is stored as stale and does not update the campaign. Raises NotFoundError when
     the campaign has been deleted.
@@ -104,6 +104,12 @@ def _apply_to_campaign(session: Session, campaign: CampaignRow, verdict: StopVer
         set_campaign_state(campaign, CampaignState.READY)
     elif campaign.state == CampaignState.DECIDING and verdict.reason is not None:
         end_campaign(session, campaign, _OUTCOMES[verdict.reason], verdict.why)
+    elif campaign.state == CampaignState.FINISHED and campaign.outcome != Outcome.STOPPED:
+        # Which flights count has changed; what an operator has stopped stays stopped.
+        if verdict.reason is None:
+            reopen(campaign)
+        else:
+            campaign.outcome, campaign.stop_reason = _OUTCOMES[verdict.reason], verdict.why
 
 
 def request_proposal(session: Session, campaign: CampaignRow) -> None:
@@ -205,7 +211,7 @@ def end_campaign(session: Session, campaign: CampaignRow, outcome: Outcome, reas
 
 
 def reopen(campaign: CampaignRow) -> None:
-    """Continue a finished campaign. Its stop rule ends it again with the next proposal, where it is still met."""
+    """Continue a finished campaign."""
     set_campaign_state(campaign, CampaignState.DECIDING)
     campaign.outcome, campaign.stop_reason = None, ""
 

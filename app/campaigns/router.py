@@ -16,7 +16,6 @@ from app.campaigns.schemas import (
     NewCampaign,
     NextFlight,
     Promotion,
-    Reopening,
     Sort,
 )
 from app.campaigns.statistics import campaign_statistics
@@ -94,15 +93,6 @@ def finish_campaign(
     """Finish a campaign between flights, on the operator's decision."""
     reason = (body or Finish()).reason
     return act(Campaign, lambda session: service.finish_campaign(session, campaign_id, reason, asking))
-
-
-@router.post("/{campaign_id}/reopen")
-def reopen_campaign(
-    act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Reopening | None = None
-) -> Campaign:
-    """Reopen a finished campaign for more flights."""
-    flights = (body or Reopening()).flights
-    return act(Campaign, lambda session: service.reopen_campaign(session, campaign_id, flights, asking))
 
 
 @router.post("/{campaign_id}/archive")

@@ -122,12 +122,6 @@ class Finish(Request):
     reason: Text = "stopped by the operator"
 
 
-class Reopening(Request):
-    """For how many more flights a finished campaign is reopened; its stop rule applies again after them."""
-
-    flights: Annotated[int, Field(strict=True, ge=1, le=50)] = 3
-
-
 class Promotion(Request):
     """Who makes the best gains the vehicle's safe gains, and why; `version` is the vehicle's."""
 
@@ -184,6 +178,7 @@ class Winner(BaseModel):
 
     gains: Gains
     trial_numbers: list[int]
+    verdict: Annotated[Verdict | None, Field(description=VERDICT)]
 
 
 Standing = Literal["candidate", "confirmed", "not confirmed"]
@@ -201,6 +196,9 @@ class Campaign(BaseModel):
     definition: Definition
     definition_digest: Annotated[
         str | None, Field(description="SHA-256 of definition and vehicle, once they are frozen")
+    ]
+    open_until_flight: Annotated[
+        int, Field(description="number of flights up to which no stop rule ends it, because it was reopened")
     ]
     vehicle: CampaignVehicle
     parent_id: int | None

@@ -215,9 +215,15 @@ def finish_campaign(session: Session, campaign_id: int, reason: str, context: Re
 
 
 def reopen_campaign(session: Session, campaign_id: int, flights: int, context: RequestContext) -> Campaign:
-    """Reopen a finished campaign for this many more flights. Raises ConflictError unless it is finished."""
+    """Reopen a finished campaign for this many more flights. Raises ConflictError unless it is finished, and for a
+    rehearsal, because its result lets another campaign fly."""
     row = _get_permitted(session, campaign_id, context)
     check_action(CAMPAIGN_ACTIONS, "reopen", row.state, f"Campaign {row.id}")
+    if (rehearsed := repository.rehearsed_id(session, row.id)) is not None:
+        raise ConflictError(
+            f"Campaign {row.id} is the rehearsal of campaign {rehearsed}, which may fly because of its result.",
+            hint="Clone it to fly more.",
+        )
     reopen(row)
     row.open_until_flight = len(history.in_history(history.trials_of(session, row.id))) + flights
     history_changed(session, row)

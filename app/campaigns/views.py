@@ -48,6 +48,12 @@ _NEXT_ACTIONS: Final[Mapping[CampaignState, str]] = {
 }
 
 
+_HINTS: Final[Mapping[CampaignState, str]] = {
+    CampaignState.FINISHED: "Reopen the campaign to fly more.",
+    CampaignState.ARCHIVED: "Clone the campaign to fly more.",
+}
+
+
 def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     session.flush()
     trials = history.trials_of(session, row.id)
@@ -64,6 +70,7 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         stop_reason=row.stop_reason,
         definition=Definition.model_validate(row.definition),
         definition_digest=row.definition_digest,
+        open_until_flight=row.open_until_flight,
         vehicle=fleet.campaign_vehicle(row),
         parent_id=row.parent_id,
         rehearsal=rehearsal,
@@ -144,7 +151,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
         problem=Trouble(
             title="There is no proposal for the current flights.",
             detail="Its computation was cancelled." if cancelled else f"The campaign is {row.state}.",
-            hint="Compute it again." if row.state in CAMPAIGN_ACTIONS["propose"] else "Reopen or clone the campaign to fly more.",
+            hint=_HINTS.get(row.state, "Compute it again."),
         ),
     )
 
@@ -195,7 +202,11 @@ def _verdict(now: ComparisonState | None) -> Verdict | None:
 
 
 def _winner(now: ComparisonState | None) -> Winner | None:
-    return None if now is None else Winner(gains=dict(now.winner.gains), trial_numbers=list(now.winner.numbers))
+    return (
+        None
+        if now is None
+        else Winner(gains=dict(now.winner.gains), trial_numbers=list(now.winner.numbers), verdict=_verdict(now))
+    )
 
 
 def _standing(row: CampaignRow, now: ComparisonState | None) -> Standing | None:
@@ -243,6 +254,8 @@ def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> li
     impossible = {"plan", "define", "delete", "finish"} if flight is not None else set()
     if repository.has_claimed_flight(session, row.id):
         impossible.add("delete")
+    if repository.rehearsed_id(session, row.id) is not None:
+        impossible.add("reopen")
     return [action for action in allowed(CAMPAIGN_ACTIONS, row.state) if action not in impossible]
 
 

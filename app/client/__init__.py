@@ -29,13 +29,14 @@ from typing import Final, Literal, Self, TypeVar
 import httpx2
 from pydantic import BaseModel, ValidationError
 
-from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal, Reopening
+from app.campaigns.schemas import Campaign, CampaignSummary, Definition, NewCampaign, NextFlight, Proposal
 from app.campaigns.trials.schemas import (
     AbortAnswer,
     AbortJudgement,
     Classification,
     FlightOrder,
     NewTrial,
+    Reopening,
     Trajectory,
     Trial,
 )

@@ -15,7 +15,7 @@ class CampaignState(StrEnum):
     draft: its first gains are not computed yet. ready: they are, and nothing has flown; the definition may still
     change. flying: a trial is in the air. deciding: the next gains are being computed, or a review is due. finished:
     converged, out of flights, or stopped by the operator, see `Outcome`; it is reopened by the operator, or, unless
-    the operator stopped it, when the class of one of its flights changes.
+    the operator stopped it, when its stop rule is no longer met by the flights that count.
     """
 
     DRAFT = "draft"

@@ -191,7 +191,7 @@ def record_lift_off(session: Session, flight_id: int) -> None:
         raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
     if mismatch := find_mismatch(trial.read_back or {}, trial.gains):
         raise ConflictError(
-            f"Trial {trial.number} must not fly: of the vehicle's gains {mismatch}.",
+            f"Trial {trial.number} must not fly: the vehicle does not hold its gains: {mismatch}.",
             hint="Stage it again. If this happens again, check the vehicle's link.",
         )
     set_trial_state(trial, TrialState.FLYING, reason="")

@@ -93,7 +93,8 @@ class Takeoff:
     """One takeoff.
 
     `trajectory` is its record, with time counted from its beginning; `gains` are those used then, empty if not in the
-    log; `notes` explain how both were read. `start_s` is in seconds since the log's first sample.
+    log; `gain_names` are those of its autopilot, empty if the format has none; `notes` explain how both were read.
+    `start_s` is in seconds since the log's first sample.
     """
 
     number: int
@@ -101,6 +102,7 @@ class Takeoff:
     begins_with: str
     trajectory: Trajectory
     gains: Gains
+    gain_names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -332,6 +334,7 @@ class _Record:
                 clock=self.log.clock,
             ),
             gains=self.held.gains,
+            gain_names=tuple(gain.gain for gain in next(iter(self.log.gain_sets), ())),
             notes=notes,
         )
 

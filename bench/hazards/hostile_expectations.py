@@ -44,7 +44,7 @@ _NO_GAINS: Final = (
 )
 _BY_HAND: Final = (
     "took over manual control",
-    "may have flown",
+    "may have been interrupted",
     "entered mode",
     "did not arm",
     "did not lift off",

@@ -48,7 +48,7 @@ SEEN_ALIKE = [
     ("px4", "an hour ahead", State.RECORD, "completed", ""),
     ("ardupilot", "deaf", State.RECORD, "invalid", "The vehicle began to land by itself"),
     ("px4", "mocap nan", State.RECORD, "invalid", "The second source of altitude did not track it"),
-    ("px4", "pilot for 1 s", State.RECORD, "invalid", "A pilot may have flown the vehicle"),
+    ("px4", "pilot for 1 s", State.RECORD, "invalid", "The flight may have been interrupted"),
     ("ardupilot", "twin 3600 s older", State.RECORD, "invalid", "Two vehicles use the same system id"),
 ]
 """Further ones, for the complete ring."""

@@ -163,6 +163,23 @@ def test_a_campaign_is_reopened_for_one_to_fifty_flights(
     assert (answer.status_code, answer.json()["problems"][0]["field"]) == (status, "flights")
 
 
+def test_a_campaign_is_reopened_with_planned_flights_or_not_at_all(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 1}})
+    path = f"/api/campaigns/{campaign['id']}"
+    flown = create_flown_trial(client, database, campaign["id"])
+    too_many = client.post(f"{path}/reopen", json={"flights": 1, "plan": ["repeat", "baseline"]})
+    assert too_many.status_code == 422
+    refused = client.post(f"{path}/reopen", json={"plan": ["repeat", "smaller step"]})
+    assert refused.status_code == 409
+    assert (get(client, path)["state"], get(client, path)["open_until_flight"]) == ("finished", 0)
+    assert len(get(client, f"{path}/trials")["items"]) == 1
+    reopened = client.post(f"{path}/reopen", json={"plan": ["repeat", "baseline", "repeat"]}).json()
+    assert (reopened["state"], reopened["open_until_flight"]) == ("deciding", 4)
+    planned = get(client, f"{path}/trials")["items"][1:]
+    assert [trial["kind"] for trial in planned] == ["repeat", "baseline", "repeat"]
+    assert all(trial["gains"] == flown["gains"] for trial in planned)
+
+
 def test_a_campaign_that_is_not_finished_is_not_reopened(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     answer = client.post(f"/api/campaigns/{campaign['id']}/reopen")
@@ -191,7 +208,7 @@ def test_a_finished_campaign_without_a_proposal_gives_the_reason(client: TestCli
     client.post(f"/api/jobs/{job['id']}/cancel")
     problem = get(client, f"{path}/proposal")["problem"]
     assert problem["detail"] == "Its computation was cancelled."
-    assert "clone" in problem["hint"].lower()
+    assert "reopen" in problem["hint"].lower()
 
 
 def test_gains_of_ones_own_are_judged_without_searching_the_model_again(

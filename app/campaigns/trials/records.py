@@ -53,14 +53,14 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
     than those of the experiment, UnconfirmedError that names both sets, GainsError when the flown gains are outside the
     campaign's bounds.
     """
-    if not flown.gains:
-        return
-    if row.gains.keys() != flown.gains.keys():
+    if flown.gain_names and row.gains.keys() != set(flown.gain_names):
         raise InputError(
-            f"The log has the gains {', '.join(flown.gains)}; this campaign tunes {', '.join(row.gains)}.",
+            f"The log has the gains {', '.join(flown.gain_names)}; this campaign tunes {', '.join(row.gains)}.",
             hint="It is a log of another autopilot. Upload it to a campaign whose experiment has these gains.",
             problems=(Problem("file", f"does not contain the gains {', '.join(row.gains)}"),),
         )
+    if not flown.gains:
+        return
     if _same(row.gains, flown.gains):
         row.read_back = row.read_back or dict(row.gains)
         return

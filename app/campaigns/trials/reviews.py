@@ -11,15 +11,7 @@ from app.campaigns.trials.schemas import AbortJudgement, Classification, Trial
 from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action, check_transition, check_version
 from app.common.errors import ConflictError, InputError, Problem
-from app.common.states import (
-    CAMPAIGN_ACTIONS,
-    HISTORY_TRIAL_STATES,
-    TRIAL_ACTIONS,
-    TRIAL_TRANSITIONS,
-    CampaignState,
-    Outcome,
-    TrialState,
-)
+from app.common.states import CAMPAIGN_ACTIONS, TRIAL_ACTIONS, TRIAL_TRANSITIONS, TrialState
 from app.core.experiments import get_experiment
 from app.db.models import CampaignRow, TrialRow
 from app.fleet.control import require_may
@@ -28,8 +20,8 @@ from app.fleet.control import require_may
 def classify_trial(
     session: Session, trial_id: int, classification: Classification, context: RequestContext = LOCAL_CLI
 ) -> Trial:
-    """Classify a flight by a person's decision; the next gains are computed again from what counts now, and a campaign
-    that its stop rule has finished is reopened if that changes.
+    """Classify a flight by a person's decision. The next gains are computed again from what counts now; a campaign that
+    its stop rule has finished is reopened if the rule is no longer met.
 
     Raises ConflictError when the transition is not in the table or another client changed the trial first, InputError
     when a flight without a usable record is to count, NotAllowedError when the client may not command a real vehicle.
@@ -47,11 +39,10 @@ def classify_trial(
     check_action(TRIAL_ACTIONS, "classify", row.state, f"Trial {row.number}")
     check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Trial {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
-    changes_history = not HISTORY_TRIAL_STATES.isdisjoint({row.state, outcome})
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
     set_trial_state(row, outcome, reason=classification.reason)
     row.version += 1
-    _flights_changed(session, campaign, reopens=changes_history)
+    proposals.history_changed(session, campaign)
     return trial_view(session, campaign, row)
 
 
@@ -78,15 +69,8 @@ def judge_abort(
         )
     row.abort_cause = judgement.cause
     row.version += 1
-    _flights_changed(session, campaign, reopens=True)
-    return trial_view(session, campaign, row)
-
-
-def _flights_changed(session: Session, campaign: CampaignRow, *, reopens: bool) -> None:
-    """Have the next gains computed; a campaign that its stop rule has finished is reopened, and judged again then."""
-    if reopens and campaign.state == CampaignState.FINISHED and campaign.outcome != Outcome.STOPPED:
-        proposals.reopen(campaign)
     proposals.history_changed(session, campaign)
+    return trial_view(session, campaign, row)
 
 
 def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:

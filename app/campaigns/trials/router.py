@@ -5,8 +5,17 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
 
+from app.campaigns.schemas import Campaign
 from app.campaigns.trials import photos, records, reviews, service
-from app.campaigns.trials.schemas import AbortJudgement, Classification, Trajectory, Trial, TrialEdit, TrialPhoto
+from app.campaigns.trials.schemas import (
+    AbortJudgement,
+    Classification,
+    Reopening,
+    Trajectory,
+    Trial,
+    TrialEdit,
+    TrialPhoto,
+)
 from app.common.schemas import Page
 from app.web.dependencies import (
     FILE_BODY,
@@ -30,6 +39,14 @@ router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_on
 def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[Trial]:
     """The trials of a campaign, in the order of their numbers."""
     return service.list_trials(session, campaign_id, limit=limit, cursor=cursor)
+
+
+@router.post("/campaigns/{campaign_id}/reopen")
+def reopen_campaign(
+    act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Reopening | None = None
+) -> Campaign:
+    """Reopen a finished campaign for more flights."""
+    return act(Campaign, lambda session: service.reopen_campaign(session, campaign_id, body or Reopening(), asking))
 
 
 @router.get("/trials/{trial_id}")

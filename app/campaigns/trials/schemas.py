@@ -1,9 +1,9 @@
 """API schemas of trials and trajectories."""
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 from app.common.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
 from app.common.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
@@ -51,6 +51,20 @@ class TrialPhoto(BaseModel):
     trial_id: int
     media_type: str
     added_at: datetime
+
+
+class Reopening(Request):
+    """For how many more flights a finished campaign is reopened; its stop rule applies again after them. `plan` are
+    those that are planned at once, in this order."""
+
+    flights: Annotated[int, Field(strict=True, ge=1, le=50)] = 3
+    plan: Annotated[list[Variant], Field(max_length=50)] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if len(self.plan) > self.flights:
+            raise ValueError("plan has more flights than the campaign is reopened for")
+        return self
 
 
 class Classification(Request):

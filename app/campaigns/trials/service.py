@@ -16,8 +16,9 @@ from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.history import set_flight_state, set_trial_state
+from app.campaigns.schemas import Campaign
 from app.campaigns.statistics import standing_within_bounds_of
-from app.campaigns.trials.schemas import NewTrial, Trial, TrialEdit, Variant
+from app.campaigns.trials.schemas import NewTrial, Reopening, Trial, TrialEdit, Variant
 from app.campaigns.trials.views import trial_view, trial_views
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, GainlineError, InputError, Problem
@@ -203,6 +204,14 @@ def create_trial(session: Session, campaign_id: int, new: NewTrial, context: Req
     session.add(row)
     session.flush()
     return trial_view(session, campaign, row)
+
+
+def reopen_campaign(session: Session, campaign_id: int, asked: Reopening, context: RequestContext) -> Campaign:
+    """Reopen a finished campaign, and plan trials. Raises what `create_trial` and `campaigns.reopen_campaign` raise."""
+    campaigns.reopen_campaign(session, campaign_id, asked.flights, context)
+    for variant in asked.plan:
+        create_trial(session, campaign_id, NewTrial(variant=variant), context)
+    return campaigns.get_campaign(session, campaign_id)
 
 
 def warm_gate_cache_for_new(session: Session, campaign_id: int, new: NewTrial) -> None:

@@ -41,7 +41,7 @@ def evaluate_stop_rule(
 
     Flights that repeat earlier gains count towards the budget only: they are not expected to improve. `battery_v` is
     the voltage, V, at which the last flight ended, whether or not that flight counts. Up to `open_until_flight` flights
-    no rule ends the campaign, because it was reopened for them.
+    no rule ends the campaign, because it was reopened for them; a low battery is still reported.
     """
     verdict = decide_stop(
         definition.stop,
@@ -53,11 +53,13 @@ def evaluate_stop_rule(
     if not verdict.stop or len(flights) >= open_until_flight:
         return verdict
     left = count(open_until_flight - len(flights), "more flight")
-    return replace(verdict, stop=False, reason=None, why=f"Reopened for {left}.")
+    warning = f" {verdict.why}" if verdict.reason == "battery low" else ""
+    return replace(verdict, stop=False, reason=None, why=f"Reopened for {left}.{warning}")
 
 
 def _is_repeat(flights: Sequence[Flight], place: int) -> bool:
-    return any(earlier.gains == flights[place].gains for earlier in flights[:place])
+    """Whether its gains have been scored before."""
+    return any(earlier.error is not None and earlier.gains == flights[place].gains for earlier in flights[:place])
 
 
 def landing_battery_v(record: Trajectory) -> float | None:
@@ -88,7 +90,7 @@ def decide_stop(
     None stands for a flight without an error (aborted) or with gains flown before: it counts towards the budget, but
     not as an improvement or a failure. `battery_v` is the voltage at which the last flight ended.
 
-    `paper` is the paper's rule, literally: stop when the error fails twice in a row to improve by more than 5 % on the
+    `paper` is the paper's rule: stop when the error fails twice in a row to improve by more than 5 % on the
     best so far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error is
     neither an improvement on anything nor a failure. `noise` never stops on errors: the proposals schedule the flights
     that decide, and kind `none` ends the campaign, with `because` (its explanation) as the reason. `budget` counts

@@ -132,7 +132,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "never came within 1 m of the set point",
             "note",
             "invalid",
-            "A pilot may have flown the vehicle briefly.",
+            "The flight may have been interrupted.",
         ),
         Failure.OWN_LANDING: Response(
             "a landing that was not commanded: its own failsafe, or an exception of its flight plan",

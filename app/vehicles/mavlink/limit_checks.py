@@ -88,11 +88,15 @@ def find_interrupted_climb(watch: TrialObservation, limits: Limits) -> Finding |
 
 
 def find_incomplete_climb(watch: TrialObservation, limits: Limits) -> Finding | None:
-    """Find at the end of a record that the vehicle has never been near its set point: a change of mode that no
-    heartbeat reported may have ended its climb."""
+    """Find at the end of a record that the vehicle has never been near its set point. Its gains may have kept it low,
+    or a change of mode that no heartbeat reported."""
     if watch.highest_m >= limits.set_point_m - _CLIMBED_WITHIN_M:
         return None
-    return Finding(failure=Failure.INTERRUPTED, why=f"It did not come within {_CLIMBED_WITHIN_M:g} m of its set point.")
+    why = (
+        f"It did not come within {_CLIMBED_WITHIN_M:g} m of its set point, because of its gains or of a change of mode "
+        "that no heartbeat reported."
+    )
+    return Finding(failure=Failure.INTERRUPTED, why=why)
 
 
 def _named(mode: str, limits: Limits) -> str:

@@ -51,9 +51,10 @@ GONE_AFTER_S: Final = 1.5
 DUPLICATE_TIMEOUT_S: Final = 3.0
 """Time for which a message of another peer with the vehicle's ids counts."""
 UNKNOWN_PEER_INTERVAL_S: Final = 0.2
-"""Interval at which a datagram of another host is parsed, so that a flood of them costs nothing."""
-_MAX_UNKNOWN_HOSTS: Final = 32
-"""Greatest number of other hosts of which a datagram is parsed in that interval."""
+"""Interval at which a datagram of another peer is parsed while the vehicle is received, so that a flood of them costs
+nothing."""
+_MAX_UNKNOWN_PEERS: Final = 32
+"""Greatest number of other peers of which a datagram is parsed in that interval."""
 
 MAV_TYPE_GCS: Final = 6
 MAV_STATE_ACTIVE: Final = 4
@@ -146,7 +147,7 @@ class Link:
         self._vehicle_system, self._make = target_system, make
         self._vehicle_component: int | None = None
         self._duplicates = DuplicateDetector()
-        self._checked_s: dict[str, float] = {}
+        self._checked_s: dict[Peer, float] = {}
         self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
@@ -347,18 +348,19 @@ class Link:
         if is_gone and is_same_host:
             if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
                 self._transport.adopt(peer)
-        elif not is_gone and self._last_packet_s is not None and self._may_check(peer[0], now_s):
+        elif not is_gone and self._last_packet_s is not None and self._may_check(peer, now_s):
             ids = (self._vehicle_system, self._vehicle_component)
             messages = filter(is_known, self._new_codec().parse(data))
             if any((source_system(each), source_component(each)) == ids for each in messages):
                 self._duplicate_s = now_s
 
-    def _may_check(self, host: str, now_s: float) -> bool:
-        """Whether to parse a datagram of another host now. Each has its own interval: none can hide another."""
+    def _may_check(self, peer: Peer, now_s: float) -> bool:
+        """Whether to parse a datagram of another peer now. Each has its own interval, so that one does not hide
+        another."""
         recent_s = {each: at_s for each, at_s in self._checked_s.items() if now_s - at_s < UNKNOWN_PEER_INTERVAL_S}
-        if host in recent_s or len(recent_s) >= _MAX_UNKNOWN_HOSTS:
+        if peer in recent_s or len(recent_s) >= _MAX_UNKNOWN_PEERS:
             return False
-        self._checked_s = {**recent_s, host: now_s}
+        self._checked_s = {**recent_s, peer: now_s}
         return True
 
     def _is_vehicle(self, message: Message) -> bool:

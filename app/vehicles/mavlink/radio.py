@@ -46,8 +46,8 @@ class VehicleMemory:
 
     heartbeat: Heartbeat | None = None
     heartbeat_s: float = float("-inf")
-    disarmed_since_s: float | None = None
-    """Since when every heartbeat has reported disarmed."""
+    agreed_since_s: float = float("-inf")
+    """Since when every heartbeat has reported the same of its motors, armed or disarmed."""
     version: str = ""
     uid: str = ""
     block: int | None = None
@@ -68,9 +68,9 @@ class VehicleMemory:
     def note(self, measurement: Measurement | None, now_s: float) -> None:
         match measurement:
             case Heartbeat(armed=armed):
+                if self.heartbeat is None or self.heartbeat.armed != armed:
+                    self.agreed_since_s = now_s
                 self.heartbeat, self.heartbeat_s = measurement, now_s
-                since_s = now_s if self.disarmed_since_s is None else self.disarmed_since_s
-                self.disarmed_since_s = None if armed else since_s
             case Version(version=version, uid=uid):
                 self.version, self.uid = version or self.version, uid or self.uid
             case BlockEntered(number=number):
@@ -138,8 +138,16 @@ class AutopilotLink:
     @property
     def is_disarmed(self) -> bool:
         """Whether it is disarmed by at least two heartbeats with none between them that contradicts."""
-        seen = self.seen
-        return seen.disarmed_since_s is not None and seen.heartbeat_s - seen.disarmed_since_s >= self.confirmation_s
+        return self._heartbeats_agree and self.seen.heartbeat is not None and not self.seen.heartbeat.armed
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether it is armed by at least two heartbeats with none between them that contradicts."""
+        return self._heartbeats_agree and self.seen.heartbeat is not None and self.seen.heartbeat.armed
+
+    @property
+    def _heartbeats_agree(self) -> bool:
+        return self.seen.heartbeat_s - self.seen.agreed_since_s >= self.confirmation_s
 
     @property
     def confirmation_s(self) -> float:

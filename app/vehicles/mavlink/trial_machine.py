@@ -219,7 +219,7 @@ def _record(trial: Trial, event: Event) -> Step:
         return _overtime(trial, now_s)
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
-    climbs_by_itself = trial.plan.climbs_from_ground  # other autopilots may be kept low by their gains
+    climbs_by_itself = trial.plan.climbs_from_ground
     if climbs_by_itself and (finding := limit_checks.find_incomplete_climb(trial.watch, trial.plan.limits)):
         trial = note(trial, finding)
     return land(trial, State.LAND, now_s)

@@ -406,7 +406,7 @@ class MavlinkVehicle:
         self._check_identity()
 
     def _check_identity(self) -> None:
-        armed = preflight.ARMED if preflight.is_armed(self._radio) else ""
+        armed = preflight.ARMED if self._radio.is_armed else ""
         change = preflight.identity_change(self._radio, self._pinned)
         if self._state not in QUARANTINE_STATES:
             if why := f"{armed} {change}".strip():
@@ -527,6 +527,7 @@ class MavlinkVehicle:
         try:
             self.restore()
         except VehicleError as error:
+            self._check_identity()
             if self._state not in QUARANTINE_STATES:
                 self._enter(State.QUARANTINE)
                 self._why = f"Its safe gains could not be verified: {error}"

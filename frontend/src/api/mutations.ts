@@ -20,6 +20,7 @@ import {
   type NewCampaignInput,
   type NewTrial,
   promoteBest,
+  type Reopening,
   rehearseCampaign,
   reopenCampaign,
   type Trial,
@@ -191,23 +192,12 @@ export function usePromote({ id, vehicle }: Campaign) {
 }
 
 /** Continue a finished campaign for some flights, of which `plan` lists those that are planned at once, in order. */
-export function useReopen({ id, vehicle }: Campaign) {
+export function useReopen(campaignId: number) {
   const settled = useSettled();
   return useMutation({
-    mutationFn: async ({ flights, plan }: Reopening) => {
-      const reopened = await answer(reopenCampaign({ path: { campaign_id: id }, body: { flights } }));
-      for (const variant of plan) {
-        await answer(createTrial({ path: { campaign_id: id }, body: { variant }, headers: controlHeader(vehicle.id) }));
-      }
-      return reopened;
-    },
-    onSettled: () => settled.ofCampaign(id),
+    mutationFn: (body: Reopening) => answer(reopenCampaign({ path: { campaign_id: campaignId }, body })),
+    onSettled: () => settled.ofCampaign(campaignId),
   });
-}
-
-interface Reopening {
-  flights: number;
-  plan: readonly NonNullable<NewTrial["variant"]>[];
 }
 
 export function useArchive(campaignId: number) {

@@ -97,6 +97,17 @@ def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
         assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
 
 
+def test_a_log_of_another_autopilot_is_refused_also_where_its_gains_are_not_in_it(
+    client: TestClient, database: Database
+) -> None:
+    definition = {"experiment": "takeoff-px4", "strategy": "manual"}
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=definition)
+    data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False)).encode()
+    answer = client.post(path_of(create_trial(client, campaign["id"])), content=data, headers=ANY)
+    assert (answer.status_code, set(problems_of(answer))) == (422, {"file"})
+    assert "The log has the gains kp, ki, kd" in answer.json()["detail"]
+
+
 def test_of_a_log_with_two_takeoffs_the_one_that_is_asked_for_is_stored(client: TestClient, trial: Json) -> None:
     both = recorded(f"{TUNED}.tlog") + recorded(f"{DEFAULT}.tlog")
     refused = client.post(path_of(trial), content=both, headers=ANY)

@@ -114,6 +114,22 @@ def test_repeats_and_baselines_are_no_failures_to_improve() -> None:
     assert evaluate_stop_rule(definition, [*worse, fly(7, 60, 50)], STEP).reason == "not improving"
 
 
+def test_gains_that_were_only_aborted_before_are_no_repeat() -> None:
+    aborted = replace(fly(1, 30, 40), outcome="aborted", error=None)
+    flights = [aborted, fly(2, 30, 40)]
+    verdict = evaluate_stop_rule(Definition(stop=StopRule(improvement=0.5)), flights, STEP)
+    assert verdict.threshold == pytest.approx(0.5 * (flights[1].error or 0.0))
+
+
+def test_a_reopened_campaign_is_still_warned_of_a_low_battery() -> None:
+    definition = Definition(stop=StopRule(min_battery_v=10.5))
+    verdict = evaluate_stop_rule(definition, [fly(1, 30, 40)], STEP, battery_v=10.2, open_until_flight=4)
+    assert not verdict.stop
+    assert verdict.why.startswith(
+        "Reopened for 3 more flights. The last flight ended at 10.20 V; the minimum is 10.5 V."
+    )
+
+
 @pytest.mark.parametrize("flown", [2, 3])
 def test_no_rule_ends_a_campaign_before_the_flights_it_was_reopened_for(flown: int) -> None:
     flights = [fly(number, 30, 40) for number in range(1, flown + 1)]

@@ -126,20 +126,6 @@ export const finishCampaign = <ThrowOnError extends boolean = false>(options: Op
 });
 
 /**
- * Reopen Campaign
- *
- * Reopen a finished campaign for more flights.
- */
-export const reopenCampaign = <ThrowOnError extends boolean = false>(options: Options<ReopenCampaignData, ThrowOnError>): RequestResult<ReopenCampaignResponses, ReopenCampaignErrors, ThrowOnError> => (options.client ?? client).post<ReopenCampaignResponses, ReopenCampaignErrors, ThrowOnError>({
-    url: '/api/campaigns/{campaign_id}/reopen',
-    ...options,
-    headers: {
-        'Content-Type': 'application/json',
-        ...options.headers
-    }
-});
-
-/**
  * Archive Campaign
  *
  * Archive a finished campaign.
@@ -218,6 +204,20 @@ export const listTrials = <ThrowOnError extends boolean = false>(options: Option
  */
 export const createTrial = <ThrowOnError extends boolean = false>(options: Options<CreateTrialData, ThrowOnError>): RequestResult<CreateTrialResponses, CreateTrialErrors, ThrowOnError> => (options.client ?? client).post<CreateTrialResponses, CreateTrialErrors, ThrowOnError>({
     url: '/api/campaigns/{campaign_id}/trials',
+    ...options,
+    headers: {
+        'Content-Type': 'application/json',
+        ...options.headers
+    }
+});
+
+/**
+ * Reopen Campaign
+ *
+ * Reopen a finished campaign for more flights.
+ */
+export const reopenCampaign = <ThrowOnError extends boolean = false>(options: Options<ReopenCampaignData, ThrowOnError>): RequestResult<ReopenCampaignResponses, ReopenCampaignErrors, ThrowOnError> => (options.client ?? client).post<ReopenCampaignResponses, ReopenCampaignErrors, ThrowOnError>({
+    url: '/api/campaigns/{campaign_id}/reopen',
     ...options,
     headers: {
         'Content-Type': 'application/json',

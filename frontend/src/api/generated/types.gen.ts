@@ -211,6 +211,12 @@ export type Campaign = {
      * SHA-256 of definition and vehicle, once they are frozen
      */
     definition_digest: string | null;
+    /**
+     * Open Until Flight
+     *
+     * number of flights up to which no stop rule ends it, because it was reopened
+     */
+    open_until_flight: number;
     vehicle: CampaignVehicle;
     /**
      * Parent Id
@@ -290,7 +296,7 @@ export type CampaignEdit = {
  * draft: its first gains are not computed yet. ready: they are, and nothing has flown; the definition may still
  * change. flying: a trial is in the air. deciding: the next gains are being computed, or a review is due. finished:
  * converged, out of flights, or stopped by the operator, see `Outcome`; it is reopened by the operator, or, unless
- * the operator stopped it, when the class of one of its flights changes.
+ * the operator stopped it, when its stop rule is no longer met by the flights that count.
  */
 export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finished' | 'archived';
 
@@ -2540,13 +2546,18 @@ export type Release = {
 /**
  * Reopening
  *
- * For how many more flights a finished campaign is reopened; its stop rule applies again after them.
+ * For how many more flights a finished campaign is reopened; its stop rule applies again after them. `plan` are
+ * those that are planned at once, in this order.
  */
 export type Reopening = {
     /**
      * Flights
      */
     flights?: number;
+    /**
+     * Plan
+     */
+    plan?: Array<'smaller step' | 'repeat' | 'baseline'>;
 };
 
 /**
@@ -3829,6 +3840,12 @@ export type Winner = {
      * Trial Numbers
      */
     trial_numbers: Array<number>;
+    /**
+     * Verdict
+     *
+     * verdict of the best gains against the first flight's; null while they are the same or no flight is valid
+     */
+    verdict: 'better' | 'worse' | 'unresolved' | 'not known yet' | null;
 };
 
 /**
@@ -4291,53 +4308,6 @@ export type FinishCampaignResponses = {
 
 export type FinishCampaignResponse = FinishCampaignResponses[keyof FinishCampaignResponses];
 
-export type ReopenCampaignData = {
-    /**
-     * Body
-     */
-    body?: Reopening | null;
-    headers?: {
-        /**
-         * Idempotency-Key
-         *
-         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
-         */
-        'Idempotency-Key'?: string | null;
-        /**
-         * X-Gainline-Control
-         *
-         * token of the lease that gives control of the vehicle
-         */
-        'X-Gainline-Control'?: string | null;
-    };
-    path: {
-        /**
-         * Campaign Id
-         */
-        campaign_id: number;
-    };
-    query?: never;
-    url: '/api/campaigns/{campaign_id}/reopen';
-};
-
-export type ReopenCampaignErrors = {
-    /**
-     * An error: what happened, what to do about it, and the invalid fields.
-     */
-    default: Problem;
-};
-
-export type ReopenCampaignError = ReopenCampaignErrors[keyof ReopenCampaignErrors];
-
-export type ReopenCampaignResponses = {
-    /**
-     * Successful Response
-     */
-    200: Campaign;
-};
-
-export type ReopenCampaignResponse = ReopenCampaignResponses[keyof ReopenCampaignResponses];
-
 export type ArchiveCampaignData = {
     body?: never;
     headers?: {
@@ -4689,6 +4659,53 @@ export type CreateTrialResponses = {
 };
 
 export type CreateTrialResponse = CreateTrialResponses[keyof CreateTrialResponses];
+
+export type ReopenCampaignData = {
+    /**
+     * Body
+     */
+    body?: Reopening | null;
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/reopen';
+};
+
+export type ReopenCampaignErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ReopenCampaignError = ReopenCampaignErrors[keyof ReopenCampaignErrors];
+
+export type ReopenCampaignResponses = {
+    /**
+     * Successful Response
+     */
+    200: Campaign;
+};
+
+export type ReopenCampaignResponse = ReopenCampaignResponses[keyof ReopenCampaignResponses];
 
 export type GetTrialData = {
     body?: never;

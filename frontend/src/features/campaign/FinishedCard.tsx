@@ -42,7 +42,7 @@ interface Props {
 /** The campaign's result, and its next actions. */
 export function FinishedCard({ campaign, trials, onChoose }: Props) {
   const archive = useArchive(campaign.id);
-  const reopen = useReopen(campaign);
+  const reopen = useReopen(campaign.id);
   const isCandidate = campaign.standing === "candidate";
   const experiment = campaign.definition.experiment ?? "";
   const unit = useUnits(experiment).error;
@@ -87,7 +87,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
             variant={isCandidate ? "filled" : "default"}
             leftSection={<IconRepeat size={20} aria-hidden />}
             loading={reopen.isPending}
-            onClick={() => reopen.mutate({ flights: FURTHER_FLIGHTS, plan: isCandidate ? CONFIRMATION : [] })}
+            onClick={() => reopen.mutate({ flights: FURTHER_FLIGHTS, plan: isCandidate ? [...CONFIRMATION] : [] })}
           >
             {isCandidate ? `Confirm with ${FURTHER_FLIGHTS} flights` : `Reopen for ${FURTHER_FLIGHTS} more flights`}
           </Button>

@@ -18,7 +18,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
   const promote = usePromote(campaign);
   const vehicle = useVehicle(campaign.vehicle.registered ? campaign.vehicle.id : null);
   if (vehicle === null || campaign.winner === null) return null;
-  const { possible, why } = promotable(campaign, vehicle);
+  const { possible, why } = promotable(campaign.winner, vehicle);
   if (!possible) {
     const isDone = sameHeld(vehicle.safe_gains, campaign.winner.gains);
     return (

@@ -99,11 +99,11 @@ test("what a class would change is said before: which flight is the best then, a
 
 test("the best gains become the safe ones only once flights have shown that they are better", () => {
   const drone = { name: "Number 1", safe_gains: { kp: 283 } };
-  const winner = { gains: { kp: 400 }, trial_numbers: [2, 3] };
-  expect(promotable({ winner, verdict: "better" }, drone)).toEqual({ possible: true, why: "" });
-  expect(promotable({ winner, verdict: "unresolved" }, drone).why).toContain("their verdict is “unresolved”");
-  expect(promotable({ winner, verdict: null }, drone).possible).toBe(false);
-  expect(promotable({ winner: { ...winner, gains: { kp: 283 } }, verdict: "better" }, drone).why).toBe(
+  const winner = { gains: { kp: 400 }, trial_numbers: [2, 3], verdict: "better" as const };
+  expect(promotable(winner, drone)).toEqual({ possible: true, why: "" });
+  expect(promotable({ ...winner, verdict: "unresolved" }, drone).why).toContain("their verdict is “unresolved”");
+  expect(promotable({ ...winner, verdict: null }, drone).possible).toBe(false);
+  expect(promotable({ ...winner, gains: { kp: 283 } }, drone).why).toBe(
     "The best gains are the safe gains of Number 1.",
   );
 });

@@ -127,11 +127,12 @@ export function standingWithout(trial: Trial, trials: readonly Trial[]): string 
 
 /** Whether the best gains may become the vehicle's safe gains; if not, the reason and the action. */
 export function promotable(
-  { winner, verdict }: Pick<Campaign, "winner" | "verdict">,
+  winner: Campaign["winner"],
   { name, safe_gains: safe }: Pick<Vehicle, "name" | "safe_gains">,
 ): { possible: boolean; why: string } {
   if (winner !== null && sameHeld(safe, winner.gains))
     return { possible: false, why: `The best gains are the safe gains of ${name}.` };
+  const verdict = winner?.verdict ?? null;
   if (verdict === "better") return { possible: true, why: "" };
   const because = verdict === null ? "no gains are better than the first yet" : `their verdict is “${verdict}”`;
   return {
