@@ -70,7 +70,7 @@ class Manifest(_Strict):
     """Manifest of a bundle. `parts`: the SHA-256 of every other file in the zip, by its name."""
 
     format: Literal["gainline-campaign"]
-    version: Literal[1, 2]
+    version: Literal[1, 2, 3]
     program: ShortText
     made_at: AwareDatetime
     parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
