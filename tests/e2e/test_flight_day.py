@@ -235,12 +235,14 @@ def fly_another(dashboard: Dashboard, campaign_id: int, choose: Callable[[], Non
 
 
 def repeat_the_best(dashboard: Dashboard, campaign_id: int) -> None:
-    best = dashboard.get(f"/campaigns/{campaign_id}")["best"]
+    winner = dashboard.get(f"/campaigns/{campaign_id}")["winner"]
     trial = fly_another(
         dashboard, campaign_id, lambda: press(dashboard, re.compile("^Repeat (the best|instead)"))
     )  # the recommended one, or beside it
-    assert trial["gains"] == best["gains"]
-    assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["flights"] == best["flights"] + 1
+    assert trial["gains"] == winner["gains"]
+    groups = dashboard.get(f"/campaigns/{campaign_id}/statistics")["groups"]
+    repeated = next(group for group in groups if group["gains"] == winner["gains"])
+    assert repeated["trial_numbers"] == [*winner["trial_numbers"], trial["number"]]
 
 
 def is_over(dashboard: Dashboard, campaign_id: int) -> bool:
@@ -278,13 +280,13 @@ def see_the_result(dashboard: Dashboard, campaign_id: int) -> None:
 def promote(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> None:
     """The statistics say "better": the best gains become those that the vehicle is left with."""
     campaign = dashboard.get(f"/campaigns/{campaign_id}")
-    assert campaign["verdict"] == "better"
+    assert campaign["winner"]["verdict"] == "better"
     dashboard.button("Set best gains as safe gains").click()
     dashboard.page.get_by_label("Decided by, and why").fill(DECIDED)
     dashboard.button("Save safe gains").click()
     told = dashboard.page.get_by_text("The best gains are the safe gains of Number 1.")
     expect(told).to_contain_text("Number 1 still has [283 13 82]")
-    assert dashboard.get(f"/vehicles/{vehicle_id}")["safe_gains"] == campaign["best"]["gains"]
+    assert dashboard.get(f"/vehicles/{vehicle_id}")["safe_gains"] == campaign["winner"]["gains"]
 
 
 def open_the_report(dashboard: Dashboard, campaign_id: int) -> None:

@@ -115,7 +115,7 @@ def test_no_more_trials_are_planned_than_the_flight_budget_holds(client: TestCli
     answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"gains": first["gains"]})
     assert answer.status_code == 409
     assert "2 flights" in answer.json()["detail"]
-    assert "clone" in answer.json()["hint"]
+    assert "reopen" in answer.json()["hint"]
     assert client.post(f"/api/trials/{first['id']}/cancel").status_code == 200
     create_trial(client, campaign["id"], gains=first["gains"])
 
