@@ -52,7 +52,7 @@ ENDS_WITHIN_S: Final = 90.0
 ORDERS_EVERY_S: Final = 0.4
 """Interval between Land commands; the worker records each one, which takes longer than forwarding it."""
 SEED: Final = 20261121
-LONG: Final = {"kind": "budget", "max_flights": 100}
+ABORTED: Final = {"strategy": "gradient", "stop": {"kind": "budget", "max_flights": 100}}
 OPENED_EVERY_S: Final = 0.1
 OPENED_AT_ONCE: Final = 20
 
@@ -241,9 +241,7 @@ class Operator:
         self._post(f"/vehicles/{self._vehicle}/connect")
         self._until(f"/vehicles/{self._vehicle}", lambda vehicle: vehicle["state"] == "ready")
         chosen = {"kind": "mavlink", "id": self._vehicle}
-        self._campaign = self._post("/campaigns", {"name": "Aborts", "vehicle": chosen, "definition": {"stop": LONG}})[
-            "id"
-        ]
+        self._campaign = self._post("/campaigns", {"name": "Aborts", "vehicle": chosen, "definition": ABORTED})["id"]
         self._until(f"/campaigns/{self._campaign}", lambda campaign: campaign["state"] == "ready")
 
     def order_landings(self, seconds: float) -> None:

@@ -37,9 +37,9 @@ FLIGHTS: Final = 7
 ROUNDS: Final = 3
 CASES: Final[dict[str, dict[str, object]]] = {
     "calibrated": {"strategy": "calibrated"},
-    "gradient, scaled": {},
-    "gradient, raw": {"options": {"scaled": False}},
-    "gradient from the simplex start": {"start": {"kind": "simplex"}},
+    "gradient, scaled": {"strategy": "gradient"},
+    "gradient, raw": {"strategy": "gradient", "options": {"scaled": False}},
+    "gradient from the simplex start": {"strategy": "gradient", "start": {"kind": "simplex"}},
     "simplex": {"strategy": "simplex"},
 }
 

@@ -27,7 +27,6 @@ from app.db.migrate import migrate
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow, TrialRow
 from app.db.session import Database
 from app.db.trajectories import pack
-from app.fleet.schemas import VehicleChoice
 
 SAMPLES: Final = 16_700
 SEED: Final = 20261122
@@ -93,7 +92,9 @@ def seed_database(
 
 
 def _campaign(database: Database, name: str, flights: int, takeoffs: Takeoffs) -> int:
-    new = NewCampaign(name=name, vehicle=VehicleChoice(kind="jsbsim"))
+    new = NewCampaign.model_validate(
+        {"name": name, "vehicle": {"kind": "jsbsim"}, "definition": {"strategy": "gradient"}}
+    )
     with database.write() as session:
         campaign_id = campaigns.create_campaign(session, new).id
     for first in range(1, flights + 1, 50):
