@@ -62,6 +62,7 @@ def test_a_noisy_twin_is_flown_to_a_candidate_confirmed_reviewed_and_confirmed_a
     expect(page.get_by_text(CONFIRMED)).to_be_visible()
 
 
+@pytest.mark.complete
 def test_the_green_button_flies_the_gains_that_stand_above_it(dashboard: Dashboard, states: States) -> None:
     """Seen: “Repeat the best” flew 3968/922/139 while the table under it showed the step, 3911/1073/269."""
     campaign_id = states.campaign(strategy="calibrated", flights=2)
