@@ -184,7 +184,8 @@ def find_missing_uid(radio: AutopilotLink, pinned: Identity | None) -> str:
     return "It did not report its hardware id, so it may be another vehicle; nothing was written."
 
 
-def is_armed(radio: AutopilotLink) -> bool:
+def reports_armed(radio: AutopilotLink) -> bool:
+    """Whether its last heartbeat reports that it is armed; `radio.is_armed` takes two."""
     return radio.seen.heartbeat is not None and radio.seen.heartbeat.armed
 
 
@@ -194,7 +195,7 @@ def require_disarmed(radio: AutopilotLink) -> None:
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
     while not radio.is_disarmed and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
-    if is_armed(radio):
+    if reports_armed(radio):
         raise SafeGainsError(ARMED, hint=_LAND_FIRST)
     if not radio.is_disarmed:
         raise SafeGainsError(
@@ -215,7 +216,7 @@ def make_armable(radio: AutopilotLink) -> None:
     heartbeat = radio.seen.heartbeat
     steps = radio.profile.make_armable(radio.target, heartbeat.mode) if heartbeat is not None else ()
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
-    while steps and not radio.is_disarmed and not is_armed(radio) and radio.clock.now_s() < until_s:
+    while steps and not radio.is_disarmed and not reports_armed(radio) and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
     if steps and radio.is_disarmed:
         _set_up(radio, steps)
@@ -369,7 +370,7 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
 
 def _own_checks(radio: AutopilotLink) -> CheckItem:
     ready = bool(radio.seen.may_arm)
-    if not ready and not is_armed(radio):
+    if not ready and not reports_armed(radio):
         _request_checks(radio)
     return CheckItem(
         name="own_checks",
@@ -416,7 +417,7 @@ def _mode(radio: AutopilotLink) -> str:
 
 
 def _disarmed(radio: AutopilotLink) -> CheckItem:
-    armed = is_armed(radio)
+    armed = reports_armed(radio)
     return CheckItem(
         name=_DISARMED,
         title="Motors",

@@ -219,9 +219,9 @@ def _record(trial: Trial, event: Event) -> Step:
         return _overtime(trial, now_s)
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
-    climbs_by_itself = trial.plan.climbs_from_ground
-    if climbs_by_itself and (finding := limit_checks.find_incomplete_climb(trial.watch, trial.plan.limits)):
-        trial = note(trial, finding)
+    incomplete = limit_checks.find_incomplete_climb(trial.watch, trial.plan.limits)
+    if trial.plan.climbs_from_ground and incomplete:
+        trial = note(trial, incomplete)
     return land(trial, State.LAND, now_s)
 
 

@@ -446,7 +446,7 @@ class MavlinkVehicle:
 
     def _check(self, watched_s: float) -> tuple[preflight.GroundObservation, tuple[CheckItem, ...]]:
         self._identify()
-        if not preflight.is_armed(self._radio) and self._state not in QUARANTINE_STATES:
+        if not preflight.reports_armed(self._radio) and self._state not in QUARANTINE_STATES:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
             preflight.make_armable(self._radio)
         watched = preflight.observe(self._radio, self._secondary, watched_s=watched_s)
