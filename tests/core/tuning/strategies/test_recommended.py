@@ -1,0 +1,16 @@
+import pytest
+
+from app.core.tuning.strategies import recommended_strategy
+
+
+@pytest.mark.parametrize(
+    ("experiment", "strategy"),
+    [
+        ("takeoff", "calibrated"),
+        ("takeoff-ardupilot", "manual"),
+        ("pitch-tracking", "gradient"),
+        ("no such experiment", "calibrated"),
+    ],
+)
+def test_an_experiment_recommends_the_first_strategy_that_works_with_it(experiment: str, strategy: str) -> None:
+    assert recommended_strategy(experiment) == strategy
