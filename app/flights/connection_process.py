@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
 from multiprocessing.connection import Connection
-from typing import Final
+from typing import Final, Literal
 
 from app.common.data_folder import telemetry_log, trial_parameters_folder, vehicle_lock
 from app.common.states import ActKind
@@ -29,6 +29,7 @@ from app.flights.process_messages import (
     ConnectionRequest,
     FlightRequest,
     SafeGainsRestored,
+    StagingLost,
     TakeOffCommand,
     ToVehicleProcess,
     VehicleCommand,
@@ -36,9 +37,10 @@ from app.flights.process_messages import (
     VehicleResponse,
 )
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
-from app.live.messages import FlightPhase, Telemetry, VehicleStatus
+from app.live.messages import FlightPhase, Telemetry, UnreadyReason, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
+    Condition,
     ConnectedVehicle,
     FlightRecord,
     InterruptedByOrderError,
@@ -49,8 +51,18 @@ from app.vehicles.base import (
 )
 from app.vehicles.registry import get_kind, restore_safe_gains
 
+Staging = Literal["none", "staged", "silent", "lost"]
+"""Of the flight that waits for its take-off: nothing staged, the staged gains read back, a silence since then, or the
+gains no longer on the vehicle."""
+_NOT_READY: Final[Mapping[Staging, str]] = {
+    "silent": "nothing is received from the vehicle",
+    "lost": "the staged gains are no longer on the vehicle",
+}
+
 POLL_INTERVAL_S: Final = 0.005
 STATUS_INTERVAL_S: Final = 0.2
+SILENT_AFTER_S: Final = 2.0
+"""A vehicle that has sent nothing for this long is not ready to fly."""
 LOST_AFTER_S: Final = 3.0
 """A vehicle without a heartbeat for this long is shown as gone."""
 LOCK_TIMEOUT_S: Final = 120.0
@@ -94,6 +106,7 @@ class VehicleProcess(FlightLoop):
         self._call = call
         self._speed = float(call.options.get("clock_speed", 1.0))
         self._is_open = self._may_interrupt = False
+        self._staging: Staging = "none"
         self._take_off_by_s: float | None = None
         self._vehicle = self._open_vehicle()
         self._is_open = True
@@ -152,8 +165,38 @@ class VehicleProcess(FlightLoop):
         """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
         while (message := self._poll_commands()) is None:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)
-            self._publish_status()
+            if (status := self._publish_status()) is not None and self._staging in {"staged", "silent"}:
+                self._watch_staged(status)
         return message
+
+    def _await_takeoff_clearance(self) -> TakeOffCommand | None:
+        """Wait for the worker's decision while the staged vehicle is watched. Raises VehicleError if it is to take off
+        without its staged gains."""
+        self._staging = "staged"
+        try:
+            cleared = super()._await_takeoff_clearance()
+            if cleared is not None and (problem := _NOT_READY.get(self._staging)):
+                raise _not_flown(f"It was not flown: {problem}.", "Stage it again.")
+        finally:
+            self._staging = "none"
+        return cleared
+
+    def _watch_staged(self, status: VehicleStatus) -> None:
+        """After a silence, a restart or a gap in its positions, read the staged gains again; tell the worker if they
+        are lost."""
+        if self._is_silent(status):
+            self._staging = "silent"
+        elif self._staging == "silent" or not status.held or not status.position_hz:
+            try:
+                with self._interruptible():
+                    self._vehicle.confirm_staged()
+                self._staging = "staged"
+            except VehicleError as error:
+                self._staging = "lost"
+                self._line.send(StagingLost(str(error)))
+
+    def _is_silent(self, status: Condition) -> bool:
+        return status.packet_age_s is None or status.packet_age_s > SILENT_AFTER_S * self._speed
 
     def _poll_commands(self) -> ToVehicleProcess | None:
         """Forward a command at once; return any other message."""
@@ -205,11 +248,15 @@ class VehicleProcess(FlightLoop):
         self._line.send(CommandForwarded(ordered.number, ordered.order, ordered.reason, problem))
         return not problem
 
-    def _publish_status(self) -> None:
+    def _publish_status(self) -> VehicleStatus | None:
+        """Publish the status if it is due; return what was published."""
         now_s = self._clock.now_s()
-        if now_s >= self._show_due_s:
-            self._show_due_s = max(self._show_due_s + STATUS_INTERVAL_S, now_s)
-            self._line.send_if_ready(self._status())
+        if now_s < self._show_due_s:
+            return None
+        self._show_due_s = max(self._show_due_s + STATUS_INTERVAL_S, now_s)
+        status = self._status()
+        self._line.send_if_ready(status)
+        return status
 
     def _status(self) -> VehicleStatus:
         condition = self._vehicle.condition()
@@ -220,8 +267,14 @@ class VehicleProcess(FlightLoop):
             state="gone" if age_s is None or age_s > LOST_AFTER_S * self._speed else "connected",
             at=status_time(),
             concern=self._vehicle.concern,
+            unready=self._unready(condition),
             **known | {"held": dict(condition.held)},
         )
+
+    def _unready(self, condition: Condition) -> UnreadyReason:
+        if self._staging == "silent" or self._is_silent(condition):
+            return "link silent"
+        return "gains unknown" if self._staging == "lost" or not condition.held else ""
 
     def _held(self) -> dict[str, float]:
         return dict(self._vehicle.condition().held)
@@ -291,7 +344,10 @@ class VehicleProcess(FlightLoop):
             return
         self._take_off_by_s = now_s + TAKE_OFF_TIMEOUT_S if now_s <= by_s else None
         if now_s > by_s:
-            raise _late_take_off_error()
+            raise _not_flown(
+                "It was not flown: the take-off was too late, because the vehicle's process had stalled.",
+                "Check that this computer is not overloaded, then request the flight again.",
+            )
 
     def _take_off(self, vehicle: Vehicle, request: FlightRequest, cleared: TakeOffCommand) -> FlightRecord:
         with self._interruptible():
@@ -326,10 +382,7 @@ def _has_expired(ordered: VehicleCommand) -> bool:
     return time.monotonic() > ordered.by_s
 
 
-def _late_take_off_error() -> VehicleError:
-    error = VehicleError(
-        "It was not flown: the take-off was too late, because the vehicle's process had stalled.",
-        hint="Check that this computer is not overloaded, then request the flight again.",
-    )
+def _not_flown(what: str, hint: str) -> VehicleError:
+    error = VehicleError(what, hint=hint)
     error.not_flown = True
     return error

@@ -38,6 +38,8 @@ class FlightProcess:
         self._sending = threading.Lock()
         self.trial_id: int | None = None
         """Trial of the running flight."""
+        self.staging_lost = ""
+        """Why its vehicle no longer holds the staged gains; empty while it does."""
 
     @property
     def alive(self) -> bool:
@@ -52,7 +54,7 @@ class FlightProcess:
 
         The caller answers GainsStaged by `take_off` or `cancel_take_off`. Raises VehicleError when the process dies.
         """
-        self.trial_id = request.trial_id
+        self.trial_id, self.staging_lost = request.trial_id, ""
         try:
             self._post(request)
             while not isinstance(message := self._next(), FlightFinished):

@@ -72,6 +72,13 @@ class CancelFlight:
 
 
 @dataclass(frozen=True, slots=True)
+class StagingLost:
+    """From the process, while it waits for the take-off: why the vehicle no longer holds the staged gains."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class FlightLanded:
     """From the process: the flight's record."""
 
@@ -178,7 +185,7 @@ class CommandForwarded:
     problem: str = ""
 
 
-FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | FlightMessage
+FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | StagingLost | FlightMessage
 ToVehicleProcess = FlightRequest | TakeOffCommand | CancelTakeOff | CancelFlight | VehicleRequest | VehicleCommand
 
 Publish = Callable[[PublishedMessage], None]

@@ -206,6 +206,8 @@ class FlightRunner:
                 return flag.reason
             if not backend.alive:
                 return "the vehicle's process ended"
+            if backend.staging_lost:
+                return backend.staging_lost
             try:
                 with self._database.read() as session:
                     may_take_off, reason = flight_rows.clearance_of(session, request.flight_id)

@@ -27,6 +27,7 @@ from app.flights.process_messages import (
     ConnectionRequest,
     FlightFailure,
     FromVehicleProcess,
+    StagingLost,
     VehicleCommand,
     VehicleRequest,
     VehicleResponse,
@@ -152,6 +153,8 @@ class VehicleConnection(FlightProcess):
                     case CommandForwarded(number, problem=problem) as forwarded:
                         self._answer_order(number, problem)
                         self._hear_of(forwarded)
+                    case StagingLost(why):
+                        self.staging_lost = why
                     case ConnectionOpened(concern=concern) as opened:
                         status, patience_s = replace(status, concern=concern), self.call.clock.wall_s(SILENT_AFTER_S)
                         self._messages.put(opened)

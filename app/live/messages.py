@@ -24,6 +24,9 @@ NO_LINK: Final = "No worker has a link to this vehicle, so nothing was sent: use
 Phase = Literal["staging", "staged", "flying", "landed", "ended"]
 VehicleLinkState = Literal["connecting", "connected", "gone", "not answering"]
 VehicleCommandKind = Literal["land", "motors off"]
+UnreadyReason = Literal["", "link silent", "gains unknown"]
+"""Why a vehicle on the ground is not ready, as its own process sees it: nothing was received from it for 2 s, or
+the staged gains have not been read again since; or its gains are unknown, since it restarted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +74,7 @@ class VehicleStatus(Condition):
     state: VehicleLinkState
     at: str
     concern: str = ""
+    unready: UnreadyReason = ""
     age_s: float = 0.0
     type: Literal["vehicle"] = "vehicle"
 

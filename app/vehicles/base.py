@@ -205,6 +205,11 @@ class ConnectedVehicle(Vehicle, Protocol):
         repeated every second until telemetry confirms it. Raises VehicleError if the link is closed."""
         ...
 
+    def confirm_staged(self) -> None:
+        """Read the staged gains again after a silence of the vehicle. Raises VehicleError if it restarted meanwhile, or
+        does not report the staged gains."""
+        ...
+
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks; a failed check is an item of the result, not an error."""
         ...

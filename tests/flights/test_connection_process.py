@@ -82,6 +82,12 @@ class RecordingPipe(WorkerPipe):
 
 @pytest.fixture
 def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[AnsweringRig]:
+    with AnsweringRig() as one:
+        take_the_place_of_every_vehicle(one, monkeypatch)
+        yield one
+
+
+def take_the_place_of_every_vehicle(one: AnsweringRig, monkeypatch: pytest.MonkeyPatch) -> None:
     def connect(
         options: Options,
         safe_gains: Mapping[str, float],
@@ -102,10 +108,8 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[AnsweringRig]:
             on_wait=on_wait,
         )
 
-    with AnsweringRig() as one:
-        kind = replace(MAVLINK, connect=connect)
-        monkeypatch.setattr(vehicle_process_module, "get_kind", lambda _: kind)
-        yield one
+    kind = replace(MAVLINK, connect=connect)
+    monkeypatch.setattr(vehicle_process_module, "get_kind", lambda _: kind)
 
 
 def started(

@@ -8,6 +8,7 @@ one, by itself or by its clock, is doubted until more of the same kind have arri
 from dataclasses import dataclass, replace
 from typing import Final
 
+from app.vehicles.mavlink.boot_clock import AHEAD_S, BACK_S, RESTARTED_S, OtherClock
 from app.vehicles.mavlink.events import (
     Battery,
     BlockEntered,
@@ -42,12 +43,6 @@ _MAX_GLITCHES: Final = 3
 _DOUBTED_LIMIT: Final = 10.0
 _DOUBT_DECAY_1_S: Final = 5.0
 """Tolerated doubted samples per second; with `_DOUBTED_LIMIT` more than that, the position is unreliable."""
-_AHEAD_S: Final = 2.0
-"""Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
-_BACK_S: Final = 1.0
-"""If the clock goes back by less than this, the packet was late."""
-_SAME_CLOCK_S: Final = 0.5
-_REBOOTED_S: Final = 0.4
 BEHIND_M: Final = 0.5
 """An altitude that has fallen behind the integrated climb rate by more than this does not follow it."""
 _DRIFT_M: Final = 1.0
@@ -55,15 +50,6 @@ _DRIFT_M: Final = 1.0
 MAX_DIFFERENCE_M: Final = 0.3
 """Greatest difference between the second source of altitude and the vehicle's own."""
 _MAX_SECONDARY_AGE_S: Final = 0.5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OtherClock:
-    """Positions by a clock other than the record's: the first at `first_s` by our clock, the last at `last_s`."""
-
-    first_s: float
-    last_s: float
-    last: Position
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -328,7 +314,7 @@ def _add_position(
     newest = doubted or last
     if newest is not None:
         gained_s = position.time_boot_s - newest.time_boot_s
-        if gained_s <= 0.0 or gained_s > now_s - watch.advanced_s + _AHEAD_S:
+        if gained_s <= 0.0 or gained_s > now_s - watch.advanced_s + AHEAD_S:
             return _add_other_clock(watch, position, now_s, newest), ()
     watch = _with_latency(watch, position, now_s)
     quiet_s = now_s - watch.advanced_s
@@ -352,22 +338,17 @@ def _add_other_clock(watch: TrialObservation, position: Position, now_s: float, 
     """Process a position whose time is late, repeated or too far ahead. The vehicle has rebooted only if the clock went
     back and continues from there, and no more positions by the previous clock arrive."""
     other = watch.other
-    goes_on = other is not None and _is_same_clock(other, position, now_s)
+    goes_on = other is not None and other.goes_on(position, now_s)
     first_s = other.first_s if other is not None and goes_on else now_s
     is_alone = watch.accepted_s <= first_s and watch.advanced_s <= first_s
-    fell_back = position.time_boot_s < newest.time_boot_s - _BACK_S
+    fell_back = position.time_boot_s < newest.time_boot_s - BACK_S
     watch = replace(watch, other=OtherClock(first_s=first_s, last_s=now_s, last=position))
     if not (fell_back and is_alone and goes_on):
         return watch
-    if now_s - first_s < _REBOOTED_S:
+    if now_s - first_s < RESTARTED_S:
         return replace(watch, stuck_s=0.0)
     watch = replace(watch, rebooted=True, last=position, doubted=None, least_offset_s=None)
     return replace(watch, advanced_s=now_s, accepted_s=now_s, sent_s=now_s)
-
-
-def _is_same_clock(other: OtherClock, position: Position, now_s: float) -> bool:
-    gained_s = position.time_boot_s - other.last.time_boot_s
-    return gained_s > 0.0 and abs(gained_s - (now_s - other.last_s)) < _SAME_CLOCK_S
 
 
 def _follows(one: Position, other: Position) -> bool:

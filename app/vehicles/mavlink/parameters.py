@@ -148,7 +148,7 @@ def _unconfirmed(gain: GainParameter) -> VehicleError:
 
 class GainStore:
     """Safe gains, staged gains and held gains of a vehicle. `staged` were written for the next flight and read back
-    equal, None without such gains; `held` are those read back last."""
+    equal, None without such gains; `held` are those read back last, empty if they are unknown."""
 
     def __init__(self, radio: AutopilotLink, safe: Gains) -> None:
         """Check the safe gains. Raises GainsError if the autopilot cannot hold them."""
@@ -157,6 +157,16 @@ class GainStore:
         self.safe: Final[Gains] = check_gains(safe, radio.profile.gain_sets[0])
         self.staged: dict[str, float] | None = None
         self.held: dict[str, float] = {}
+        self._restarts = radio.seen.restarts
+
+    @property
+    def have_restarted(self) -> bool:
+        """Whether the vehicle has restarted since its gains were last read."""
+        return self._radio.seen.restarts != self._restarts
+
+    def forget(self) -> None:
+        """Take the gains on the vehicle as unknown until they are read again."""
+        self.staged, self.held = None, {}
 
     def stage(self, gains: Gains) -> dict[str, float]:
         """Write gains for the next flight and return those read back. Raises GainsError, and changes nothing, for gains
@@ -169,8 +179,7 @@ class GainStore:
 
     def read(self) -> dict[str, float]:
         """Read the gains. Raises VehicleError if the vehicle does not reply."""
-        self.held = read_gains(self._radio, self._found(), self.wanted)
-        return dict(self.held)
+        return dict(self._note(self._radio.seen.restarts, read_gains(self._radio, self._found(), self.wanted)))
 
     def restore(self) -> dict[str, float]:
         """Write the safe gains and return those read back. Raises VehicleError if the vehicle does not reply."""
@@ -220,8 +229,11 @@ class GainStore:
         return self._gain_set
 
     def _write(self, wanted: Gains) -> dict[str, float]:
-        self.held = write_gains(self._radio, self._found(), wanted)
-        return self.held
+        return self._note(self._radio.seen.restarts, write_gains(self._radio, self._found(), wanted))
+
+    def _note(self, restarts: int, held: dict[str, float]) -> dict[str, float]:
+        self._restarts, self.held = restarts, held
+        return held
 
 
 def written(gains: Gains) -> str:

@@ -8,6 +8,7 @@ from typing import Final
 from app.core.clock import Clock
 from app.vehicles.base import Condition
 from app.vehicles.mavlink.arming_checks import ArmingChecks
+from app.vehicles.mavlink.boot_clock import RestartCounter
 from app.vehicles.mavlink.dialects import Message, source_component
 from app.vehicles.mavlink.events import (
     Action,
@@ -56,9 +57,15 @@ class VehicleMemory:
     may_arm: bool | None = None
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
+    restart_counter: RestartCounter = field(default_factory=RestartCounter)
     status_texts: deque[str] = field(default_factory=lambda: deque(maxlen=_STATUS_TEXTS))
     _piece_of: int = 0
     _pieces: str = ""
+
+    @property
+    def restarts(self) -> int:
+        """Number of times that the vehicle has restarted since it was connected."""
+        return self.restart_counter.restarts
 
     def forget_vehicle(self) -> None:
         """Discard its identity and the results of its arming checks."""
@@ -82,6 +89,7 @@ class VehicleMemory:
                 self.arming_checks.take(measurement)
             case Position():
                 self.positions.append((now_s, measurement))
+                self.restart_counter.take(measurement, now_s)
             case StatusText():
                 self._add_chunk(measurement)
             case _:

@@ -44,6 +44,8 @@ _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
 _ANOTHER: Final = "Check which vehicle it is, then try again."
 _LAND_REPEATED: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
+_RESTARTED: Final = "It restarted: its gains have not been read since."
+_STAGE_AGAIN: Final = "Stage the flight again."
 _SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
 
 
@@ -157,6 +159,7 @@ class MavlinkVehicle:
             self._require_not_quarantined()
             self._require_staged()
             ground = self._observe_ground(STANDSTILL_S)
+            self._require_staged()  # again: a restart meanwhile leaves none
             self._parameters.set()
             stop = should_stop()
         except BaseException as error:
@@ -207,6 +210,7 @@ class MavlinkVehicle:
         problem = self._radio.link.log_problem
         troubles = (
             f"The telemetry log {problem}." if problem else "",
+            _RESTARTED if self._gains.have_restarted and self._flight is None else "",
             self._secondary.source.trouble if self._secondary is not None else "",
             self._flight.trouble if self._flight is not None else "",
             self._repeated.trouble if self._repeated is not None else "",
@@ -226,6 +230,25 @@ class MavlinkVehicle:
             packets = self._radio.receive(min(left_s, _LISTEN_S))
             self._check_identity()
             self._repeat_command(packets)
+
+    def confirm_staged(self) -> None:
+        """Read the staged gains again after a silence. Raises VehicleError if it restarted meanwhile, does not send its
+        position, or does not report the staged gains; SafeGainsError if it may only be observed."""
+        self._require_not_quarantined()
+        self._identify()
+        preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
+        watched = preflight.observe(self._radio, self._secondary, watched_s=STANDSTILL_S)
+        restarted = self._gains.have_restarted
+        self._identify()
+        self._require_not_quarantined()
+        self._require_uid()
+        if not watched.positions:
+            raise VehicleError("It does not send its position, so it may have restarted.", hint=_STAGE_AGAIN)
+        if restarted or self._gains.staged is None:
+            raise VehicleError("It restarted, so its gains are no longer those staged.", hint=_STAGE_AGAIN)
+        item = self._gains.check()
+        if not item.passed:
+            raise VehicleError(f"It no longer holds the staged gains but {item.found}.", hint=_STAGE_AGAIN)
 
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
@@ -406,6 +429,8 @@ class MavlinkVehicle:
         self._check_identity()
 
     def _check_identity(self) -> None:
+        if self._gains.have_restarted:
+            self._gains.forget()
         armed = preflight.ARMED if self._radio.is_armed else ""
         change = preflight.identity_change(self._radio, self._pinned)
         if self._state not in QUARANTINE_STATES:

@@ -1,0 +1,64 @@
+"""The vehicle's clock, its time since boot: another one that goes on by itself is the sign of a restart.
+
+Packets may be late, repeated, in any order, or corrupted: a single one by another clock says nothing.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from app.vehicles.mavlink.events import Position
+
+AHEAD_S: Final = 2.0
+"""Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
+BACK_S: Final = 1.0
+"""If the clock goes back by less than this, the packet was late."""
+RESTARTED_S: Final = 0.4
+"""Time for which another clock goes on alone before it is the vehicle's."""
+_SAME_CLOCK_S: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OtherClock:
+    """Positions by a clock other than the vehicle's so far: the first at `first_s` by our clock, the last at
+    `last_s`."""
+
+    first_s: float
+    last_s: float
+    last: Position
+
+    def goes_on(self, position: Position, now_s: float) -> bool:
+        """Whether the position is by this clock."""
+        gained_s = position.time_boot_s - self.last.time_boot_s
+        return gained_s > 0.0 and abs(gained_s - (now_s - self.last_s)) < _SAME_CLOCK_S
+
+
+class RestartCounter:
+    """Counts the restarts of a vehicle on the ground by its positions.
+
+    A clock that jumps ahead counts, too: while this computer slept, the vehicle may have restarted.
+    """
+
+    def __init__(self) -> None:
+        self.restarts = 0
+        self._last: Position | None = None
+        self._last_s = 0.0
+        self._other: OtherClock | None = None
+
+    def take(self, position: Position, now_s: float) -> None:
+        """Process a position received at `now_s` by our clock."""
+        if self._last is None or self._is_expected(self._last, position, now_s):
+            self._last, self._last_s, self._other = position, now_s, None
+        elif not -BACK_S <= position.time_boot_s - self._last.time_boot_s <= 0.0:  # otherwise it is late or repeated
+            self._take_other(position, now_s)
+
+    def _is_expected(self, last: Position, position: Position, now_s: float) -> bool:
+        return 0.0 < position.time_boot_s - last.time_boot_s <= now_s - self._last_s + AHEAD_S
+
+    def _take_other(self, position: Position, now_s: float) -> None:
+        other = self._other
+        first_s = other.first_s if other is not None and other.goes_on(position, now_s) else now_s
+        if now_s - first_s < RESTARTED_S:
+            self._other = OtherClock(first_s=first_s, last_s=now_s, last=position)
+        else:
+            self.restarts += 1
+            self._last, self._last_s, self._other = position, now_s, None
