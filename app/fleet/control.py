@@ -86,6 +86,14 @@ def require_not_controlled_by_other(row: VehicleRow, context: RequestContext) ->
     return held.operator
 
 
+def is_in_control(row: VehicleRow, context: RequestContext) -> bool:
+    """Whether the request may command the vehicle as far as control is concerned: its operator's token is needed for a
+    real vehicle with a link, and for any that another operator controls."""
+    if control_of(row) is None:
+        return not (row.is_real and row.registered)
+    return context.token is not None and holds(row, context.token)
+
+
 def require_control(row: VehicleRow, context: RequestContext) -> str:
     """Return the operator in control, who must send the request from Gainline's own page in an unlocked browser on this
     computer; a real vehicle takes off on no other request. Raises NotAllowedError or ConflictError otherwise."""

@@ -6,7 +6,8 @@ from starlette.concurrency import run_in_threadpool
 from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
 from app.flights import service
-from app.web.dependencies import CurrentDatabase, Id, IdempotentPost, Live, RequestContextDep, json_only
+from app.flights.schemas import TrialReadiness
+from app.web.dependencies import CurrentDatabase, Id, IdempotentPost, Live, Reader, RequestContextDep, json_only
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
 
@@ -49,10 +50,17 @@ def unstage_trial(act: IdempotentPost, trial_id: Id) -> Trial:
 
 
 @router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)
-def take_off_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
+def take_off_trial(act: IdempotentPost, asking: RequestContextDep, live: Live, trial_id: Id) -> Trial:
     """Take off with a staged vehicle: the operator's own act. For a real vehicle, accepted only from the dashboard's
-    own page on this computer, with the token of the operator in control."""
-    return act(Trial, lambda session: service.take_off_trial(session, trial_id, asking))
+    own page on this computer, with the token of the operator in control. Refused while the vehicle is not ready."""
+    return act(Trial, lambda session: service.take_off_trial(session, trial_id, asking, live.report))
+
+
+@router.get("/trials/{trial_id}/readiness")
+def read_readiness(session: Reader, asking: RequestContextDep, live: Live, trial_id: Id) -> TrialReadiness:
+    """How far a flight has come, and what takes it back at this moment. It changes without an event: read it again
+    every second before a take-off."""
+    return service.trial_readiness(session, trial_id, asking, live.report)
 
 
 @router.post("/trials/{trial_id}/abort", status_code=status.HTTP_202_ACCEPTED)

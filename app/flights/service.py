@@ -1,5 +1,6 @@
 """Requests for flights, from the first to the operator's take-off request. The worker's side is in `flight_rows`."""
 
+from collections.abc import Callable
 from contextlib import suppress
 
 from sqlalchemy.orm import Session
@@ -14,12 +15,18 @@ from app.campaigns.trials.service import check_own_gains
 from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action
 from app.common.errors import ConflictError, NotAllowedError
-from app.common.states import HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
+from app.common.states import ACTIVE_FLIGHT_STATES, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.fleet.control import require_control, require_may_command, require_not_controlled_by_other
+from app.fleet.control import is_in_control, require_control, require_may_command, require_not_controlled_by_other
+from app.flights.readiness import Readiness, Standing, readiness_of, require_ready
+from app.flights.schemas import TrialReadiness
+from app.live.hub import VehicleReport
+
+ReportOf = Callable[[int], VehicleReport]
+"""What is known of a vehicle at this moment, by its id."""
 
 
 def warm_gate_cache(session: Session, trial_id: int) -> None:
@@ -113,12 +120,35 @@ def request_flight(
     session.flush()
 
 
-def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> Trial:
+def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
+    """How far the flight of a trial has come and what takes that back, for who asks. Raises NotFoundError."""
+    row = history.trial_row(session, trial_id)
+    readiness = _readiness(session, row, context, report_of)
+    return TrialReadiness.model_validate(readiness, from_attributes=True)
+
+
+def _readiness(session: Session, row: TrialRow, context: RequestContext, report_of: ReportOf) -> Readiness:
+    vehicle = campaigns.get_row(session, row.campaign_id).vehicle
+    flight = history.latest_flights(session, [row.id]).get(row.id)
+    active = flight if flight is not None and flight.state in ACTIVE_FLIGHT_STATES else None
+    standing = Standing(
+        trial=row.state,
+        vehicle=vehicle.state,
+        has_link=vehicle.registered,
+        has_control=is_in_control(vehicle, context),
+        take_off_requested=active is not None and active.take_off_at is not None,
+        standing_down=active is not None and bool(active.stand_down),
+    )
+    return readiness_of(standing, report_of(vehicle.id))
+
+
+def take_off_trial(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> Trial:
     """Request the take-off of a staged vehicle: the operator's own act.
 
     For a real vehicle the request has to come from Gainline's own page in an unlocked browser on this computer, with
     the token of the operator in control. Raises ConflictError when nothing is staged, the take-off was requested
-    already, another operator is in control, or the rehearsal is no longer satisfied; NotAllowedError otherwise.
+    already, another operator is in control, the rehearsal is no longer satisfied, or the vehicle is no longer ready;
+    NotAllowedError otherwise.
     """
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "take-off", row.state, f"Trial {row.number}")
@@ -132,6 +162,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext) -> 
     else:
         require_may_command(vehicle, context)
         require_not_controlled_by_other(vehicle, context)
+    require_ready(_readiness(session, row, context, report_of))
     flight.take_off_at = utc_now()
     return trial_view(session, campaign, row)
 

@@ -52,6 +52,13 @@ class LiveState:
         )
         return [*vehicles, *flights]
 
+    def vehicle(self, vehicle_id: int) -> VehicleStatus | None:
+        """The vehicle's newest status with its age; None if none has come from this worker."""
+        if (known := self._vehicles.get(vehicle_id)) is None:
+            return None
+        status, heard_s = known
+        return replace(status, age_s=self._clock_s() - heard_s)
+
     def vehicles(self, state: VehicleLinkState) -> list[VehicleStatus]:
         """The newest status of each vehicle whose link is in that state."""
         return [status for status, _ in self._vehicles.values() if status.state == state]
@@ -89,6 +96,14 @@ class LinkState:
     """Whether the worker can be reached at this moment."""
 
     worker: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleReport:
+    """What is known of a vehicle at this moment: whether the worker answers, and the newest status with its age."""
+
+    worker: bool
+    status: VehicleStatus | None = None
 
 
 Live = PublishedMessage | LinkState
@@ -158,6 +173,10 @@ class Hub:
     @property
     def streams(self) -> int:
         return len(self._subscriptions)
+
+    def vehicle(self, vehicle_id: int) -> VehicleStatus | None:
+        """The vehicle's newest status with its age; may be called from any thread."""
+        return self._memory.vehicle(vehicle_id)
 
     def vehicles(self, state: VehicleLinkState) -> list[VehicleStatus]:
         """Status of the vehicles whose link is in that state."""

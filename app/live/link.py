@@ -20,7 +20,7 @@ from app.common.errors import StorageError
 from app.core.errors import GainlineError, InputError
 from app.db.outbox import DatabaseWatch, events_after, latest_event_id
 from app.db.session import Database
-from app.live.hub import Change, Hub, LinkState
+from app.live.hub import Change, Hub, LinkState, VehicleReport
 from app.live.messages import (
     MAX_LINE_BYTES,
     Abort,
@@ -271,6 +271,10 @@ class Live:
         if not self.client.connected:
             return "absent"
         return "running" if self.client.answers else "not answering"
+
+    def report(self, vehicle_id: int) -> VehicleReport:
+        """What is known of a vehicle now; may be called from any thread."""
+        return VehicleReport(worker=self.client.answers, status=self.hub.vehicle(vehicle_id))
 
     async def abort(self, trial_id: int, reason: str) -> AbortAnswer:
         """Abort a flight directly at the worker, without the database. Raises LinkDownError when it cannot be

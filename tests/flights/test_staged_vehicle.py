@@ -18,7 +18,7 @@ from app.flights.process_messages import (
     ToVehicleProcess,
 )
 from app.live.messages import UnreadyReason, VehicleStatus
-from app.vehicles.mavlink.dialects import FieldValue
+from app.vehicles.mavlink.dialects import number, text
 from tests.flights.test_connection_process import (
     AnsweringRig,
     RecordingPipe,
@@ -107,10 +107,6 @@ def staged_for(
     return line
 
 
-def without_header(message: Mapping[str, FieldValue]) -> dict[str, FieldValue]:
-    return {name: value for name, value in message.items() if name != "mavpackettype"}
-
-
 def lost(line: TimedPipe) -> list[str]:
     return [said.why for said in line.said if isinstance(said, StagingLost)]
 
@@ -150,9 +146,15 @@ def test_gains_that_another_program_changed_during_a_silence_are_no_longer_stage
 ) -> None:
     def change(one: AnsweringRig) -> None:
         one.muted = True
-        last = one.told("PARAM_SET")[-1].to_dict()
+        last = one.told("PARAM_SET")[-1]
+        fields = {name: number(last, name) for name in ("target_system", "target_component", "param_type")}
         with one.link() as other:
-            other.send("PARAM_SET", **{**without_header(last), "param_value": last["param_value"] + 1.0})
+            other.send(
+                "PARAM_SET",
+                **{name: int(value) for name, value in fields.items()},
+                param_id=text(last, "param_id"),
+                param_value=number(last, "param_value") + 1.0,
+            )
 
     def hear(one: AnsweringRig) -> None:
         one.muted = False

@@ -1,6 +1,9 @@
 """A real vehicle flies in two steps: its gains staged and read back, then its operator's own act in the browser."""
 
+from collections.abc import Iterator
+from concurrent.futures import Future
 from datetime import timedelta
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -15,6 +18,8 @@ from app.db.types import utc_now
 from app.fleet import commands
 from app.flights import flight_rows
 from app.flights.flight_rows import FlightOutcome
+from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_address
+from app.live.server import LiveServer
 from app.main import create_app
 from app.vehicles.base import FlightRecord
 from tests.builders import (
@@ -39,6 +44,28 @@ from tests.fleet.vehicles import (
     take_control,
 )
 from tests.unlocking import HERE, unlock
+
+
+@pytest.fixture(autouse=True)
+def worker_link(settings: Settings) -> Iterator[LiveServer]:
+    """The worker's end of the live link, before the client looks for it."""
+    with LiveServer(
+        live_address(settings.data_dir),
+        abort=lambda _trial, _reason: False,
+        order=lambda *_: Future(),
+        hello=lambda: WorkerHello(pid=1, version="test"),
+    ) as server:
+        yield server
+
+
+def report(client: TestClient, planned: Json, unready: UnreadyReason = "") -> None:
+    """The vehicle's status arrives, as five times a second."""
+    application: Any = client.app
+    while not application.state.live.worker_running:
+        get(client, "/api/health")
+    vehicle_id = get(client, f"/api/campaigns/{planned['campaign_id']}")["vehicle"]["id"]
+    status = VehicleStatus(vehicle_id=vehicle_id, state="connected", at="", step="idle", unready=unready)
+    application.state.live.hub.publish(status)
 
 
 @pytest.fixture
@@ -67,6 +94,7 @@ def trial(client: TestClient, known: Json) -> Json:
 
 
 def take_off(client: TestClient, staged: Json, headers: dict[str, str]) -> tuple[int, str]:
+    report(client, staged)
     answer = client.post(f"/api/trials/{staged['id']}/take-off", headers=headers)
     return answer.status_code, answer.json().get("detail", "")
 
@@ -383,3 +411,39 @@ def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json
     answer = client.post(f"/api/trials/{planned['id']}/abort")
     assert (answer.status_code, answer.json()["accepted"]) == (202, True)
     assert trial(client, planned)["flight"]["state"] == "cancelled"
+
+
+LOST = {"link silent": "Nothing has been received from the vehicle for 2 s.", "gains unknown": "has restarted"}
+
+
+@pytest.mark.parametrize("unready", LOST)
+def test_a_staged_vehicle_that_is_no_longer_ready_does_not_take_off_until_it_is_again(
+    client: TestClient, database: Database, real: Json, staged: Json, unready: UnreadyReason
+) -> None:
+    operator = control_header(client, real) | OUR_PAGE
+    path = f"/api/trials/{staged['id']}"
+    report(client, staged, unready)
+    refused = client.post(f"{path}/take-off", headers=operator)
+    assert (refused.status_code, LOST[unready] in refused.json()["detail"]) == (409, True), refused.text
+    readiness = client.get(f"{path}/readiness", headers=operator).json()
+    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (["control"], ["staged"], False)
+    assert [loss["kind"] for loss in readiness["losses"]] == [unready]
+    assert is_wanted(database, staged) == (False, None)
+    report(client, staged)
+    readiness = client.get(f"{path}/readiness", headers=operator).json()
+    assert (readiness["steps"], readiness["losses"], readiness["is_ready"]) == (["control", "staged"], [], True)
+    assert client.post(f"{path}/take-off", headers=operator).status_code == 202
+    assert client.get(f"{path}/readiness", headers=operator).json()["steps"] == ["control", "staged", "held"]
+
+
+def test_who_is_not_in_control_sees_no_step_of_a_staged_flight_as_held(client: TestClient, staged: Json) -> None:
+    report(client, staged)
+    readiness = get(client, f"/api/trials/{staged['id']}/readiness")
+    assert (readiness["steps"], readiness["lost"]) == ([], ["control", "staged"])
+    assert [loss["kind"] for loss in readiness["losses"]] == ["control ended"]
+
+
+def test_a_vehicle_of_which_no_status_has_come_does_not_take_off(client: TestClient, real: Json, staged: Json) -> None:
+    operator = control_header(client, real) | OUR_PAGE
+    answer = client.post(f"/api/trials/{staged['id']}/take-off", headers=operator)
+    assert (answer.status_code, "not connected" in answer.json()["detail"]) == (409, True)

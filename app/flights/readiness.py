@@ -1,0 +1,204 @@
+"""Readiness of a trial's vehicle to fly it, as a state machine.
+
+    control → staged → held → in flight → landed → reviewed
+
+Before take-off a loss takes steps back: what was reached no longer holds, and the take-off is refused until its way on
+was taken. In flight a loss takes nothing back, but tells the operator what the vehicle does now.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final, Literal
+
+from app.common.errors import ConflictError
+from app.common.states import TrialState, VehicleState
+from app.live.hub import VehicleReport
+
+ReadinessStep = Literal["control", "staged", "held", "in flight", "landed", "reviewed"]
+STEPS: Final[tuple[ReadinessStep, ...]] = ("control", "staged", "held", "in flight", "landed", "reviewed")
+
+LossKind = Literal[
+    "worker away", "not connected", "process silent", "link silent", "gains unknown", "quarantined", "control ended"
+]
+STATUS_TIMEOUT_S: Final = 2.0
+"""The process of a vehicle reports its status five times a second."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LossText:
+    """What a loss means and the way on, on the ground and in flight. `keeps` is the last step that it leaves."""
+
+    what: str
+    way_on: str
+    what_in_flight: str = ""
+    way_on_in_flight: str = ""
+    keeps: ReadinessStep | None = "control"
+
+
+_BY_HAND: Final = "If it does not descend, use its own remote control."
+
+LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
+    {
+        "worker away": LossText(
+            what="The worker does not answer, so nothing can be commanded.",
+            way_on="It restarts by itself within seconds; start a separate one with `gainline worker`. Then stage the "
+            "flight again.",
+            what_in_flight="The worker does not answer.",
+            way_on_in_flight=f"The process that has the link lands the vehicle. {_BY_HAND}",
+        ),
+        "not connected": LossText(
+            what="The vehicle is not connected.",
+            way_on="Connect it on its page, then stage the flight again.",
+            what_in_flight="The process that has the link has ended.",
+            way_on_in_flight="Use the vehicle's own remote control.",
+        ),
+        "process silent": LossText(
+            what="The process that has the link does not answer.",
+            way_on="Wait until it answers. If it does not, restart the worker and stage the flight again.",
+            what_in_flight="The process that has the link does not answer.",
+            way_on_in_flight="Use the vehicle's own remote control.",
+        ),
+        "link silent": LossText(
+            what="Nothing has been received from the vehicle for 2 s.",
+            way_on="Check its power and its radio. It is ready again once its gains have been read back.",
+            what_in_flight="Nothing has been received from the vehicle for 2 s.",
+            way_on_in_flight=f"Land is repeated until the vehicle confirms it. {_BY_HAND}",
+        ),
+        "gains unknown": LossText(
+            what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
+            way_on="Select Check now on its page, or stage the flight again.",
+        ),
+        "quarantined": LossText(
+            what="The vehicle is quarantined.",
+            way_on="Inspect it, then release it on its page.",
+            keeps=None,
+        ),
+        "control ended": LossText(
+            what="You are not in control of the vehicle.",
+            way_on="Take control.",
+            keeps=None,
+        ),
+    }
+)
+
+_REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
+    {
+        TrialState.PLANNED: "control",
+        TrialState.STAGED: "staged",
+        TrialState.FLYING: "in flight",
+        TrialState.LOST: "in flight",
+        TrialState.CAPTURED: "landed",
+        TrialState.VALID: "reviewed",
+        TrialState.ABORTED: "reviewed",
+        TrialState.INVALID: "reviewed",
+        TrialState.CANCELLED: None,
+    }
+)
+_IN_FLIGHT: Final = STEPS.index("in flight")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """What readiness follows from: the stored state of a trial and its vehicle, and who asks.
+
+    `has_link`: the vehicle is registered, with a process that keeps its link. `has_control`: the one who asks may
+    command it. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe gains are being
+    restored instead.
+    """
+
+    trial: TrialState
+    vehicle: VehicleState
+    has_link: bool
+    has_control: bool
+    take_off_requested: bool = False
+    standing_down: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loss:
+    """Something that takes readiness back, what it means now, and the way on."""
+
+    kind: LossKind
+    what: str
+    way_on: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Readiness:
+    """Steps that hold, steps that were reached and are lost, each in order, and why."""
+
+    steps: tuple[ReadinessStep, ...]
+    lost: tuple[ReadinessStep, ...]
+    losses: tuple[Loss, ...]
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the operator may start the take-off."""
+        return self.steps[-1:] == ("staged",)
+
+
+def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
+    """Evaluate how far a flight has come and which of it still holds."""
+    reached = _REACHED[standing.trial]
+    if standing.trial is TrialState.STAGED and standing.standing_down:
+        reached = "control"
+    elif standing.trial is TrialState.STAGED and standing.take_off_requested:
+        reached = "held"
+    steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
+    if len(steps) > _IN_FLIGHT + 1 or not steps:
+        return Readiness(steps=steps, lost=(), losses=())
+    kinds = _losses(standing, report)
+    if len(steps) > _IN_FLIGHT:
+        return Readiness(steps=steps, lost=(), losses=_in_flight(kinds))
+    if not standing.has_control and standing.trial is TrialState.PLANNED:
+        steps = ()
+    kept = min((_count(LOSSES[kind].keeps) for kind in kinds), default=len(steps))
+    losses = tuple(Loss(kind=kind, what=LOSSES[kind].what, way_on=LOSSES[kind].way_on) for kind in kinds)
+    return Readiness(steps=steps[:kept], lost=steps[kept:], losses=losses)
+
+
+def require_ready(readiness: Readiness) -> None:
+    """Raise ConflictError with the first loss, if there is one."""
+    if readiness.losses:
+        raise ConflictError(readiness.losses[0].what, hint=readiness.losses[0].way_on)
+
+
+def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
+    found: list[LossKind] = []
+    if (link := _link_loss(standing, report)) is not None:
+        found.append(link)
+    if standing.vehicle is VehicleState.QUARANTINED:
+        found.append("quarantined")
+    if not standing.has_control and standing.trial is not TrialState.PLANNED:
+        found.append("control ended")
+    return found
+
+
+def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
+    """The loss nearest to this computer: what is behind it is not known."""
+    if not report.worker:
+        return "worker away"
+    if not standing.has_link:
+        return None
+    status = report.status
+    if standing.vehicle is VehicleState.DISCONNECTED or status is None or status.state == "connecting":
+        return "not connected"
+    if status.state == "not answering" or status.age_s > STATUS_TIMEOUT_S:
+        return "process silent"
+    if status.state == "gone":
+        return "link silent"
+    return status.unready or None
+
+
+def _in_flight(kinds: list[LossKind]) -> tuple[Loss, ...]:
+    texts = ((kind, LOSSES[kind]) for kind in kinds)
+    return tuple(
+        Loss(kind=kind, what=text.what_in_flight, way_on=text.way_on_in_flight)
+        for kind, text in texts
+        if text.what_in_flight
+    )
+
+
+def _count(kept: ReadinessStep | None) -> int:
+    return 0 if kept is None else STEPS.index(kept) + 1

@@ -1,0 +1,24 @@
+"""API schemas of flights."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, Field
+
+from app.flights.readiness import LossKind, ReadinessStep
+
+
+class ReadinessLoss(BaseModel):
+    """Something that takes readiness back: what it means now, and the way on."""
+
+    kind: LossKind
+    what: str
+    way_on: str
+
+
+class TrialReadiness(BaseModel):
+    """How far a flight has come, for who asks: the steps that hold, in order, and those that were reached and lost."""
+
+    steps: list[ReadinessStep]
+    lost: list[ReadinessStep]
+    losses: Annotated[list[ReadinessLoss], Field(description="why; the take-off is refused while there is any")]
+    is_ready: Annotated[bool, Field(description="whether the take-off of the staged vehicle may be requested")]

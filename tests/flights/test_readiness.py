@@ -1,0 +1,137 @@
+"""Every state of a flight against every loss: what holds, what is taken back, and what is said."""
+
+import pytest
+
+from app.common.errors import ConflictError
+from app.common.states import TrialState, VehicleState
+from app.flights.readiness import LOSSES, STEPS, LossKind, ReadinessStep, Standing, readiness_of, require_ready
+from app.live.hub import VehicleReport
+from app.live.messages import UnreadyReason, VehicleLinkState, VehicleStatus
+
+
+def status(state: VehicleLinkState = "connected", unready: UnreadyReason = "", *, age_s: float = 0.1) -> VehicleStatus:
+    return VehicleStatus(
+        vehicle_id=1, state=state, at="2026-11-24T12:00:00Z", step="idle", unready=unready, age_s=age_s
+    )
+
+
+GOOD = VehicleReport(worker=True, status=status())
+
+REACHED: dict[str, tuple[TrialState, dict[str, bool], ReadinessStep | None]] = {
+    "planned": (TrialState.PLANNED, {}, "control"),
+    "staged": (TrialState.STAGED, {}, "staged"),
+    "held": (TrialState.STAGED, {"take_off_requested": True}, "held"),
+    "unstaging": (TrialState.STAGED, {"standing_down": True, "take_off_requested": True}, "control"),
+    "in flight": (TrialState.FLYING, {"take_off_requested": True}, "in flight"),
+    "lost": (TrialState.LOST, {}, "in flight"),
+    "captured": (TrialState.CAPTURED, {}, "landed"),
+    "valid": (TrialState.VALID, {}, "reviewed"),
+    "aborted": (TrialState.ABORTED, {}, "reviewed"),
+    "invalid": (TrialState.INVALID, {}, "reviewed"),
+    "cancelled": (TrialState.CANCELLED, {}, None),
+}
+
+REPORTS: dict[str, tuple[VehicleReport, VehicleState, LossKind]] = {
+    "no worker": (VehicleReport(worker=False, status=status()), VehicleState.READY, "worker away"),
+    "never heard": (VehicleReport(worker=True), VehicleState.READY, "not connected"),
+    "connecting": (VehicleReport(worker=True, status=status("connecting")), VehicleState.READY, "not connected"),
+    "disconnected": (GOOD, VehicleState.DISCONNECTED, "not connected"),
+    "process hangs": (VehicleReport(worker=True, status=status("not answering")), VehicleState.READY, "process silent"),
+    "old status": (VehicleReport(worker=True, status=status(age_s=2.1)), VehicleState.READY, "process silent"),
+    "no heartbeat": (VehicleReport(worker=True, status=status("gone")), VehicleState.READY, "link silent"),
+    "silent for 2 s": (
+        VehicleReport(worker=True, status=status(unready="link silent")),
+        VehicleState.READY,
+        "link silent",
+    ),
+    "restarted": (
+        VehicleReport(worker=True, status=status(unready="gains unknown")),
+        VehicleState.READY,
+        "gains unknown",
+    ),
+    "quarantined": (GOOD, VehicleState.QUARANTINED, "quarantined"),
+}
+
+
+def standing(
+    state: TrialState, flags: dict[str, bool], vehicle: VehicleState = VehicleState.READY, *, has_control: bool = True
+) -> Standing:
+    return Standing(trial=state, vehicle=vehicle, has_link=True, has_control=has_control, **flags)
+
+
+def up_to(step: ReadinessStep | None) -> tuple[ReadinessStep, ...]:
+    return () if step is None else STEPS[: STEPS.index(step) + 1]
+
+
+@pytest.mark.parametrize("name", REACHED)
+def test_without_a_loss_every_step_up_to_the_reached_one_holds(name: str) -> None:
+    state, flags, reached = REACHED[name]
+    found = readiness_of(standing(state, flags), GOOD)
+    assert (found.steps, found.lost, found.losses) == (up_to(reached), (), ())
+    assert found.is_ready == (name == "staged")
+
+
+@pytest.mark.parametrize("loss", REPORTS)
+@pytest.mark.parametrize("name", ["planned", "staged", "held", "unstaging"])
+def test_before_take_off_a_loss_takes_steps_back_and_refuses_the_take_off(name: str, loss: str) -> None:
+    state, flags, reached = REACHED[name]
+    report, vehicle, kind = REPORTS[loss]
+    found = readiness_of(standing(state, flags, vehicle), report)
+    kept = up_to(LOSSES[kind].keeps)
+    assert found.steps == kept[: len(up_to(reached))]
+    assert found.steps + found.lost == up_to(reached)
+    assert [(each.kind, each.what, each.way_on) for each in found.losses] == [
+        (kind, LOSSES[kind].what, LOSSES[kind].way_on)
+    ]
+    assert not found.is_ready
+    with pytest.raises(ConflictError) as refused:
+        require_ready(found)
+    assert str(refused.value) == f"{LOSSES[kind].what} {LOSSES[kind].way_on}"
+
+
+@pytest.mark.parametrize("loss", REPORTS)
+@pytest.mark.parametrize("name", ["in flight", "lost"])
+def test_in_flight_a_loss_takes_nothing_back_and_says_what_to_do_now(name: str, loss: str) -> None:
+    state, flags, _ = REACHED[name]
+    report, vehicle, kind = REPORTS[loss]
+    found = readiness_of(standing(state, flags, vehicle), report)
+    assert (found.steps, found.lost) == (up_to("in flight"), ())
+    text = LOSSES[kind]
+    expected = [(kind, text.what_in_flight, text.way_on_in_flight)] if text.what_in_flight else []
+    assert [(each.kind, each.what, each.way_on) for each in found.losses] == expected
+    assert "Stage" not in "".join(each.way_on for each in found.losses)
+
+
+@pytest.mark.parametrize("loss", REPORTS)
+@pytest.mark.parametrize("name", ["captured", "valid", "aborted", "invalid", "cancelled"])
+def test_after_the_landing_a_loss_changes_nothing(name: str, loss: str) -> None:
+    state, flags, reached = REACHED[name]
+    report, vehicle, _ = REPORTS[loss]
+    assert readiness_of(standing(state, flags, vehicle), report).steps == up_to(reached)
+    assert readiness_of(standing(state, flags, vehicle), report).losses == ()
+
+
+@pytest.mark.parametrize("name", ["staged", "held"])
+def test_control_that_ends_takes_everything_back(name: str) -> None:
+    state, flags, reached = REACHED[name]
+    found = readiness_of(standing(state, flags, has_control=False), GOOD)
+    assert (found.steps, found.lost) == ((), up_to(reached))
+    assert [each.kind for each in found.losses] == ["control ended"]
+
+
+def test_control_that_was_never_taken_is_no_loss() -> None:
+    found = readiness_of(standing(TrialState.PLANNED, {}, has_control=False), GOOD)
+    assert (found.steps, found.lost, found.losses) == ((), (), ())
+
+
+def test_a_simulation_without_a_link_needs_only_the_worker() -> None:
+    linkless = Standing(trial=TrialState.PLANNED, vehicle=VehicleState.READY, has_link=False, has_control=True)
+    assert readiness_of(linkless, VehicleReport(worker=True)).losses == ()
+    assert [each.kind for each in readiness_of(linkless, VehicleReport(worker=False)).losses] == ["worker away"]
+
+
+def test_every_loss_that_can_be_met_in_flight_says_what_the_operator_does_then() -> None:
+    for kind, text in LOSSES.items():
+        assert bool(text.what_in_flight) == bool(text.way_on_in_flight), kind
+        assert text.what, kind
+        assert text.way_on, kind
