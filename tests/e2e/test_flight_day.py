@@ -177,7 +177,7 @@ def fly_the_first(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> Js
     assert vehicle["control"]["operator"] == "Ada"
     picture(dashboard, "staged")
     hold_until_it_flies(dashboard, trial["id"])
-    expect(word(dashboard)).to_have_text("Recording")
+    expect(word(dashboard)).to_have_text("In flight")
     see_it_fly(dashboard, 250)
     picture(dashboard, "flying", at_rest=False)
     land(dashboard)

@@ -71,7 +71,7 @@ def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, 
     assert dashboard.get(f"/vehicles/{vehicle_id}")["control"]["operator"] == "Ada"
     expect(line_of(dashboard)).to_contain_text("[300 20 90]safe [283 13 82]")
     hold_until_it_flies(dashboard, trial_id)
-    expect(word(dashboard)).to_have_text("Recording")
+    expect(word(dashboard)).to_have_text("In flight")
     see_it_fly(dashboard, 40)
     abort(dashboard)
     expect(word(dashboard)).to_have_text("Aborted")
@@ -179,7 +179,7 @@ def test_the_motors_stop_when_the_knob_is_slid_to_its_end_and_not_before(
     take_control(dashboard)
     stage(dashboard, len(TRIED))
     hold_until_it_flies(dashboard, trial_id)
-    expect(word(dashboard)).to_have_text("Recording")
+    expect(word(dashboard)).to_have_text("In flight")
     knob.click()
     slide(page, knob, 150)
     assert orders(dashboard, vehicle_id) == []

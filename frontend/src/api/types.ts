@@ -27,6 +27,7 @@ export type {
   Sort,
   SparkCurve,
   Trial,
+  TrialReadiness,
   TrialState,
   Trouble,
   Vehicle,

@@ -52,7 +52,7 @@ function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
         <span className="visually-hidden">Battery</span>
         {withUnit(aged?.status.batteryV, "V", 1)}
       </span>
-      <HeldGains vehicle={vehicle} held={aged?.status.held ?? {}} stale={stale} />
+      <HeldGains vehicle={vehicle} held={aged?.status.held ?? vehicle.held ?? {}} stale={stale} />
       <InControl vehicle={vehicle} />
     </section>
   );
@@ -64,10 +64,10 @@ interface HeldProps {
   stale: boolean;
 }
 
-/** Current gains next to the safe gains: from the link, otherwise as last read back. */
+/** Current gains next to the safe gains: from the link, which may not know them; without one as last read back. */
 function HeldGains({ vehicle, held, stale }: HeldProps) {
   const { safe_gains: safe } = vehicle;
-  const known = inOrder(Object.keys(held).length > 0 ? held : (vehicle.held ?? {}), Object.keys(safe));
+  const known = inOrder(held, Object.keys(safe));
   const names = Object.keys(safe).join(", ");
   if (Object.keys(known).length === 0) {
     return (

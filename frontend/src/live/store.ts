@@ -84,7 +84,7 @@ export function onLive(trialId: number, draw: (flight: LiveFlight) => void): () 
 const TICK_MS = 250;
 
 /** The current time, updated regularly so that ages increase without messages. */
-function useMoment(): Moment {
+export function useMoment(): Moment {
   const [now, setNow] = useState(momentNow);
   useEffect(() => {
     const ticking = setInterval(() => setNow(momentNow()), TICK_MS);

@@ -34,7 +34,7 @@ test("a status is read with its gains and its units", () => {
   const { status } = heard();
   expect([status.vehicleId, status.step, status.altitudeM, status.batteryV]).toEqual([3, "record", 2.9, 11.4]);
   expect(status.held).toEqual({ kp: 283, ki: 13, kd: 82 });
-  expect(stepWord(status.step)).toBe("Recording");
+  expect(stepWord(status.step)).toBe("In flight");
 });
 
 test("the age counts on while nothing comes, and after two seconds nothing is current", () => {

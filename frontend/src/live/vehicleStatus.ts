@@ -96,7 +96,7 @@ const STEPS: Readonly<Record<string, string>> = {
   idle: "On the ground",
   arm: "Arming",
   "take-off": "Taking off",
-  record: "Recording",
+  record: "In flight",
   land: "Landing",
   "abort-land": "Aborted, landing",
   "link lost": "Link lost",

@@ -10,9 +10,13 @@ interface Props {
 
 const AROUND = 2 * Math.PI * 20;
 
-/** Calls `onHeld` after a press of two seconds; an earlier release cancels. Ignores the keyboard. */
+/**
+ * Calls `onHeld` after a press of two seconds; an earlier release cancels. Ignores the keyboard. A hold that something
+ * else than the finger ends says so.
+ */
 export function HoldButton({ label, disabled = false, onHeld }: Props) {
   const [share, setShare] = useState<number | null>(null);
+  const [interrupted, setInterrupted] = useState(false);
   const pointer = useRef<number | null>(null);
   const frame = useRef(0);
   const note = useId();
@@ -25,6 +29,11 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
     setShare(null);
   }, []);
 
+  const interrupt = useCallback((): void => {
+    if (pointer.current !== null) setInterrupted(true);
+    letGo();
+  }, [letGo]);
+
   const watch = useCallback(
     (hold: Hold): void => {
       frame.current = requestAnimationFrame(() => {
@@ -35,11 +44,12 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
           watch(now.hold);
           return;
         }
+        if (now.kind === "broken") return interrupt();
         letGo();
-        if (now.kind === "done") act.current();
+        act.current();
       });
     },
-    [letGo],
+    [letGo, interrupt],
   );
 
   function press(event: PointerEvent<HTMLButtonElement>): void {
@@ -49,22 +59,23 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
     pointer.current = event.pointerId;
     const now = performance.now();
     setShare(0);
+    setInterrupted(false);
     watch({ sinceMs: now, seenMs: now });
   }
 
   useEffect(() => {
-    window.addEventListener("blur", letGo);
-    document.addEventListener("visibilitychange", letGo);
+    window.addEventListener("blur", interrupt);
+    document.addEventListener("visibilitychange", interrupt);
     return () => {
-      window.removeEventListener("blur", letGo);
-      document.removeEventListener("visibilitychange", letGo);
+      window.removeEventListener("blur", interrupt);
+      document.removeEventListener("visibilitychange", interrupt);
       cancelAnimationFrame(frame.current);
     };
-  }, [letGo]);
+  }, [interrupt]);
 
   useEffect(() => {
-    if (disabled) letGo();
-  }, [disabled, letGo]);
+    if (disabled) interrupt();
+  }, [disabled, interrupt]);
 
   const release = (event: PointerEvent<HTMLButtonElement>): void => {
     if (event.pointerId === pointer.current) letGo();
@@ -88,8 +99,13 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
           <circle cx={24} cy={24} r={20} strokeDasharray={AROUND} strokeDashoffset={AROUND * (1 - (share ?? 0))} />
           <IconPlaneDeparture x={13} y={13} size={22} />
         </svg>
-        <span>{share === null ? label : `Keep holding: ${(2 * (1 - share)).toFixed(1)} s`}</span>
+        <span>{share === null ? label : `Keep holding… ${(2 * (1 - share)).toFixed(1)} s`}</span>
       </button>
+      {interrupted && (
+        <p role="status" className={classes["interrupted"]}>
+          Hold interrupted: nothing was sent. Hold again.
+        </p>
+      )}
       <p id={note} className={classes["note"]}>
         Hold for 2 s with a finger or pointer. Release to cancel. The keyboard is ignored.
       </p>

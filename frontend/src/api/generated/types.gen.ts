@@ -2466,6 +2466,26 @@ export type Proposal = {
 };
 
 /**
+ * ReadinessLoss
+ *
+ * Something that takes readiness back: what it means now, and the way on.
+ */
+export type ReadinessLoss = {
+    /**
+     * Kind
+     */
+    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'quarantined' | 'control ended';
+    /**
+     * What
+     */
+    what: string;
+    /**
+     * Way On
+     */
+    way_on: string;
+};
+
+/**
  * RecordBrief
  *
  * The stored record of a flight, without its samples. `ending`: whether the flight was completed, was aborted, or
@@ -3411,6 +3431,34 @@ export type TrialPhoto = {
      * Added At
      */
     added_at: string;
+};
+
+/**
+ * TrialReadiness
+ *
+ * How far a flight has come, for who asks: the steps that hold, in order, and those that were reached and lost.
+ */
+export type TrialReadiness = {
+    /**
+     * Steps
+     */
+    steps: Array<'control' | 'staged' | 'held' | 'in flight' | 'landed' | 'reviewed'>;
+    /**
+     * Lost
+     */
+    lost: Array<'control' | 'staged' | 'held' | 'in flight' | 'landed' | 'reviewed'>;
+    /**
+     * Losses
+     *
+     * why; the take-off is refused while there is any
+     */
+    losses: Array<ReadinessLoss>;
+    /**
+     * Is Ready
+     *
+     * whether the take-off of the staged vehicle may be requested
+     */
+    is_ready: boolean;
 };
 
 /**
@@ -5363,6 +5411,44 @@ export type TakeOffTrialResponses = {
 };
 
 export type TakeOffTrialResponse = TakeOffTrialResponses[keyof TakeOffTrialResponses];
+
+export type GetReadinessData = {
+    body?: never;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Trial Id
+         */
+        trial_id: number;
+    };
+    query?: never;
+    url: '/api/trials/{trial_id}/readiness';
+};
+
+export type GetReadinessErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type GetReadinessError = GetReadinessErrors[keyof GetReadinessErrors];
+
+export type GetReadinessResponses = {
+    /**
+     * Successful Response
+     */
+    200: TrialReadiness;
+};
+
+export type GetReadinessResponse = GetReadinessResponses[keyof GetReadinessResponses];
 
 export type AbortTrialData = {
     /**

@@ -10,6 +10,7 @@ import { useVehicle } from "../../api/vehicles";
 import { Chart } from "../../charts/Chart";
 import { type PlotlyFigure, withChosen } from "../../charts/traces";
 import type { AbortControl } from "../../live/flights";
+import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
 import { VehicleBadge } from "../../ui/Badges";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
@@ -19,6 +20,7 @@ import { useTitle } from "../../ui/useTitle";
 import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
 import { endOfTime, type FlyStep, flyStateLabel, flyStep } from "./flyScreen";
+import { ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
 
@@ -66,11 +68,14 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const step = flyStep(trial, live?.phase ?? null);
   const concern = status?.status.concern || vehicle?.concern || "";
   const quarantined = vehicle !== null && (vehicle.state === "quarantined" || (status?.status.concern ?? "") !== "");
-  const { word, tone } = flyStateLabel(trial, step, status, quarantined);
+  const readiness = useReadiness(trial.id, vehicle?.id ?? null);
+  const isReady = readiness?.is_ready ?? false;
+  const isHeld = isReady || readiness?.steps.includes("staged") === true;
+  const { word, tone } = flyStateLabel(trial, step, status, { quarantined, isReady });
   const isFlying = step === "flying";
   const watching = useReadOnlyReason(vehicle);
   const barred = BARRED.has(step) && (quarantined || watching !== null);
-  const steps = { campaign, trial, step, abort };
+  const steps = { campaign, trial, step, abort, isReady, isBlocked: readiness !== null && readiness.losses.length > 0 };
   return (
     <div className={classes["screen"]} data-step={step}>
       <div className={classes["head"]}>
@@ -110,13 +115,14 @@ function Screen({ campaign, trial, vehicle }: Props) {
         </div>
       </div>
       <section className={classes["steps"]} aria-label="Next action">
+        {readiness !== null && <ReadinessStepper readiness={readiness} />}
         <ReadOnlyNotice why={vehicle === null ? null : watching} />
         {quarantined && vehicle !== null && <Quarantine vehicle={vehicle} concern={concern} orders={orders} />}
         {!barred && (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}
         <HeldGains
           asked={trial.gains}
-          readBack={trial.read_back}
-          held={step === "over" || step === "judge" ? {} : (status?.status.held ?? {})}
+          readBack={step === "staged" && !isHeld ? null : trial.read_back}
+          held={step === "over" || step === "judge" || !status?.isCurrent ? {} : status.status.held}
           titles={titles}
           areSet={step !== "plan"}
         />

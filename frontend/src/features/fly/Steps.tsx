@@ -26,13 +26,24 @@ interface Props {
   trial: Trial;
   step: FlyStep;
   abort: AbortControl;
+  isReady: boolean;
+  /** Whether something must be put right first, as the stepper says. */
+  isBlocked: boolean;
 }
 
 /** Actions of the current step for a vehicle with a link: control, staging, take-off, review. */
-export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & { vehicle: Vehicle }) {
+export function LinkedSteps({
+  campaign,
+  trial,
+  step,
+  abort,
+  isReady,
+  isBlocked,
+  vehicle,
+}: Props & { vehicle: Vehicle }) {
   switch (step) {
     case "plan":
-      return <Plan campaign={campaign} trial={trial} vehicle={vehicle} />;
+      return <Plan campaign={campaign} trial={trial} vehicle={vehicle} isBlocked={isBlocked} />;
     case "staging":
       return (
         <Waiting text="Writing each gain and reading it back.">
@@ -42,7 +53,7 @@ export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & {
         </Waiting>
       );
     case "staged":
-      return <TakeOff trial={trial} vehicle={vehicle} />;
+      return <TakeOff trial={trial} vehicle={vehicle} isReady={isReady} />;
     case "unstaging":
       return <Waiting text="Writing the safe gains and reading them back. The flight then returns to planned." />;
     case "flying":
@@ -54,7 +65,7 @@ export function LinkedSteps({ campaign, trial, step, abort, vehicle }: Props & {
 }
 
 /** Actions of the current step for a simulation without a link: one click flies. */
-export function PlainSteps({ campaign, trial, step, abort }: Props) {
+export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
   const [speed, setSpeed] = useSpeed();
   const fly = useFlyTrial(campaign);
   switch (step) {
@@ -67,7 +78,7 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
                 size="xl"
                 leftSection={<IconPlaneDeparture size={24} aria-hidden />}
                 loading={fly.isPending}
-                disabled={!trial.actions.includes("fly")}
+                disabled={!trial.actions.includes("fly") || isBlocked}
                 onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
               >
                 Fly
@@ -94,7 +105,14 @@ export function PlainSteps({ campaign, trial, step, abort }: Props) {
   }
 }
 
-function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; vehicle: Vehicle }) {
+interface PlanProps {
+  campaign: Campaign;
+  trial: Trial;
+  vehicle: Vehicle;
+  isBlocked: boolean;
+}
+
+function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
   const { stage } = useFlyActions(vehicle.id);
   const isInControl = useIsInControl(vehicle);
   const isOthers = vehicle.control !== null && !isInControl;
@@ -109,7 +127,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
       </p>
     );
   }
-  const isReady = vehicle.actions.includes("stage") && trial.actions.includes("stage");
+  const mayStage = vehicle.actions.includes("stage") && trial.actions.includes("stage") && !isBlocked;
   return (
     <Stack gap={12}>
       {(vehicle.is_real || isOthers || isInControl) && <OperatorControl vehicle={vehicle} />}
@@ -126,7 +144,7 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
       <Button
         size="xl"
         leftSection={<IconUpload size={24} aria-hidden />}
-        disabled={!isReady || wantsControl}
+        disabled={!mayStage || wantsControl}
         loading={stage.isPending}
         onClick={() => stage.mutate(trial)}
       >
@@ -142,11 +160,11 @@ function Plan({ campaign, trial, vehicle }: { campaign: Campaign; trial: Trial; 
   );
 }
 
-function TakeOff({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
+function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; isReady: boolean }) {
   const { takeOff, unstage } = useFlyActions(vehicle.id);
   const isInControl = useIsInControl(vehicle);
   const isOthers = vehicle.control !== null && !isInControl;
-  const may = trial.actions.includes("take-off") && !isOthers && (isInControl || !vehicle.is_real);
+  const may = isReady && trial.actions.includes("take-off");
   return (
     <Stack gap={12}>
       {(vehicle.is_real || isOthers) && !isInControl && <OperatorControl vehicle={vehicle} />}

@@ -36,15 +36,34 @@ test("a trial is planned, staged, flown and judged; the stream may run ahead of 
   expect(flyStep({ state: "valid", flight }, "ended")).toBe("over");
 });
 
-test("the word in flight is the vehicle's own step, and a silent vehicle is never recording", () => {
+test("the word in flight is the vehicle's own step, and a silent vehicle is never in flight", () => {
   const trial = { state: "flying", flight } as const;
-  expect(flyStateLabel(trial, "flying", statusAt("record", 0.1), false)).toEqual({ word: "Recording", tone: "busy" });
-  expect(flyStateLabel(trial, "flying", statusAt("abort-land", 0.1), false).tone).toBe("bad");
-  expect(flyStateLabel(trial, "flying", statusAt("record", 4), false).word).toBe("Link lost");
-  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), false).word).toBe("Starting");
-  expect(flyStateLabel(trial, "flying", null, false).word).toBe("Flying");
-  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), true).word).toBe("Quarantined");
-  expect(flyStateLabel({ state: "lost", flight }, "judge", null, false).word).toBe("Lost");
+  expect(flyStateLabel(trial, "flying", statusAt("record", 0.1), { quarantined: false, isReady: true })).toEqual({
+    word: "In flight",
+    tone: "busy",
+  });
+  expect(flyStateLabel(trial, "flying", statusAt("abort-land", 0.1), { quarantined: false, isReady: true }).tone).toBe(
+    "bad",
+  );
+  expect(flyStateLabel(trial, "flying", statusAt("record", 4), { quarantined: false, isReady: true }).word).toBe(
+    "Link lost",
+  );
+  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: false, isReady: true }).word).toBe(
+    "Starting",
+  );
+  expect(flyStateLabel(trial, "flying", null, { quarantined: false, isReady: true }).word).toBe("Flying");
+  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: true, isReady: true }).word).toBe(
+    "Quarantined",
+  );
+  expect(flyStateLabel({ state: "lost", flight }, "judge", null, { quarantined: false, isReady: true }).word).toBe(
+    "Lost",
+  );
+});
+
+test("a staged vehicle is ready only while its readiness holds", () => {
+  const staged = { state: "staged", flight } as const;
+  const label = (isReady: boolean) => flyStateLabel(staged, "staged", null, { quarantined: false, isReady });
+  expect([label(true).word, label(false).word]).toEqual(["Gains set, ready to fly", "Not ready to fly"]);
 });
 
 test("a gain is ticked only when the vehicle holds exactly what it was asked to", () => {

@@ -57,8 +57,13 @@ const IN_FLIGHT: ReadonlySet<string> = new Set([
   "restore",
 ]);
 
-/** Main label. For a vehicle with a link, `status` has the step; a stale one is never "Recording". */
-export function flyStateLabel(trial: Standing, step: FlyStep, status: Aged | null, quarantined: boolean): StateLabel {
+/** Main label. For a vehicle with a link, `status` has the step; a stale one is never "In flight". */
+export function flyStateLabel(
+  trial: Standing,
+  step: FlyStep,
+  status: Aged | null,
+  { quarantined, isReady }: { quarantined: boolean; isReady: boolean },
+): StateLabel {
   if (step === "flying" && status !== null) {
     if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
     if (IN_FLIGHT.has(status.status.step)) {
@@ -69,6 +74,7 @@ export function flyStateLabel(trial: Standing, step: FlyStep, status: Aged | nul
   }
   if (quarantined) return { word: "Quarantined", tone: "bad" };
   if (step === "over" || (step === "judge" && trial.state === "lost")) return trialStateLabel(trial.state);
+  if (step === "staged" && !isReady) return { word: "Not ready to fly", tone: "bad" };
   return WORDS[step];
 }
 

@@ -1,0 +1,52 @@
+import { IconAlertTriangleFilled, IconCircle, IconCircleCheckFilled, IconCircleXFilled } from "@tabler/icons-react";
+import { READINESS_STEPS, type Readiness, type ReadinessStep } from "../../live/readiness";
+import classes from "./ReadinessStepper.module.css";
+
+const TITLES: Record<ReadinessStep, string> = {
+  control: "Control",
+  staged: "Staged",
+  held: "Held",
+  "in flight": "In flight",
+  landed: "Landed",
+  reviewed: "Reviewed",
+};
+
+const STANDINGS = {
+  done: { Icon: IconCircleCheckFilled, word: "done" },
+  lost: { Icon: IconCircleXFilled, word: "lost" },
+  open: { Icon: IconCircle, word: "open" },
+} as const;
+
+function standingOf(step: ReadinessStep, { steps, lost }: Readiness): keyof typeof STANDINGS {
+  if (steps.includes(step)) return "done";
+  return lost.includes(step) ? "lost" : "open";
+}
+
+/** How far a flight has come, what was taken back, why, and the way on. */
+export function ReadinessStepper({ readiness }: { readiness: Readiness }) {
+  return (
+    <div className={classes["readiness"]}>
+      <ol className={classes["stepper"]} aria-label="Readiness">
+        {READINESS_STEPS.map((step) => {
+          const standing = standingOf(step, readiness);
+          const { Icon, word } = STANDINGS[standing];
+          return (
+            <li key={step} data-standing={standing}>
+              <Icon size={20} aria-hidden />
+              {TITLES[step]}
+              <span className="visually-hidden">: {word}</span>
+            </li>
+          );
+        })}
+      </ol>
+      {readiness.losses.map(({ kind, what, way_on }) => (
+        <p key={kind} role="alert" className={classes["loss"]}>
+          <IconAlertTriangleFilled size={20} aria-hidden />
+          <span>
+            <strong>{what}</strong> {way_on}
+          </span>
+        </p>
+      ))}
+    </div>
+  );
+}

@@ -1,0 +1,119 @@
+/** Readiness of a trial's vehicle: the server's answer, taken back by what only this page can tell. */
+
+import { useQuery } from "@tanstack/react-query";
+import { useEffect, useRef, useState } from "react";
+import { answer } from "../api/client";
+import { controlHeader, useOwnLease } from "../api/control";
+import { getReadiness } from "../api/generated";
+import type { TrialReadiness } from "../api/types";
+import { momentNow, useConnection, useMoment } from "./store";
+import { type Moment, secondsBetween } from "./vehicleStatus";
+
+export type ReadinessStep = TrialReadiness["steps"][number];
+
+export const READINESS_STEPS: readonly ReadinessStep[] = [
+  "control",
+  "staged",
+  "held",
+  "in flight",
+  "landed",
+  "reviewed",
+];
+
+const ASK_MS = 1000;
+/** An older answer says nothing about now. Longer than a hold, so that a slow answer does not break it. */
+const ANSWER_S = 4;
+/** Without a tick for this long, the page or the whole tablet stood still. */
+const STALL_S = 2;
+
+interface Loss {
+  kind: TrialReadiness["losses"][number]["kind"] | "server away" | "page stalled";
+  what: string;
+  way_on: string;
+}
+
+export interface Readiness extends Omit<TrialReadiness, "losses"> {
+  losses: readonly Loss[];
+}
+
+interface PageState {
+  /** Age of the answer, in seconds. */
+  answerAgeS: number;
+  isServerAway: boolean;
+  /** How long the page stood still after the answer, in seconds; 0 if it did not. */
+  stalledS: number;
+}
+
+function pageLoss({ answerAgeS, isServerAway, stalledS }: PageState, isInFlight: boolean): Loss | null {
+  if (stalledS > 0) {
+    return {
+      kind: "page stalled",
+      what: `This page stood still for ${Math.round(stalledS)} s. What it shows is older than that.`,
+      way_on: "The state is being read again.",
+    };
+  }
+  if (!isServerAway && answerAgeS <= ANSWER_S) return null;
+  return {
+    kind: "server away",
+    what: "The server does not answer. What this page shows is no longer current.",
+    way_on: isInFlight
+      ? "ABORT is sent again until the server answers. If the vehicle does not descend, use its own remote control."
+      : "Nothing can be commanded from here. Check the network and the computer that runs Gainline.",
+  };
+}
+
+/** The server's answer, as far as the page may still rely on it. */
+export function readinessNow(answered: TrialReadiness, page: PageState): Readiness {
+  const isInFlight = answered.steps.includes("in flight");
+  const loss = pageLoss(page, isInFlight);
+  if (loss === null) return answered;
+  const losses = [loss, ...answered.losses];
+  if (isInFlight) return { ...answered, losses, is_ready: false };
+  const kept: ReadinessStep[] = answered.steps.includes("control") ? ["control"] : [];
+  const lost = READINESS_STEPS.filter(
+    (step) => !kept.includes(step) && [...answered.steps, ...answered.lost].includes(step),
+  );
+  return { steps: kept, lost, losses, is_ready: false };
+}
+
+/** Readiness at this moment; null until the first answer. */
+export function useReadiness(trialId: number, vehicleId: number | null): Readiness | null {
+  const token = useOwnLease(vehicleId)?.token ?? "";
+  const { state } = useConnection();
+  const [stalledS, clearStall] = useStall();
+  const asked = useQuery({
+    queryKey: ["trial", trialId, "readiness", token],
+    queryFn: async () => {
+      const headers = vehicleId === null ? {} : controlHeader(vehicleId);
+      const readiness = await answer(getReadiness({ path: { trial_id: trialId }, headers }));
+      clearStall();
+      return { readiness, at: momentNow() };
+    },
+    refetchInterval: ASK_MS,
+    retry: false,
+  });
+  const now = useMoment();
+  if (asked.data === undefined) return null;
+  const { readiness, at } = asked.data;
+  return readinessNow(readiness, {
+    answerAgeS: secondsBetween(at, now),
+    isServerAway: state === "away",
+    stalledS,
+  });
+}
+
+/** How long the page stood still, until cleared. */
+function useStall(): [stalledS: number, clear: () => void] {
+  const [stalledS, setStalledS] = useState(0);
+  const seen = useRef<Moment>(momentNow());
+  useEffect(() => {
+    const ticking = setInterval(() => {
+      const now = momentNow();
+      const gapS = secondsBetween(seen.current, now);
+      seen.current = now;
+      if (gapS > STALL_S) setStalledS(gapS);
+    }, 250);
+    return () => clearInterval(ticking);
+  }, []);
+  return [stalledS, () => setStalledS(0)];
+}

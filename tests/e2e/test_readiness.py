@@ -1,0 +1,184 @@
+"""Readiness on the fly screen: taken back by every loss, with what it means and the way on, and given again."""
+
+import json
+import os
+import re
+import signal
+from collections.abc import Iterator
+from dataclasses import asdict
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, Route, expect
+
+from app.common.states import TrialState, VehicleState
+from app.flights.readiness import STEPS, Readiness, readiness_of
+from tests.e2e.conftest import Opener, Server, new_context
+from tests.e2e.dashboard import Dashboard
+from tests.e2e.flying_by_hand import (
+    disconnect,
+    hold_button,
+    in_state,
+    line_of,
+    middle_of,
+    register,
+    stage,
+    state_of,
+    take_control,
+    word,
+)
+from tests.e2e.states import States
+from tests.flights.test_readiness import GOOD, REACHED, REPORTS, standing
+from tests.runtime.drones import TRIED, Drone
+
+READY, NOT_READY = "Gains set, ready to fly", "Not ready to fly"
+
+
+@pytest.fixture(scope="module")
+def drone(states: States) -> Iterator[Drone]:
+    """In real time, so that a silence leaves its clock and the ground's together."""
+    states.clear()
+    with Drone(speed=1.0) as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def vehicle_id(shared_server: Server, drone: Drone, browser: Browser) -> Iterator[int]:
+    with new_context(browser, shared_server.url) as context:
+        office = Dashboard(context.new_page(), shared_server.url)
+        vehicle = register(office, drone)
+        yield vehicle
+        disconnect(office, vehicle)
+
+
+@pytest.fixture
+def dashboard(open_dashboard: Opener, shared_server: Server) -> Dashboard:
+    dashboard = open_dashboard(shared_server.url, alone=True)
+    dashboard.page.clock.install()
+    return dashboard
+
+
+@pytest.fixture
+def trial_id(dashboard: Dashboard, states: States, vehicle_id: int) -> Iterator[int]:
+    """A staged trial, by Ada, on the fly screen."""
+    in_state(dashboard, vehicle_id, "ready")
+    once = {"kind": "budget", "max_flights": 1}
+    campaign_id = states.campaign("mavlink", name="Up to 3 m", vehicle_id=vehicle_id, stop=once)
+    states.rehearse(campaign_id)
+    trial = states.plan(campaign_id, TRIED)
+    dashboard.open(f"/fly/{trial}")
+    take_control(dashboard)
+    stage(dashboard, len(TRIED))
+    yield trial
+    if state_of(dashboard, trial) == "staged":
+        dashboard.post(f"/trials/{trial}/unstage")
+        in_state(dashboard, vehicle_id, "ready")
+
+
+def stepper(page: Page) -> list[str]:
+    """Standing of each step, in order."""
+    items = page.get_by_role("list", name="Readiness").get_by_role("listitem")
+    return [one.get_attribute("data-standing") or "" for one in items.all()]
+
+
+def losses(page: Page) -> Locator:
+    return page.get_by_label("Next action").get_by_role("alert")
+
+
+def test_a_link_that_is_gone_for_a_minute_is_never_under_a_green_ready_to_fly(
+    dashboard: Dashboard, drone: Drone, vehicle_id: int, trial_id: int
+) -> None:
+    """Observed defect: “Gains set, ready to fly” was green and the hold button active."""
+    page = dashboard.page
+    expect(word(dashboard)).to_have_text(READY)
+    assert stepper(page) == ["done", "done", "open", "open", "open", "open"]
+    os.kill(drone.pid, signal.SIGSTOP)
+    try:
+        expect(losses(page)).to_contain_text("Nothing has been received from the vehicle for 2 s. Check its power")
+        expect(word(dashboard)).to_have_text(NOT_READY)
+        expect(hold_button(page)).to_be_disabled()
+        assert stepper(page) == ["done", "lost", "open", "open", "open", "open"]
+        expect(page.get_by_label("read back")).to_have_count(0)
+        page.clock.fast_forward(60_000)
+        expect(losses(page)).to_contain_text(["Nothing has been received from the vehicle for 2 s."])
+        expect(word(dashboard)).to_have_text(NOT_READY)
+        expect(hold_button(page)).to_be_disabled()
+    finally:
+        os.kill(drone.pid, signal.SIGCONT)
+    expect(word(dashboard)).to_have_text(READY)
+    expect(losses(page)).to_have_count(0)
+    expect(page.get_by_label("read back")).to_have_count(len(TRIED))
+    expect(hold_button(page)).to_be_enabled()
+
+
+def test_after_a_restart_of_the_drone_no_tick_stands_beside_gains_that_it_no_longer_holds(
+    dashboard: Dashboard, drone: Drone, vehicle_id: int, trial_id: int
+) -> None:
+    """Observed defect: the old read-back kept its ticks, and *Check now* was disabled."""
+    page = dashboard.page
+    drone.switch_off()
+    drone.switch_on()
+    expect(page.get_by_text(re.compile("It restarted, so its gains are no longer those staged"))).to_be_visible()
+    expect(page.get_by_label("read back")).to_have_count(0)
+    expect(dashboard.button("Stage")).to_be_enabled()
+    expect(line_of(dashboard)).to_contain_text("[283 13 82]safe")
+    assert state_of(dashboard, trial_id) == "planned"
+    dashboard.open(f"/vehicles/{vehicle_id}")
+    expect(dashboard.button("Check now")).to_be_enabled()
+
+
+def test_a_hold_that_the_pages_own_stall_broke_says_so(dashboard: Dashboard, trial_id: int) -> None:
+    page = dashboard.page
+    middle_of(page, hold_button(page))
+    page.mouse.down()
+    page.clock.run_for(300)
+    page.clock.fast_forward(1500)
+    expect(page.get_by_role("status").filter(has_text="Hold interrupted")).to_have_text(
+        "Hold interrupted: nothing was sent. Hold again."
+    )
+    page.mouse.up()
+    assert dashboard.get(f"/trials/{trial_id}")["flight"]["take_off_at"] is None
+
+
+def test_a_page_that_stood_still_takes_readiness_back_until_it_has_read_the_state_again(
+    dashboard: Dashboard, trial_id: int
+) -> None:
+    page = dashboard.page
+    with_hold = re.compile("/readiness$")
+    page.route(with_hold, lambda route: route.abort())
+    page.clock.fast_forward(30_000)
+    expect(losses(page).first).to_contain_text(re.compile(r"This page stood still for (29|3\d) s"))
+    expect(word(dashboard)).to_have_text(NOT_READY)
+    expect(hold_button(page)).to_be_disabled()
+    page.unroute(with_hold)
+    expect(word(dashboard)).to_have_text(READY)
+
+
+def test_a_server_that_does_not_answer_takes_readiness_back(dashboard: Dashboard, trial_id: int) -> None:
+    page = dashboard.page
+    page.route(re.compile("/readiness$"), lambda route: route.abort())
+    expect(losses(page)).to_contain_text(["The server does not answer."])
+    expect(hold_button(page)).to_be_disabled()
+    page.unroute(re.compile("/readiness$"))
+    expect(hold_button(page)).to_be_enabled()
+
+
+def test_every_loss_in_every_state_is_shown_as_the_server_says_it(dashboard: Dashboard, trial_id: int) -> None:
+    page = dashboard.page
+    shown: Readiness = readiness_of(standing(TrialState.STAGED, {}), GOOD)
+
+    def answer(route: Route) -> None:
+        body = {**asdict(shown), "is_ready": shown.is_ready}
+        route.fulfill(status=200, content_type="application/json", body=json.dumps(body))
+
+    page.route(re.compile("/readiness$"), answer)
+    without_loss = [(GOOD, VehicleState.READY)]
+    cases = [(report, vehicle) for report, vehicle, _ in REPORTS.values()]
+    for state, flags, _ in REACHED.values():
+        for report, vehicle in without_loss + cases:
+            shown = readiness_of(standing(state, flags, vehicle), report)
+            page.clock.run_for(1100)
+            expected = ["done" if s in shown.steps else "lost" if s in shown.lost else "open" for s in STEPS]
+            dashboard.until(lambda wanted=expected: stepper(page) == wanted)  # type: ignore[misc]
+            expect(losses(page)).to_have_text([f"{loss.what} {loss.way_on}" for loss in shown.losses])
+            expect(hold_button(page)).to_be_enabled(enabled=shown.is_ready)
+    page.unroute(re.compile("/readiness$"))
