@@ -75,6 +75,7 @@ def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, 
     see_it_fly(dashboard, 40)
     abort(dashboard)
     expect(word(dashboard)).to_have_text("Aborted")
+    expect(dashboard.page.get_by_text("Safe gains restored and read back.")).to_be_visible()
     expect(dashboard.page.get_by_role("link", name="Next flight")).to_be_visible()
     trial = dashboard.get(f"/trials/{trial_id}")
     assert (trial["state"], trial["read_back"]) == ("aborted", TRIED)

@@ -69,7 +69,9 @@ class TimedPipe(RecordingPipe):
         return super().receive(timeout_s)
 
 
-@pytest.fixture(params=sorted(GAINS))
+@pytest.fixture(
+    params=["paparazzi", *(pytest.param(other, marks=pytest.mark.complete) for other in ("ardupilot", "px4"))]
+)
 def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[AnsweringRig]:
     with AnsweringRig(request.param) as one:
         take_the_place_of_every_vehicle(one, monkeypatch)

@@ -313,6 +313,7 @@ def test_a_real_flight_keeps_its_battery_and_waits_for_a_persons_class(
     flown = fly(client, database, real, planned, with_battery(11.5, 10.75))
     assert (flown["state"], flown["flight"]["battery"]) == ("captured", "blue 2")
     assert (flown["flight"]["battery_v_before"], flown["flight"]["battery_v_after"]) == (11.5, 10.75)
+    assert flown["flight"]["safe_gains_restored"] is True
 
 
 def test_an_unusable_measurement_suggests_invalid_for_a_real_flight_and_makes_a_simulated_one_invalid(

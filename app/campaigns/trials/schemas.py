@@ -124,6 +124,10 @@ class FlightBrief(BaseModel):
     battery: Annotated[str, Field(description="label of the battery used; empty if not given")]
     battery_v_before: float | None
     battery_v_after: float | None
+    safe_gains_restored: Annotated[
+        bool | None,
+        Field(description="whether the safe gains were read back afterwards; null if nothing was reported about them"),
+    ]
 
 
 class GroupBrief(BaseModel):

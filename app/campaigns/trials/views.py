@@ -284,6 +284,7 @@ def _flight(row: FlightRow | None) -> FlightBrief | None:
         battery=row.battery,
         battery_v_before=row.battery_v_before,
         battery_v_after=row.battery_v_after,
+        safe_gains_restored=None if row.restored is None else row.restored == row.safe_gains,
     )
 
 

@@ -1375,6 +1375,12 @@ export type FlightBrief = {
      * Battery V After
      */
     battery_v_after: number | null;
+    /**
+     * Safe Gains Restored
+     *
+     * whether the safe gains were read back afterwards; null if nothing was reported about them
+     */
+    safe_gains_restored: boolean | null;
 };
 
 /**

@@ -20,7 +20,7 @@ import { useTitle } from "../../ui/useTitle";
 import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
 import { endOfTime, type FlyStep, flyStateLabel, flyStep } from "./flyScreen";
-import { ReadinessStepper } from "./ReadinessStepper";
+import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
 
@@ -91,6 +91,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
         <p className="visually-hidden" role="status">
           Flight {trial.number}: {word}
         </p>
+        {readiness !== null && <ReadinessStepper readiness={readiness} />}
         {vehicle === null && <VehicleBadge isReal={campaign.vehicle.is_real} title={campaign.vehicle.title} />}
       </div>
       <div className={classes["watch"]}>
@@ -115,7 +116,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
         </div>
       </div>
       <section className={classes["steps"]} aria-label="Next action">
-        {readiness !== null && <ReadinessStepper readiness={readiness} />}
+        {readiness !== null && <ReadinessLosses losses={readiness.losses} />}
         <ReadOnlyNotice why={vehicle === null ? null : watching} />
         {quarantined && vehicle !== null && <Quarantine vehicle={vehicle} concern={concern} orders={orders} />}
         {!barred && (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}

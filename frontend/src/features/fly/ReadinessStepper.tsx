@@ -22,31 +22,33 @@ function standingOf(step: ReadinessStep, { steps, lost }: Readiness): keyof type
   return lost.includes(step) ? "lost" : "open";
 }
 
-/** How far a flight has come, what was taken back, why, and the way on. */
+/** How far a flight has come, and what was taken back. */
 export function ReadinessStepper({ readiness }: { readiness: Readiness }) {
   return (
-    <div className={classes["readiness"]}>
-      <ol className={classes["stepper"]} aria-label="Readiness">
-        {READINESS_STEPS.map((step) => {
-          const standing = standingOf(step, readiness);
-          const { Icon, word } = STANDINGS[standing];
-          return (
-            <li key={step} data-standing={standing}>
-              <Icon size={20} aria-hidden />
-              {TITLES[step]}
-              <span className="visually-hidden">: {word}</span>
-            </li>
-          );
-        })}
-      </ol>
-      {readiness.losses.map(({ kind, what, way_on }) => (
-        <p key={kind} role="alert" className={classes["loss"]}>
-          <IconAlertTriangleFilled size={20} aria-hidden />
-          <span>
-            <strong>{what}</strong> {way_on}
-          </span>
-        </p>
-      ))}
-    </div>
+    <ol className={classes["stepper"]} aria-label="Readiness">
+      {READINESS_STEPS.map((step) => {
+        const standing = standingOf(step, readiness);
+        const { Icon, word } = STANDINGS[standing];
+        return (
+          <li key={step} data-standing={standing}>
+            <Icon size={20} aria-hidden />
+            {TITLES[step]}
+            <span className="visually-hidden">: {word}</span>
+          </li>
+        );
+      })}
+    </ol>
   );
+}
+
+/** Why steps were taken back, and the way on. */
+export function ReadinessLosses({ losses }: Pick<Readiness, "losses">) {
+  return losses.map(({ kind, what, way_on }) => (
+    <p key={kind} role="alert" className={classes["loss"]}>
+      <IconAlertTriangleFilled size={20} aria-hidden />
+      <span>
+        <strong>{what}</strong> {way_on}
+      </span>
+    </p>
+  ));
 }

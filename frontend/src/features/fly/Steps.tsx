@@ -60,8 +60,26 @@ export function LinkedSteps({
       return <Abort trial={trial} abort={abort} />;
     case "judge":
     case "over":
-      return <FlightReviewCard campaign={campaign} trial={trial} />;
+      return (
+        <>
+          <SafeGainsResult flight={trial.flight} />
+          <FlightReviewCard campaign={campaign} trial={trial} />
+        </>
+      );
   }
+}
+
+/** Whether the vehicle was left with its safe gains. */
+function SafeGainsResult({ flight }: Pick<Trial, "flight">) {
+  if (flight === null) return null;
+  if (flight.safe_gains_restored === true)
+    return <p className={classes["quiet"]}>Safe gains restored and read back.</p>;
+  return (
+    <p role="alert" className={classes["checks"]}>
+      The safe gains were not read back after this flight: the gains on the vehicle are unknown. Inspect it before you
+      fly again.
+    </p>
+  );
 }
 
 /** Actions of the current step for a simulation without a link: one click flies. */

@@ -15,6 +15,7 @@ const flight: Flight = {
   battery: "",
   battery_v_before: null,
   battery_v_after: null,
+  safe_gains_restored: null,
 };
 
 function statusAt(step: string, ageS: number) {
