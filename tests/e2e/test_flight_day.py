@@ -85,7 +85,7 @@ def create(dashboard: Dashboard, vehicle_id: int) -> int:
     picture(dashboard, "wizard")
     page.get_by_role("button", name=re.compile("^Advanced")).click()
     page.get_by_label("Maximum flights").fill(str(FLIGHTS_AT_MOST))
-    page.get_by_label("Minimum improvement").fill(str(IMPROVEMENT_PERCENT))
+    page.get_by_label("Improvement threshold").fill(str(IMPROVEMENT_PERCENT))
     dashboard.button("Create campaign").click()
     expect(page.get_by_role("heading", level=1)).to_have_text(NAME)
     made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")

@@ -38,9 +38,9 @@ export function ConnectionNotice() {
   if (state === "away") {
     return (
       <p className={classes["notice"]} role="status">
-        <strong>The server is not responding.</strong> The data shown is
-        {heardAt === null ? " out of date" : [" from ", <Time key="at" at={heardAt} />]}. The page updates automatically
-        when the server is back.
+        <strong>The server is not responding.</strong>{" "}
+        {heardAt === null ? "The data is out of date. " : ["Data as of ", <Time key="at" at={heardAt} />, ". "]}
+        The page updates automatically when the server is back.
       </p>
     );
   }

@@ -104,7 +104,7 @@ function StopFields({ form, reasons, set }: Props) {
       />
       {form.stop === "paper" && (
         <NumberField
-          label="Minimum improvement"
+          label="Improvement threshold"
           suffix=" %"
           value={form.improvementPercent}
           error={reasons["stop.improvement"]}

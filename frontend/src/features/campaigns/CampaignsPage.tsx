@@ -17,7 +17,7 @@ import { STATE_FILTERS, type StateFilter, statesFor } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
 
 const SORTS: { value: Sort; label: string }[] = [
-  { value: "-updated", label: "Last updated" },
+  { value: "-updated", label: "Recently updated" },
   { value: "-created", label: "Newest" },
   { value: "created", label: "Oldest" },
   { value: "name", label: "Name" },

@@ -281,7 +281,7 @@ export function unreadable(form: CampaignForm, catalogue: Catalogue): string[] {
       .map(({ title }) => title);
   const entries: [string, NumberEntry][] = [
     ["Maximum flights", form.maxFlights],
-    ["Minimum improvement", form.stop === "paper" ? form.improvementPercent : ""],
+    ["Improvement threshold", form.stop === "paper" ? form.improvementPercent : ""],
     ["Confidence", form.stop === "noise" ? form.confidencePercent : ""],
     ["Stop below battery voltage", form.minBatteryV],
     ["Maximum first step", form.firstStepPercent],

@@ -123,7 +123,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         <Stack gap={12}>
           <Checkbox
             size="md"
-            label="These gains have been verified on this vehicle."
+            label="Verified safe on this vehicle"
             checked={form.confirmed}
             error={reasons["safe_gains_confirmed"]}
             onChange={(event) => set({ confirmed: event.currentTarget.checked })}

@@ -83,10 +83,10 @@ export function RequestList({ vehicleId }: { vehicleId: number }) {
   const acts = useActs(vehicleId);
   const items = acts.data?.pages.flatMap((page) => page.items) ?? [];
   return (
-    <Panel title="Requests" className={classes["wide"]}>
+    <Panel title="Command log" className={classes["wide"]}>
       <ErrorNotice error={acts.error} />
       {acts.isPending && <Skeleton height={120} aria-busy="true" />}
-      <ScrollTable label="Requests" className={classes["table"]}>
+      <ScrollTable label="Command log" className={classes["table"]}>
         <thead>
           <tr>
             <th scope="col">Request</th>
