@@ -169,6 +169,19 @@ def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard, states: 
     assert len(lines) == 1 + trial["record"]["samples"]
 
 
+def test_a_page_opens_at_its_top_wherever_the_one_before_was_scrolled_to(dashboard: Dashboard, states: States) -> None:
+    dashboard.open(f"/campaigns/{states.campaign(flights=1)}")
+    page = dashboard.page
+    page.set_viewport_size({"width": 800, "height": 500})
+    link = page.get_by_role("link", name="Open flight").first
+    link.scroll_into_view_if_needed()
+    page.mouse.wheel(0, 200)
+    dashboard.until(lambda: page.evaluate("window.scrollY") > 100)
+    link.click()
+    expect(page).to_have_url(re.compile("/flights/"))
+    dashboard.until(lambda: page.evaluate("window.scrollY") == 0)
+
+
 def test_the_numbers_behind_a_chart_stand_in_a_table(dashboard: Dashboard, states: States) -> None:
     campaign_id = states.campaign(flights=1)
     [trial] = dashboard.trials(campaign_id)

@@ -1,6 +1,6 @@
 import { useQueryClient } from "@tanstack/react-query";
-import { Suspense, useEffect, useRef } from "react";
-import { Link, Outlet, useLocation, useMatch } from "react-router";
+import { Suspense, useEffect, useLayoutEffect, useRef } from "react";
+import { Link, Outlet, useLocation, useMatch, useNavigationType } from "react-router";
 import { useReadOnlyReason } from "../api/access";
 import { useRenewedControl } from "../api/control";
 import { useCampaign } from "../api/queries";
@@ -64,6 +64,18 @@ function CampaignVehicle({ campaignId }: { campaignId: number }) {
   return <VehicleBadge isReal={vehicle.is_real} title={vehicle.registered ? vehicle.name : vehicle.title} />;
 }
 
+/** A page that a link opens begins at its top; going back leaves the place to the browser. */
+function usePagesOpenAtTop(): void {
+  const { pathname, hash } = useLocation();
+  const type = useNavigationType();
+  const shown = useRef(pathname);
+  useLayoutEffect(() => {
+    if (pathname === shown.current) return;
+    shown.current = pathname;
+    if (type === "PUSH" && hash === "") window.scrollTo(0, 0);
+  }, [pathname, hash, type]);
+}
+
 export function AppFrame() {
   const onPage = useMatch("/campaigns/:campaignId/*");
   const campaignId = onPage ? Number(onPage.params.campaignId) : null;
@@ -73,6 +85,7 @@ export function AppFrame() {
   const onFlyScreen = useMatch("/fly/:trialId") !== null;
   useEventStream(flying.length > 0);
   useRenewedControl();
+  usePagesOpenAtTop();
   const { state } = useConnection();
   const watching = useReadOnlyReason(null);
   useSpaceAborts(flying, campaignId, abort.press);
