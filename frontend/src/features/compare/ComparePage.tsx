@@ -32,7 +32,7 @@ function useChosen(): [number[], (trials: readonly number[]) => void] {
   const chosen = chosenIn(params);
   const choose = (trials: readonly number[]): void => {
     remember(trials);
-    setParams(paramsOf(trials), { replace: true });
+    setParams(paramsOf(trials, params.get("campaign")), { replace: true });
   };
   useEffect(() => {
     const added = Number(params.get("add"));
@@ -40,7 +40,8 @@ function useChosen(): [number[], (trials: readonly number[]) => void] {
     const named = chosenIn(params);
     if (named.length > 0) remember(named);
     else if (added > 0 || before.length > 0) {
-      setParams(paramsOf(added > 0 && !before.includes(added) ? [...before, added] : before), { replace: true });
+      const flights = added > 0 && !before.includes(added) ? [...before, added] : before;
+      setParams(paramsOf(flights, params.get("campaign")), { replace: true });
     }
   }, [params, setParams]);
   return [chosen, choose];
@@ -65,29 +66,31 @@ export function ComparePage() {
           </Button>
         )}
       </Group>
-      <Stack gap="var(--gap)">
-        {chosen.length === 0 && <Introduction />}
-        {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
-        {problem !== null && chosen.length > 1 && (
-          <div>
-            <ErrorNotice error={comparison.error} />
-            {kept.length < chosen.length && (
-              <Button variant="default" mt={10} onClick={() => choose(kept)}>
-                Remove {count(chosen.length - kept.length, "flight")}
-              </Button>
-            )}
-          </div>
-        )}
-        {comparison.data !== undefined && chosen.length > 1 && (
-          <Compared comparison={comparison.data} trials={chosen} choose={choose} />
-        )}
-        {comparison.isPending && chosen.length > 1 && <div style={{ height: 480 }} aria-busy="true" />}
+      <div className={classes["layout"]}>
+        <Stack gap="var(--gap)" miw={0}>
+          {chosen.length === 0 && <Introduction />}
+          {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
+          {problem !== null && chosen.length > 1 && (
+            <div>
+              <ErrorNotice error={comparison.error} />
+              {kept.length < chosen.length && (
+                <Button variant="default" mt={10} onClick={() => choose(kept)}>
+                  Remove {count(chosen.length - kept.length, "flight")}
+                </Button>
+              )}
+            </div>
+          )}
+          {comparison.data !== undefined && chosen.length > 1 && (
+            <Compared comparison={comparison.data} trials={chosen} choose={choose} />
+          )}
+          {comparison.isPending && chosen.length > 1 && <div style={{ height: 480 }} aria-busy="true" />}
+        </Stack>
         <FlightPicker
           chosen={chosen}
           from={from > 0 ? from : null}
           onToggle={(trial) => choose(toggled(chosen, trial))}
         />
-      </Stack>
+      </div>
     </>
   );
 }

@@ -15,8 +15,10 @@ export function chosenIn(params: URLSearchParams): number[] {
   return idsIn(params.getAll("trial"));
 }
 
-export function paramsOf(trials: readonly number[]): URLSearchParams {
-  return new URLSearchParams(trials.map((trial) => ["trial", String(trial)]));
+/** The URL of these flights, and of the campaign whose flights are listed first. */
+export function paramsOf(trials: readonly number[], campaign: string | null): URLSearchParams {
+  const listed: [string, string][] = campaign === null ? [] : [["campaign", campaign]];
+  return new URLSearchParams([...listed, ...trials.map((trial): [string, string] => ["trial", String(trial)])]);
 }
 
 export function remember(trials: readonly number[]): void {
