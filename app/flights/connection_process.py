@@ -175,7 +175,8 @@ class VehicleProcess(FlightLoop):
         self._staging = "staged"
         try:
             cleared = super()._await_takeoff_clearance()
-            if cleared is not None and (problem := _NOT_READY.get(self._staging)):
+            is_in_time = cleared is not None and time.monotonic() <= cleared.by_s
+            if is_in_time and (problem := _NOT_READY.get(self._staging)):
                 raise _not_flown(f"It was not flown: {problem}.", "Stage it again.")
         finally:
             self._staging = "none"

@@ -18,7 +18,6 @@ from app.flights.process_messages import (
     ToVehicleProcess,
 )
 from app.live.messages import UnreadyReason, VehicleStatus
-from app.vehicles.mavlink.dialects import number, text
 from tests.flights.test_connection_process import (
     AnsweringRig,
     RecordingPipe,
@@ -148,15 +147,7 @@ def test_gains_that_another_program_changed_during_a_silence_are_no_longer_stage
 ) -> None:
     def change(one: AnsweringRig) -> None:
         one.muted = True
-        last = one.told("PARAM_SET")[-1]
-        fields = {name: number(last, name) for name in ("target_system", "target_component", "param_type")}
-        with one.link() as other:
-            other.send(
-                "PARAM_SET",
-                **{name: int(value) for name, value in fields.items()},
-                param_id=text(last, "param_id"),
-                param_value=number(last, "param_value") + 1.0,
-            )
+        one.change_last_parameter()
 
     def hear(one: AnsweringRig) -> None:
         one.muted = False

@@ -458,7 +458,7 @@ class MavlinkVehicle:
     def _require_staged(self) -> None:
         if self._gains.staged is None:
             raise VehicleError(
-                "No gains were staged for this flight, so it was not started.",
+                "No gains were staged, or the vehicle has restarted since; it was not flown.",
                 hint="Stage the gains, compare what is read back, then fly.",
             )
 

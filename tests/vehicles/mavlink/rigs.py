@@ -24,7 +24,7 @@ from app.simdrone.registry import Make
 from app.vehicles import registry as open_module
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse
-from app.vehicles.mavlink.dialects import Message, text
+from app.vehicles.mavlink.dialects import Message, number, text
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Transport, open_transport
@@ -119,6 +119,14 @@ class LockstepRig(Lockstep, _Heard):
                 whom = {"target_system": 1, "target_component": 0}
                 link.send("PARAM_SET", **whom, param_id=name, param_type=kind, param_value=whole)
             self.wait_s(TICK_S)
+
+    def change_last_parameter(self) -> None:
+        """As another ground station does, to the parameter that was written last."""
+        last = self.told("PARAM_SET")[-1]
+        whole = {name: int(number(last, name)) for name in ("target_system", "target_component", "param_type")}
+        changed = number(last, "param_value") + 1.0
+        with self.link() as other:
+            other.send("PARAM_SET", **whole, param_id=text(last, "param_id"), param_value=changed)
 
     def take_the_place_of_every_vehicle(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Whoever opens a vehicle over MAVLink is given this one, with the options asked for."""

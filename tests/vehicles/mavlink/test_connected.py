@@ -366,9 +366,19 @@ def test_a_check_judges_everything_and_raises_nothing() -> None:
 def test_gains_that_changed_after_they_were_staged_are_not_flown() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)
+        rig.change_last_parameter()
+        with pytest.raises(VehicleError, match=r"Gains: kp .* needed: kp 1600"):
+            vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+        assert vehicle.restore() == SAFE
+
+
+def test_gains_that_were_staged_before_a_restart_are_not_flown() -> None:
+    with LockstepRig() as rig, connected(rig) as vehicle:
+        vehicle.stage(TUNED)
         rig.drone.reboot()
         vehicle.attend(4.0)
-        with pytest.raises(VehicleError, match=r"Gains: kp .* needed: kp 1600"):
+        assert vehicle.condition().held == {}
+        with pytest.raises(VehicleError, match="the vehicle has restarted since"):
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert vehicle.restore() == SAFE
 
