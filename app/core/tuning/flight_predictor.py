@@ -9,6 +9,7 @@ from app.core.experiments import experiment_of
 from app.core.experiments.base import ModelledExperiment
 from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
+from app.core.tuning.calibration import EXPERIMENTS, fitted_flights
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
 from app.core.tuning.gate import space_of
 from app.core.tuning.predictions import predict_corrected, repeat_proposal, with_interval
@@ -76,6 +77,13 @@ def flight_predictor(
         model=model,
         base=base,
     )
+
+
+def modelled_flights(definition: Definition, flights: Sequence[Flight]) -> frozenset[int]:
+    """Numbers of the flights whose records `flight_predictor` needs."""
+    valid = [flight for flight in flights if flight.outcome == "valid"]
+    used = fitted_flights(flights) if valid and definition.experiment in EXPERIMENTS else valid
+    return frozenset(flight.number for flight in (*valid[:1], *used))
 
 
 def predict_repeat(definition: Definition, flights: Sequence[Flight], gains: Gains) -> Proposal | None:
