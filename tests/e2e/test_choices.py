@@ -3,9 +3,9 @@
 import re
 
 import pytest
-from playwright.sync_api import Locator, expect
+from playwright.sync_api import Locator, Route, expect
 
-from tests.e2e.dashboard import Dashboard
+from tests.e2e.dashboard import Dashboard, Json
 from tests.e2e.states import States
 
 PATIENT = {"kind": "budget", "max_flights": 20}
@@ -71,8 +71,12 @@ def test_an_answer_about_earlier_gains_never_stands_beside_newer_ones(dashboard:
     dashboard.open_campaign(campaign_id)
     dashboard.choose("Own gains")
     expect(dashboard.fly_button).to_be_enabled()
-    held = []
-    dashboard.page.route("**/api/campaigns/*/prediction", lambda route: held.append(route))
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    dashboard.page.route("**/api/campaigns/*/prediction", hold)
     dashboard.page.get_by_role("textbox", name="kp").fill("701")
     expect(dashboard.page.get_by_text("Updating…")).to_be_visible()
     expect(dashboard.fly_button).to_be_disabled()
@@ -81,10 +85,10 @@ def test_an_answer_about_earlier_gains_never_stands_beside_newer_ones(dashboard:
     dashboard.until(lambda: held)
     held.pop().continue_()
     dashboard.until(lambda: held)
-    assert held[0].request.post_data_json["gains"]["kp"] == 703
+    asked: Json = held[0].request.post_data_json
+    assert asked["gains"]["kp"] == 703
     expect(dashboard.page.get_by_text("Updating…")).to_be_visible()
     expect(dashboard.fly_button).to_be_disabled()
-    dashboard.page.unroute("**/api/campaigns/*/prediction")
     held.pop().continue_()
     expect(dashboard.page.get_by_text(re.compile("^Predicted error"))).to_be_visible()
     expect(dashboard.fly_button).to_be_enabled()

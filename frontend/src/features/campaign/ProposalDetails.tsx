@@ -55,7 +55,7 @@ interface ReasonProps {
 export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
   const { kind, why } = proposal.advice;
   const isRecommended = proposal.choices.some(({ kind: one, recommended }) => recommended && one === chosen);
-  if (isFirst && isRecommended) return null;
+  if (chosen === "own" ? kind !== "stop" : isFirst && isRecommended) return null;
   if (!isRecommended && kind !== "stop") return <Note fz="body">{CHOICES[chosen].hint}</Note>;
   const Icon = ICONS[kind];
   return (

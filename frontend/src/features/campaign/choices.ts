@@ -12,7 +12,7 @@ export const CHOICES: Record<ChoiceName, { label: string; hint: string }> = {
   "smaller step": { label: "Smaller step", hint: "Halfway from the best gains to the step." },
   repeat: { label: "Repeat", hint: "The best gains again: was the result luck?" },
   baseline: { label: "Baseline", hint: "The first gains again: has the vehicle changed?" },
-  own: { label: "Own gains", hint: "Gains that you choose." },
+  own: { label: "Own gains", hint: "" },
 };
 
 export const RECOMMENDED: Record<Proposal["recommended"], string> = {
