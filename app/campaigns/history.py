@@ -49,11 +49,14 @@ def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
 def flights_of(session: Session, campaign_id: int, *, recorded: Collection[int] | None = None) -> tuple[Flight, ...]:
     """The valid and aborted flights with their trajectories as stored; of those not in `recorded`, without samples."""
     rows = in_history(trials_of(session, campaign_id))
-    wanted = [row for row in rows if row.trajectory_id is not None and (recorded is None or row.number in recorded)]
-    records = trajectories.samples_of(session, [row.trajectory_id for row in wanted if row.trajectory_id is not None])
-    return tuple(
-        _flight(row, _recorded(row, records[row.trajectory_id]) if row.trajectory_id in records else _NOTHING)
+    wanted = {
+        row.number: row.trajectory_id
         for row in rows
+        if row.trajectory_id is not None and (recorded is None or row.number in recorded)
+    }
+    records = trajectories.samples_of(session, wanted.values())
+    return tuple(
+        _flight(row, _recorded(row, records[wanted[row.number]]) if row.number in wanted else _NOTHING) for row in rows
     )
 
 

@@ -54,7 +54,7 @@ def choices_of(
     """The gain sets that the next flight may use, each once, in a fixed order; the proposal's are among them."""
     variants = _variants(campaign, trials, proposal.gains)
     own = _kind_of(proposal, variants)
-    others = {
+    others: dict[ChoiceKind, dict[str, float]] = {
         kind: gains
         for kind, gains in variants.items()
         if kind != own and gains != proposal.gains and (kind != "smaller step" or own == "step")

@@ -91,11 +91,14 @@ def test_a_refusal_offers_the_nearest_value_that_would_pass(dashboard: Dashboard
     campaign_id = states.campaign("twin", step_fraction=1.0, first_step_fraction=1.0)
     dashboard.open_campaign(campaign_id)
     refuse(dashboard.page)
+    ki = dashboard.page.get_by_role("textbox", name="ki")
+    expect(ki).to_have_attribute("aria-invalid", "true")
     expect(dashboard.page.get_by_text(re.compile("stuck on the ground"))).to_be_visible()
     expect(dashboard.fly_button).to_be_disabled()
     dashboard.button("Use ki 1073").click()
-    expect(dashboard.page.get_by_role("textbox", name="ki")).to_have_value("1073")
-    expect(dashboard.fly_button).to_be_enabled()
+    expect(ki).to_have_value("1073")
+    expect(ki).not_to_have_attribute("aria-invalid", "true")
+    expect(dashboard.page.get_by_text(re.compile("stuck on the ground"))).to_have_count(0)
     assert dashboard.trials(campaign_id) == []
 
 

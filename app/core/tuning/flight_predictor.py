@@ -62,21 +62,24 @@ def flight_predictor(
         return None
     if donor is not None:
         experiment = transfer(definition, experiment, flights, donor).experiment
-    if not has_flown(flights):
-        nominal = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
-        model, base = partial(predict_corrected, nominal), None
-    else:
-        strategy = STRATEGIES[definition.strategy]
-        model = strategy.predict_flight(definition, experiment, flights)
-        base = best_flight(flights) if strategy.corrects_model else None
+    strategy, flown = STRATEGIES[definition.strategy], has_flown(flights)
+    model = strategy.predict_flight if flown else partial(_first_flight, donor)
     return FlightPredictor(
         experiment=experiment,
         space=space,
         flights=flights,
         scatter=pool_scatter(groups_of(flights), experiment.scatter),
-        model=model,
-        base=base,
+        model=model(definition, experiment, flights),
+        base=best_flight(flights) if flown and strategy.corrects_model else None,
     )
+
+
+def _first_flight(
+    donor: Flight | None, _definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]
+) -> PredictionOf:
+    """The model before the first valid flight: the nominal one, or the one corrected by the donor's flight."""
+    model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
+    return partial(predict_corrected, model)
 
 
 def modelled_flights(definition: Definition, flights: Sequence[Flight]) -> frozenset[int]:

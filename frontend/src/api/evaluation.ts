@@ -9,7 +9,7 @@ import type { GainsPrediction, Gate } from "./types";
 
 export type GainSet = Readonly<Record<string, number>>;
 
-export function sameGains(one: GainSet, other: GainSet): boolean {
+function sameGains(one: GainSet, other: GainSet): boolean {
   const names = Object.keys(one);
   return names.length === Object.keys(other).length && names.every((name) => one[name] === other[name]);
 }

@@ -25,7 +25,6 @@ export type {
   NewVehicle,
   NextFlight,
   OptionInfo,
-  PredictedCurve,
   PresetInfo,
   Proposal,
   Sort,

@@ -6,6 +6,8 @@ import classes from "./NextFlight.module.css";
 export interface GainEntry {
   texts: Readonly<Record<string, string>>;
   reasons: Readonly<Record<string, string>>;
+  /** Gains that the gate refuses. */
+  refused: readonly string[];
   onText: (name: string, text: string) => void;
 }
 
@@ -64,7 +66,7 @@ export function GainTable({ rows, unit, titles, entry }: Props) {
   );
 }
 
-function NextInput({ name, texts, reasons, onText }: GainEntry & { name: string }) {
+function NextInput({ name, texts, reasons, refused, onText }: GainEntry & { name: string }) {
   return (
     <TextInput
       aria-label={name}
@@ -72,7 +74,7 @@ function NextInput({ name, texts, reasons, onText }: GainEntry & { name: string 
       inputMode="decimal"
       autoComplete="off"
       value={texts[name] ?? ""}
-      error={reasons[name] !== undefined}
+      error={reasons[name] !== undefined || refused.includes(name)}
       onChange={(event) => onText(name, event.currentTarget.value)}
     />
   );

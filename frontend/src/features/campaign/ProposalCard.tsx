@@ -33,6 +33,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview }: 
   const units = useUnits(experiment);
   const titles = useGainTitles(experiment);
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
+  const isEvaluated = chosen.gains !== null && chosen.error === null;
   const isRefused = chosen.isChecked && chosen.gate?.passed === false;
   return (
     <Panel title={`Next flight: ${number}`}>
@@ -40,12 +41,15 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview }: 
         <FlightChoices proposal={proposal} chosen={chosen.name} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable rows={chosen.rows} unit={units.gains} titles={titles} entry={chosen.entry} />
-        <PredictedError
-          predicted={chosen.predicted}
-          isCurrent={chosen.isPredicted}
-          best={campaign.best?.error ?? null}
-          unit={units.error}
-        />
+        {isEvaluated && (
+          <PredictedError
+            predicted={chosen.predicted}
+            isCurrent={chosen.isPredicted}
+            best={campaign.best?.error ?? null}
+            unit={units.error}
+          />
+        )}
+        <ErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
         {isRefused && chosen.gate !== null && chosen.choice === undefined && (
           <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />
         )}
@@ -54,7 +58,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview }: 
           {chosen.choice?.proposed && (
             <ProposalExplanation explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />
           )}
-          {(chosen.choice !== undefined || !isRefused) && (
+          {isEvaluated && (chosen.choice !== undefined || !isRefused) && (
             <GateChecks gate={chosen.gate} isCurrent={chosen.isChecked} />
           )}
         </div>
@@ -106,7 +110,17 @@ function FlightButtons({ campaign, proposal, chosen, number, upload }: ButtonsPr
       {label}
     </Button>
   );
-  if (!can_fly) return <ImportRecord upload={upload} {...(isReady ? { plan: trial } : {})} />;
+  if (!can_fly) {
+    return (
+      <>
+        <ImportRecord upload={upload} {...(isReady ? { plan: trial } : {})} />
+        <Button variant="default" loading={create.isPending} disabled={!isReady} onClick={() => create.mutate(trial)}>
+          Plan flight {number}
+        </Button>
+        <ErrorNotice error={create.error} />
+      </>
+    );
+  }
   return (
     <>
       {!needs_staging && button(`Fly flight ${number}`, true, () => create.mutate({ ...trial, ...order }))}
@@ -121,7 +135,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload }: ButtonsPr
           onFly={(overrule) => create.mutate({ ...trial, overrule, ...(needs_staging ? {} : order) })}
         />
       )}
-      <ErrorNotice error={create.error ?? chosen.error} shown={chosen.rows.map(({ name }) => name)} />
+      <ErrorNotice error={create.error} />
     </>
   );
 }

@@ -62,6 +62,9 @@ export function useNextFlight(campaign: Campaign, proposal: Proposal, onPreview:
   useEffect(() => () => onPreview(null), [onPreview]);
   const error = isProposal ? null : (prediction.error ?? gate.error);
   const reasons = { ...reasonsByField(problemOf(error), Object.keys(texts)), ...own.reasons };
+  const refused = (gate.isCurrent ? (gate.result?.checks ?? []) : []).flatMap(({ passed, gain }) =>
+    passed || !gain ? [] : [gain],
+  );
   return {
     name,
     choice,
@@ -78,7 +81,7 @@ export function useNextFlight(campaign: Campaign, proposal: Proposal, onPreview:
     ),
     entry:
       choice === undefined
-        ? { texts, reasons, onText: (gain, text) => setTexts({ ...texts, [gain]: text }) }
+        ? { texts, reasons, refused, onText: (gain, text) => setTexts({ ...texts, [gain]: text }) }
         : undefined,
     gains,
     predicted: isProposal ? proposal : prediction.result,
