@@ -13,6 +13,7 @@ from app import __version__
 from app.accounts.keys_and_links import Keyring
 from app.bundles.router import router as bundles
 from app.campaigns import catalogue
+from app.campaigns.flight_predictions import PredictorCache
 from app.campaigns.router import figures_router, landscape_router, vehicles_router
 from app.campaigns.router import router as campaigns
 from app.campaigns.trials.router import router as trials
@@ -72,6 +73,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.database = database
+    app.state.predictors = PredictorCache()
     own = (
         catalogue.router,
         system.router,

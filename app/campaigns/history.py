@@ -46,13 +46,17 @@ def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
     return repository.of_campaigns(session, campaign_ids)
 
 
-def flights_of(session: Session, campaign_id: int) -> tuple[Flight, ...]:
-    """The valid and aborted flights with their trajectories as stored."""
+def flights_of(session: Session, campaign_id: int, *, recorded: Collection[int] | None = None) -> tuple[Flight, ...]:
+    """The valid and aborted flights with their trajectories as stored; of those not in `recorded`, without samples."""
     rows = in_history(trials_of(session, campaign_id))
-    records = trajectories.samples_of(session, [row.trajectory_id for row in rows if row.trajectory_id is not None])
-    return tuple(
-        _flight(row, _NOTHING if row.trajectory_id is None else _recorded(row, records[row.trajectory_id]))
+    wanted = {
+        row.number: row.trajectory_id
         for row in rows
+        if row.trajectory_id is not None and (recorded is None or row.number in recorded)
+    }
+    records = trajectories.samples_of(session, wanted.values())
+    return tuple(
+        _flight(row, _recorded(row, records[wanted[row.number]]) if row.number in wanted else _NOTHING) for row in rows
     )
 
 

@@ -47,13 +47,14 @@ def read_history(session: Session, campaign_id: int) -> CampaignHistory:
         definition=definition,
         flights=history.flights_of(session, campaign_id),
         digest=history.history_digest(session, row, definition, trials),
-        donor=_donor(session, definition),
+        donor=read_donor(session, definition),
         battery_v=history.last_battery_v(trials),
         open_until_flight=row.open_until_flight,
     )
 
 
-def _donor(session: Session, definition: Definition) -> Flight | None:
+def read_donor(session: Session, definition: Definition) -> Flight | None:
+    """The flight that a warm start uses, None without one. Raises ConflictError when it has been deleted or changed."""
     named = definition.start.donor
     if named is None:
         return None

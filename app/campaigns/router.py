@@ -2,17 +2,19 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Query, status
+from fastapi import APIRouter, Depends, Query, Request, status
 
 from app.accounts.permissions import Permission, is_allowed
-from app.campaigns import figure_data, landscapes, proposals, service, wear
+from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, wear
 from app.campaigns.schemas import (
     Campaign,
     CampaignEdit,
     CampaignStatistics,
     CampaignSummary,
     Clone,
+    ConsideredGains,
     Finish,
+    GainsPrediction,
     NewCampaign,
     NextFlight,
     Promotion,
@@ -38,6 +40,14 @@ from app.web.dependencies import (
     Writer,
     json_only,
 )
+
+
+async def _predictors(request: Request) -> flight_predictions.PredictorCache:
+    predictors: flight_predictions.PredictorCache = request.app.state.predictors
+    return predictors
+
+
+Predictors = Annotated[flight_predictions.PredictorCache, Depends(_predictors)]
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"], dependencies=[Depends(json_only)])
 
@@ -137,6 +147,14 @@ def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
 def compute_proposal(act: IdempotentPost, campaign_id: Id) -> NextFlight:
     """Compute the proposal again."""
     return act(NextFlight, lambda session: service.compute_proposal(session, campaign_id))
+
+
+@router.post("/{campaign_id}/prediction")
+def predict_gains(
+    database: CurrentDatabase, predictors: Predictors, campaign_id: Id, body: ConsideredGains
+) -> GainsPrediction:
+    """Predict a flight with any gains, by the model that the next proposal comes from. Changes nothing."""
+    return flight_predictions.predict_gains(database, predictors, campaign_id, body.gains)
 
 
 figures_router = APIRouter(prefix="/api", tags=["figures"])

@@ -277,9 +277,24 @@ class Advice(BaseModel):
     why: str
 
 
+Variant = Literal["smaller step", "repeat", "baseline"]
+ChoiceKind = Literal["step", "smaller step", "repeat", "baseline"]
+
+
+class FlightChoice(BaseModel):
+    """A gain set that the next flight may use. `proposed`: it is the proposal's own, otherwise a variant of that kind;
+    `recommended`: it is the advice's."""
+
+    kind: ChoiceKind
+    gains: Gains
+    proposed: bool
+    recommended: bool
+
+
 class Proposal(BaseModel):
     """The next gain set, computed from one history; stale as soon as that history has changed. `recommended` is the
-    advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so."""
+    advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so. `choices` are the
+    proposal and its variants, no gain set twice; none is recommended when the advice is to stop."""
 
     id: int
     campaign_id: int
@@ -288,6 +303,7 @@ class Proposal(BaseModel):
     advice: Advice
     gains: Gains
     changes: dict[str, GainChange]
+    choices: list[FlightChoice]
     predicted_error: float | None
     interval: Interval | None
     explanation: Explanation
@@ -304,6 +320,31 @@ class NextFlight(BaseModel):
     state: Literal["computing", "ready", "failed", "none"]
     proposal: Proposal | None
     problem: Trouble | None
+
+
+class ConsideredGains(Request):
+    """A complete gain set that is considered for the next flight."""
+
+    gains: Annotated[dict[str, Number], Field(max_length=50, examples=[{"kp": 283, "ki": 13, "kd": 82}])]
+
+
+class PredictedCurve(BaseModel):
+    """The scored output of a predicted flight over time, thinned for drawing."""
+
+    time_s: list[float]
+    values: list[float]
+
+
+class GainsPrediction(BaseModel):
+    """What is predicted for gains: their error with its interval, the curve, and the edges of its band. From the
+    flights of these gains if there were any, otherwise from the model of the next proposal; null without a model."""
+
+    gains: Gains
+    predicted_error: float | None
+    interval: Interval | None
+    curve: PredictedCurve | None
+    lower: PredictedCurve | None
+    upper: PredictedCurve | None
 
 
 class RepeatGroup(BaseModel):

@@ -15,6 +15,7 @@ from app.campaigns.schemas import (
     Campaign,
     CampaignSummary,
     Definition,
+    FlightChoice,
     FlyingTrial,
     GainChange,
     NextFlight,
@@ -27,6 +28,7 @@ from app.campaigns.schemas import (
     Winner,
 )
 from app.campaigns.statistics import best_trial, standing_of, standing_within_bounds_of
+from app.campaigns.variants import choices_of
 from app.common.conflict_checks import allowed
 from app.common.schemas import Gate, Interval, Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
@@ -172,6 +174,7 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         advice=advice,
         gains=row.gains,
         changes=_changes(now, row.gains),
+        choices=_choices(campaign, row, trials, advice),
         predicted_error=row.predicted_error,
         interval=None if row.interval is None else Interval.model_validate(row.interval),
         explanation=_EXPLANATION.validate_python(row.explanation),
@@ -181,6 +184,18 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         stale=is_stale(session, campaign, row, trials),
         computed_at=row.computed_at,
     )
+
+
+def _choices(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow], advice: Advice) -> list[FlightChoice]:
+    return [
+        FlightChoice(
+            kind=kind,
+            gains=gains,
+            proposed=gains == row.gains,
+            recommended=advice.kind != "stop" and gains == advice.gains,
+        )
+        for kind, gains in choices_of(campaign, row, trials).items()
+    ]
 
 
 def _advice(row: ProposalRow, verdict: StopVerdict) -> Advice:

@@ -122,8 +122,17 @@ class Dashboard:
 
     @property
     def fly_button(self) -> Locator:
-        """Flies what the strategy proposes, whether or not that is what is recommended."""
-        return self.page.get_by_role("button", name=re.compile("^(Fly next trial|Fly the step|Fly these gains)$"))
+        """Flies the gains that are chosen, the recommended ones at first."""
+        return self.page.get_by_role("button", name=re.compile(r"^Fly flight \d+$"))
+
+    def choose(self, choice: str) -> None:
+        """Choose what to fly next: Step, Smaller step, Repeat, Baseline or Own gains."""
+        self.page.get_by_role("radiogroup", name="Gains to fly").get_by_text(re.compile(f"^{choice}")).click()
+
+    def choose_proposed(self, campaign_id: int) -> None:
+        """Choose what the strategy proposes, whether or not that is what is recommended."""
+        choices = self.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["choices"]
+        self.choose(next(each["kind"] for each in choices if each["proposed"]).capitalize())
 
     # ---- charts
 

@@ -187,10 +187,9 @@ def _the_key_of_another_act(dashboard: Dashboard, _server: Server, _states: Stat
 @provokes(GainsError)
 def _gains_under_which_the_integrator_wraps(dashboard: Dashboard, _server: Server, states: States) -> None:
     dashboard.open_campaign(states.campaign())
-    dashboard.button("Edit gains").click()
-    for name, value in {"kp": 283, "ki": 1356, "kd": 82}.items():
-        dashboard.page.get_by_label(re.compile(f"^{name}")).fill(str(value))
-    dashboard.button("Fly these gains").click()
+    body = json.dumps({"gains": {"kp": 283, "ki": 1356, "kd": 82}})
+    instead(dashboard, "/campaigns/*/trials", body=body)
+    dashboard.fly()
 
 
 @provokes(TrajectoryError)

@@ -36,7 +36,7 @@ FLIGHTS_AT_MOST: Final = 9
 DECIDED: Final = "Ada and Ben, from the flights of this campaign"
 CHARTS: Final = re.compile("^[34]$")
 """Takeoffs, errors and gains; the landscape as well if it has been computed by then."""
-RECOMMENDED: Final = re.compile("^(Repeat the best|Fly the baseline|Stage)$")
+STAGE: Final = re.compile(r"^Stage flight \d+$")
 
 
 @pytest.fixture
@@ -58,10 +58,10 @@ def test_a_day_from_the_wizard_to_the_report(
     first = fly_the_first(dashboard, campaign_id, vehicle_id)
     abort_the_second(dashboard, campaign_id, vehicle_id)
     mark_the_third_invalid(dashboard, campaign_id, first)
-    fly_another(dashboard, campaign_id, lambda: press(dashboard, RECOMMENDED))
+    fly_another(dashboard, campaign_id, lambda: press(dashboard, STAGE))
     repeat_the_best(dashboard, campaign_id)
     while not is_over(dashboard, campaign_id):
-        fly_another(dashboard, campaign_id, lambda: press(dashboard, RECOMMENDED))
+        fly_another(dashboard, campaign_id, lambda: press(dashboard, STAGE))
     see_the_result(dashboard, campaign_id)
     promote(dashboard, campaign_id, vehicle_id)
     open_the_report(dashboard, campaign_id)
@@ -135,7 +135,12 @@ def proposed(dashboard: Dashboard, campaign_id: int) -> Json:
     """The trial of the proposed gains, its fly screen open."""
     dashboard.when_ready(campaign_id)
     proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
-    trial = planned(dashboard, campaign_id, lambda: press(dashboard, re.compile("^Stage$")))
+
+    def stage_the_step() -> None:
+        dashboard.choose_proposed(campaign_id)
+        press(dashboard, STAGE)
+
+    trial = planned(dashboard, campaign_id, stage_the_step)
     assert trial["gains"] == proposal["gains"]
     return trial
 
@@ -236,9 +241,12 @@ def fly_another(dashboard: Dashboard, campaign_id: int, choose: Callable[[], Non
 
 def repeat_the_best(dashboard: Dashboard, campaign_id: int) -> None:
     winner = dashboard.get(f"/campaigns/{campaign_id}")["winner"]
-    trial = fly_another(
-        dashboard, campaign_id, lambda: press(dashboard, re.compile("^Repeat (the best|instead)"))
-    )  # the recommended one, or beside it
+
+    def stage_a_repeat() -> None:
+        dashboard.choose("Repeat")
+        press(dashboard, STAGE)
+
+    trial = fly_another(dashboard, campaign_id, stage_a_repeat)
     assert trial["gains"] == winner["gains"]
     groups = dashboard.get(f"/campaigns/{campaign_id}/statistics")["groups"]
     repeated = next(group for group in groups if group["gains"] == winner["gains"])

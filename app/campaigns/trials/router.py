@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response, status
 from fastapi.responses import FileResponse
 
-from app.campaigns.schemas import Campaign
+from app.campaigns.schemas import Campaign, ConsideredGains
 from app.campaigns.trials import photos, records, reviews, service
 from app.campaigns.trials.schemas import (
     AbortJudgement,
@@ -16,7 +16,7 @@ from app.campaigns.trials.schemas import (
     TrialEdit,
     TrialPhoto,
 )
-from app.common.schemas import Page
+from app.common.schemas import Gate, Page
 from app.web.dependencies import (
     FILE_BODY,
     REQUEST_BODY,
@@ -39,6 +39,12 @@ router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_on
 def list_trials(session: Reader, campaign_id: Id, limit: Limit = 50, cursor: CursorText = None) -> Page[Trial]:
     """The trials of a campaign, in the order of their numbers."""
     return service.list_trials(session, campaign_id, limit=limit, cursor=cursor)
+
+
+@router.post("/campaigns/{campaign_id}/gate")
+def evaluate_gate(session: Reader, campaign_id: Id, body: ConsideredGains) -> Gate:
+    """The gate's result for any gains. Changes nothing; a trial's gains are checked again."""
+    return service.evaluate_gate(session, campaign_id, body.gains)
 
 
 @router.post("/campaigns/{campaign_id}/reopen")

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, Field, model_validator
 
+from app.campaigns.schemas import Variant
 from app.common.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
 from app.common.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 from app.core.statistics.comparisons import Verdict
@@ -18,13 +19,11 @@ class FlightOrder(Request):
     speed: Speed | None = 10.0
 
 
-Variant = Literal["smaller step", "repeat", "baseline"]
-
-
 class NewTrial(Request):
     """A trial of a proposal, of your own gains, or of a variant: exactly one of the three. With `fly` it is flown at
     once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
-    `baseline`, the first flight's gains again."""
+    `baseline`, the first flight's gains again. A variant with `gains` is refused when these are not its gains: it then
+    flies what its client has shown, or nothing."""
 
     proposal_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)] | None = None
     gains: Annotated[dict[str, Number], Field(max_length=50, examples=[{"kp": 283, "ki": 13, "kd": 82}])] | None = None

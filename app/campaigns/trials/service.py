@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
 from sqlalchemy.orm import Session
 
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
@@ -16,13 +15,13 @@ from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.history import set_flight_state, set_trial_state
-from app.campaigns.schemas import Campaign
-from app.campaigns.statistics import standing_within_bounds_of
-from app.campaigns.trials.schemas import NewTrial, Reopening, Trial, TrialEdit, Variant
+from app.campaigns.schemas import Campaign, Variant
+from app.campaigns.trials.schemas import NewTrial, Reopening, Trial, TrialEdit
 from app.campaigns.trials.views import trial_view, trial_views
+from app.campaigns.variants import gains_of
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, GainlineError, InputError, Problem
-from app.common.schemas import Page, decode_cursor, encode_cursor
+from app.common.schemas import Gate, Page, decode_cursor, encode_cursor
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
 from app.core.experiments import experiment_of
@@ -66,6 +65,15 @@ def check_flown_gains(session: Session, campaign: CampaignRow, flown: Gains) -> 
     return GateDecision(gains, proposals.gate_json(gate), "")
 
 
+def evaluate_gate(session: Session, campaign_id: int, asked: Gains) -> Gate:
+    """The gate's result for gains that a person considers.
+
+    Raises GainsError when they are not the campaign's gains, or no controller can hold them.
+    """
+    _, gate = _asked(session, campaigns.get_row(session, campaign_id), asked)
+    return Gate.model_validate(proposals.gate_json(gate))
+
+
 def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[str, float], GateResult]:
     """The gains, complete and in order, and the gate's result."""
     definition = definition_of(campaign)
@@ -101,35 +109,6 @@ def _judged(campaign: CampaignRow, gains: dict[str, float], gate: GateResult, ov
 
 
 KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repeat": "repeat", "baseline": "baseline"}
-
-
-def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[str, float]:
-    """Gains of a variant.
-
-    `repeat`: the best gains by all their flights; `baseline`: the first flight's; `smaller step`: half way from the
-    best to the present proposal. Like the advice, it ignores flights outside the campaign's bounds. Raises
-    ConflictError before the first valid flight inside the bounds, and where half a step rounds to none.
-    """
-    now = standing_within_bounds_of(campaign, history.trials_of(session, campaign.id))
-    if now is None:
-        raise ConflictError(
-            f"Campaign {campaign.id} has no valid flight inside its bounds yet, which a {variant} needs.",
-            hint="Fly the first proposal.",
-        )
-    if variant == "baseline":
-        return dict(now.baseline.gains)
-    best = dict(now.winner.gains)
-    if variant == "repeat":
-        return best
-    space = space_of(definition_of(campaign))
-    proposed = space.vector(proposals.require_fresh_proposal(session, campaign).gains)
-    half = space.mapping(space.nearest((space.vector(best) + proposed) / 2.0))
-    if half == best or np.array_equal(space.vector(half), proposed):
-        raise ConflictError(
-            "The proposed step cannot be made smaller: half of it is less than one count.",
-            hint="Fly the proposal, or repeat the best gains.",
-        )
-    return half
 
 
 def cancel_trial(session: Session, trial_id: int) -> Trial:
@@ -238,18 +217,30 @@ def _seen(session: Session, row: TrialRow) -> Trial:
 
 def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[GateDecision, ProposalRow | None]:
     """The gains that may fly, and the proposal that they come from, if any."""
-    if sum(given is not None for given in (new.proposal_id, new.gains, new.variant)) != 1:
+    own = new.gains if new.variant is None else None
+    if sum(given is not None for given in (new.proposal_id, own, new.variant)) != 1:
         raise InputError(
             "A trial flies a proposal, gains of your own, or a variant.",
             hint="Send exactly one of them.",
             problems=(Problem("proposal_id", "or gains or variant: exactly one of them is required"),),
         )
     if new.proposal_id is None:
-        asked = new.gains if new.variant is None else gains_of(session, campaign, new.variant)
+        asked = own if new.variant is None else _of_variant(session, campaign, new.variant, new.gains)
         assert asked is not None
         return check_own_gains(session, campaign, asked, overrule=new.overrule), None
     proposal = proposals.fresh_proposal(session, campaign, new.proposal_id)
     return check_proposal(campaign, proposal, overrule=new.overrule), proposal
+
+
+def _of_variant(session: Session, campaign: CampaignRow, variant: Variant, shown: Gains | None) -> Gains:
+    """The variant's gains. Raises ConflictError when they are not those that the client has shown."""
+    gains = gains_of(session, campaign, variant)
+    if shown is not None and dict(shown) != gains:
+        raise ConflictError(
+            f"The gains of the {variant} have changed since they were shown.",
+            hint="Check the new gains, then request the flight again.",
+        )
+    return gains
 
 
 def _kind(session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None) -> TrialKind:

@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Flight
+from app.core.definition import Flight, best_flight
 from app.core.experiments.base import (
     Experiment,
     FittedParameter,
@@ -113,10 +113,8 @@ def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Cali
 
     At least one flight must be valid; all others are ignored.
     """
-    valid = [flight for flight in flights if flight.outcome == "valid" and flight.error is not None]
-    best = min(valid, key=lambda flight: (flight.error, flight.number))
-    fitted = [flight for flight in valid[-MAX_FLIGHTS:] if flight is not best][1 - MAX_FLIGHTS :]
-    fitted = sorted((best, *fitted), key=lambda flight: flight.number)
+    fitted = fitted_flights(flights)
+    best = best_flight(fitted)
     numbers = tuple(flight.number for flight in fitted)
     fit = _Fit(experiment, fitted)
     start = fit.start()
@@ -140,6 +138,14 @@ def calibrate(experiment: ModelledExperiment, flights: Sequence[Flight]) -> Cali
         own_models=own_models,
         residual=resample_to_grid(experiment, best) - flown,
     )
+
+
+def fitted_flights(flights: Sequence[Flight]) -> list[Flight]:
+    """The flights that `calibrate` uses, in the order of their numbers. At least one flight must be valid."""
+    valid = [flight for flight in flights if flight.outcome == "valid" and flight.error is not None]
+    best = best_flight(valid)
+    latest = [flight for flight in valid[-MAX_FLIGHTS:] if flight is not best][1 - MAX_FLIGHTS :]
+    return sorted((best, *latest), key=lambda flight: flight.number)
 
 
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:

@@ -30,8 +30,8 @@ from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 from app.core.statistics.comparisons import Group, PooledScatter, groups_of
 from app.core.tuning.calibration import Calibration
-from app.core.tuning.corrected_model import resample_to_grid
-from app.core.tuning.strategy import Explanation, Interval, Kind, Proposal, band_channels
+from app.core.tuning.corrected_model import CorrectedModel, resample_to_grid
+from app.core.tuning.strategy import Explanation, Interval, Kind, ModelPrediction, Proposal, band_channels
 
 CONFIDENCE: Final = 0.9
 MODELS: Final = 16
@@ -105,6 +105,11 @@ def prediction_of(proposal: Proposal) -> Prediction | None:
         lower=None if interval is None else interval.lower,
         upper=None if interval is None else interval.upper,
     )
+
+
+def predict_corrected(model: CorrectedModel, gains: Vector) -> ModelPrediction:
+    """What a corrected model predicts for `gains`, shape (n,)."""
+    return ModelPrediction(*model.predict(gains))
 
 
 def with_interval(

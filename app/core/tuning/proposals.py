@@ -51,7 +51,7 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     warm = None if donor is None else transfer(definition, experiment, flights, donor)
     if warm is not None:
         experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
-    if not _has_flown(flights):
+    if not has_flown(flights):
         return _start(definition, experiment, space, flights, donor)
     scatter = pool_scatter(groups_of(flights), experiment.scatter)
     strategy = STRATEGIES[definition.strategy]
@@ -62,7 +62,8 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     return _with_notes(_confirmed(definition, experiment, space, flights, proposal), flights, warm)
 
 
-def _has_flown(flights: Sequence[Flight]) -> bool:
+def has_flown(flights: Sequence[Flight]) -> bool:
+    """Whether any flight is valid."""
     return any(flight.outcome == "valid" for flight in flights)
 
 
@@ -70,7 +71,7 @@ def _manual_proposal(
     definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
     """Without a model: propose the start gains, then the operator's own; nothing is predicted."""
-    if _has_flown(flights):
+    if has_flown(flights):
         proposal = by_hand(definition, experiment, space, flights)
         return _confirmed(definition, experiment, space, flights, proposal)
     gains = start_gains(definition, experiment, space)

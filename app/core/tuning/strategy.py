@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from app.core.definition import Definition, Flight, Option
 from app.core.experiments.base import Experiment, FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
@@ -39,6 +39,18 @@ class Interval:
 
     def __contains__(self, error: float) -> bool:
         return self.lower <= error <= self.upper
+
+
+class ModelPrediction(NamedTuple):
+    """Output and error that a model predicts for one gain set; with an interval if the model has one of its own."""
+
+    trajectory: Trajectory
+    error: float
+    interval: Interval | None = None
+
+
+PredictionOf = Callable[[Vector], ModelPrediction]
+"""Gains (g,) → what a model predicts for their flight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +98,8 @@ class Strategy:
     """A registered strategy.
 
     `propose(definition, experiment, space, flights)` requires at least one valid flight. `predict_errors(definition,
-    experiment, flights)` returns the model from which the predicted errors of its proposals come, for many gain sets.
+    experiment, flights)` returns the model from which the predicted errors of its proposals come, for many gain sets;
+    `predict_flight(definition, experiment, flights)` the same model for one set, with the curve.
     `experiments` names those it supports; empty for all. `corrects_model`: whether its predictions are corrected by the
     flight that its explanation names as the base. `needs_model`: whether it searches for gains on a model.
     """
@@ -97,6 +110,7 @@ class Strategy:
     options: tuple[Option, ...]
     propose: Callable[[Definition, ModelledExperiment, PolicySpace, Sequence[Flight]], Proposal]
     predict_errors: Callable[[Definition, ModelledExperiment, Sequence[Flight]], ErrorsOf]
+    predict_flight: Callable[[Definition, ModelledExperiment, Sequence[Flight]], PredictionOf]
     experiments: tuple[str, ...] = ()
     corrects_model: bool = True
     needs_model: bool = True

@@ -120,22 +120,20 @@ export function useJudgeAbort() {
 
 export interface RecordOrder extends RecordFiles {
   trialId?: number;
-  proposalId?: number;
+  plan?: NewTrial;
   /** Number of the takeoff in a log with several. */
   takeoff?: number;
   /** Accept the log's gains although they differ from the planned ones. */
   confirm?: boolean;
 }
 
-/** Upload the record of a flight made elsewhere; without a planned trial, the proposal is planned first. */
+/** Upload the record of a flight made elsewhere; without a planned trial, one is planned first. */
 export function useUploadRecord(campaignId: number) {
   const settled = useSettled();
   return useMutation({
-    mutationFn: async ({ file, companion, trialId, proposalId, takeoff, confirm }: RecordOrder) => {
+    mutationFn: async ({ file, companion, trialId, plan, takeoff, confirm }: RecordOrder) => {
       const planned =
-        trialId ??
-        (await answer(createTrial({ path: { campaign_id: campaignId }, body: { proposal_id: proposalId ?? null } })))
-          .id;
+        trialId ?? (await answer(createTrial({ path: { campaign_id: campaignId }, body: plan ?? {} }))).id;
       return answer(
         uploadTrajectory({
           path: { trial_id: planned },

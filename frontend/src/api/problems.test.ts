@@ -1,7 +1,6 @@
 import { expect, test } from "vitest";
 import {
   ApiError,
-  isGateRefusal,
   limitsOf,
   offersOf,
   otherProblems,
@@ -72,15 +71,6 @@ test("values that would pass are read from the refusals that have any", () => {
   ]);
   expect(offersOf(null)).toEqual([]);
   expect(limitsOf(problem)).toEqual(["can wrap"]);
-});
-
-test("only refused gains can be overruled, no other mistake", () => {
-  const gains = { field: "gains.ki", reason: "can wrap" };
-  expect(isGateRefusal(problemFrom(422, { problems: [gains, { field: "gains", reason: "too far" }] }))).toBe(true);
-  expect(isGateRefusal(problemFrom(422, { problems: [gains, { field: "overrule", reason: "only simulated" }] }))).toBe(
-    false,
-  );
-  expect(isGateRefusal(problemFrom(undefined, null))).toBe(false);
 });
 
 test("the reason that harms in flight comes first, and sentences are joined by a space", () => {

@@ -71,12 +71,6 @@ function offeredBy(value: unknown): Record<string, number> {
   return Object.fromEntries(Object.entries(value).filter(([, number]) => typeof number === "number"));
 }
 
-/** Whether the request was refused because of its gains only. */
-export function isGateRefusal(problem: Problem | null): boolean {
-  const fields = (problem?.problems ?? []).map(({ field }) => field.replace(/^body\./, ""));
-  return fields.length > 0 && fields.every((field) => field === "gains" || field.startsWith("gains."));
-}
-
 /** Gain values that would pass, of all refusals together. */
 export function offersOf(problem: Problem | null): [gain: string, value: number][] {
   const all = Object.assign({}, ...(problem?.problems ?? []).map(({ offer }) => offer ?? {})) as Record<string, number>;

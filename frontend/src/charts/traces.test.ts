@@ -10,6 +10,7 @@ import {
   windowFrom,
   withChosen,
   withLive,
+  withPrediction,
   withTimeRange,
 } from "./traces";
 
@@ -87,4 +88,22 @@ test("a zoom says which seconds are looked at, and the way back that it is all o
   expect(windowFrom({ "xaxis.range": [2, 4] }, [0, 32])).toEqual([2, 4]);
   expect(windowFrom({ "xaxis.range[0]": 0, "xaxis.range[1]": 32 }, [0, 32])).toBeNull();
   expect(windowFrom({ "yaxis.range[0]": 0 }, [0, 32])).toBeUndefined();
+});
+
+test("another prediction takes the place of the figure's, with its band, and leaves the flights", () => {
+  const predicted: Trace[] = [
+    ...traces,
+    { meta: { role: "band", edge: "lower" }, x: [0], y: [1] },
+    { meta: { role: "band", edge: "upper" }, x: [0], y: [2] },
+    { meta: { role: "prediction", trial: 3 }, x: [0], y: [1.5] },
+  ];
+  const curve = { time_s: [0, 1], values: [0, 2.9] };
+  const drawn = withPrediction(predicted, { curve, lower: { time_s: [0, 2], values: [0, 2] }, upper: null });
+  expect(drawn.slice(0, 4)).toEqual(traces);
+  expect(drawn.slice(4)).toMatchObject([
+    { x: [0, 2], y: [0, 2] },
+    { x: [], y: [] },
+    { meta: { trial: 3 }, x: [0, 1], y: [0, 2.9] },
+  ]);
+  expect(withPrediction(predicted, null).slice(4)).toMatchObject(predicted.slice(4));
 });

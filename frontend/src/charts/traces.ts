@@ -7,6 +7,7 @@ interface TraceMeta {
   role?: string;
   trial?: number;
   standing?: string;
+  edge?: "lower" | "upper";
 }
 
 export interface Trace {
@@ -34,6 +35,26 @@ export function withLive(traces: readonly Trace[], flight: LiveFlight | null): T
   return traces.map((trace) =>
     trace.meta?.role === "live" ? { ...trace, x: flight.timeS, y: flight.measured, showlegend: true } : trace,
   );
+}
+
+type Points = { time_s: number[]; values: number[] } | null;
+
+interface DrawnPrediction {
+  curve: Points;
+  lower: Points;
+  upper: Points;
+}
+
+/** The traces with another predicted curve and band; with the figure's own for null. */
+export function withPrediction(traces: readonly Trace[], prediction: DrawnPrediction | null): Trace[] {
+  return traces.map((trace) => {
+    const { role, edge } = trace.meta ?? {};
+    if (role !== "prediction" && role !== "band") return trace;
+    const named = { ...trace, uid: edge === undefined ? role : `${role}-${edge}` };
+    if (prediction === null) return named;
+    const points = prediction[edge ?? "curve"];
+    return { ...named, x: points?.time_s ?? [], y: points?.values ?? [] };
+  });
 }
 
 const FADED = 0.22;

@@ -19,7 +19,7 @@ from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import Calibration, calibrate
 from app.core.tuning.gate import allows
 from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
-from app.core.tuning.strategy import ErrorsOf, Explanation, Kind, Proposal, Strategy
+from app.core.tuning.strategy import ErrorsOf, Explanation, Kind, ModelPrediction, PredictionOf, Proposal, Strategy
 from app.core.tuning.trust_region import Box, find_robust_optimum, merit, trust_fraction
 
 MODELS: Final = 8
@@ -52,9 +52,7 @@ def propose(
     """
     if not isinstance(experiment, Takeoff):
         raise TypeError(f"calibrated works with takeoff only, not with {experiment.name}")
-    calibration = calibrate(experiment, flights)
-    fitted = [flight for flight in flights if flight.number in calibration.numbers]
-    base = best_flight(fitted)
+    calibration, base = _calibrated(experiment, flights)
     models = calibration.plausible(runs=MODELS, width=ROBUSTNESS_SD)
     fraction = min(trust_fraction(flights), definition.step_fraction)
     box = Box(*space.reachable(space.vector(base.gains), fraction))
@@ -85,9 +83,23 @@ def propose(
 
 def error_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
     """The errors predicted by the calibrated model. At least one flight must be valid."""
+    return partial(predict_errors, *_calibrated(experiment, flights))
+
+
+def flight_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
+    """The flights predicted by the calibrated model. At least one flight must be valid."""
+    return partial(_predict, *_calibrated(experiment, flights))
+
+
+def _calibrated(experiment: ModelledExperiment, flights: Sequence[Flight]) -> tuple[Calibration, Flight]:
+    """The calibration, and the best of its flights."""
     calibration = calibrate(experiment, flights)
-    base = best_flight([flight for flight in flights if flight.number in calibration.numbers])
-    return partial(predict_errors, calibration, base)
+    return calibration, best_flight([flight for flight in flights if flight.number in calibration.numbers])
+
+
+def _predict(calibration: Calibration, base: Flight, gains: Vector) -> ModelPrediction:
+    found = predict_flight(calibration, base, gains)
+    return ModelPrediction(found.trajectory, found.error, found.interval)
 
 
 def _choose(
@@ -178,5 +190,6 @@ CALIBRATED: Final = Strategy(
     options=(),
     propose=propose,
     predict_errors=error_model,
+    predict_flight=flight_model,
     experiments=("takeoff",),
 )

@@ -8,6 +8,7 @@ A step that the gate would refuse is halved in the same way.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,8 @@ from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import known_distribution
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop
 from app.core.tuning.gate import allows
-from app.core.tuning.strategy import ErrorsOf, Explanation, LadderStep, Proposal, Strategy
+from app.core.tuning.predictions import predict_corrected
+from app.core.tuning.strategy import ErrorsOf, Explanation, LadderStep, PredictionOf, Proposal, Strategy
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +148,11 @@ def error_model(definition: Definition, experiment: ModelledExperiment, flights:
     return _corrected(definition, experiment, best_flight(flights))[0].errors
 
 
+def flight_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
+    """The flights of the same model."""
+    return partial(predict_corrected, _corrected(definition, experiment, best_flight(flights))[0])
+
+
 def _first_allowed_step(
     line: SearchLine,
     best: LadderStep,
@@ -239,4 +246,5 @@ GRADIENT: Final = Strategy(
     ),
     propose=propose,
     predict_errors=error_model,
+    predict_flight=flight_model,
 )

@@ -16,7 +16,17 @@ from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 from app.core.tuning.corrected_model import Optimum, model_optimum, uncorrected_model
 from app.core.tuning.identification import Fit, Identified, identify
-from app.core.tuning.strategy import ErrorsOf, Explanation, Interval, Proposal, Strategy, band_channels
+from app.core.tuning.predictions import predict_corrected
+from app.core.tuning.strategy import (
+    ErrorsOf,
+    Explanation,
+    Interval,
+    ModelPrediction,
+    PredictionOf,
+    Proposal,
+    Strategy,
+    band_channels,
+)
 
 _STARTS: Final = 256
 _SEARCHES: Final = 1
@@ -46,7 +56,7 @@ def propose(
         return _nothing_to_fit(experiment, space, base)
     here = space.nearest(space.vector(base.gains))
     low, high = space.reachable(here, definition.step_fraction)
-    aircraft = experiment.informed(found.model, np.sqrt(np.diag(found.covariance)))
+    aircraft = _aircraft(experiment, found)
     optimum = _optimum(aircraft, space, low, high, here)
     gains = space.mapping(optimum.gains)
     expected = _expected_error(aircraft, found, here)
@@ -73,8 +83,20 @@ def error_model(definition: Definition, experiment: ModelledExperiment, flights:
     found = identify(experiment, flights, _fit_of(definition))
     if found is None:
         return uncorrected_model(experiment).errors
-    aircraft = experiment.informed(found.model, np.sqrt(np.diag(found.covariance)))
-    return partial(_expected_errors, aircraft, found)
+    return partial(_expected_errors, _aircraft(experiment, found), found)
+
+
+def flight_model(definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
+    """The flights of the same model."""
+    assert isinstance(experiment, PitchTracking)
+    found = identify(experiment, flights, _fit_of(definition))
+    if found is None:
+        return partial(predict_corrected, uncorrected_model(experiment))
+    return partial(_prediction, _aircraft(experiment, found), found)
+
+
+def _aircraft(experiment: PitchTracking, found: Identified) -> PitchTracking:
+    return experiment.informed(found.model, np.sqrt(np.diag(found.covariance)))
 
 
 def _fit_of(definition: Definition) -> Fit:
@@ -128,7 +150,7 @@ def _folded(outputs: Matrix, noise: float) -> Matrix:
     return np.asarray(noise * np.sqrt(2.0 / np.pi) * np.exp(-(apart**2)) + outputs * erf(apart))
 
 
-def _prediction(aircraft: PitchTracking, found: Identified, gains: Vector) -> tuple[Trajectory, float, Interval]:
+def _prediction(aircraft: PitchTracking, found: Identified, gains: Vector) -> ModelPrediction:
     """Predicted output with its band, error, and interval, over models from the fit's distribution."""
     spread = ParameterDistribution(
         mean=tuple(found.model.tolist()),
@@ -142,7 +164,7 @@ def _prediction(aircraft: PitchTracking, found: Identified, gains: Vector) -> tu
     reach = _TAIL_SD * float(np.hypot(noise, _MODEL_ERROR_SD * error))
     lowest, highest = np.quantile(errors, (_TAIL, 1.0 - _TAIL))
     interval = Interval(lower=max(0.0, min(error, float(lowest)) - reach), upper=max(error, float(highest)) + reach)
-    return _trajectory(aircraft, outputs, _TAIL_SD * found.pitch_noise_rad), error, interval
+    return ModelPrediction(_trajectory(aircraft, outputs, _TAIL_SD * found.pitch_noise_rad), error, interval)
 
 
 def _trajectory(aircraft: PitchTracking, outputs: Matrix, reach: float) -> Trajectory:
@@ -220,5 +242,6 @@ IDENTIFIED: Final = Strategy(
     ),
     propose=propose,
     predict_errors=error_model,
+    predict_flight=flight_model,
     experiments=("pitch-tracking",),
 )

@@ -1,6 +1,7 @@
 """Gains chosen by the operator, subject to the same checks."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 from app.core.definition import Definition, Flight, best_flight
@@ -8,7 +9,8 @@ from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace
 from app.core.tuning.corrected_model import correct_by_bias
-from app.core.tuning.strategy import ErrorsOf, Explanation, Proposal, Strategy
+from app.core.tuning.predictions import predict_corrected
+from app.core.tuning.strategy import ErrorsOf, Explanation, PredictionOf, Proposal, Strategy
 
 
 def propose(_definition: Definition, experiment: Experiment, space: PolicySpace, flights: Sequence[Flight]) -> Proposal:
@@ -38,6 +40,11 @@ def error_model(_definition: Definition, experiment: ModelledExperiment, flights
     return correct_by_bias(experiment, best_flight(flights)).errors
 
 
+def flight_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
+    """The flights of the same model."""
+    return partial(predict_corrected, correct_by_bias(experiment, best_flight(flights)))
+
+
 MANUAL: Final = Strategy(
     name="manual",
     title="Manual",
@@ -45,5 +52,6 @@ MANUAL: Final = Strategy(
     options=(),
     propose=propose,
     predict_errors=error_model,
+    predict_flight=flight_model,
     needs_model=False,
 )

@@ -1,6 +1,7 @@
 """Nelder–Mead on the nominal model alone: the paper's starting point, and also a strategy."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -10,7 +11,8 @@ from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace
 from app.core.tuning.corrected_model import model_optimum, uncorrected_model
-from app.core.tuning.strategy import ErrorsOf, Explanation, Proposal, Strategy
+from app.core.tuning.predictions import predict_corrected
+from app.core.tuning.strategy import ErrorsOf, Explanation, PredictionOf, Proposal, Strategy
 
 
 def propose(
@@ -52,6 +54,11 @@ def error_model(_definition: Definition, experiment: ModelledExperiment, _flight
     return uncorrected_model(experiment).errors
 
 
+def flight_model(_definition: Definition, experiment: ModelledExperiment, _flights: Sequence[Flight]) -> PredictionOf:
+    """The flights of the same model."""
+    return partial(predict_corrected, uncorrected_model(experiment))
+
+
 SIMPLEX: Final = Strategy(
     name="simplex",
     title="Simplex on the model",
@@ -59,5 +66,6 @@ SIMPLEX: Final = Strategy(
     options=(),
     propose=propose,
     predict_errors=error_model,
+    predict_flight=flight_model,
     corrects_model=False,
 )

@@ -733,6 +733,20 @@ export type Comparison = {
 };
 
 /**
+ * ConsideredGains
+ *
+ * A complete gain set that is considered for the next flight.
+ */
+export type ConsideredGains = {
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number;
+    };
+};
+
+/**
  * Control
  *
  * The operator in control. Renewals are not published as events: load it again after `until` to see whether it has
@@ -1384,6 +1398,33 @@ export type FlightBrief = {
 };
 
 /**
+ * FlightChoice
+ *
+ * A gain set that the next flight may use. `proposed`: it is the proposal's own, otherwise a variant of that kind;
+ * `recommended`: it is the advice's.
+ */
+export type FlightChoice = {
+    /**
+     * Kind
+     */
+    kind: 'step' | 'smaller step' | 'repeat' | 'baseline';
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Proposed
+     */
+    proposed: boolean;
+    /**
+     * Recommended
+     */
+    recommended: boolean;
+};
+
+/**
  * FlightComparison
  *
  * A comparison of flights, in the order in which they were named.
@@ -1651,6 +1692,29 @@ export type GainInfo = {
      * Integer
      */
     integer: boolean;
+};
+
+/**
+ * GainsPrediction
+ *
+ * What is predicted for gains: their error with its interval, the curve, and the edges of its band. From the
+ * flights of these gains if there were any, otherwise from the model of the next proposal; null without a model.
+ */
+export type GainsPrediction = {
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Predicted Error
+     */
+    predicted_error: number | null;
+    interval: Interval | null;
+    curve: PredictedCurve | null;
+    lower: PredictedCurve | null;
+    upper: PredictedCurve | null;
 };
 
 /**
@@ -2088,7 +2152,8 @@ export type NewCampaignOutput = {
  *
  * A trial of a proposal, of your own gains, or of a variant: exactly one of the three. With `fly` it is flown at
  * once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
- * `baseline`, the first flight's gains again.
+ * `baseline`, the first flight's gains again. A variant with `gains` is refused when these are not its gains: it then
+ * flies what its client has shown, or nothing.
  */
 export type NewTrial = {
     /**
@@ -2375,6 +2440,22 @@ export type PageVehicle = {
 };
 
 /**
+ * PredictedCurve
+ *
+ * The scored output of a predicted flight over time, thinned for drawing.
+ */
+export type PredictedCurve = {
+    /**
+     * Time S
+     */
+    time_s: Array<number>;
+    /**
+     * Values
+     */
+    values: Array<number>;
+};
+
+/**
  * PresetInfo
  *
  * A campaign that is ready to be created.
@@ -2417,7 +2498,8 @@ export type Promotion = {
  * Proposal
  *
  * The next gain set, computed from one history; stale as soon as that history has changed. `recommended` is the
- * advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so.
+ * advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so. `choices` are the
+ * proposal and its variants, no gain set twice; none is recommended when the advice is to stop.
  */
 export type Proposal = {
     /**
@@ -2449,6 +2531,10 @@ export type Proposal = {
     changes: {
         [key: string]: GainChange;
     };
+    /**
+     * Choices
+     */
+    choices: Array<FlightChoice>;
     /**
      * Predicted Error
      */
@@ -4627,6 +4713,36 @@ export type ComputeProposalResponses = {
 
 export type ComputeProposalResponse = ComputeProposalResponses[keyof ComputeProposalResponses];
 
+export type PredictGainsData = {
+    body: ConsideredGains;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/prediction';
+};
+
+export type PredictGainsErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type PredictGainsError = PredictGainsErrors[keyof PredictGainsErrors];
+
+export type PredictGainsResponses = {
+    /**
+     * Successful Response
+     */
+    200: GainsPrediction;
+};
+
+export type PredictGainsResponse = PredictGainsResponses[keyof PredictGainsResponses];
+
 export type ListTrialsData = {
     body?: never;
     path: {
@@ -4713,6 +4829,36 @@ export type CreateTrialResponses = {
 };
 
 export type CreateTrialResponse = CreateTrialResponses[keyof CreateTrialResponses];
+
+export type EvaluateGateData = {
+    body: ConsideredGains;
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: never;
+    url: '/api/campaigns/{campaign_id}/gate';
+};
+
+export type EvaluateGateErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type EvaluateGateError = EvaluateGateErrors[keyof EvaluateGateErrors];
+
+export type EvaluateGateResponses = {
+    /**
+     * Successful Response
+     */
+    200: Gate;
+};
+
+export type EvaluateGateResponse = EvaluateGateResponses[keyof EvaluateGateResponses];
 
 export type ReopenCampaignData = {
     /**

@@ -4,10 +4,11 @@ import { SegmentedControl, useComputedColorScheme } from "@mantine/core";
 import { useIdle, useMediaQuery } from "@mantine/hooks";
 import { memo, useCallback, useDeferredValue, useEffect, useRef, useState } from "react";
 import { type TimeRange, useCampaignFigure, useCurveOf, useLandscape } from "../../api/queries";
-import type { Campaign, FigureCard, Trial } from "../../api/types";
+import type { Campaign, FigureCard, GainsPrediction, Trial } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { type PlotlyFigure, withChosen, withTimeRange } from "../../charts/traces";
+import { type PlotlyFigure, withChosen, withPrediction, withTimeRange } from "../../charts/traces";
 import classes from "./CampaignPage.module.css";
+import type { Preview } from "./useNextFlight";
 
 /** Height of the lower charts: enough for a panel of each gain. */
 const LOWER_PX = 300;
@@ -16,13 +17,17 @@ const FIRST_SECONDS = [-0.3, 8] as const;
 /** For more flights the server draws an envelope, and one flight's curve on request. */
 const EACH_DRAWN = 30;
 
-function useDressed(chosen: number | null, span: string): (figure: PlotlyFigure) => PlotlyFigure {
+function useDressed(
+  chosen: number | null,
+  span: string,
+  prediction: GainsPrediction | null,
+): (figure: PlotlyFigure) => PlotlyFigure {
   return useCallback(
     (figure) => ({
-      data: withChosen(figure.data, chosen),
+      data: withPrediction(withChosen(figure.data, chosen), prediction),
       layout: withTimeRange(figure.layout, span === "first" ? FIRST_SECONDS : null),
     }),
-    [chosen, span],
+    [chosen, span, prediction],
   );
 }
 
@@ -30,11 +35,13 @@ interface CurvesProps {
   campaign: Campaign;
   trials: readonly Trial[];
   chosen: number | null;
+  /** The prediction of the gains that are chosen for the next flight; null for the proposal's. */
+  preview: Preview | null;
   onChoose: (trialNumber: number) => void;
 }
 
 /** The curves of all flights with the set point and the next prediction. */
-export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen, onChoose }: CurvesProps) {
+export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen, preview, onChoose }: CurvesProps) {
   const theme = useComputedColorScheme("light");
   const [picked, setPicked] = useState("whole");
   const span = useDeferredValue(picked);
@@ -55,7 +62,8 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
       error={takeoffs.error}
       height={440}
       topic="curves"
-      dressed={useDressed(chosen, span)}
+      dressed={useDressed(chosen, span, preview?.prediction ?? null)}
+      className={preview?.isCurrent === false ? classes["outdated"] : undefined}
       liveTrial={campaign.flying?.trial_id ?? null}
       onChoose={onChoose}
       onWindow={setZoom}

@@ -16,6 +16,7 @@ import classes from "./CampaignPage.module.css";
 import { FlightsPanel } from "./FlightsPanel";
 import { NextFlightCard, useCampaignStatus } from "./NextFlightCard";
 import { StatisticsPanel } from "./StatisticsPanel";
+import type { Preview } from "./useNextFlight";
 import { VerdictPanel } from "./VerdictPanel";
 import { selectedTrial } from "./verdict";
 
@@ -70,6 +71,7 @@ interface View {
 function CampaignView({ campaign, trials: read, trouble }: View) {
   const trials = read ?? NONE;
   const [chosen, setChosen] = useState<number | null>(null);
+  const [preview, setPreview] = useState<Preview | null>(null);
   const standing = useCampaignStatus(campaign.id);
   const unproposed = useProposal(campaign.id).error;
   const experiment = campaign.definition.experiment ?? "takeoff";
@@ -90,7 +92,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <ReadOnlyNotice why={watching} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
         <Stack gap="var(--gap)" miw={0}>
-          <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} onChoose={choose} />
+          <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} preview={preview} onChoose={choose} />
           {shown !== null && (
             <Verdict
               trial={shown}
@@ -102,7 +104,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
           )}
         </Stack>
         <div className={classes["next"]}>
-          {standing !== null && <Next {...standing} onChoose={setChosen} />}
+          {standing !== null && <Next {...standing} onChoose={setChosen} onPreview={setPreview} />}
           {standing === null &&
             (unproposed || trouble ? (
               <ErrorNotice error={unproposed ?? trouble} />

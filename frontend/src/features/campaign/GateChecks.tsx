@@ -8,8 +8,21 @@ import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import classes from "./NextFlight.module.css";
 
+interface GateChecksProps {
+  gate: Gate | null;
+  /** Whether the result belongs to the gains shown. */
+  isCurrent?: boolean;
+}
+
 /** Gate checks of a flight: a summary line, and each check when opened or when one has failed. */
-export function GateChecks({ gate }: { gate: Gate }) {
+export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
+  if (gate === null || !isCurrent) {
+    return (
+      <Note className={classes["checking"] ?? ""} role="status">
+        Gate: checking…
+      </Note>
+    );
+  }
   const refused = gate.checks.filter((check) => !check.passed).length;
   const summary =
     refused === 0

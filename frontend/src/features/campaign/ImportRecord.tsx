@@ -3,20 +3,22 @@ import { IconFileUpload } from "@tabler/icons-react";
 import type { RecordOrder, RecordUpload } from "../../api/mutations";
 import { problemOf } from "../../api/problems";
 import { RECORD_FILES, recordOf, takeoffsIn, wantsConfirmation } from "../../api/records";
+import type { NewTrial } from "../../api/types";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 
 interface Props {
   upload: RecordUpload;
   trialId?: number;
-  proposalId?: number;
+  /** Planned first, without a `trialId`; the record can be uploaded once one of them is there. */
+  plan?: NewTrial;
 }
 
 /** Upload of the record of a flight made elsewhere with these gains. */
-export function ImportRecord({ upload, trialId, proposalId }: Props) {
+export function ImportRecord({ upload, trialId, plan }: Props) {
   const target = {
     ...(trialId === undefined ? {} : { trialId }),
-    ...(proposalId === undefined ? {} : { proposalId }),
+    ...(plan === undefined ? {} : { plan }),
   };
   const problem = problemOf(upload.error);
   const again = (answer: Partial<RecordOrder>) =>
@@ -42,6 +44,7 @@ export function ImportRecord({ upload, trialId, proposalId }: Props) {
             fullWidth
             size="lg"
             loading={upload.isPending}
+            disabled={trialId === undefined && plan === undefined}
             leftSection={<IconFileUpload size={22} aria-hidden />}
           >
             Upload flight record

@@ -12,9 +12,11 @@ import { hasLanded, nextStep } from "./nextStep";
 import { PlannedCard } from "./PlannedCard";
 import { ProposalCard } from "./ProposalCard";
 import { RehearsalCard, RehearsalNote } from "./RehearsalCard";
+import type { ShowPreview } from "./useNextFlight";
 
 interface Props extends CampaignStatus {
   onChoose: (trialNumber: number) => void;
+  onPreview: ShowPreview;
 }
 
 /** The next action of the campaign, in every state. */
@@ -27,7 +29,7 @@ export function NextFlightCard(props: Props) {
   );
 }
 
-function Step({ campaign, next, trials, onChoose }: Props) {
+function Step({ campaign, next, trials, onChoose, onPreview }: Props) {
   const step = nextStep(campaign, next, trials);
   // Kept here, so that the error of a refused record is still shown when its trial becomes a planned one.
   const upload = useUploadRecord(campaign.id);
@@ -42,7 +44,16 @@ function Step({ campaign, next, trials, onChoose }: Props) {
       return <PlannedCard campaign={campaign} trial={step.trial} upload={upload} />;
     case "propose":
     case "nothing better":
-      return <ProposalCard campaign={campaign} proposal={step.proposal} trials={trials} upload={upload} />;
+      return (
+        <ProposalCard
+          key={step.proposal.id}
+          campaign={campaign}
+          proposal={step.proposal}
+          trials={trials}
+          upload={upload}
+          onPreview={onPreview}
+        />
+      );
     case "judge":
       return (
         <Panel title={`Review flight ${step.trial.number}`}>

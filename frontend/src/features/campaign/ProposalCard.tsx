@@ -1,118 +1,66 @@
-import { Button, Stack, Text } from "@mantine/core";
-import { IconPencil, IconPlaneDeparture } from "@tabler/icons-react";
-import { useState } from "react";
-import { type RecordUpload, useCreateTrial, useFinish } from "../../api/mutations";
-import { useStatistics } from "../../api/queries";
+import { Button, Stack } from "@mantine/core";
+import { IconPlaneDeparture } from "@tabler/icons-react";
+import { type RecordUpload, useCreateTrial } from "../../api/mutations";
+import { offersOf } from "../../api/problems";
 import type { Campaign, Proposal, Trial } from "../../api/types";
-import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useUnits } from "../../ui/units";
-import { GateChecks } from "./GateChecks";
+import { refusalOf, trialOf } from "./choices";
+import { FlightChoices } from "./FlightChoices";
+import { GainTable } from "./GainTable";
+import { GateChecks, GateRefusal } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
-import { ManualGains } from "./ManualGains";
-import classes from "./NextFlight.module.css";
 import { speedOf } from "./nextStep";
-import { GainTable, PredictedError, ProposalExplanation, Recommendation } from "./ProposalDetails";
-import { advised, type Choice, changesTo, choicesFor, expectationOf, KINDS, type Variant } from "./proposal";
+import { OverruleGate } from "./OverruleGate";
+import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
+import { StopCampaign } from "./StopCampaign";
+import { type ChosenFlight, type ShowPreview, useNextFlight } from "./useNextFlight";
 
 interface Props {
   campaign: Campaign;
   proposal: Proposal;
   trials: readonly Trial[];
   upload: RecordUpload;
+  onPreview: ShowPreview;
 }
 
-/** The proposed flight: recommendation, current and next gains, prediction, and a button that flies it. */
-export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
-  const [editing, setEditing] = useState(false);
-  const [speed, setSpeed] = useSpeed();
-  const create = useCreateTrial(campaign);
+/** The next flight: one choice of gains, what is predicted for them, and the button that flies them. */
+export function ProposalCard({ campaign, proposal, trials, upload, onPreview }: Props) {
+  const chosen = useNextFlight(campaign, proposal, onPreview);
   const experiment = campaign.definition.experiment ?? "";
   const units = useUnits(experiment);
   const titles = useGainTitles(experiment);
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
-  const { can_fly, needs_staging, registered } = campaign.vehicle;
-  const order = can_fly && !needs_staging ? { fly: { speed: speedOf(speed) } } : {};
-  const advice = advised(proposal);
-  const flyVariant = (variant: Variant): void => create.mutate({ variant, ...order });
-  if (editing) {
-    return (
-      <Panel title={`Flight ${number}, manual gains`}>
-        <ManualGains
-          campaign={campaign}
-          start={proposal.gains}
-          onClose={() => setEditing(false)}
-          speed={speedOf(speed)}
-        />
-      </Panel>
-    );
-  }
+  const isEvaluated = chosen.gains !== null && chosen.error === null;
+  const isRefused = chosen.isChecked && chosen.gate?.passed === false;
   return (
-    <Panel
-      title={`Next flight: ${number}`}
-      tools={
-        <Text span c="dimmed" fz="body">
-          {KINDS[proposal.kind]}
-        </Text>
-      }
-    >
+    <Panel title={`Next flight: ${number}`}>
       <Stack gap={14}>
-        {trials.length > 0 && <Recommendation advice={advice} />}
-        {advice.variant !== null && (
-          <>
-            <GainTable changes={changesTo(advice.gains, proposal)} unit={units.gains} titles={titles} />
-            <div>
-              <FlyButton
-                label={advice.variant === "repeat" ? "Repeat the best" : "Fly the baseline"}
-                loading={create.isPending}
-                onClick={() => advice.variant !== null && flyVariant(advice.variant)}
-              />
-              <Expectation campaignId={campaign.id} variant={advice.variant} />
-            </div>
-            <h3 className={classes["instead"]}>Or the proposed step</h3>
-          </>
+        <FlightChoices proposal={proposal} chosen={chosen.name} onChoose={chosen.choose} />
+        <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
+        <GainTable rows={chosen.rows} unit={units.gains} titles={titles} entry={chosen.entry} />
+        {isEvaluated && (
+          <PredictedError
+            predicted={chosen.predicted}
+            isCurrent={chosen.isPredicted}
+            best={campaign.best?.error ?? null}
+            unit={units.error}
+          />
         )}
-        <GainTable changes={proposal.changes} unit={units.gains} titles={titles} />
-        <PredictedError proposal={proposal} best={campaign.best?.error ?? null} unit={units.error} />
-        {can_fly ? (
-          <>
-            {!needs_staging && (
-              <FlyButton
-                label={flyLabel(advice.variant === null, proposal)}
-                quiet={advice.variant !== null || advice.kind === "stop"}
-                loading={create.isPending}
-                disabled={!proposal.gate.passed}
-                onClick={() => create.mutate({ proposal_id: proposal.id, ...order })}
-              />
-            )}
-            {registered ? (
-              <FlyButton
-                label="Stage"
-                quiet={!needs_staging || advice.variant !== null || advice.kind === "stop"}
-                loading={create.isPending}
-                disabled={!proposal.gate.passed}
-                onClick={() => create.mutate({ proposal_id: proposal.id })}
-              />
-            ) : (
-              <SpeedSwitch value={speed} onChange={setSpeed} />
-            )}
-          </>
-        ) : (
-          <ImportRecord upload={upload} proposalId={proposal.id} />
+        <ErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
+        {isRefused && chosen.gate !== null && chosen.choice === undefined && (
+          <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />
         )}
-        <FlightAlternatives
-          campaignId={campaign.id}
-          choices={choicesFor(campaign, proposal, trials).filter(({ variant }) => variant !== advice.variant)}
-          disabled={create.isPending}
-          onFly={flyVariant}
-          onEdit={() => setEditing(true)}
-        />
-        <ErrorNotice error={create.error} />
+        <FlightButtons campaign={campaign} proposal={proposal} chosen={chosen} number={number} upload={upload} />
         <div>
-          <ProposalExplanation explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />
-          <GateChecks gate={proposal.gate} />
+          {chosen.choice?.proposed && (
+            <ProposalExplanation explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />
+          )}
+          {isEvaluated && (chosen.choice !== undefined || !isRefused) && (
+            <GateChecks gate={chosen.gate} isCurrent={chosen.isChecked} />
+          )}
         </div>
         {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
       </Stack>
@@ -120,96 +68,74 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
   );
 }
 
-function flyLabel(recommended: boolean, { kind }: Proposal): string {
-  if (kind === "manual") return "Fly these gains again";
-  if (recommended) return "Fly next trial";
-  return kind === "none" ? "Fly these gains" : "Fly the step";
-}
-
-interface FlyProps {
-  label: string;
-  loading: boolean;
-  onClick: () => void;
-  quiet?: boolean;
-  disabled?: boolean;
-}
-
-function FlyButton({ label, loading, onClick, quiet = false, disabled = false }: FlyProps) {
+function Refusal({ chosen, problem }: { chosen: ChosenFlight; problem: ReturnType<typeof refusalOf> }) {
+  const names = chosen.rows.map(({ name }) => name);
   return (
+    <GateRefusal
+      problem={problem}
+      offers={names.flatMap((name) => offersOf(problem).filter(([gain]) => gain === name))}
+      onUse={(offers) => chosen.use(Object.fromEntries(offers))}
+    />
+  );
+}
+
+interface ButtonsProps {
+  campaign: Campaign;
+  proposal: Proposal;
+  chosen: ChosenFlight;
+  number: number;
+  upload: RecordUpload;
+}
+
+/** Flies exactly the gains shown, once these have been predicted and have passed the gate. */
+function FlightButtons({ campaign, proposal, chosen, number, upload }: ButtonsProps) {
+  const [speed, setSpeed] = useSpeed();
+  const create = useCreateTrial(campaign);
+  const { can_fly, is_real, needs_staging, registered } = campaign.vehicle;
+  const { gains, gate, isChecked, isPredicted } = chosen;
+  const isReady = gains !== null && isChecked && isPredicted && gate?.passed === true;
+  const trial = trialOf(proposal, chosen.choice, gains ?? {});
+  const order = { fly: { speed: speedOf(speed) } };
+  const stopIsAdvised = proposal.recommended === "stop";
+  const button = (label: string, isMain: boolean, onClick: () => void) => (
     <Button
       fullWidth
       size="lg"
-      variant={quiet ? "default" : "filled"}
+      variant={isMain && !stopIsAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
-      loading={loading}
-      disabled={disabled}
+      loading={create.isPending}
+      disabled={!isReady}
       onClick={onClick}
     >
       {label}
     </Button>
   );
-}
-
-interface FlightAlternativesProps {
-  campaignId: number;
-  choices: readonly Choice[];
-  disabled: boolean;
-  onFly: (variant: Variant) => void;
-  onEdit: () => void;
-}
-
-/** Alternatives to the proposal, each with its expected error. */
-function FlightAlternatives({ campaignId, choices, disabled, onFly, onEdit }: FlightAlternativesProps) {
-  return (
-    <div className={classes["row"]}>
-      {choices.map(({ variant, label, hint }) => (
-        <div key={variant}>
-          <Button fullWidth variant="default" title={hint} disabled={disabled} onClick={() => onFly(variant)}>
-            {label}
-          </Button>
-          <Expectation campaignId={campaignId} variant={variant} />
-        </div>
-      ))}
-      <Button variant="default" leftSection={<IconPencil size={18} aria-hidden />} onClick={onEdit}>
-        Edit gains
-      </Button>
-    </div>
-  );
-}
-
-/** One line below the button that flies the variant. */
-function Expectation({ campaignId, variant }: { campaignId: number; variant: Variant }) {
-  const expectation = expectationOf(variant, useStatistics(campaignId).data);
-  return expectation === "" ? null : (
-    <Note fz="fine" lh={1.35} m="6px 2px 4px" className="numbers">
-      {expectation}
-    </Note>
-  );
-}
-
-/** Ends the campaign between flights, after a confirmation because planned trials are cancelled. */
-function StopCampaign({ campaignId }: { campaignId: number }) {
-  const [asking, setAsking] = useState(false);
-  const finish = useFinish(campaignId);
-  if (!asking) {
+  if (!can_fly) {
     return (
-      <Button variant="subtle" color="gray" c="var(--dim)" onClick={() => setAsking(true)}>
-        Stop campaign
-      </Button>
+      <>
+        <ImportRecord upload={upload} {...(isReady ? { plan: trial } : {})} />
+        <Button variant="default" loading={create.isPending} disabled={!isReady} onClick={() => create.mutate(trial)}>
+          Plan flight {number}
+        </Button>
+        <ErrorNotice error={create.error} />
+      </>
     );
   }
   return (
-    <Stack gap={14}>
-      <Note fz="body">Stop this campaign? Its flights are kept, and it can be reopened.</Note>
-      <div className={classes["row"]}>
-        <Button variant="default" onClick={() => setAsking(false)}>
-          Continue
-        </Button>
-        <Button color="red" loading={finish.isPending} onClick={() => finish.mutate()}>
-          Stop campaign
-        </Button>
-      </div>
-      <ErrorNotice error={finish.error} />
-    </Stack>
+    <>
+      {!needs_staging && button(`Fly flight ${number}`, true, () => create.mutate({ ...trial, ...order }))}
+      {registered ? (
+        button(`Stage flight ${number}`, needs_staging, () => create.mutate(trial))
+      ) : (
+        <SpeedSwitch value={speed} onChange={setSpeed} />
+      )}
+      {isChecked && gate?.passed === false && !is_real && (
+        <OverruleGate
+          pending={create.isPending}
+          onFly={(overrule) => create.mutate({ ...trial, overrule, ...(needs_staging ? {} : order) })}
+        />
+      )}
+      <ErrorNotice error={create.error} />
+    </>
   );
 }

@@ -1,73 +1,32 @@
 import { Stack } from "@mantine/core";
 import { IconFlagCheck, IconHome, IconRepeat, IconStairsUp } from "@tabler/icons-react";
-import type { Explanation, FittedParameter, Proposal } from "../../api/types";
+import type { Explanation, FittedParameter, Interval, Proposal } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { against, gainText, NOTHING, percentChange, withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import { intervalText, percent, plusMinus } from "../../ui/uncertainty";
+import { CHOICES, type ChoiceName, RECOMMENDED } from "./choices";
 import classes from "./NextFlight.module.css";
-import { type Advised, RECOMMENDED } from "./proposal";
-
-interface Props {
-  changes: Proposal["changes"];
-  unit: string;
-  titles?: Readonly<Record<string, string>>;
-}
-
-/** Gains now and next, with the change of each. */
-export function GainTable({ changes, unit, titles = {} }: Props) {
-  return (
-    <table className={classes["gains"]}>
-      <caption className="visually-hidden">Gains now and proposed</caption>
-      <thead>
-        <tr>
-          <th scope="col">Gain{unit && ` (${unit})`}</th>
-          <th scope="col">Now</th>
-          <th scope="col">Next</th>
-          <th scope="col" className={classes["delta"]}>
-            Change
-          </th>
-        </tr>
-      </thead>
-      <tbody>
-        {Object.entries(changes).map(([name, { now, next, delta }]) => (
-          <tr key={name}>
-            <th scope="row">
-              {name} {titles[name] && <small>{titles[name]}</small>}
-            </th>
-            <td className={classes["now"]} title={String(now)}>
-              {gainText(now)}
-            </td>
-            <td className={classes["next"]} title={String(next)}>
-              {gainText(next)}
-            </td>
-            <td className={classes["delta"]} data-same={delta === 0 || undefined}>
-              {delta === 0 ? "same" : `${delta > 0 ? "+" : "−"}${gainText(Math.abs(delta))}`}
-            </td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
-  );
-}
 
 interface PredictedErrorProps {
-  proposal: Proposal;
+  predicted: { predicted_error: number | null; interval: Interval | null } | null;
+  /** Whether the prediction belongs to the gains shown. */
+  isCurrent: boolean;
   best: number | null;
   unit: string;
 }
 
-/** Predicted error with its interval. */
-export function PredictedError({ proposal, best, unit }: PredictedErrorProps) {
-  const { predicted_error: error, interval } = proposal;
+/** Predicted error with its interval; grey while it belongs to other gains. */
+export function PredictedError({ predicted, isCurrent, best, unit }: PredictedErrorProps) {
+  const { predicted_error: error = null, interval = null } = predicted ?? {};
   const change = percentChange(error, best);
-  if (error === null) return <Note fz="body">No prediction: there is no model of these gains.</Note>;
+  if (error === null && isCurrent) return <Note fz="body">No prediction: there is no model of these gains.</Note>;
   return (
-    <div className={`${classes["predicted"]} numbers`}>
+    <div className={`${classes["predicted"]} numbers`} data-stale={!isCurrent || undefined} aria-busy={!isCurrent}>
       <span>
-        Predicted
+        {isCurrent ? "Predicted error" : "Updating…"}
         <HelpTip topic="predicted" />
       </span>
       <span>
@@ -86,15 +45,25 @@ export function PredictedError({ proposal, best, unit }: PredictedErrorProps) {
 
 const ICONS = { step: IconStairsUp, repeat: IconRepeat, baseline: IconHome, stop: IconFlagCheck } as const;
 
-/** The recommended action, and its reason. */
-export function Recommendation({ advice }: { advice: Advised }) {
-  const Icon = ICONS[advice.kind];
+interface ReasonProps {
+  proposal: Proposal;
+  chosen: ChoiceName;
+  isFirst: boolean;
+}
+
+/** Why these gains: the advice where they are recommended, or to stop, otherwise what the choice is for. */
+export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
+  const { kind, why } = proposal.advice;
+  const isRecommended = proposal.choices.some(({ kind: one, recommended }) => recommended && one === chosen);
+  if (chosen === "own" ? kind !== "stop" : isFirst && isRecommended) return null;
+  if (!isRecommended && kind !== "stop") return <Note fz="body">{CHOICES[chosen].hint}</Note>;
+  const Icon = ICONS[kind];
   return (
-    <Aside tone="good" className={classes["advice"] ?? ""} data-kind={advice.kind}>
+    <Aside tone="good" className={classes["advice"] ?? ""} data-kind={kind}>
       <Icon size={22} color="var(--best)" aria-hidden />
       <p>
-        <strong>Recommended: {RECOMMENDED[advice.kind].toLowerCase()}</strong>
-        {advice.why && <span>{advice.why}</span>}
+        <strong>Recommended: {RECOMMENDED[kind].toLowerCase()}</strong>
+        {why && <span>{why}</span>}
       </p>
     </Aside>
   );

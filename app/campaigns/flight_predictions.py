@@ -1,0 +1,102 @@
+"""Predictions of flights with gains that a person considers, by a model that is fitted once for each history."""
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable
+from threading import Lock
+from typing import Final
+
+from app.campaigns import history, repository
+from app.campaigns.definitions import definition_of
+from app.campaigns.proposals import read_donor
+from app.campaigns.schemas import GainsPrediction, PredictedCurve
+from app.common.schemas import Interval
+from app.common.states import TrialState
+from app.core.experiments import experiment_of
+from app.core.policy import Gains
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
+from app.core.tuning.gate import space_of
+from app.core.tuning.strategy import Proposal, band_channels
+from app.db.session import Database
+from app.figures.scale import thin_by_bends, thinned
+
+CURVE_POINTS: Final = 500
+KEPT: Final = 4
+
+
+class PredictorCache:
+    """The predictors of the histories asked for last, by digest; None for a history without a model."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._kept: OrderedDict[str, FlightPredictor | None] = OrderedDict()
+
+    def __contains__(self, digest: str) -> bool:
+        return digest in self._kept
+
+    def get(self, digest: str, build: Callable[[], FlightPredictor | None]) -> FlightPredictor | None:
+        """The predictor of that history, built at the first request; concurrent requests wait for it."""
+        with self._lock:
+            if digest not in self._kept:
+                self._kept[digest] = build()
+                while len(self._kept) > KEPT:
+                    self._kept.popitem(last=False)
+            self._kept.move_to_end(digest)
+            return self._kept[digest]
+
+
+def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, asked: Gains) -> GainsPrediction:
+    """What is predicted for a complete gain set: the mean of its flights, or else the flight of the proposal's model.
+
+    Takes some ten milliseconds; up to a second for the first gains after a flight, outside of any transaction. Raises
+    NotFoundError, and GainsError when they are not the campaign's gains or no controller can hold them.
+    """
+    with database.read() as session:
+        campaign = repository.get_campaign(session, campaign_id)
+        definition, trials = definition_of(campaign), history.trials_of(session, campaign_id)
+        gains = space_of(definition).complete(asked)
+        digest = history.history_digest(session, campaign, definition, trials)
+        recorded = {row.number for row in trials if row.state == TrialState.VALID and row.gains == gains}
+        is_new = not recorded and digest not in cache
+        if is_new:
+            recorded |= modelled_flights(definition, history.flown_gains(trials))
+        flights = history.flights_of(session, campaign_id, recorded=recorded)
+        donor = read_donor(session, definition) if is_new else None
+    predicted = predict_repeat(definition, flights, gains)
+    if predicted is None:
+        predictor = cache.get(digest, lambda: flight_predictor(definition, flights, donor))
+        predicted = None if predictor is None else predictor.predict(gains)
+    return _view(gains, predicted, experiment_of(definition).output)
+
+
+def _view(gains: Gains, predicted: Proposal | None, output: str) -> GainsPrediction:
+    error = None if predicted is None else predicted.predicted_error
+    if predicted is None or error is None or not math.isfinite(error):  # a model may diverge
+        return GainsPrediction(
+            gains=dict(gains), predicted_error=None, interval=None, curve=None, lower=None, upper=None
+        )
+    interval = predicted.interval
+    lower, upper = (_edge(predicted.predicted, channel) for channel in band_channels(output))
+    return GainsPrediction(
+        gains=dict(gains),
+        predicted_error=error,
+        interval=None if interval is None else Interval.model_validate(interval, from_attributes=True),
+        curve=_curve(predicted.predicted, output),
+        lower=lower,
+        upper=upper,
+    )
+
+
+def _curve(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
+    if trajectory is None:
+        return None
+    time_s, values = thinned(trajectory.time_s, trajectory[channel], CURVE_POINTS)
+    return PredictedCurve(time_s=time_s, values=values)
+
+
+def _edge(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:
+    if trajectory is None or channel not in trajectory.channels:
+        return None
+    time_s, values = thin_by_bends(trajectory.time_s, trajectory[channel])
+    return PredictedCurve(time_s=time_s, values=values)

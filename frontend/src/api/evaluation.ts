@@ -1,0 +1,69 @@
+/** Prediction and gate result of gains that are considered for the next flight. */
+
+import { useDebouncedValue } from "@mantine/hooks";
+import { keepPreviousData, useQuery } from "@tanstack/react-query";
+import { useState } from "react";
+import { answer } from "./client";
+import { evaluateGate, predictGains } from "./generated";
+import type { GainsPrediction, Gate } from "./types";
+
+export type GainSet = Readonly<Record<string, number>>;
+
+function sameGains(one: GainSet, other: GainSet): boolean {
+  const names = Object.keys(one);
+  return names.length === Object.keys(other).length && names.every((name) => one[name] === other[name]);
+}
+
+interface Evaluated<Result> {
+  /** The latest answer, possibly for earlier gains. */
+  result: Result | null;
+  /** Whether the answer is for the gains asked for. */
+  isCurrent: boolean;
+  error: unknown;
+}
+
+/** One request at a time: while one is answered, only the latest gains wait for the next. */
+function useEvaluated<Result>(
+  key: readonly (string | number)[],
+  gains: GainSet | null,
+  evaluate: (gains: GainSet) => Promise<Result>,
+): Evaluated<Result> {
+  const [asked, setAsked] = useState(gains);
+  const { data, error, isFetching, isPlaceholderData } = useQuery({
+    queryKey: ["evaluation", ...key, asked],
+    queryFn: () => evaluate(asked ?? {}),
+    enabled: asked !== null,
+    placeholderData: keepPreviousData,
+    gcTime: KEPT_MS,
+  });
+  const isAsked = asked === gains || (asked !== null && gains !== null && sameGains(asked, gains));
+  if (!isAsked && !isFetching) setAsked(gains);
+  return {
+    result: data ?? null,
+    isCurrent: isAsked && data !== undefined && !isPlaceholderData,
+    error: isAsked ? error : null,
+  };
+}
+
+const KEPT_MS = 60_000;
+/** The gate takes longer than a prediction, and is asked once the gains are at rest. */
+const AT_REST_MS = 80;
+
+export interface Evaluation {
+  prediction: Evaluated<GainsPrediction>;
+  gate: Evaluated<Gate>;
+}
+
+/** Evaluates the gains beside a proposal; nothing while there are none. */
+export function useEvaluation(campaignId: number, proposalId: number, gains: GainSet | null): Evaluation {
+  const [rested] = useDebouncedValue(gains, AT_REST_MS);
+  const path = { campaign_id: campaignId };
+  const prediction = useEvaluated(["prediction", campaignId, proposalId], gains, (some) =>
+    answer(predictGains({ path, body: { gains: some } })),
+  );
+  const gate = useEvaluated(["gate", campaignId, proposalId], rested, (some) =>
+    answer(evaluateGate({ path, body: { gains: some } })),
+  );
+  const isAtRest = rested === gains || (rested !== null && gains !== null && sameGains(rested, gains));
+  return { prediction, gate: { ...gate, isCurrent: gate.isCurrent && isAtRest } };
+}

@@ -1,0 +1,33 @@
+import { Chip, Group } from "@mantine/core";
+import type { Proposal } from "../../api/types";
+import { CHOICES, type ChoiceName } from "./choices";
+import classes from "./NextFlight.module.css";
+
+interface Props {
+  proposal: Proposal;
+  chosen: ChoiceName;
+  onChoose: (choice: ChoiceName) => void;
+}
+
+/** One choice of what to fly next. */
+export function FlightChoices({ proposal, chosen, onChoose }: Props) {
+  const recommended = proposal.choices.find((choice) => choice.recommended)?.kind;
+  return (
+    <Chip.Group value={chosen} onChange={(name) => onChoose(name as ChoiceName)}>
+      <Group gap={8} role="radiogroup" aria-label="Gains to fly">
+        {[...proposal.choices.map(({ kind }) => kind), "own" as const].map((name) => (
+          <Chip
+            key={name}
+            name="gains-to-fly"
+            value={name}
+            variant="outline"
+            classNames={{ label: classes["choice"] ?? "" }}
+          >
+            {CHOICES[name].label}
+            {name === recommended && " (recommended)"}
+          </Chip>
+        ))}
+      </Group>
+    </Chip.Group>
+  );
+}

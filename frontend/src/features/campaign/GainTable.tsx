@@ -1,0 +1,114 @@
+import { TextInput } from "@mantine/core";
+import { gainText } from "../../ui/format";
+import { changeText, type GainRow, placeIn, sliderStep } from "./choices";
+import classes from "./NextFlight.module.css";
+
+export interface GainEntry {
+  texts: Readonly<Record<string, string>>;
+  reasons: Readonly<Record<string, string>>;
+  /** Gains that the gate refuses. */
+  refused: readonly string[];
+  onText: (name: string, text: string) => void;
+}
+
+interface Props {
+  rows: readonly GainRow[];
+  unit: string;
+  titles: Readonly<Record<string, string>>;
+  /** Makes the next gains inputs. */
+  entry?: GainEntry | undefined;
+}
+
+/** Gains now and next, with the change of each as a factor and within the bounds. */
+export function GainTable({ rows, unit, titles, entry }: Props) {
+  return (
+    <table className={classes["gains"]}>
+      <caption className="visually-hidden">Gains now and next</caption>
+      <thead>
+        <tr>
+          <th scope="col">Gain{unit && ` (${unit})`}</th>
+          <th scope="col">Now</th>
+          <th scope="col">Next</th>
+          <th scope="col" className={classes["delta"]}>
+            Change
+          </th>
+        </tr>
+      </thead>
+      {rows.map((row) => (
+        <tbody key={row.name}>
+          <tr>
+            <th scope="row">
+              {row.name} {titles[row.name] && <small>{titles[row.name]}</small>}
+            </th>
+            <td className={classes["now"]} title={String(row.now)}>
+              {gainText(row.now)}
+            </td>
+            <td className={classes["next"]} title={row.next === null ? undefined : String(row.next)}>
+              {entry === undefined ? row.next !== null && gainText(row.next) : <NextInput name={row.name} {...entry} />}
+            </td>
+            <td className={classes["delta"]} data-same={row.next === row.now || undefined}>
+              {row.next !== null && changeText(row.now, row.next)}
+            </td>
+          </tr>
+          <tr>
+            <td colSpan={4}>
+              <Bounds row={row} entry={entry} />
+              {entry?.reasons[row.name] && (
+                <small className={classes["reason"]} role="alert">
+                  {entry.reasons[row.name]}
+                </small>
+              )}
+            </td>
+          </tr>
+        </tbody>
+      ))}
+    </table>
+  );
+}
+
+function NextInput({ name, texts, reasons, refused, onText }: GainEntry & { name: string }) {
+  return (
+    <TextInput
+      aria-label={name}
+      classNames={{ input: classes["entry"] ?? "" }}
+      inputMode="decimal"
+      autoComplete="off"
+      value={texts[name] ?? ""}
+      error={reasons[name] !== undefined || refused.includes(name)}
+      onChange={(event) => onText(name, event.currentTarget.value)}
+    />
+  );
+}
+
+/** The old and the new gain on a scale of the bounds; a slider where the gain may be changed. */
+function Bounds({ row, entry }: { row: GainRow; entry: GainEntry | undefined }) {
+  const { name, now, next, bounds } = row;
+  if (bounds === null) return null;
+  const [from, to] = [placeIn(bounds, now), placeIn(bounds, next ?? now)];
+  return (
+    <div className={classes["bounds"]}>
+      <small>{gainText(bounds[0])}</small>
+      <div className={classes["scale"]}>
+        <span
+          className={classes["moved"]}
+          style={{ insetInlineStart: `${Math.min(from, to)}%`, width: `${Math.abs(to - from)}%` }}
+        />
+        <span className={classes["was"]} style={{ insetInlineStart: `${from}%` }} />
+        {entry === undefined ? (
+          <span className={classes["becomes"]} style={{ insetInlineStart: `${to}%` }} />
+        ) : (
+          <input
+            type="range"
+            aria-label={`Slider for ${name}`}
+            min={bounds[0]}
+            max={bounds[1]}
+            step={sliderStep(row)}
+            value={next ?? now}
+            onChange={(event) => entry.onText(name, event.currentTarget.value)}
+          />
+        )}
+      </div>
+      <small>{gainText(bounds[1])}</small>
+    </div>
+  );
+}

@@ -1,0 +1,114 @@
+/** What may be flown next: the proposal, its variants, or gains of one's own. */
+
+import type { GainSet } from "../../api/evaluation";
+import type { Problem } from "../../api/problems";
+import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal } from "../../api/types";
+import { gainText, readNumber } from "../../ui/format";
+
+export type ChoiceName = FlightChoice["kind"] | "own";
+
+export const CHOICES: Record<ChoiceName, { label: string; hint: string }> = {
+  step: { label: "Step", hint: "The strategy's step." },
+  "smaller step": { label: "Smaller step", hint: "Halfway from the best gains to the step." },
+  repeat: { label: "Repeat", hint: "The best gains again: was the result luck?" },
+  baseline: { label: "Baseline", hint: "The first gains again: has the vehicle changed?" },
+  own: { label: "Own gains", hint: "" },
+};
+
+export const RECOMMENDED: Record<Proposal["recommended"], string> = {
+  step: "Fly the step",
+  repeat: "Repeat the best",
+  baseline: "Fly the baseline",
+  stop: "Stop the campaign",
+};
+
+/** The recommended choice; without one the proposal's own. */
+export function preselected({ choices }: Proposal): ChoiceName {
+  return (choices.find(({ recommended }) => recommended) ?? choices.find(({ proposed }) => proposed))?.kind ?? "own";
+}
+
+/** What to fly, without how: the proposal, a variant with the gains that are shown, or one's own gains. */
+export function trialOf(proposal: Proposal, choice: FlightChoice | undefined, gains: GainSet): NewTrial {
+  if (choice === undefined) return { gains };
+  if (choice.proposed) return { proposal_id: proposal.id };
+  return choice.kind === "step" ? { gains } : { variant: choice.kind, gains };
+}
+
+export interface GainRow {
+  name: string;
+  now: number;
+  /** Null while what is typed is no number. */
+  next: number | null;
+  /** Null until the catalogue is loaded. */
+  bounds: readonly [number, number] | null;
+  integer: boolean;
+}
+
+/** Each gain now and next, with the campaign's bounds. */
+export function gainRows(
+  { changes }: Proposal,
+  next: Readonly<Record<string, number | null>>,
+  known: readonly GainInfo[],
+  bounds: Readonly<Record<string, readonly number[]>>,
+): GainRow[] {
+  return Object.entries(changes).map(([name, { now }]) => {
+    const gain = known.find((one) => one.name === name);
+    const [lower = gain?.lower, upper = gain?.upper] = bounds[name] ?? [];
+    return {
+      name,
+      now,
+      next: next[name] ?? null,
+      bounds: lower === undefined || upper === undefined ? null : [lower, upper],
+      integer: gain?.integer ?? false,
+    };
+  });
+}
+
+/** `×1.27`; the difference where a factor says nothing. */
+export function changeText(now: number, next: number): string {
+  if (now === next) return "same";
+  if (next / now > 0 && Number.isFinite(next / now)) return `×${Number((next / now).toPrecision(3))}`;
+  return `${next > now ? "+" : "−"}${gainText(Math.abs(next - now))}`;
+}
+
+/** Place of a value within the bounds, in percent from the lower one. */
+export function placeIn([lower, upper]: readonly [number, number], value: number): number {
+  if (upper === lower) return 0;
+  return 100 * Math.min(1, Math.max(0, (value - lower) / (upper - lower)));
+}
+
+/** Step of a slider: a count, or about a five-hundredth of the range. */
+export function sliderStep({ integer, bounds }: GainRow): number {
+  if (integer || bounds === null || bounds[1] === bounds[0]) return 1;
+  return 10 ** Math.floor(Math.log10((bounds[1] - bounds[0]) / 500));
+}
+
+/** Typed gains: the numbers, null for what is none, and the reasons. */
+export function readGains(texts: Readonly<Record<string, string>>): {
+  values: Record<string, number | null>;
+  reasons: Record<string, string>;
+  gains: GainSet | null;
+} {
+  const readings = Object.entries(texts).map(([name, text]) => [name, readNumber(text)] as const);
+  const values = Object.fromEntries(readings.map(([name, { value }]) => [name, value ?? null]));
+  const reasons = Object.fromEntries(readings.flatMap(([name, { reason }]) => (reason ? [[name, reason]] : [])));
+  const isRead = Object.keys(reasons).length === 0;
+  return { values, reasons, gains: isRead ? (values as Record<string, number>) : null };
+}
+
+/** The gate's refusal in the form of a refused request. */
+export function refusalOf({ checks }: Gate): Problem {
+  return {
+    status: 422,
+    title: "The gate refuses these gains.",
+    detail: "",
+    hint: "",
+    problems: checks
+      .filter(({ passed }) => !passed)
+      .map(({ gain, sentence, offer = {} }) => ({
+        field: gain ? `gains.${gain}` : "gains",
+        reason: sentence,
+        ...(Object.keys(offer).length > 0 ? { offer } : {}),
+      })),
+  };
+}

@@ -1,0 +1,98 @@
+import { useEffect, useMemo, useState } from "react";
+import { type GainSet, useEvaluation } from "../../api/evaluation";
+import { problemOf, reasonsByField } from "../../api/problems";
+import { useCatalogue } from "../../api/queries";
+import type { Campaign, FlightChoice, GainsPrediction, Gate, Interval, Proposal } from "../../api/types";
+import { typed, typedGain } from "../../ui/format";
+import { type ChoiceName, type GainRow, gainRows, preselected, readGains } from "./choices";
+import type { GainEntry } from "./GainTable";
+
+/** The prediction that the chart draws in place of the proposal's. */
+export interface Preview {
+  prediction: GainsPrediction | null;
+  /** False while it belongs to other gains than those chosen. */
+  isCurrent: boolean;
+}
+
+export type ShowPreview = (preview: Preview | null) => void;
+
+interface PredictedError {
+  predicted_error: number | null;
+  interval: Interval | null;
+}
+
+export interface ChosenFlight {
+  name: ChoiceName;
+  /** Undefined for own gains. */
+  choice: FlightChoice | undefined;
+  choose: (name: ChoiceName) => void;
+  rows: GainRow[];
+  entry: GainEntry | undefined;
+  /** Null while what is typed are no numbers. */
+  gains: GainSet | null;
+  /** Prediction and gate result, and whether they belong to these gains. */
+  predicted: PredictedError | null;
+  isPredicted: boolean;
+  gate: Gate | null;
+  isChecked: boolean;
+  error: unknown;
+  /** Replaces some of one's own gains. */
+  use: (gains: GainSet) => void;
+}
+
+function typedGains(gains: GainSet): Record<string, string> {
+  return Object.fromEntries(Object.entries(gains).map(([name, value]) => [name, typedGain(value)]));
+}
+
+/** The choice of what to fly next, with everything that belongs to its gains. */
+export function useNextFlight(campaign: Campaign, proposal: Proposal, onPreview: ShowPreview): ChosenFlight {
+  const [name, setName] = useState(() => preselected(proposal));
+  const [texts, setTexts] = useState(() => typedGains(proposal.gains));
+  const experiment = useCatalogue().data?.experiments.find((one) => one.name === campaign.definition.experiment);
+  const choice = proposal.choices.find(({ kind }) => kind === name);
+  const own = useMemo(() => readGains(texts), [texts]);
+  const gains = choice === undefined ? own.gains : choice.gains;
+  const isProposal = choice?.proposed === true;
+  const { prediction, gate } = useEvaluation(campaign.id, proposal.id, isProposal ? null : gains);
+  const preview = useMemo(
+    () => (isProposal ? null : { prediction: prediction.result, isCurrent: prediction.isCurrent }),
+    [isProposal, prediction.result, prediction.isCurrent],
+  );
+  useEffect(() => onPreview(preview), [onPreview, preview]);
+  useEffect(() => () => onPreview(null), [onPreview]);
+  const error = isProposal ? null : (prediction.error ?? gate.error);
+  const reasons = { ...reasonsByField(problemOf(error), Object.keys(texts)), ...own.reasons };
+  const refused = (gate.isCurrent ? (gate.result?.checks ?? []) : []).flatMap(({ passed, gain }) =>
+    passed || !gain ? [] : [gain],
+  );
+  return {
+    name,
+    choice,
+    choose: (next) => {
+      // One's own gains start from those shown.
+      if (next === "own" && choice !== undefined) setTexts(typedGains(choice.gains));
+      setName(next);
+    },
+    rows: gainRows(
+      proposal,
+      choice === undefined ? own.values : choice.gains,
+      experiment?.gains ?? [],
+      campaign.definition.bounds ?? {},
+    ),
+    entry:
+      choice === undefined
+        ? { texts, reasons, refused, onText: (gain, text) => setTexts({ ...texts, [gain]: text }) }
+        : undefined,
+    gains,
+    predicted: isProposal ? proposal : prediction.result,
+    isPredicted: isProposal || prediction.isCurrent,
+    gate: isProposal ? proposal.gate : gate.result,
+    isChecked: isProposal || gate.isCurrent,
+    error,
+    use: (offers) =>
+      setTexts({
+        ...texts,
+        ...Object.fromEntries(Object.entries(offers).map(([gain, value]) => [gain, typed(value)])),
+      }),
+  };
+}

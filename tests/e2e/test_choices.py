@@ -1,0 +1,94 @@
+"""What to fly next is one choice: its gains, its prediction, its curve, and one button that flies them."""
+
+import re
+
+import pytest
+from playwright.sync_api import Locator, Route, expect
+
+from tests.e2e.dashboard import Dashboard
+from tests.e2e.states import States
+
+PATIENT = {"kind": "budget", "max_flights": 20}
+OWN = {"kp": 700, "ki": 60}
+
+
+def gains_shown(dashboard: Dashboard) -> dict[str, float]:
+    """The next gains in the card's table, by name, as a person reads them."""
+    rows = dashboard.page.get_by_role("table", name="Gains now and next").get_by_role("row")
+    found = {}
+    for row in rows.filter(has=dashboard.page.get_by_role("rowheader")).all():
+        cell = row.get_by_role("cell").nth(1)
+        text = cell.get_by_role("textbox").input_value() if cell.get_by_role("textbox").count() else cell.inner_text()
+        found[row.get_by_role("rowheader").inner_text().split()[0]] = float(text)
+    return found
+
+
+def card_of(dashboard: Dashboard, number: int) -> Locator:
+    return dashboard.panel(f"Next flight: {number}")
+
+
+def fly_what_is_shown(dashboard: Dashboard, campaign_id: int, number: int, choice: str) -> None:
+    expect(card_of(dashboard, number)).to_be_visible()
+    dashboard.choose(choice)
+    if choice == "Own gains":
+        for name, value in OWN.items():
+            dashboard.page.get_by_role("textbox", name=name).fill(str(value))
+        dashboard.page.get_by_role("slider", name="Slider for kd").press("ArrowRight")
+    expect(dashboard.fly_button).to_be_enabled()
+    shown = gains_shown(dashboard)
+    predicted = dashboard.post(f"/campaigns/{campaign_id}/prediction", {"gains": shown})
+    expect(card_of(dashboard, number)).to_contain_text(f"{predicted['predicted_error']:.3f} m")
+    dashboard.until(lambda: is_drawn(dashboard, predicted["curve"]["values"]))
+    dashboard.fly()
+    dashboard.wait_for_flight(number)
+    assert dashboard.trials(campaign_id)[number - 1]["gains"] == shown, choice
+
+
+def is_drawn(dashboard: Dashboard, altitude_m: list[float]) -> bool:
+    """Whether the dashed curve is that one, to the eye."""
+    drawn = dashboard.trace("takeoffs", "prediction")
+    return drawn is not None and drawn["y"][-1] == pytest.approx(altitude_m[-1], abs=1e-3)
+
+
+def test_the_green_button_flies_the_gains_shown_whatever_is_chosen(dashboard: Dashboard, states: States) -> None:
+    """Seen: it flew 3968/922/139, the best again, while the table under it showed the step, 3911/1073/269."""
+    campaign_id = states.campaign(strategy="calibrated", stop=PATIENT, flights=2)
+    proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
+    assert proposal["advice"]["kind"] == "repeat"
+    assert proposal["advice"]["gains"] != proposal["gains"]
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("Max")
+    expect(dashboard.page.get_by_role("radio", name="Repeat (recommended)")).to_be_checked()
+    assert gains_shown(dashboard) == proposal["advice"]["gains"]
+    for number, choice in enumerate(("Repeat", "Smaller step", "Step", "Baseline", "Own gains"), start=3):
+        fly_what_is_shown(dashboard, campaign_id, number, choice)
+    kinds = [trial["kind"] for trial in dashboard.trials(campaign_id)]
+    assert kinds[2:] == ["repeat", "shorter step", "step", "baseline", "manual"]
+
+
+def test_an_answer_about_earlier_gains_never_stands_beside_newer_ones(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(strategy="calibrated", stop=PATIENT, flights=1)
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose("Own gains")
+    expect(dashboard.fly_button).to_be_enabled()
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    dashboard.page.route("**/api/campaigns/*/prediction", hold)
+    dashboard.page.get_by_role("textbox", name="kp").fill("701")
+    expect(dashboard.page.get_by_text("Updating…")).to_be_visible()
+    expect(dashboard.fly_button).to_be_disabled()
+    dashboard.page.get_by_role("textbox", name="kp").fill("702")
+    dashboard.page.get_by_role("textbox", name="kp").fill("703")
+    dashboard.until(lambda: held)
+    held.pop().continue_()
+    dashboard.until(lambda: held)
+    assert held[0].request.post_data_json == {"gains": {**gains_shown(dashboard), "kp": 703}}
+    expect(dashboard.page.get_by_text("Updating…")).to_be_visible()
+    expect(dashboard.fly_button).to_be_disabled()
+    held.pop().continue_()
+    expect(dashboard.page.get_by_text(re.compile("^Predicted error"))).to_be_visible()
+    expect(dashboard.fly_button).to_be_enabled()
+    assert dashboard.trials(campaign_id)[1:] == []
