@@ -274,6 +274,7 @@ def _known(file: CampaignFile) -> dict[str, SettingPath]:
         "first_step_fraction": ("definition", "first_step_fraction"),
         "step_fraction": ("definition", "step_fraction"),
         "stop": ("definition", "stop", "kind"),
+        "confidence": ("definition", "stop", "confidence"),
         "improvement": ("definition", "stop", "improvement"),
         **{option.name: ("vehicle", "options", option.name) for option in get_kind(file.vehicle.kind).options},
         **{option.name: ("definition", "options", option.name) for option in (strategy.options if strategy else ())},
