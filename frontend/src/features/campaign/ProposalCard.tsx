@@ -8,6 +8,7 @@ import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useUnits } from "../../ui/units";
+import { FlightWindow } from "./FlightWindow";
 import { GateChecks } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
 import { ManualGains } from "./ManualGains";
@@ -76,6 +77,7 @@ export function ProposalCard({ campaign, proposal, trials, upload }: Props) {
         )}
         <GainTable changes={proposal.changes} unit={units.gains} titles={titles} />
         <PredictedError proposal={proposal} best={campaign.best?.error ?? null} unit={units.error} />
+        <FlightWindow definition={campaign.definition} />
         {can_fly ? (
           <>
             {!needs_staging && (
