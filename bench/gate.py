@@ -122,7 +122,7 @@ def _aborted(gains: Counts, models: Matrix, seed: int) -> str:
     beyond = (aborts > (CEILING_M, LARGEST_TOUCH_DOWN_M_S)).any(axis=1)
     if not beyond.any():
         return ""
-    own = fly_runs(SAFE_COUNTS, SAFE_COUNTS, models[beyond], abort_steps(int(beyond.sum())), TARGET, 16693)
+    own = fly_runs(SAFE_COUNTS, SAFE_COUNTS, models[beyond], abort_steps(int(beyond.sum()), 16693), TARGET, 16693)
     highest = np.maximum(own.aborts[:, :, HIGHEST_M].max(axis=1), own.reports[:, HIGHEST_M])
     fastest = own.aborts[:, :, TOUCH_DOWN_M_S].max(axis=1)
     harmful = (aborts[beyond, 0] > np.maximum(highest, CEILING_M)) | (

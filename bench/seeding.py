@@ -93,7 +93,7 @@ def seed_database(
 
 def _campaign(database: Database, name: str, flights: int, takeoffs: Takeoffs) -> int:
     new = NewCampaign.model_validate(
-        {"name": name, "vehicle": {"kind": "jsbsim"}, "definition": {"strategy": "gradient"}}
+        {"name": name, "vehicle": {"kind": "jsbsim"}, "definition": {"strategy": "gradient", "stop": {"kind": "paper"}}}
     )
     with database.write() as session:
         campaign_id = campaigns.create_campaign(session, new).id

@@ -60,10 +60,11 @@ def create_csv(settling_s: float = 1.0, *, until_s: float = 33.0) -> bytes:
 
 
 def create_campaign(client: httpx2.Client, *, vehicle: str = "twin", **fields: object) -> Json:
-    """A draft, of the strategy that computes fastest unless `definition` names another."""
+    """A draft, of the strategy that computes fastest and the paper's stop rule unless `definition` names others."""
     given = fields.pop("definition", {})
     assert isinstance(given, Mapping)
-    definition = given if given.get("experiment", "takeoff") != "takeoff" else {"strategy": "gradient", **given}
+    fastest = {"strategy": "gradient"} if given.get("experiment", "takeoff") == "takeoff" else {}
+    definition = {**fastest, **given, "stop": {"kind": "paper", **given.get("stop", {})}}
     wanted = {"name": "Test", "vehicle": {"kind": vehicle}, "definition": definition, **fields}
     answer = client.post("/api/campaigns", json=wanted)
     assert answer.status_code == 201, answer.text

@@ -13,7 +13,7 @@ from app.campaigns.schemas import NewCampaign
 from app.common.errors import InputError, NotFoundError, Problem
 from app.common.schemas import Number, Text
 from app.core.definition import Definition
-from app.core.experiments import experiment_of, get_experiment
+from app.core.experiments import EXPERIMENTS, experiment_of, get_experiment
 from app.core.policy import shortened
 from app.core.tuning.definition_checks import MAX_FLIGHTS
 from app.core.tuning.strategies import STRATEGIES
@@ -262,20 +262,25 @@ def _assignments(file: CampaignFile, settings: Sequence[str]) -> dict[SettingPat
         raise InputError(
             "Invalid settings.",
             problems=tuple(problems),
-            hint="Settings belong to the chosen vehicle, strategy and stop rule.",
+            hint="Settings belong to the chosen vehicle, experiment, strategy and stop rule.",
         )
     return chosen
 
 
 def _known(file: CampaignFile) -> dict[str, SettingPath]:
     """Path of each setting, by its name on the command line."""
-    strategy = STRATEGIES.get(file.definition.strategy)
+    strategy, experiment = STRATEGIES.get(file.definition.strategy), EXPERIMENTS.get(file.definition.experiment)
     return {
         "first_step_fraction": ("definition", "first_step_fraction"),
         "step_fraction": ("definition", "step_fraction"),
         "stop": ("definition", "stop", "kind"),
+        "confidence": ("definition", "stop", "confidence"),
         "improvement": ("definition", "stop", "improvement"),
         **{option.name: ("vehicle", "options", option.name) for option in get_kind(file.vehicle.kind).options},
+        **{
+            option.name: ("definition", "experiment_options", option.name)
+            for option in (experiment.options if experiment else ())
+        },
         **{option.name: ("definition", "options", option.name) for option in (strategy.options if strategy else ())},
     }
 

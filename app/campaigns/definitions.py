@@ -16,9 +16,10 @@ from app.campaigns.schemas import Definition as DefinitionIn
 from app.campaigns.schemas import Donor, Start
 from app.common.errors import NotFoundError
 from app.common.states import TrialState
-from app.core.definition import Definition
+from app.core.definition import Definition, problems_of_options
 from app.core.errors import InputError, Problem
 from app.core.experiments import get_experiment
+from app.core.experiments.base import Experiment
 from app.core.tuning.definition_checks import check_definition
 from app.db.models import CampaignRow, JsonObject, TrialRow
 from app.fleet.schemas import VehicleChoice
@@ -44,6 +45,11 @@ def definition_of(row: CampaignRow) -> Definition:
     are_others = own.keys() != default.keys()  # a placeholder of a vehicle elsewhere may serve several experiments
     safe_gains = None if are_others or own == default else own
     return replace(_ADAPTER.validate_python(row.definition), safe_gains=safe_gains)
+
+
+def experiment_of_campaign(row: CampaignRow) -> Experiment:
+    """The experiment of a stored campaign, configured as defined there."""
+    return get_experiment(row.experiment, row.definition["experiment_options"])
 
 
 def frozen_digest(row: CampaignRow) -> str:
@@ -132,7 +138,7 @@ def fill_in_donor(session: Session, asked: DefinitionIn) -> DefinitionIn:
 
     The donor is the best valid flight of its campaign unless a trial is named. Its record and gains are fixed from then
     on, whatever class the trial gets later. Raises InputError when there is no such flight, it belongs to another
-    experiment, or its record does not match the checksum in the definition.
+    experiment or has another window, or its record does not match the checksum in the definition.
     """
     named = asked.start.donor
     if named is None or asked.start.kind != "campaign":
@@ -154,6 +160,8 @@ def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
     if campaign.experiment != asked.experiment:
         reason = f"campaign {campaign.id} flies {campaign.experiment!r}, this one {asked.experiment!r}"
         raise _refused("campaign_id", reason)
+    if (difference := _other_window(campaign, asked)) is not None:
+        raise _refused("campaign_id", difference)
     trials = history.trials_of(session, campaign.id)
     if named.trial_number is None:
         found = history.best_of(trials)
@@ -165,9 +173,22 @@ def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
     return found
 
 
+def _other_window(campaign: CampaignRow, asked: DefinitionIn) -> str | None:
+    """Why the campaign's flights cannot be compared with those of the definition, which has the same experiment; None
+    if their windows are equal, and for options that the definition's own check refuses."""
+    experiment = get_experiment(campaign.experiment)
+    chosen = asked.experiment_options
+    if any(problems_of_options(chosen, experiment.options, field="experiment_options", owner=experiment.name)):
+        return None
+    theirs_s, own_s = experiment_of_campaign(campaign).window_s, experiment.configured(chosen).window_s
+    if theirs_s == own_s:
+        return None
+    return f"campaign {campaign.id} scores {theirs_s:g} s of a flight, this one {own_s:g} s: different windows"
+
+
 def _refused(field: str, reason: str) -> InputError:
     return InputError(
         "This campaign cannot start from the given campaign.",
         problems=(Problem(f"definition.start.donor.{field}", reason),),
-        hint="Choose a campaign of the same experiment with a valid flight, or another start.",
+        hint="Choose a campaign of the same experiment and window with a valid flight, or another start.",
     )

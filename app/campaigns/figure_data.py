@@ -10,9 +10,10 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
-from app.campaigns.definitions import definition_of
+from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
+from app.common.schemas import OptionValue
 from app.common.states import TrialState
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
@@ -87,7 +88,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     experiment = experiment_of(definition)
     rows = history.trials_of(session, campaign_id)
     flown = [row for row in rows if row.state in history.FLOWN]
-    set_point, reference = _goal(experiment.name)
+    set_point, reference = _goal(campaign)
     bare = History(
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
@@ -174,10 +175,14 @@ def _coarse(curves: Mapping[int, list[list[float]]], row: TrialRow) -> Curve:
     return Curve(points[:, 0], points[:, 1])
 
 
+def _goal(campaign: CampaignRow) -> tuple[Curve, Curve | None]:
+    """Set point over the window, and the reference if the model has one; neither depends on the gains."""
+    return _cached_goal(campaign.experiment, tuple(campaign.definition["experiment_options"].items()))
+
+
 @lru_cache
-def _goal(experiment_name: str) -> tuple[Curve, Curve | None]:
-    """Set point of an experiment, and its reference if its model has one; neither depends on the gains."""
-    experiment = get_experiment(experiment_name)
+def _cached_goal(experiment_name: str, options: tuple[tuple[str, OptionValue], ...]) -> tuple[Curve, Curve | None]:
+    experiment = get_experiment(experiment_name, dict(options))
     grid = experiment.grid_s
     set_point = Curve(grid, experiment.set_point(grid))
     modelled = experiment.modelled
@@ -235,8 +240,8 @@ def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _
 
 def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
     campaign = repository.get_campaign(session, row.campaign_id)
-    experiment = get_experiment(campaign.experiment)
-    set_point, reference = _goal(experiment.name)
+    experiment = experiment_of_campaign(campaign)
+    set_point, reference = _goal(campaign)
     record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)
     best = history.best_of(trials)
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None

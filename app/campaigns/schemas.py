@@ -50,12 +50,12 @@ class Start(Request):
 
 
 class StopRule(Request):
-    """`paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
-    the budget. `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner
-    was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
-    kind a flight that ends below `min_battery_v` ends it."""
+    """`noise`: ends when no remaining difference can be resolved with `confidence`, after the winner was flown again
+    and compared with the baseline. `paper`: ends after two flights in a row without `improvement` (a share of the best)
+    on the best so far, or with the budget. `budget`: only the number of flights ends the campaign. With every kind a
+    flight that ends below `min_battery_v` ends it."""
 
-    kind: Literal["paper", "noise", "budget"] = "paper"
+    kind: Literal["noise", "paper", "budget"] = "noise"
     max_flights: Annotated[int, Field(strict=True, ge=1, le=200)] = 7
     improvement: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.5)] = 0.05
     confidence: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.5, lt=1)] = 0.9

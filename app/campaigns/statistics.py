@@ -6,7 +6,7 @@ from typing import Final, Literal
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
-from app.campaigns.definitions import definition_of
+from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.schemas import (
     BestTrial,
     CampaignStatistics,
@@ -17,7 +17,6 @@ from app.campaigns.schemas import (
     TrackRecord,
     Trend,
 )
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, percent, plus_minus, short
 from app.core.statistics.comparisons import Group, drift_of, optimism, pool_scatter, trend_of
@@ -34,7 +33,7 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     """Statistics of a campaign. Raises NotFoundError."""
     row = repository.get_campaign(session, campaign_id)
     trials = history.trials_of(session, campaign_id)
-    definition, experiment = definition_of(row), get_experiment(row.experiment)
+    definition, experiment = definition_of(row), experiment_of_campaign(row)
     flights = history.flown_gains(trials)
     now = compare_winner(definition, experiment, flights)
     scatter = pool_scatter((), experiment.scatter) if now is None else now.scatter
@@ -63,12 +62,12 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
 
 def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:
     """Groups, scatter and winner of a campaign; None before its first valid flight."""
-    return compare_winner(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
+    return compare_winner(definition_of(row), experiment_of_campaign(row), history.flown_gains(trials))
 
 
 def standing_within_bounds_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:
     """Groups, scatter and winner among the gains that may be flown again; None before the first valid flight."""
-    return standing_within_bounds(definition_of(row), get_experiment(row.experiment), history.flown_gains(trials))
+    return standing_within_bounds(definition_of(row), experiment_of_campaign(row), history.flown_gains(trials))
 
 
 def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestTrial | None:

@@ -15,7 +15,7 @@ from app.campaigns.definitions import definition_of
 from app.common.errors import InputError, Problem
 from app.common.schemas import OptionValue
 from app.compare.schemas import FlightDifference, FlightSetting
-from app.core.definition import Option
+from app.core.definition import Option, with_defaults
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Experiment
 from app.core.formatting import count, format_gains, plus_minus
@@ -150,7 +150,8 @@ def population_of(campaign: CampaignRow) -> str:
     if not fleet.can_fly(vehicle):
         return f"campaign {campaign.id}"
     options = {} if vehicle.registered else campaign.vehicle_options
-    experiment = [campaign.experiment, definition_of(campaign).experiment_options]
+    offered = get_experiment(campaign.experiment).options
+    experiment = [campaign.experiment, with_defaults(definition_of(campaign).experiment_options, offered)]
     return json.dumps([vehicle.id, options, experiment], sort_keys=True)
 
 
@@ -184,12 +185,16 @@ def _refusal(
     if row.state not in history.FLOWN:
         return f"flight {row.number} of campaign {row.campaign_id} has not flown: it is {row.state}"
     first = next(found[other] for other in trial_ids if other in found)
-    unit, wanted = experiments[row.campaign_id].error_unit, experiments[first.campaign_id].error_unit
-    if unit == wanted:
+    own, wanted = experiments[row.campaign_id], experiments[first.campaign_id]
+    if own.error_unit != wanted.error_unit:
+        differ = f"is in {own.error_unit}", f"in {wanted.error_unit}"
+    elif own.window_s != wanted.window_s:
+        differ = f"covers a window of {own.window_s:g} s", f"one of {wanted.window_s:g} s"
+    else:
         return None
     return (
-        f"the error of flight {row.number} of campaign {row.campaign_id} is in {unit}, that of flight {first.number} "
-        f"of campaign {first.campaign_id} in {wanted}: the errors are different quantities"
+        f"the error of flight {row.number} of campaign {row.campaign_id} {differ[0]}, that of flight {first.number} "
+        f"of campaign {first.campaign_id} {differ[1]}: the errors are different quantities"
     )
 
 
@@ -203,7 +208,9 @@ def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
         FlightSetting(title="Vehicle", unit="", value=campaign.vehicle.title),
         *_options(options, () if kind is None else kind.options),
         FlightSetting(title="Experiment", unit="", value=side.experiment.title),
-        *_options(campaign.definition["experiment_options"], get_experiment(campaign.experiment).options),
+        *_options(
+            with_defaults(campaign.definition["experiment_options"], side.experiment.options), side.experiment.options
+        ),
         FlightSetting(title="Strategy", unit="", value=strategy.title),
         *_options(campaign.definition["options"], strategy.options),
         FlightSetting(title="Seed of the campaign", unit="", value=_seed(campaign)),

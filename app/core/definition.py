@@ -44,16 +44,16 @@ class Start:
 class StopRule:
     """When a campaign ends.
 
-    - `paper`: after two flights in a row that do not improve on the best so far by `improvement` (a fraction of the
-      best), or when the budget is used up.
     - `noise`: when no further step can be distinguished from noise with `confidence`, and the winner was flown again
       and compared with the baseline.
+    - `paper`: after two flights in a row that do not improve on the best so far by `improvement` (a fraction of the
+      best), or when the budget is used up.
     - `budget`: only the number of flights ends the campaign.
 
     With every kind, `max_flights` or a flight that ends below `min_battery_v` (V) ends the campaign.
     """
 
-    kind: Literal["paper", "noise", "budget"] = "paper"
+    kind: Literal["noise", "paper", "budget"] = "noise"
     max_flights: int = 7
     improvement: float = 0.05
     confidence: float = 0.9

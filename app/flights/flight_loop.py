@@ -21,7 +21,6 @@ import numpy as np
 from app.common.data_folder import vehicle_lock
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
-from app.core.experiments import get_experiment
 from app.flights.process_messages import (
     CancelFlight,
     CancelTakeOff,
@@ -301,7 +300,7 @@ class FlightMonitor:
     ) -> None:
         self._campaign_id = request.campaign_id
         self._trial_id = request.trial_id
-        self._experiment = get_experiment(request.experiment)
+        self._experiment = request.configured_experiment
         self._columns: list[str] = []
         self._scored_until_s = float(self._experiment.grid_s[-1])
         self._publish = publish

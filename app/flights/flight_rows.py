@@ -121,6 +121,7 @@ def _claimed(flight: FlightRow, campaign: CampaignRow, worker: str) -> FlightReq
         trial_id=flight.trial_id,
         campaign_id=campaign.id,
         experiment=campaign.experiment,
+        experiment_options=campaign.definition["experiment_options"],
         vehicle_id=flight.vehicle_id,
         vehicle_kind=flight.vehicle.kind,
         vehicle_options=fleet.options_of(campaign),

@@ -12,6 +12,8 @@ from pathlib import Path
 
 from app.common.states import ActKind, FlightMode
 from app.core.clock import REAL_TIME, Clock
+from app.core.experiments import get_experiment
+from app.core.experiments.base import Experiment
 from app.live.messages import FlightPhase, PublishedMessage, Telemetry, VehicleCommandKind, VehicleStatus
 from app.vehicles.base import CheckItem, FlightOptions, FlightRecord, Identity, OptionValue
 
@@ -34,11 +36,19 @@ class FlightRequest:
     safe_gains: Mapping[str, float]
     gains: Mapping[str, float]
     seed: int
+    experiment_options: Mapping[str, OptionValue] = field(default_factory=dict)
     speed: float | None = None
     mode: FlightMode = "fly"
 
+    @property
+    def configured_experiment(self) -> Experiment:
+        """The experiment with its settings."""
+        return get_experiment(self.experiment, self.experiment_options)
+
     def options(self, clock: Clock) -> FlightOptions:
-        return FlightOptions(seed=self.seed, speed=self.speed, clock=clock)
+        return FlightOptions(
+            seed=self.seed, speed=self.speed, clock=clock, window_s=self.configured_experiment.window_s
+        )
 
 
 @dataclass(frozen=True, slots=True)

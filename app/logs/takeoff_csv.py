@@ -184,7 +184,7 @@ def _require_rows(rows: int) -> None:
     if rows < MIN_ROWS:
         raise TrajectoryError(
             f"The file has {count(rows, 'sample')}; a flight needs at least {MIN_ROWS}.",
-            hint="Upload the whole takeoff, from the command to 32.6 s after it.",
+            hint="Upload the whole takeoff, from the command to the end of the scored window.",
             problems=(Problem("time_s", "has too few rows"),),
         )
 

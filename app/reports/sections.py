@@ -14,7 +14,7 @@ from app.campaigns.history import FLOWN
 from app.campaigns.schemas import Campaign, CampaignStatistics, Start, StopRule
 from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
-from app.core.definition import OptionValue
+from app.core.definition import OptionValue, with_defaults
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
 from app.core.formatting import count, gain, gains, number, short_percent
@@ -135,7 +135,7 @@ def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Ident
         facts.append(Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}"))
     facts += _options(vehicle.options, () if kind is None else kind.options)
     facts.append(Fact("Experiment", experiment.title))
-    facts += _options(campaign.definition.experiment_options, experiment.options)
+    facts += _options(with_defaults(campaign.definition.experiment_options, experiment.options), experiment.options)
     facts += [
         Fact(
             f"Gain {each.name}",

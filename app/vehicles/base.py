@@ -13,6 +13,7 @@ from typing import Final, Literal, Protocol
 
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
+from app.core.experiments.takeoff import WINDOW_S
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 
@@ -45,17 +46,28 @@ class Sample:
         return self.channels[channel]
 
 
+RECORDED_BEYOND_S: Final = 0.4
+"""Time recorded after the end of the scored window."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOptions:
     """Options of one flight.
 
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
     over the time of the `clock` (10.0: ten times real time); None runs as fast as possible. Real vehicles ignore both.
+    `window_s` is the scored time after the take-off command; a vehicle with one manoeuvre of fixed length ignores it.
     """
 
     seed: int
     speed: float | None = None
     clock: Clock = REAL_TIME
+    window_s: float = WINDOW_S
+
+    @property
+    def record_s(self) -> float:
+        """Length of the record after the take-off command."""
+        return self.window_s + RECORDED_BEYOND_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,11 +65,13 @@ def _vehicle(
 ) -> "MavlinkVehicle":
     """Open the vehicle. It counts as REAL unless it is on this computer: other simulation hosts are not known here.
 
-    The modules that talk to a vehicle are imported here, so that only the process that opens one loads them.
+    Options that did not exist when the vehicle was registered have their defaults. The modules that talk to a vehicle
+    are imported here, so that only the process that opens one loads them.
     """
     from app.vehicles.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415
     from app.vehicles.mocap.opening import open_source  # noqa: PLC0415
 
+    options = {each.name: each.default for each in MAVLINK.options} | dict(options)
     clock = ScaledClock(float(options["clock_speed"]))
     place = str(options["second_source"])
     source = open_source(place, clock) if place else None
@@ -163,6 +165,7 @@ MAVLINK: Final = VehicleKind(
         VehicleOption(
             "plan_radius_m", "Paparazzi: maximum distance from HOME in the flight plan", "m", 8.0, 0.5, 1000.0
         ),
+        VehicleOption("plan_time_s", "Paparazzi: time limit of the flight plan's take-off", "s", 45.0, 15.0, 600.0),
         VehicleOption("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
             "second_source",

@@ -23,9 +23,19 @@ from app.core.control.paparazzi import (
     fix,
 )
 from app.core.errors import GainsError, InputError, Problem
+from app.core.experiments.takeoff import WINDOW_S
 from app.core.policy import Gains, shortened
 from app.core.records.trajectory import Trajectory
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample, ShouldStop, StopRequest, VehicleError
+from app.vehicles.base import (
+    RECORDED_BEYOND_S,
+    FlightOptions,
+    FlightRecord,
+    OptionValue,
+    Sample,
+    ShouldStop,
+    StopRequest,
+    VehicleError,
+)
 from app.vehicles.kernels import (
     ALTITUDE,
     CHANNELS,
@@ -106,8 +116,8 @@ class Pacer:
 
 GAIN_NAMES: Final = ("kp", "ki", "kd")
 TAKEOFF_ALTITUDE_M: Final = 3.0
-FLIGHT_S: Final = 33.0
-"""Time recorded after the command, a little more than the 32.6 s that are scored."""
+FLIGHT_S: Final = WINDOW_S + RECORDED_BEYOND_S
+"""Time recorded after the command for the paper's window, 33 s."""
 TELEMETRY_HZ: Final = 50
 HIGHEST_HOVER: Final = 0.95
 """Share of full thrust up to which a vehicle that hovers with it can be controlled."""
@@ -120,7 +130,7 @@ _LANDING_SLICE: Final = RATE_HZ // 4
 
 STEPS: Final = round(FLIGHT_S * RATE_HZ) + 1
 MAX_STEPS: Final = STEPS + round(_LANDING_S * RATE_HZ)
-"""Steps of the longest flight: aborted at the last instant, then landed."""
+"""Steps of the longest flight with the paper's window: aborted at the last instant, then landed."""
 
 
 class Simulation(Protocol):
@@ -201,7 +211,7 @@ class SimulatedVehicle(GainHolder):
         try:
             simulation = self._launch(order)
             rows: list[Rows] = []
-            stop = self._take_off(simulation, rows, Pacer(order.speed, order.clock), on_sample, should_stop)
+            stop = self._take_off(simulation, rows, order, on_sample, should_stop)
             self._restore()
             if stop is not None:
                 rows.extend(self._land(simulation, rows[-1]) if rows else [self._stay(simulation)])
@@ -218,13 +228,14 @@ class SimulatedVehicle(GainHolder):
         self,
         simulation: Simulation,
         rows: list[Rows],
-        pacer: Pacer,
+        order: FlightOptions,
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
     ) -> StopRequest | None:
         """Fill `rows` until the manoeuvre is over; return the stop request that ended it early, if any."""
         command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
-        for first, last in _slices():
+        pacer = Pacer(order.speed, order.clock)
+        for first, last in _slices(order.record_s):
             if (stop := pacer.wait_until(first * STEP_S, should_stop)) is not None:
                 return stop
             rows.append(_flown(simulation, last - first, command, TAKEOFF_ALTITUDE_M))
@@ -284,10 +295,10 @@ def _command(mode: int, target: int, gains: Gains) -> Integers:
     return command
 
 
-def _slices() -> Iterator[tuple[int, int]]:
-    """First and past-last step of each 20 ms; the very last slice is the instant at which the record ends."""
-    edges = [round(i * RATE_HZ / TELEMETRY_HZ) for i in range(round(FLIGHT_S * TELEMETRY_HZ) + 1)]
-    return zip(edges, [*edges[1:], STEPS], strict=True)
+def _slices(record_s: float) -> Iterator[tuple[int, int]]:
+    """First and past-last step of each 20 ms; the last slice ends with the instant at which the record does."""
+    edges = [round(i * RATE_HZ / TELEMETRY_HZ) for i in range(int(record_s * TELEMETRY_HZ) + 1)]
+    return zip(edges, [*edges[1:], round(record_s * RATE_HZ) + 1], strict=True)
 
 
 def _flown(simulation: Simulation, steps: int, command: Integers, set_point_m: float) -> Rows:

@@ -114,7 +114,7 @@ TWIN: Final = VehicleKind(
         VehicleOption(
             "measurement_delay_s", "Age of the altitude and climb rate that the loop senses", "s", 0.0, 0.0, 0.1
         ),
-        VehicleOption("battery_sag", "Share of the thrust lost evenly over a flight", "of thrust", 0.0, 0.0, 0.1),
+        VehicleOption("battery_sag", "Share of the thrust lost evenly over 33 s", "of thrust", 0.0, 0.0, 0.1),
     ),
     open=opener("twin", TwinFlight),
     find_conflicts=_cannot_lift,

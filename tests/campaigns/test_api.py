@@ -29,7 +29,7 @@ def test_a_campaign_needs_nothing_but_a_name(client: TestClient) -> None:
     assert (campaign["name"], campaign["state"], campaign["version"]) == ("Mine", "draft", 1)
     assert (campaign["vehicle"]["kind"], campaign["definition"]["strategy"]) == ("jsbsim", "calibrated")
     assert campaign["definition"]["stop"] == {
-        "kind": "paper",
+        "kind": "noise",
         "max_flights": 7,
         "improvement": 0.05,
         "confidence": 0.9,

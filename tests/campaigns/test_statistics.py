@@ -251,6 +251,14 @@ def test_a_donor_that_cannot_be_one_is_refused_by_name(client: TestClient, datab
     assert "there is no campaign 99" in refusal({"campaign_id": 99})["definition.start.donor.campaign_id"]
     assert "leave it out" in refusal({"campaign_id": donor, "checksum": "0" * 64})["definition.start.donor.checksum"]
     assert "must lie in" in refusal({"campaign_id": donor}, bounds={"kp": (0, 290)})["definition.start.gains.kp"]
+    other = refusal({"campaign_id": donor}, experiment_options={"window_s": 20.0})["definition.start.donor.campaign_id"]
+    assert other == f"campaign {donor} scores 32.6 s of a flight, this one 20 s: different windows"
+    assert (
+        "10 … 60 s"
+        in refusal({"campaign_id": donor}, experiment_options={"window_s": 5.0})[
+            "definition.experiment_options.window_s"
+        ]
+    )
     assert "this one" in refusal({"campaign_id": donor}, experiment="elsewhere")["definition.start.donor.campaign_id"]
     answer = client.post(
         "/api/campaigns", json={"name": "Warm", "definition": {"start": {"donor": {"campaign_id": donor}}}}

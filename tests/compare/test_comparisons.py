@@ -235,6 +235,20 @@ def test_what_cannot_be_compared_is_named_by_its_place(client: TestClient, datab
     assert "at most 20 items" in refusal(client, range(1, 22))["trial"]
 
 
+def test_errors_over_different_windows_are_refused_by_name(client: TestClient, database: Database) -> None:
+    paper = fly(client, database, create(client, database), 1.0)
+    named, shorter = (
+        create_ready_campaign(client, database, definition={**LONG, "experiment_options": {"window_s": window_s}})["id"]
+        for window_s in (32.6, 20.0)
+    )
+    same, other = fly(client, database, named, 1.0), fly(client, database, shorter, 1.0)
+    assert refusal(client, [paper, other]) == {
+        "trial.1": f"the error of flight 1 of campaign {shorter} covers a window of 20 s, that of flight 1 of campaign "
+        "1 one of 32.6 s: the errors are different quantities"
+    }
+    assert get(client, address([paper, same]))["pairs"][0]["basis"] == "repeats"
+
+
 def test_errors_in_different_units_are_refused_by_name(client: TestClient, database: Database) -> None:
     takeoff = fly(client, database, create(client, database), 1.0)
     pitch = create_ready_campaign(

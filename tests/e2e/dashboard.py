@@ -176,9 +176,11 @@ class Dashboard:
         return answer.json()
 
     def create(self, vehicle: str = "twin", *, name: str = "", **definition: object) -> int:
-        """A campaign whose first gains are computed."""
-        made = self.post("/campaigns", {"name": name or f"On {vehicle}", "vehicle": {"kind": vehicle},
-                                        "definition": {"strategy": "gradient", **definition}})  # fmt: skip
+        """A campaign under the paper's stop rule, unless another is named, whose first gains are computed."""
+        defined = {"strategy": "gradient", "stop": {"kind": "paper"}, **definition}
+        made = self.post(
+            "/campaigns", {"name": name or f"On {vehicle}", "vehicle": {"kind": vehicle}, "definition": defined}
+        )
         return self.when_ready(int(made["id"]))
 
     def when_ready(self, campaign_id: int) -> int:

@@ -70,12 +70,13 @@ class States:
         vehicle_id: int | None = None,
         **definition: object,
     ) -> int:
-        """A campaign with so many flights of its proposals, and the next one ready unless it has ended."""
+        """A campaign, under the paper's stop rule unless another is named, with so many flights of its proposals, and
+        the next one ready unless it has ended."""
         new = NewCampaign.model_validate(
             {
                 "name": name or f"On {vehicle}",
                 "vehicle": {"kind": vehicle, "options": dict(options or {}), "id": vehicle_id},
-                "definition": {"strategy": "gradient", **definition},
+                "definition": {"strategy": "gradient", "stop": {"kind": "paper"}, **definition},
             }
         )
 

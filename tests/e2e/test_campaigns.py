@@ -215,14 +215,18 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     page.get_by_label("Maximum flights").fill("-3")
     page.get_by_label("kp minimum").fill("3000")
     page.get_by_label("kp maximum").fill("2000")
+    page.get_by_label("Scored window").fill("5")
     dashboard.button("Create campaign").click()
     expect(page.get_by_label("Maximum flights")).to_have_attribute("aria-invalid", "true")
     page.get_by_label("Maximum flights").fill("7")
     dashboard.button("Create campaign").click()
     expect(page.get_by_label("kp maximum")).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_text("must lie in 10 … 60 s, got 5")).to_be_visible()
     assert dashboard.get("/campaigns")["total"] == before
     page.get_by_label("kp minimum").fill("0")
+    page.get_by_label("Scored window").fill("20")
     dashboard.button("Create campaign").click()
     expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
     made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
     assert made["definition"]["bounds"] == {"kp": [0, 2000]}
+    expect(page.get_by_text("Scored window: 20 s from the take-off command")).to_be_visible(timeout=30_000)

@@ -84,6 +84,7 @@ def create(dashboard: Dashboard, vehicle_id: int) -> int:
     page.get_by_label("Name", exact=True).fill(NAME)
     picture(dashboard, "wizard")
     page.get_by_role("button", name=re.compile("^Advanced")).click()
+    page.get_by_text("No improvement", exact=True).click()
     page.get_by_label("Maximum flights").fill(str(FLIGHTS_AT_MOST))
     page.get_by_label("Improvement threshold").fill(str(IMPROVEMENT_PERCENT))
     dashboard.button("Create campaign").click()

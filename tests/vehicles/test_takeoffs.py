@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from app.core.errors import GainsError
-from app.vehicles.base import Vehicle
+from app.vehicles.base import FlightOptions, Vehicle
 from app.vehicles.kernels import CHANNELS
 from app.vehicles.registry import VEHICLE_KINDS, open_vehicle
-from tests.vehicles.flying import SAFE, TAKES_OFF, Watcher, fly
+from tests.vehicles.flying import SAFE, TAKES_OFF, TUNED, Watcher, fly, never, unwatched
 
 SLICE_STEPS: Final = 11
 """20 ms at 512 Hz, rounded up."""
@@ -64,6 +64,18 @@ def test_a_flight_leaves_every_channel_at_512_hz_from_the_command_past_the_score
     assert flight.time_s[0] == 0.0
     np.testing.assert_allclose(np.diff(flight.time_s), 1 / 512, rtol=1e-12)
     assert flight.time_s[-1] >= 32.6
+
+
+@pytest.mark.parametrize("window_s", [10.0, 20.25])
+def test_a_flight_with_another_window_is_the_same_and_lasts_as_long_as_that_needs(
+    kind: str, vehicle: Vehicle, window_s: float
+) -> None:
+    whole = fly(vehicle).trajectory
+    vehicle.stage(TUNED)
+    order = FlightOptions(seed=1, window_s=window_s)
+    chosen = vehicle.fly(order, on_sample=unwatched, should_stop=never).trajectory
+    assert chosen.time_s[-1] == pytest.approx(window_s + 0.4, abs=1 / 512)
+    assert np.array_equal(chosen["altitude_m"], whole["altitude_m"][: len(chosen)])
 
 
 def test_altitude_points_up_from_the_ground_to_3_m(kind: str, vehicle: Vehicle) -> None:

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
+from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.schemas import NewTrial, Trial
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
@@ -25,7 +26,6 @@ from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
 from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, Ending, TrialState
 from app.core.errors import TrajectoryError
-from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains
 from app.core.policy import Gains
@@ -147,7 +147,7 @@ def capture(
     stored = trajectories.store_trajectory(session, trajectory)
     row.trajectory = stored
     recorded = trajectories.trajectory_of(session, stored.id)
-    experiment = get_experiment(campaign.experiment)
+    experiment = experiment_of_campaign(campaign)
     judged = score(experiment, recorded)
     glitches = find_glitches(experiment, recorded)
     row.glitches = [asdict(glitch) for glitch in glitches]

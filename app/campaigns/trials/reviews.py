@@ -5,6 +5,7 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import LOCAL_CLI, Permission, RequestContext
 from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
+from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.records import score
 from app.campaigns.trials.schemas import AbortJudgement, Classification, Trial
@@ -12,7 +13,6 @@ from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action, check_transition, check_version
 from app.common.errors import ConflictError, InputError, Problem
 from app.common.states import CAMPAIGN_ACTIONS, TRIAL_ACTIONS, TRIAL_TRANSITIONS, TrialState
-from app.core.experiments import get_experiment
 from app.db.models import CampaignRow, TrialRow
 from app.fleet.control import require_may
 
@@ -85,7 +85,7 @@ def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> fl
     judged = (
         None
         if row.trajectory_id is None
-        else score(get_experiment(campaign.experiment), history.record_of(session, row), accept_gaps=True)
+        else score(experiment_of_campaign(campaign), history.record_of(session, row), accept_gaps=True)
     )
     if judged is None or judged.error is None:
         reason = judged.refusal if judged is not None else "it has no record"

@@ -10,6 +10,7 @@ from typing import Final, Literal
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
+from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
 from app.campaigns.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
@@ -111,7 +112,7 @@ def trial_views(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow
     """Views of some trials of a campaign."""
     session.flush()
     flights = repository.latest_flights(session, [row.id for row in rows])
-    field = ReferenceFlights(history.valid_flights(session, campaign.id), get_experiment(campaign.experiment).scatter)
+    field = ReferenceFlights(history.valid_flights(session, campaign.id), experiment_of_campaign(campaign).scatter)
     rehearsed = is_rehearsal_satisfied(rehearsal_of(session, campaign))
     return [_view(campaign, row, field, flights.get(row.id), rehearsed) for row in rows]
 

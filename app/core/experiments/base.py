@@ -263,8 +263,13 @@ class Experiment(Protocol):
     @property
     def error_unit(self) -> str: ...
     @property
+    def window_s(self) -> float:
+        """Scored time from the command on, s. Errors over different windows are different quantities."""
+        ...
+
+    @property
     def grid_s(self) -> Samples:
-        """Times of a model run from the command on, shape (n,)."""
+        """Times of a model run from the command to the end of the window, shape (n,)."""
         ...
 
     def set_point(self, time_s: Samples) -> Samples:

@@ -94,6 +94,7 @@ class PitchTracking:
     output: Final = OUTPUT
     integrates: Final = True
     error_unit: Final = "rad·s"
+    window_s: Final = WINDOW_S
     scatter: Final = Scatter(sd=0.001, degrees_of_freedom=4.0)
     search: Final = SimplexSearch(of_scale=0.5, iterations=300, bounded=False)
     difference: Final = 0.001

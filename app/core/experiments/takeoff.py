@@ -13,7 +13,7 @@ from typing import Final, Self
 import numpy as np
 
 from app.core.control.paparazzi import POSITION_BITS, RATE_HZ, fix
-from app.core.definition import Option, OptionValue
+from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import (
     Check,
     Envelope,
@@ -33,15 +33,27 @@ from app.core.records.trajectory import Samples, Trajectory
 
 TARGET_M: Final = 3.0
 WINDOW_S: Final = 32.6
+"""The paper's scored window, from the command on."""
+
+OPTIONS: Final = (
+    Option(
+        name="window_s",
+        title="Scored window",
+        default=WINDOW_S,
+        unit="s",
+        lower=10.0,
+        upper=60.0,
+    ),
+)
 
 SETTLED_S: Final = 5.0
 """A takeoff should be near its target from this time on."""
 
 _SKETCH_EVERY: Final = 4
 _SKETCH_END_S: Final = 2.0
+_SCATTER_M: Final = 0.0105
 _STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
 _TARGET: Final = fix(TARGET_M, POSITION_BITS)
-_SAMPLES: Final = int(np.ceil(WINDOW_S * RATE_HZ)) + 1
 
 
 def _gain(name: str, title: str, upper: int, default: int) -> Gain:
@@ -91,10 +103,21 @@ class Sketches:
     lowest_m: Matrix
 
 
-class Takeoff:
-    """Takeoff with the paper's autopilot.
+def _window_of(options: Mapping[str, OptionValue]) -> float:
+    return float(with_defaults(options, OPTIONS)["window_s"])
 
-    Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits.
+
+def _scatter(window_s: float, degrees_of_freedom: float, *, measured: bool = True) -> Scatter:
+    """The scatter measured over the paper's window. Most of it arises in the climb, so it grows as 1/window for shorter
+    ones; for longer ones it is kept, because with soft gains it hardly falls."""
+    return Scatter(_SCATTER_M * max(1.0, WINDOW_S / window_s), degrees_of_freedom, measured)
+
+
+class Takeoff:
+    """Takeoff with the paper's autopilot, scored over the first `window_s` from the command on.
+
+    Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits. A run has n samples,
+    16693 in the paper's window.
     """
 
     name: Final = "takeoff"
@@ -109,21 +132,27 @@ class Takeoff:
             _gain("kd", "Derivative gain", 409, 82),
         )
     )
-    options: Final[tuple[Option, ...]] = ()
-    scatter: Final = Scatter(sd=0.0105, degrees_of_freedom=4.0)
+    options: Final = OPTIONS
     search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
     difference: Final = 0.1
 
-    def __init__(self, model_parameters: tuple[ModelParameter, ...] = MODEL_PARAMETERS) -> None:
+    def __init__(
+        self, model_parameters: tuple[ModelParameter, ...] = MODEL_PARAMETERS, *, window_s: float = WINDOW_S
+    ) -> None:
+        """`window_s` must be free of problems."""
         self.model_parameters: Final = model_parameters
+        self.window_s: Final = window_s
+        self.scatter: Final = _scatter(window_s, degrees_of_freedom=4.0)
+        self._samples: Final = int(np.ceil(window_s * RATE_HZ)) + 1
 
-    def configured(self, options: Mapping[str, OptionValue]) -> Self:  # noqa: ARG002 - there are none
-        """The experiment itself: it has no settings."""
-        return self
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        """The takeoff with another window; itself if that is its own."""
+        window_s = _window_of(options)
+        return self if window_s == self.window_s else type(self)(self.model_parameters, window_s=window_s)
 
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The takeoff with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
-        return type(self)(informed_parameters(self.model_parameters, mean, sd))
+        return type(self)(informed_parameters(self.model_parameters, mean, sd), window_s=self.window_s)
 
     @property
     def modelled(self) -> Self:
@@ -137,8 +166,8 @@ class Takeoff:
 
     @property
     def grid_s(self) -> Samples:
-        """Every 1/512 s from the command to the first instant at or past 32.6 s."""
-        return np.arange(_SAMPLES) / RATE_HZ
+        """Every 1/512 s from the command to the first instant at or past the end of the window, shape (n,)."""
+        return np.arange(self._samples) / RATE_HZ
 
     def set_point(self, time_s: Samples) -> Samples:
         """3 m from the command on."""
@@ -147,17 +176,17 @@ class Takeoff:
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""
         parameters = np.ascontiguousarray(np.broadcast_to(model, (len(self.model_parameters),)))
-        channels, _ = fly(_counts(gains), parameters, _TARGET, _SAMPLES)
+        channels, _ = fly(_counts(gains), parameters, _TARGET, self._samples)
         time_s = self.grid_s
         named = dict(zip(CHANNELS, channels, strict=True)) | {"set_point_m": self.set_point(time_s)}
         return Trajectory(time_s, named, "model", "simulation")
 
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
-        """Altitude of many policies, each on its own model or all on one: gains (k, 3) → (k, 16693)."""
-        return fly_batch(_counts(gains), self._models(model, len(gains)), _TARGET, _SAMPLES)
+        """Altitude of many policies, each on its own model or all on one: gains (k, 3) → (k, n)."""
+        return fly_batch(_counts(gains), self._models(model, len(gains)), _TARGET, self._samples)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
-        """Difference of altitude and climb rate from the model's in every step of a flight, shape (16693, 3).
+        """Difference of altitude and climb rate from the model's in every step of a flight, shape (n, 3).
 
         The third column marks when the loop is entered. None if the record lacks the climb rate or the thrust command.
         """
@@ -169,7 +198,7 @@ class Takeoff:
         return observe(altitude, climb_rate, thrust, self._models(model, 1)[0])
 
     def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
-        """`outputs` with `disturbances` added to the state after each step: gains (k, 3) → (k, 16693)."""
+        """`outputs` with `disturbances` added to the state after each step: gains (k, 3) → (k, n)."""
         return fly_disturbed(_counts(gains), self._models(model, len(gains)), _TARGET, disturbances)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
@@ -180,32 +209,39 @@ class Takeoff:
         """
         safe_gains = self.space.vector(envelope.safe_gains)
         return _hazards(
-            tuple(gains.tolist()), tuple(safe_gains.tolist()), envelope.ceiling_m, spread, self.model_parameters
+            tuple(gains.tolist()),
+            tuple(safe_gains.tolist()),
+            envelope.ceiling_m,
+            spread,
+            self.model_parameters,
+            self._samples,
         )
 
     def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
-        """Simulate every policy on every model until `until_s`, which must exceed 5 s: gains (c, 3), models (k, m)."""
+        """Simulate every policy on every model until `until_s`, which must exceed 5 s, or to the end of the window:
+        gains (c, 3), models (k, m)."""
+        until_s = min(until_s, self.window_s)
         samples = round(until_s * RATE_HZ)
         runs = np.repeat(_counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
         altitude = fly_batch(*runs, _TARGET, samples)[:, ::_SKETCH_EVERY]
         rate_hz = RATE_HZ / _SKETCH_EVERY
         deviations = np.abs(TARGET_M - altitude)
-        end = deviations[:, -round(_SKETCH_END_S * rate_hz) :].mean(axis=1) * (WINDOW_S - until_s)
+        end = deviations[:, -round(_SKETCH_END_S * rate_hz) :].mean(axis=1) * (self.window_s - until_s)
         return Sketches(
-            errors=_by_policy((deviations.sum(axis=1) / rate_hz + end) / WINDOW_S, gains),
+            errors=_by_policy((deviations.sum(axis=1) / rate_hz + end) / self.window_s, gains),
             highest_m=_by_policy(altitude.max(axis=1), gains),
             lowest_m=_by_policy(altitude[:, round(SETTLED_S * rate_hz) :].min(axis=1), gains),
         )
 
     def errors(self, outputs: Matrix) -> Vector:
-        """Mean absolute altitude error, m, over 32.6 s: (k, 16693) → (k,)."""
+        """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""
         time_s = self.grid_s
-        return np.array([mean_absolute_error(time_s, row, self.set_point, 0.0, WINDOW_S) for row in outputs])
+        return np.array([mean_absolute_error(time_s, row, self.set_point, 0.0, self.window_s) for row in outputs])
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
-        require_scorable(trajectory, self.output, 0.0, WINDOW_S, accept_gaps=accept_gaps)
-        return mean_absolute_error(trajectory.time_s, trajectory[self.output], self.set_point, 0.0, WINDOW_S)
+        require_scorable(trajectory, self.output, 0.0, self.window_s, accept_gaps=accept_gaps)
+        return mean_absolute_error(trajectory.time_s, trajectory[self.output], self.set_point, 0.0, self.window_s)
 
     def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
         return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
@@ -222,6 +258,7 @@ def _hazards(
     ceiling_m: float,
     spread: ParameterDistribution,
     parameters: tuple[ModelParameter, ...],
+    samples: int,
 ) -> tuple[Check, ...]:
     takeoff = Takeoff(parameters)
     counts, safe_counts = _counts(np.array(gains)), _counts(np.array(safe_gains))
@@ -229,7 +266,7 @@ def _hazards(
     baseline = gains == tuple(takeoff.space.default.tolist())
     return (
         *check_wrapping(counts, models[0], _TARGET),
-        *check_flights(counts, safe_counts, baseline, parameters, models, ceiling_m, _TARGET, _SAMPLES),
+        *check_flights(counts, safe_counts, baseline, parameters, models, ceiling_m, _TARGET, samples),
     )
 
 
@@ -264,39 +301,43 @@ PX4_GAINS: Final = (
 class CopterTakeoff:
     """The paper's takeoff, manoeuvre and score, with the gains of another autopilot."""
 
-    options: Final[tuple[Option, ...]] = ()
+    options: Final = OPTIONS
     modelled: Final = None
     output: Final = _PAPER.output
     integrates: Final = _PAPER.integrates
     error_unit: Final = _PAPER.error_unit
-    scatter: Final = Scatter(sd=_PAPER.scatter.sd, degrees_of_freedom=1.0, measured=False)
-    """The scatter of the paper's drone, as none was measured; under PX4 one flight scattered three times as much."""
 
-    def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...]) -> None:
+    def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...], *, paper: Takeoff = _PAPER) -> None:
         self.name: Final = name
-        self.title: Final = f"{_PAPER.title} under {autopilot}"
+        self.title: Final = f"{paper.title} under {autopilot}"
         self.space: Final = PolicySpace(gains)
+        self.window_s: Final = paper.window_s
+        self.scatter: Final = _scatter(paper.window_s, degrees_of_freedom=1.0, measured=False)
+        """That of the paper's drone, as none was measured; under PX4 one flight scattered three times as much."""
+        self._autopilot: Final = autopilot
+        self._paper: Final = paper
 
-    def configured(self, options: Mapping[str, OptionValue]) -> Self:  # noqa: ARG002 - there are none
-        """The experiment itself: it has no settings."""
-        return self
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        """The takeoff with another window; itself if that is its own."""
+        paper = self._paper.configured(options)
+        return self if paper is self._paper else type(self)(self.name, self._autopilot, self.space.gains, paper=paper)
 
     @property
     def grid_s(self) -> Samples:
         """The same as the paper's takeoff."""
-        return _PAPER.grid_s
+        return self._paper.grid_s
 
     def set_point(self, time_s: Samples) -> Samples:
         """3 m from the command on."""
-        return _PAPER.set_point(time_s)
+        return self._paper.set_point(time_s)
 
     def errors(self, outputs: Matrix) -> Vector:
-        """Mean absolute altitude error, m, over 32.6 s: (k, 16693) → (k,)."""
-        return _PAPER.errors(outputs)
+        """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""
+        return self._paper.errors(outputs)
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""
-        return _PAPER.error(trajectory, accept_gaps=accept_gaps)
+        return self._paper.error(trajectory, accept_gaps=accept_gaps)
 
 
 TAKEOFF_ARDUPILOT: Final = CopterTakeoff("takeoff-ardupilot", "ArduCopter", ARDUPILOT_GAINS)

@@ -57,8 +57,9 @@ if TYPE_CHECKING:
 MODELS: Final = 32
 """Number of simulated vehicles: the likely one, and quasi-random ones around it."""
 
-ABORTS_BETWEEN_S: Final = (0.3, 1.0, 1.7, 2.6, 4.0, 8.0, 32.0)
-"""Every takeoff is aborted once in each of these intervals, at a different time on every vehicle."""
+ABORTS_BETWEEN_S: Final = (0.3, 1.0, 1.7, 2.6, 4.0, 8.0)
+"""Every takeoff is aborted once in each interval between these times, and once between the last of them and the last
+whole second of the flight, at a different time on every vehicle."""
 
 LARGEST_TOUCH_DOWN_M_S: Final = 2.5
 SMALLEST_SWING_M_S: Final = 0.1
@@ -79,9 +80,10 @@ class Runs:
     aborts: Samples
 
 
-def abort_steps(models: int) -> Counts:
-    """Abort times in steps, shape (models, 6), increasing in each row; they cover each interval evenly."""
-    edges = np.array(ABORTS_BETWEEN_S)
+def abort_steps(models: int, steps: int) -> Counts:
+    """Abort times of flights of so many steps, in steps, shape (models, 6), increasing in each row; they cover each
+    interval evenly."""
+    edges = np.array((*ABORTS_BETWEEN_S, (steps - 1) // RATE_HZ))
     shares = (np.arange(models)[:, np.newaxis] + 1.0) * _GOLDEN % 1.0
     return np.asarray(np.rint((edges[:-1] + shares * np.diff(edges)) * RATE_HZ), dtype=np.int64)
 
@@ -111,7 +113,7 @@ def check_flights(
     A `baseline` is never refused for its altitude. An abort switches to the safe gains: what these would do by
     themselves on the same vehicle is not held against the gains under test.
     """
-    aborts_at = abort_steps(len(models))
+    aborts_at = abort_steps(len(models), steps)
     runs = fly_runs(gains, safe_gains, models, aborts_at, target, steps)
     own = runs
     limits = np.array([ceiling_m, LARGEST_TOUCH_DOWN_M_S])

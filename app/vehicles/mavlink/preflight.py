@@ -25,6 +25,8 @@ POSITIONS_HZ: Final = 40.0
 SECONDARY_HZ: Final = 10.0
 ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight of this program was interrupted."
 _LISTEN_S: Final = 0.1
+_LAND_COMMAND_S: Final = 2.0
+"""Time left after the record to command the landing, before the flight plan would land the vehicle by itself."""
 _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
@@ -311,6 +313,22 @@ def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radiu
         found="waiting for a position" if away_m is None else f"{away_m:.1f} m, plus radius_m of {radius_m:g} m",
         needed=f"{plan_radius_m:g} m or less in total, because its flight plan lands it there (plan_radius_m)",
         hint="" if passed else "Move it closer to the place where it was switched on, or reduce radius_m.",
+    )
+
+
+def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
+    """Check that the flight plan does not land the vehicle before its record of `record_s` is complete."""
+    needed_s = record_s + _LAND_COMMAND_S
+    passed = needed_s <= plan_time_s
+    return CheckItem(
+        name="flight time",
+        title="Flight time",
+        passed=passed,
+        found=f"{needed_s:g} s for the record and the command to land",
+        needed=f"{plan_time_s:g} s or less, because its flight plan lands it then (plan_time_s)",
+        hint=""
+        if passed
+        else "Raise the time limit of Takeoff in its flight plan, then plan_time_s; or choose a shorter window.",
     )
 
 

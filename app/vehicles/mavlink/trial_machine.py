@@ -235,7 +235,7 @@ def _overtime(trial: Trial, now_s: float) -> Step:
     plan, last, start_s = trial.plan, trial.watch.last, trial.commanded_boot_s
     commanded_s = trial.commanded_s if trial.commanded_s is not None else now_s
     passed_s = now_s - commanded_s
-    if passed_s <= plan.record_s + plan.limits.slow_s or last is None or start_s is None:
+    if passed_s <= plan.record_s + plan.slow_s or last is None or start_s is None:
         return trial, ()
     why = f"Its clock advanced by {last.time_boot_s - start_s:.1f} s in {passed_s:.1f} s."
     return fail(trial, Finding(failure=Failure.SLOW_CLOCK, why=why), now_s)

@@ -9,7 +9,8 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Final
 
-from app.vehicles.base import MOTORS_OFF_REQUESTED
+from app.core.experiments.takeoff import WINDOW_S
+from app.vehicles.base import MOTORS_OFF_REQUESTED, RECORDED_BEYOND_S
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     Action,
@@ -95,6 +96,8 @@ QUARANTINE_STATES: Final = frozenset({State.QUARANTINE, State.OBSERVE})
 """States in which only Land and motors off may be sent, until a person releases the vehicle."""
 
 
+RECORD_S: Final = WINDOW_S + RECORDED_BEYOND_S
+"""Length of the record for the paper's window."""
 GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
 _IN_PLACE_M: Final = 0.3
@@ -117,10 +120,16 @@ class Plan:
     limits: Limits
     ground_m: float
     climbs_from_ground: bool = False
-    record_s: float = 33.0
+    record_s: float = RECORD_S
     lift_off_s: float = 1.5
     land_again_s: float = 1.0
     stop_settings: tuple[str, ...] = ()
+
+    @property
+    def slow_s(self) -> float:
+        """Longest delay of the vehicle's clock behind ours at the end of the record: its share of a longer record is
+        that of the paper's."""
+        return self.limits.slow_s * max(1.0, self.record_s / RECORD_S)
 
     @property
     def datum_m(self) -> float:

@@ -143,12 +143,12 @@ class MavlinkVehicle:
 
     def fly(
         self,
-        order: FlightOptions,  # noqa: ARG002 - speed and seed do not apply to a real vehicle
+        order: FlightOptions,
         *,
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
     ) -> FlightRecord:
-        """Arm, take off to 3 m, record, land, disarm, and restore the safe gains.
+        """Arm, take off to 3 m, record for `order.record_s`, land, disarm, and restore the safe gains.
 
         `order.speed` and `order.seed` are ignored. `should_stop` is called once the vehicle is ready for arming, and
         then every 10 ms. Raises VehicleError, with `not_flown` set, if no gains were staged, the vehicle is not ready
@@ -158,7 +158,7 @@ class MavlinkVehicle:
         try:
             self._require_not_quarantined()
             self._require_staged()
-            ground = self._observe_ground(STANDSTILL_S)
+            ground = self._observe_ground(STANDSTILL_S, order.record_s)
             self._require_staged()  # again: a restart meanwhile leaves none
             self._parameters.set()
             stop = should_stop()
@@ -170,7 +170,7 @@ class MavlinkVehicle:
         if stop is not None:
             self._restore_or_quarantine()
             return self._not_begun(ground, stop.reason)
-        flown = self._fly(ground, on_sample, should_stop)
+        flown = self._fly(ground, order.record_s, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
         return self._record(flown, ground)
@@ -462,9 +462,11 @@ class MavlinkVehicle:
                 hint="Stage the gains, compare what is read back, then fly.",
             )
 
-    def _observe_ground(self, watched_s: float) -> Ground:
+    def _observe_ground(self, watched_s: float, record_s: float) -> Ground:
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         watched, items = self._check(watched_s)
+        if self._radio.profile.flying_blocks:
+            items = (*items, preflight.evaluate_flight_time(record_s, plan_time_s=float(self._options["plan_time_s"])))
         self._require_not_quarantined()
         preflight.require(items)
         return watched.ground
@@ -491,11 +493,13 @@ class MavlinkVehicle:
         positions = tuple(position for _, position in self._radio.seen.positions)
         return replace(watched, positions=positions), items
 
-    def _fly(self, ground: Ground, on_sample: Callable[[Sample], None], should_stop: ShouldStop) -> TrialResult:
+    def _fly(
+        self, ground: Ground, record_s: float, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+    ) -> TrialResult:
         last = ground.last
         self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
-        plan = self._plan(ground)
+        plan = replace(self._plan(ground), record_s=record_s)
         self._gains.staged = self._repeated = None
         watch = watching.begin(
             self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S

@@ -13,14 +13,14 @@ export const EXPLANATIONS = explained({
   error: {
     question: "What is the error?",
     answer: [
-      "The distance from the set point. Takeoff: the mean of |3 m − altitude| over the first 32.6 s. F-16: the integral of |reference − pitch|.",
+      "The distance from the set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. F-16: the integral of |reference − pitch|.",
       "Lower is better. Zero is impossible because climbing takes time: the reference trajectory itself scores 0.091 m.",
     ],
   },
   errorSoFar: {
     question: "What is the error so far?",
     answer: [
-      "The error of the samples received so far. A takeoff starts 3 m below its set point, so this value starts high and falls. After 32.6 s it is the error of the flight.",
+      "The error of the samples received so far. A takeoff starts 3 m below its set point, so this value starts high and falls. At the end of the scored window it is the error of the flight.",
     ],
   },
   predicted: {

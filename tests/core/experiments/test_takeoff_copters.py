@@ -56,6 +56,16 @@ def test_the_manoeuvre_and_its_score_are_the_papers(name: str) -> None:
     assert experiment.errors(outputs) == pytest.approx([0.5, 0.5])
 
 
+@pytest.mark.parametrize("name", ["takeoff-ardupilot", "takeoff-px4"])
+def test_the_window_is_an_option_as_of_the_papers_takeoff(name: str) -> None:
+    experiment = get_experiment(name, {"window_s": 10.0})
+    assert (experiment.name, experiment.window_s) == (name, 10.0)
+    assert experiment.space == get_experiment(name).space
+    assert np.array_equal(experiment.grid_s, Takeoff(window_s=10.0).grid_s)
+    assert not experiment.scatter.measured
+    assert experiment.error(climb(0.25)) == pytest.approx(0.25)
+
+
 def test_the_gains_are_the_autopilots_own_with_its_defaults() -> None:
     space = get_experiment("takeoff-ardupilot").space
     assert space.mapping(space.default) == {

@@ -159,13 +159,20 @@ def test_what_the_safe_gains_do_themselves_is_no_fault_of_the_gains_that_are_jud
     assert "as with the safe gains" in answers["abort altitude"].sentence
 
 
+@pytest.mark.parametrize(("flight_s", "last_s"), [(10, 10), (60, 60)])
+def test_the_last_abort_falls_before_the_end_of_the_flight(flight_s: int, last_s: int) -> None:
+    steps = abort_steps(MODELS, flight_s * 512 + 1)
+    assert (np.diff(steps, axis=1) > 0).all()
+    assert 8.0 * 512 <= steps[:, -1].min() <= steps[:, -1].max() <= last_s * 512
+
+
 def test_aborts_fall_everywhere_and_the_same_every_time() -> None:
-    steps = abort_steps(MODELS)
+    steps = abort_steps(MODELS, 16_693)
     assert (np.diff(steps, axis=1) > 0).all()
     assert steps.min() >= 0.3 * 512
     assert steps.max() <= 32.0 * 512
     assert len(np.unique(steps[:, 2])) == MODELS
-    np.testing.assert_array_equal(steps, abort_steps(MODELS))
+    np.testing.assert_array_equal(steps, abort_steps(MODELS, 16_693))
 
 
 @pytest.mark.parametrize(
@@ -203,7 +210,7 @@ def test_an_abort_is_what_the_simulated_vehicle_does(model_parameters: dict[str,
 @pytest.mark.parametrize("model_parameters", [{}, {"motor_lag_s": 0.07, "battery_sag": 0.03, "ground_effect": 0.2}])
 def test_a_takeoff_of_the_gate_is_the_experiments_own(model_parameters: dict[str, float]) -> None:
     models = model(hover_throttle=0.6, **model_parameters)
-    runs = fly_runs(np.array([301, 133, 65]), SAFE_COUNTS, models, abort_steps(1), TARGET, 16693)
+    runs = fly_runs(np.array([301, 133, 65]), SAFE_COUNTS, models, abort_steps(1, 16_693), TARGET, 16_693)
     (curve,) = TAKEOFF.outputs(np.array([[301.0, 133.0, 65.0]]), models[0])
     assert runs.reports[0, HIGHEST_M] == curve.max()
     assert runs.reports[0, HIGHEST_STEP] == np.argmax(curve)

@@ -40,6 +40,7 @@ class QuadraticExperiment:
     scatter: Final = Scatter(sd=0.01, degrees_of_freedom=4.0)
     search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
     difference: Final = 0.1
+    window_s: Final = 1.0
     grid_s: Final = np.linspace(0.0, 1.0, 11)
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:

@@ -13,7 +13,7 @@ from app.core.tuning.strategy import Explanation, Kind, Proposal
 from tests.core.tuning.bowl import QuadraticExperiment, fly
 
 NOISE = Definition(stop=StopRule(kind="noise", max_flights=12))
-PAPER = Definition(stop=StopRule(max_flights=12))
+PAPER = Definition(stop=StopRule(kind="paper", max_flights=12))
 SIGMA = QuadraticExperiment.scatter.sd
 
 

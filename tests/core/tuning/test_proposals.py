@@ -20,6 +20,7 @@ from tests.core.tuning.flying import ARDRONE, TAKEOFF, TWIN, campaign, compiled_
 pytestmark = compiled_only
 
 SIMPLEX_START = Start(kind="simplex")
+PAPER = StopRule(kind="paper")
 RAW: dict[str, bool | int | float | str] = {"scaled": False}
 
 DEFINITIONS = st.builds(
@@ -27,7 +28,7 @@ DEFINITIONS = st.builds(
     strategy=st.sampled_from(sorted(STRATEGIES)),
     bounds=st.sampled_from([{}, {"kp": (100, 700), "ki": (5, 200)}, {"kd": (80, 84)}]),
     step_fraction=st.sampled_from([0.01, 0.1, 1.0]),
-    stop=st.just(StopRule(max_flights=4)),
+    stop=st.just(StopRule(kind="paper", max_flights=4)),
 )
 
 
@@ -45,31 +46,31 @@ def same(one: Proposal, other: Proposal) -> bool:
 
 def test_from_the_default_gains_the_fourth_flight_of_the_ardrone_is_near_the_optimum() -> None:
     """At most 0.1000 m; the paper's fourth flight scored 0.1733 m, its best 0.1521 m."""
-    flights, _ = campaign(Definition(), ARDRONE)
+    flights, _ = campaign(Definition(stop=PAPER), ARDRONE)
     assert min(errors(flights)[:4]) <= 0.1000
 
 
 def test_the_raw_option_beats_the_papers_best_within_seven_flights() -> None:
-    flights, _ = campaign(Definition(options=RAW), ARDRONE)
+    flights, _ = campaign(Definition(options=RAW, stop=PAPER), ARDRONE)
     assert len(flights) <= 7
     assert min(errors(flights)) <= 0.1521
 
 
 def test_from_the_models_optimum_the_ardrone_reaches_the_papers_best() -> None:
-    flights, _ = campaign(Definition(start=SIMPLEX_START), ARDRONE)
+    flights, _ = campaign(Definition(start=SIMPLEX_START, stop=PAPER), ARDRONE)
     assert min(errors(flights)) <= 0.0940
 
 
 @pytest.mark.parametrize("options", [{}, RAW])
 def test_on_the_twin_a_wrong_hover_throttle_latency_and_lag_do_not_hinder(options: dict[str, bool]) -> None:
     """At most 0.1400 m within 7 flights; the paper's best real flight scored 0.2265 m."""
-    flights, _ = campaign(Definition(options={**options}), TWIN)
+    flights, _ = campaign(Definition(options={**options}, stop=PAPER), TWIN)
     assert len(flights) <= 7
     assert min(errors(flights)) <= 0.1400
 
 
 def test_on_the_twin_the_models_optimum_is_a_good_start() -> None:
-    flights, _ = campaign(Definition(start=SIMPLEX_START), TWIN)
+    flights, _ = campaign(Definition(start=SIMPLEX_START, stop=PAPER), TWIN)
     assert min(errors(flights)) <= 0.1250
 
 
@@ -114,7 +115,7 @@ def test_given_start_gains_are_proposed_as_they_are() -> None:
 
 def test_the_simplex_strategy_searches_from_given_start_gains() -> None:
     gains: dict[str, float] = {"kp": 1000, "ki": 500, "kd": 100}
-    definition = Definition(strategy="simplex", start=Start(kind="given", gains=gains))
+    definition = Definition(strategy="simplex", start=Start(kind="given", gains=gains), stop=PAPER)
     flights, proposals = campaign(definition)
     assert [proposal.kind for proposal in proposals] == ["start", "step", "none"]
     assert errors(flights)[1] < errors(flights)[0]

@@ -9,7 +9,7 @@ from app.core.tuning.stop_rules import decide_stop, evaluate_stop_rule, landing_
 from app.core.tuning.strategy import Explanation, Proposal
 from tests.core.tuning.bowl import fly
 
-PAPER = StopRule()
+PAPER = StopRule(kind="paper")
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_the_papers_rule_on_the_papers_series(errors: list[float], stop: bool, r
 
 
 def test_an_improvement_of_exactly_the_fraction_is_not_more_than_it() -> None:
-    rule = StopRule(improvement=0.5)
+    rule = StopRule(kind="paper", improvement=0.5)
     assert decide_stop(rule, [0.5, 0.25]).failures == 1
     assert decide_stop(rule, [0.5, 0.2499]).failures == 0
 
@@ -107,7 +107,7 @@ STEP = Proposal(kind="step", gains={}, predicted=None, predicted_error=None, exp
 def test_repeats_and_baselines_are_no_failures_to_improve() -> None:
     """Seen: “the last 2 flights did not improve” after the two repeats that the program itself had asked for."""
     flights = [fly(1, 90, 90), fly(2, 30, 40), fly(3, 30, 40), fly(4, 90, 90)]
-    definition = Definition(stop=StopRule(max_flights=9))
+    definition = Definition(stop=StopRule(kind="paper", max_flights=9))
     assert evaluate_stop_rule(definition, flights, STEP).failures == 0
     worse = [*flights, fly(5, 50, 50), fly(6, 50, 50)]
     assert evaluate_stop_rule(definition, worse, STEP).failures == 1
@@ -117,12 +117,12 @@ def test_repeats_and_baselines_are_no_failures_to_improve() -> None:
 def test_gains_that_were_only_aborted_before_are_no_repeat() -> None:
     aborted = replace(fly(1, 30, 40), outcome="aborted", error=None)
     flights = [aborted, fly(2, 30, 40)]
-    verdict = evaluate_stop_rule(Definition(stop=StopRule(improvement=0.5)), flights, STEP)
+    verdict = evaluate_stop_rule(Definition(stop=StopRule(kind="paper", improvement=0.5)), flights, STEP)
     assert verdict.threshold == pytest.approx(0.5 * (flights[1].error or 0.0))
 
 
 def test_a_reopened_campaign_is_still_warned_of_a_low_battery() -> None:
-    definition = Definition(stop=StopRule(min_battery_v=10.5))
+    definition = Definition(stop=StopRule(kind="paper", min_battery_v=10.5))
     verdict = evaluate_stop_rule(definition, [fly(1, 30, 40)], STEP, battery_v=10.2, open_until_flight=4)
     assert not verdict.stop
     assert verdict.why.startswith(
@@ -141,7 +141,7 @@ def test_no_rule_ends_a_campaign_before_the_flights_it_was_reopened_for(flown: i
 
 def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
     proposal = STEP
-    definition = Definition(stop=StopRule(min_battery_v=10.5))
+    definition = Definition(stop=StopRule(kind="paper", min_battery_v=10.5))
     for flights in ([], [fly(1, 30, 40)]):
         assert evaluate_stop_rule(definition, flights, proposal).reason is None
         assert evaluate_stop_rule(definition, flights, proposal, battery_v=10.6).reason is None

@@ -668,6 +668,16 @@ def test_a_record_ends_by_the_grounds_clock_too() -> None:
     assert walk.trial.why.startswith("Its clock advanced by ")
 
 
+def test_a_longer_record_allows_the_clock_the_same_share_of_delay() -> None:
+    walk = TrialDriver(plan=replace(PLAN, record_s=60.4)).lift_off()
+    assert walk.trial.commanded_s is not None
+    walk.tempo = 0.93
+    walk.pass_s(60.4 + 3.4 - (walk.now_s - walk.trial.commanded_s))
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+    walk.pass_s(1.5)
+    assert (walk.state, walk.trial.failure) == (State.LAND, None)
+
+
 def test_an_altitude_that_leaps_to_the_ground_stops_no_motors() -> None:
     """Seen: at 2 m, by the positions of another vehicle that stood on the ground."""
     walk = recording()

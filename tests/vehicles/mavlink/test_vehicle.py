@@ -56,6 +56,27 @@ def test_a_whole_trial_scores_as_the_same_body_does_without_a_link() -> None:
     assert len(watcher.samples) == pytest.approx(33 * 50, rel=0.05)
 
 
+def test_a_trial_lasts_as_long_as_its_window_needs() -> None:
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
+        vehicle.stage(TUNED)
+        record = vehicle.fly(FlightOptions(seed=1, window_s=12.0), on_sample=unwatched, should_stop=never)
+        assert (record.ending, vehicle.read_gains()) == ("completed", SAFE)
+    assert 12.4 <= record.trajectory.time_s[-1] < 12.5
+    assert TAKEOFF.configured({"window_s": 12.0}).error(record.trajectory) > TAKEOFF.configured({}).scatter.sd
+
+
+def test_a_window_that_the_flight_plan_would_cut_short_is_refused_on_the_ground() -> None:
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
+        vehicle.stage(TUNED)
+        with pytest.raises(VehicleError, match=r"45 s or less, because its flight plan lands it then") as refusal:
+            vehicle.fly(FlightOptions(seed=1, window_s=60.0), on_sample=unwatched, should_stop=never)
+        assert refusal.value.not_flown
+        assert vehicle.read_gains() == SAFE
+        assert rig.drone.body.stands
+
+
 FAULTS = [
     ("link-lost:3@3", "invalid", "The link was lost in flight"),
     ("frozen-position:2@3", "invalid", "froze while packets still arrived"),

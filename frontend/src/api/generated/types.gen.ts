@@ -2987,16 +2987,16 @@ export type StartOutput = {
 /**
  * StopRule
  *
- * `paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
- * the budget. `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner
- * was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
- * kind a flight that ends below `min_battery_v` ends it.
+ * `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner was flown again
+ * and compared with the baseline. `paper`: ends after two flights in a row without `improvement` (a share of the best)
+ * on the best so far, or with the budget. `budget`: only the number of flights ends the campaign. With every kind a
+ * flight that ends below `min_battery_v` ends it.
  */
 export type StopRuleInput = {
     /**
      * Kind
      */
-    kind?: 'paper' | 'noise' | 'budget';
+    kind?: 'noise' | 'paper' | 'budget';
     /**
      * Max Flights
      */
@@ -3018,16 +3018,16 @@ export type StopRuleInput = {
 /**
  * StopRule
  *
- * `paper`: ends after two flights in a row without `improvement` (a share of the best) on the best so far, or with
- * the budget. `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner
- * was flown again and compared with the baseline. `budget`: only the number of flights ends the campaign. With every
- * kind a flight that ends below `min_battery_v` ends it.
+ * `noise`: ends when no remaining difference can be resolved with `confidence`, after the winner was flown again
+ * and compared with the baseline. `paper`: ends after two flights in a row without `improvement` (a share of the best)
+ * on the best so far, or with the budget. `budget`: only the number of flights ends the campaign. With every kind a
+ * flight that ends below `min_battery_v` ends it.
  */
 export type StopRuleOutput = {
     /**
      * Kind
      */
-    kind: 'paper' | 'noise' | 'budget';
+    kind: 'noise' | 'paper' | 'budget';
     /**
      * Max Flights
      */

@@ -9,6 +9,7 @@ import { Panel } from "../../ui/Panel";
 import { predictedText } from "../../ui/uncertainty";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
+import { FlightWindow } from "./FlightWindow";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
 import { speedOf } from "./nextStep";
@@ -46,6 +47,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
             <dd>{predictedText(trial.predicted_error, trial.predicted_interval, unit)}</dd>
           </div>
         </dl>
+        <FlightWindow definition={campaign.definition} />
         {trial.flight?.problem && <ErrorNotice error={new Error(trial.flight.problem)} />}
         {can_fly ? (
           <>

@@ -3,11 +3,13 @@ import { IconPlaneDeparture } from "@tabler/icons-react";
 import { type RecordUpload, useCreateTrial } from "../../api/mutations";
 import { offersOf } from "../../api/problems";
 import type { Campaign, Proposal, Trial } from "../../api/types";
+import { useConnection } from "../../live/store";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { refusalOf, trialOf } from "./choices";
 import { FlightChoices } from "./FlightChoices";
+import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
@@ -49,6 +51,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview }: 
             unit={units.error}
           />
         )}
+        <FlightWindow definition={campaign.definition} />
         <ErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
         {isRefused && chosen.gate !== null && chosen.choice === undefined && (
           <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />
@@ -91,6 +94,7 @@ interface ButtonsProps {
 function FlightButtons({ campaign, proposal, chosen, number, upload }: ButtonsProps) {
   const [speed, setSpeed] = useSpeed();
   const create = useCreateTrial(campaign);
+  const { worker } = useConnection();
   const { can_fly, is_real, needs_staging, registered } = campaign.vehicle;
   const { gains, gate, isChecked, isPredicted } = chosen;
   const isReady = gains !== null && isChecked && isPredicted && gate?.passed === true;
@@ -104,7 +108,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload }: ButtonsPr
       variant={isMain && !stopIsAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
       loading={create.isPending}
-      disabled={!isReady}
+      disabled={!isReady || !worker}
       onClick={onClick}
     >
       {label}

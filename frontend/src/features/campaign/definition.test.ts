@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Campaign, Catalogue } from "../../api/types";
-import { settingsOf } from "./definition";
+import { settingsOf, windowOf } from "./definition";
 
 const campaign = {
   definition: {
@@ -59,6 +59,20 @@ test("a warm start and a stop on noise are said in words", () => {
     Stop: "No resolvable improvement at 95\u00a0% confidence, or 12 flights",
     Battery: "Stops below 10.8 V after a flight",
   });
+});
+
+test("the scored window is the campaign's own, or else the experiment's default", () => {
+  const option = { name: "window_s", title: "Scored window", unit: "s", default: 32.6 };
+  const offering = {
+    ...catalogue,
+    experiments: catalogue.experiments.map((one) => ({ ...one, options: [option] })),
+  } as unknown as Catalogue;
+  const shorter = { ...campaign.definition, experiment_options: { window_s: 20 } };
+  expect(windowOf(campaign.definition, offering)).toBe(32.6);
+  expect(windowOf(shorter, offering)).toBe(20);
+  expect(windowOf(shorter)).toBe(20);
+  expect(windowOf(campaign.definition)).toBeNull();
+  expect(Object.fromEntries(settingsOf(campaign, offering))).toMatchObject({ "Scored window": "32.6 s" });
 });
 
 test("until the catalogue is there, options stand under their names", () => {

@@ -62,19 +62,39 @@ function startText(start: Definition["start"]): string {
   return start?.gains ? gainsInBrackets(start.gains) : STARTS[start?.kind ?? "default"];
 }
 
+type Experiment = Catalogue["experiments"][number];
+
+function experimentOf(definition: Definition, catalogue?: Catalogue): Experiment | undefined {
+  return catalogue?.experiments.find(({ name }) => name === definition.experiment);
+}
+
+/** All settings of the experiment: those of the definition, the others at their defaults. */
+function experimentOptions(definition: Definition, catalogue?: Catalogue): Record<string, unknown> {
+  const offered = experimentOf(definition, catalogue)?.options ?? [];
+  const defaults = Object.fromEntries(offered.map(({ name, default: standard }) => [name, standard]));
+  return { ...defaults, ...definition.experiment_options };
+}
+
+/** Scored time after the take-off command, s; null for an experiment without this setting, and until the catalogue is
+ * loaded. */
+export function windowOf(definition: Definition, catalogue?: Catalogue): number | null {
+  const seconds = experimentOptions(definition, catalogue)["window_s"];
+  return typeof seconds === "number" ? seconds : null;
+}
+
 export function settingsOf({ definition, vehicle, definition_digest }: Campaign, catalogue?: Catalogue): Row[] {
   const { stop, start } = definition;
   const kind = catalogue?.vehicle_kinds.find(({ name }) => name === vehicle.kind);
   const strategy = catalogue?.strategies.find(({ name }) => name === definition.strategy);
-  const experiment = catalogue?.experiments.find(({ name }) => name === definition.experiment);
+  const experiment = experimentOf(definition, catalogue);
   const unitOf = (name: string): string => experiment?.gains?.find((gain) => gain.name === name)?.unit ?? "";
   const rows: Row[] = [
     ["Vehicle", vehicle.title],
     ...optionRows(vehicle.options, kind?.options),
     ["Experiment", named(catalogue?.experiments, definition.experiment)],
+    ...optionRows(experimentOptions(definition, catalogue), experiment?.options),
     ["Strategy", named(catalogue?.strategies, definition.strategy)],
     ...optionRows(definition.options ?? {}, strategy?.options),
-    ...optionRows(definition.experiment_options ?? {}, experiment?.options),
     ["Start", startText(start)],
     ["Stop", stopText(stop)],
     ...(stop?.min_battery_v ? ([["Battery", `Stops below ${stop.min_battery_v} V after a flight`]] as Row[]) : []),

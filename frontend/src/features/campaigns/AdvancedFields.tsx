@@ -71,13 +71,13 @@ export function AdvancedFields(props: Props) {
 }
 
 const STOPS: Record<StopKind, { label: string; line: string }> = {
-  paper: {
-    label: "No improvement",
-    line: "Ends after two consecutive flights that are not clearly better than the best, as in the paper.",
-  },
   noise: {
     label: "No resolvable improvement",
     line: "Ends when no further step would be resolvable, after the best and the first gains have been flown again.",
+  },
+  paper: {
+    label: "No improvement",
+    line: "Ends after two consecutive flights that are not clearly better than the best, as in the paper.",
   },
   budget: { label: "Flight budget", line: "Ends after the maximum number of flights." },
 };

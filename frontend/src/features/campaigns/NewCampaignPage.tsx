@@ -164,7 +164,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
           onChange={(startGains) => set({ startGains })}
         />
       )}
-      <FoldedSection title="Advanced: stop rule, bounds, vehicle settings, seed" forcedOpen={refusedBelow}>
+      <FoldedSection title="Advanced: stop rule, window, bounds, vehicle settings, seed" forcedOpen={refusedBelow}>
         <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
       </FoldedSection>
       <ErrorNotice error={create.error} shown={[...plain, ...advanced]} />

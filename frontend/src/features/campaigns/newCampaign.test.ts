@@ -92,7 +92,7 @@ test("the form as it comes creates the recommended campaign on the simulation", 
       first_step_fraction: 0.25,
       step_fraction: 1,
       ceiling_m: 4.5,
-      stop: { kind: "paper", max_flights: 7, improvement: 0.05, confidence: 0.9, min_battery_v: null },
+      stop: { kind: "noise", max_flights: 7, improvement: 0.05, confidence: 0.9, min_battery_v: null },
       seed: 1,
     },
   });

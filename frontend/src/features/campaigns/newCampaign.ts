@@ -12,7 +12,7 @@ import type {
 import type { NumberEntry, OptionValue } from "../../ui/Fields";
 
 export type StartKind = "default" | "simplex" | "given" | "campaign";
-export type StopKind = "paper" | "noise" | "budget";
+export type StopKind = "noise" | "paper" | "budget";
 
 /** The fields of a registered vehicle that the form needs. */
 export type Chosen = Pick<Vehicle, "id" | "kind" | "name" | "experiments">;
@@ -120,7 +120,7 @@ export function startingForm(
     start: "default",
     startGains: Object.fromEntries(gains.map((gain) => [gain.name, gain.default])),
     donor: null,
-    stop: "paper",
+    stop: "noise",
     maxFlights: 7,
     improvementPercent: 5,
     confidencePercent: 90,

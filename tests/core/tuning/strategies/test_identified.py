@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.definition import Definition, Flight, OptionValue, Start
+from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import uncorrected_model
 from app.core.tuning.proposals import next_proposal
@@ -26,6 +26,7 @@ def definition(seed: int = 50, step_fraction: float = 1.0, **options: OptionValu
         strategy="identified",
         options=options,
         start=Start(kind="simplex"),
+        stop=StopRule(kind="paper"),
         step_fraction=step_fraction,
     )
 
