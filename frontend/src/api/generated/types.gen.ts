@@ -692,6 +692,22 @@ export type ComparedFlight = {
      */
     scatter: number | null;
     /**
+     * Rise Time S
+     */
+    rise_time_s: number | null;
+    /**
+     * Settling Time S
+     */
+    settling_time_s: number | null;
+    /**
+     * Overshoot M
+     */
+    overshoot_m: number | null;
+    /**
+     * Steady State Error M
+     */
+    steady_state_error_m: number | null;
+    /**
      * Flown At
      */
     flown_at: string | null;
@@ -3230,6 +3246,24 @@ export type Trial = {
      * Overshoot M
      */
     overshoot_m: number | null;
+    /**
+     * Rise Time S
+     *
+     * from 10 to 90 % of the set point; null if never reached
+     */
+    rise_time_s: number | null;
+    /**
+     * Settling Time S
+     *
+     * from the command until the output stays within ±5 % of the set point; null if it does not
+     */
+    settling_time_s: number | null;
+    /**
+     * Steady State Error M
+     *
+     * mean of output − set point over the last 5 s of the window
+     */
+    steady_state_error_m: number | null;
     /**
      * Verdict
      *

@@ -14,6 +14,7 @@ import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { trialStateLabel } from "../../ui/states";
+import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
 import { confidenceText, intervalText, plusMinus } from "../../ui/uncertainty";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
@@ -121,11 +122,12 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
             {group.standard_error !== null && <small>(± standard error)</small>}
           </Fact>
         )}
-        {trial.overshoot_m !== null && (
-          <Fact title="Overshoot" topic="overshoot">
-            {withUnit(trial.overshoot_m, "m", 2)}
-          </Fact>
-        )}
+        {hasStepResponse(trial) &&
+          MEASURES.map((measure) => (
+            <Fact key={measure.name} title={measure.title} topic={measure.topic}>
+              {measureText(trial, measure)}
+            </Fact>
+          ))}
         <Fact title="Gains" wide>
           <span className={classes["gains"]}>
             <GainList gains={trial.gains} experiment={experiment} />
