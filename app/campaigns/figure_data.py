@@ -1,6 +1,6 @@
 """Input data of the figures, loaded from the database as plain data."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -16,6 +16,7 @@ from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
+from app.core.records.flight_events import flight_events
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
 from app.core.tuning.strategy import band_channels
@@ -24,21 +25,25 @@ from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
-from app.figures.flight import FlightFigure, FlightRecordData
+from app.figures.flight import ChannelPanel, FlightFigure, FlightRecordData
 from app.figures.overlays import select_individual_flights
 from app.figures.theme import ThemeName
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
-_INPUTS: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
-    "takeoff": ("Thrust (of full)", {"thrust": "Thrust", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
-    "pitch-tracking": (
+_LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0)}
+"""Limits of commands."""
+_PANELS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
+    ("Climb rate (m/s)", {"climb_rate_m_s": "Climb rate"}),
+    ("Throttle (of full)", {"thrust": "Throttle", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
+    ("Battery (V)", {"battery_v": "Battery"}),
+    (
         "Pitch and elevator (rad)",
         {"pitch_rad": "Pitch", "pitch_reference_rad": "Pitch reference", "elevator_rad": "Elevator"},
     ),
-}
-"""Channels below the scored output in a flight's figure, by experiment: the axis title, and the channels with their
-titles."""
+)
+"""Panels below the scored output in a flight's figure, where they were recorded: the axis title, and the channels with
+their titles."""
 _CONFIDENCE: Final = 0.9
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
 
@@ -240,8 +245,6 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)
     best = history.best_of(trials)
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
-    channels = {} if record is None else record.channels
-    inputs_title, drawn = _INPUTS.get(experiment.name, ("", {}))
     predicted = _predicted(session, _proposal_of(session, row), experiment.output)
     return FlightRecordData(
         number=row.number,
@@ -255,8 +258,17 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         glitches=_glitches(row),
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,
-        inputs={
-            title: _curve(record, name) for name, title in drawn.items() if record is not None and name in channels
-        },
-        inputs_title=inputs_title,
+        panels=() if record is None else tuple(_panels(record)),
+        events=() if record is None or experiment.output != "altitude_m" else flight_events(record),
     )
+
+
+def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
+    for title, channels in _PANELS:
+        recorded = [name for name in channels if name in record.channels]
+        if recorded:
+            yield ChannelPanel(
+                title=title,
+                curves={channels[name]: _curve(record, name) for name in recorded},
+                limits=_LIMITS.get(recorded[0]),
+            )

@@ -157,6 +157,8 @@ def capture(
         score(experiment, repaired(experiment, recorded, glitches), accept_gaps=True).error if glitches else None
     )
     keep_response(row, judged.response)
+    if ending == "aborted":
+        row.settling_time_s = row.steady_state_error_m = None
     row.curve = judged.curve
     row.landing_battery_v = landing_battery_v(recorded)
     row.ending = ending
