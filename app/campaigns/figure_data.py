@@ -1,5 +1,6 @@
 """Input data of the figures, loaded from the database as plain data."""
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,6 +20,7 @@ from app.core.experiments.base import Scatter
 from app.core.records.flight_events import flight_events
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
+from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import band_channels
 from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
@@ -93,6 +95,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     rows = history.trials_of(session, campaign_id)
     flown = [row for row in rows if row.state in history.FLOWN]
     set_point, reference = _goal(experiment.name)
+    first_valid = min((row.number for row in rows if row.state == TrialState.VALID), default=math.inf)
     bare = History(
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
@@ -100,7 +103,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         gains=experiment.space.gains,
         set_point=set_point,
         reference=reference,
-        flights=tuple(map(_flight, flown)),
+        flights=tuple(_flight(row, corrected=row.number > first_valid) for row in flown),
         proposal=_next_flight(session, campaign, rows, experiment.output),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
@@ -114,26 +117,28 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
 
 
-def _flight(row: TrialRow) -> FlightData:
-    """A flight without its curve."""
+def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
+    """A flight without its curve; `corrected`: whether a valid flight before it had corrected the model."""
+    interval = _interval(row.predicted_interval)
+    predicts = is_informative(None if interval is None else interval.low, corrected=corrected)
     return FlightData(
         number=row.number,
         gains=row.gains,
         outcome="not yet judged" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
         curve=None,
         error=row.error,
-        predicted_error=row.predicted_error,
-        interval=_interval(row.predicted_interval),
+        predicted_error=row.predicted_error if predicts else None,
+        interval=interval if predicts else None,
         glitches=_glitches(row),
     )
 
 
 def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
-    """Scatter of repeated flights, including the experiment's prior; None without a valid flight, and while it is not
-    known."""
+    """Scatter of repeated flights, including the experiment's prior; None without a valid flight, while it is not
+    known, and if there is none."""
     groups = groups_of(history.flown_gains(rows))
     scatter = pool_scatter(groups, prior)
-    if not groups or not scatter.known:
+    if not groups or scatter.reported is None:
         return None
     best = select_winner(groups, scatter)
     half = scatter.half_width(1.0 + 1.0 / best.size, _CONFIDENCE)
@@ -197,23 +202,37 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
     none."""
     planned = next((row for row in rows if row.state in _UNFLOWN), None)
     if planned is not None:
-        return NextFlight(
-            number=planned.number,
-            gains=planned.gains,
-            predicted_error=planned.predicted_error,
-            interval=_interval(planned.predicted_interval),
-            **_predicted(session, _proposal_of(session, planned), output),
+        return _next(
+            NextFlight(
+                number=planned.number,
+                gains=planned.gains,
+                predicted_error=planned.predicted_error,
+                interval=_interval(planned.predicted_interval),
+                **_predicted(session, _proposal_of(session, planned), output),
+            ),
+            rows,
         )
     proposal = repository.latest_proposal(session, campaign.id)
     if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
         return None
-    return NextFlight(
-        number=max((row.number for row in rows), default=0) + 1,
-        gains=proposal.gains,
-        predicted_error=proposal.predicted_error,
-        interval=_interval(proposal.interval),
-        **_predicted(session, proposal, output),
+    return _next(
+        NextFlight(
+            number=max((row.number for row in rows), default=0) + 1,
+            gains=proposal.gains,
+            predicted_error=proposal.predicted_error,
+            interval=_interval(proposal.interval),
+            **_predicted(session, proposal, output),
+        ),
+        rows,
     )
+
+
+def _next(flight: NextFlight, rows: Sequence[TrialRow]) -> NextFlight:
+    """The flight without an error, interval and band that say nothing; the model's curve stays."""
+    corrected = any(row.state == TrialState.VALID for row in rows)
+    if is_informative(None if flight.interval is None else flight.interval.low, corrected=corrected):
+        return flight
+    return replace(flight, predicted_error=None, interval=None, band=None)
 
 
 class _Predicted(TypedDict):

@@ -305,7 +305,7 @@ export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finishe
  *
  * Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all
  * repeats and the experiment's prior; null while unknown, that is before the first repeat under an autopilot whose
- * scatter was never measured. `optimism` is how much the best is expected to look better than it is because it was
+ * scatter was never measured, and zero if all repeats gave the same error. `scatter_source` says where it is from. `optimism` is how much the best is expected to look better than it is because it was
  * chosen, and `shrunk_error` its error corrected for that.
  */
 export type CampaignStatistics = {
@@ -325,6 +325,10 @@ export type CampaignStatistics = {
      * Degrees Of Freedom
      */
     degrees_of_freedom: number;
+    /**
+     * Scatter Source
+     */
+    scatter_source: string;
     /**
      * Groups
      */

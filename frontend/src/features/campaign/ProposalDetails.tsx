@@ -63,7 +63,10 @@ interface PredictedErrorProps {
 export function PredictedError({ proposal, best, unit }: PredictedErrorProps) {
   const { predicted_error: error, interval } = proposal;
   const change = percentChange(error, best);
-  if (error === null) return <Note fz="body">No prediction: there is no model of these gains.</Note>;
+  if (error === null) {
+    const none = best === null ? "No prediction yet." : "No prediction: there is no model of these gains.";
+    return <Note fz="body">{none}</Note>;
+  }
   return (
     <div className={`${classes["predicted"]} numbers`}>
       <span>

@@ -108,7 +108,9 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± scatter of one flight)</small> : null}
         </Fact>
         <Fact title="Predicted" topic="predicted">
-          {withUnit(trial.predicted_error, unit)}{" "}
+          {trial.predicted_error === null && bestBefore === null
+            ? "No prediction yet"
+            : withUnit(trial.predicted_error, unit)}{" "}
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <PredictionResult trial={trial} />
         </Fact>
