@@ -35,17 +35,18 @@ _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad"
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
 _LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0)}
 """Limits of commands."""
-_PANELS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
-    ("Climb rate (m/s)", {"climb_rate_m_s": "Climb rate"}),
-    ("Throttle (of full)", {"thrust": "Throttle", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
-    ("Battery (V)", {"battery_v": "Battery"}),
+_PANELS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
+    ("Climb rate (m/s)", "m/s", {"climb_rate_m_s": "Climb rate"}),
+    ("Throttle (of full)", "", {"thrust": "Throttle", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
+    ("Battery (V)", "V", {"battery_v": "Battery"}),
     (
         "Pitch and elevator (rad)",
+        "rad",
         {"pitch_rad": "Pitch", "pitch_reference_rad": "Pitch reference", "elevator_rad": "Elevator"},
     ),
 )
-"""Panels below the scored output in a flight's figure, where they were recorded: the axis title, and the channels with
-their titles."""
+"""Panels below the scored output in a flight's figure, where they were recorded: the axis title, the unit, and the
+channels with their titles."""
 _CONFIDENCE: Final = 0.9
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
 
@@ -283,11 +284,12 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
 
 
 def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
-    for title, channels in _PANELS:
+    for title, unit, channels in _PANELS:
         recorded = [name for name in channels if name in record.channels]
         if recorded:
             yield ChannelPanel(
                 title=title,
+                unit=unit,
                 curves={channels[name]: _curve(record, name) for name in recorded},
                 limits=_LIMITS.get(recorded[0]),
             )

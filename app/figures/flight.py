@@ -23,15 +23,19 @@ _GAP: Final = 0.035
 _OUTPUT_SHARE: Final = 2.0
 """Height of the output's panel, in heights of the others."""
 
+_NAME_SHARE: Final = 0.09
+"""Length of an event's name, as a share of the figure's height."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelPanel:
-    """Further channels by title, all in the unit that the axis `title` names.
+    """Further channels by title, all in one `unit`, empty for shares; the axis has the `title`.
 
     `limits` are those between which a command acts, None if there are none: outside them it is saturated.
     """
 
     title: str
+    unit: str = ""
     curves: Mapping[str, Curve]
     limits: Range | None = None
 
@@ -110,7 +114,7 @@ class FlightFigure:
                 axis["showlegend"] = False
             for index, (title, curve) in enumerate(panel.curves.items()):
                 colour, dash = colours[index % len(colours)], ("solid", "dash", "dot")[index % 3]
-                traces.append({**_line(title, curve, colour, 1.5, "input", "", dash), **axis})
+                traces.append({**_line(title, curve, colour, 1.5, "input", panel.unit, dash), **axis})
             if panel.limits is not None:
                 traces += [one | axis for one in _saturated(palette, next(iter(panel.curves.values())), panel.limits)]
         return traces
@@ -149,6 +153,7 @@ class FlightFigure:
             hoversubplots="axis",
             shapes=[_mark(palette, event) for event in record.events],
             annotations=[_name(palette, event, index) for index, event in enumerate(record.events)],
+            margin=dict(theme.SIGNED_MARGIN_PX),
             meta={"panels": len(places)},
             uirevision="flight",
             **axes,
@@ -238,13 +243,13 @@ def _mark(palette: Palette, event: FlightEvent) -> dict[str, object]:
 
 
 def _name(palette: Palette, event: FlightEvent, index: int) -> dict[str, object]:
-    """The event's name along its line: the first one's to its left, because the next one follows at once."""
+    """The event's name along its line, below that of the one before it, which may be close."""
     return {
         "text": event.name,
         "x": event.time_s,
-        "y": 1,
+        "y": 1 - _NAME_SHARE * index,
         "yref": "paper",
-        "xanchor": "left" if index else "right",
+        "xanchor": "left",
         "yanchor": "top",
         "textangle": -90,
         "showarrow": False,

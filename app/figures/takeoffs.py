@@ -92,7 +92,11 @@ class TrajectoriesFigure:
             label, text = str(flight.number), f"Flight {flight.number}"
             traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.number, text=text))
         layout = theme.layout(
-            palette, **self._axes(palette, low, high), meta={"whole_s": self._whole_s}, uirevision="takeoffs"
+            palette,
+            **self._axes(palette, low, high),
+            margin=dict(theme.SIGNED_MARGIN_PX),
+            meta={"whole_s": self._whole_s},
+            uirevision="takeoffs",
         )
         summary = self._summary(sum(index < len(drawn) for index in outside))
         return ready(self, traces, layout, summary=summary, table=self._table(drawn, envelope))

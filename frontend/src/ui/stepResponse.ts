@@ -30,10 +30,12 @@ export function hasStepResponse(flight: StepResponse): boolean {
   return flight.overshoot_m !== null;
 }
 
-/** `+0.012 m` for a signed measure, `1.34 s` for others, a dash if there is none. */
+/** `+0.012 m` for a signed measure, `1.34 s` for others; a dash if there is none. A complete flight may not settle. */
 export function measureText(flight: StepResponse, { name, unit, digits }: Measure): string {
   const value = flight[name];
-  if (value === null) return NOTHING;
+  if (value === null) {
+    return name === "settling_time_s" && flight.steady_state_error_m !== null ? "not settled" : NOTHING;
+  }
   const sign = name === "steady_state_error_m" && value > 0 ? "+" : "";
   return `${sign}${value.toFixed(digits)} ${unit}`.replace(/^-/, "−");
 }
