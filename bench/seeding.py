@@ -14,7 +14,7 @@ from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of, frozen_digest
 from app.campaigns.proposals import gate_json
 from app.campaigns.schemas import NewCampaign
-from app.campaigns.trials.records import score
+from app.campaigns.trials.records import keep_response, score
 from app.common.settings import Settings
 from app.common.states import CampaignState, JobState, TrialState
 from app.core.definition import Definition
@@ -105,7 +105,8 @@ def _campaign(database: Database, name: str, flights: int, takeoffs: Takeoffs) -
                 row = _trial(campaign_id, number, gains)
                 row.trajectory = trajectories.store_trajectory(session, record)
                 judged = score(Takeoff(), record)
-                row.overshoot_m, row.curve = judged.overshoot, judged.curve
+                keep_response(row, judged.response)
+                row.curve = judged.curve
                 if number % SPOILT_EVERY == 0:
                     row.state, row.reason = TrialState.INVALID, "wind gust"
                 else:

@@ -1,8 +1,9 @@
-"""Schema of a bundle, version 2, with the validation of its contents.
+"""Schema of a bundle, version 4, with the validation of its contents.
 
 A zip of `manifest.json` (the program that wrote it, and the SHA-256 of every other part), `contents.json` (the
 campaign, after those that it starts from), and one part for each record, photo and telemetry log. A record is stored as
-in the database (`app.db.trajectories`), with its own checksum. Version 1 lacks `abort_cause`.
+in the database (`app.db.trajectories`), with its own checksum. Version 1 lacks `abort_cause`;
+versions below 4 lack rise time, settling time and steady-state error.
 """
 
 from functools import cache
@@ -21,7 +22,7 @@ from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
 
 FORMAT: Final = "gainline-campaign"
-VERSION: Final = 3
+VERSION: Final = 4
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
@@ -70,7 +71,7 @@ class Manifest(_Strict):
     """Manifest of a bundle. `parts`: the SHA-256 of every other file in the zip, by its name."""
 
     format: Literal["gainline-campaign"]
-    version: Literal[1, 2, 3]
+    version: Literal[1, 2, 3, 4]
     program: ShortText
     made_at: AwareDatetime
     parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
@@ -111,6 +112,9 @@ class Trial(_Strict):
     record: Record | None
     error: Finite | None
     overshoot_m: Finite | None
+    rise_time_s: Finite | None = None
+    settling_time_s: Finite | None = None
+    steady_state_error_m: Finite | None = None
     curve: Annotated[list[tuple[Finite, Finite]], Field(max_length=5000)] | None
     ending: Ending | None
     abort_cause: AbortCause | None = None

@@ -1,6 +1,7 @@
 """Input data of the figures, loaded from the database as plain data."""
 
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -17,29 +18,36 @@ from app.common.schemas import OptionValue
 from app.common.states import TrialState
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
+from app.core.records.flight_events import flight_events
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
+from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import band_channels
 from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
-from app.figures.flight import FlightFigure, FlightRecordData
+from app.figures.flight import ChannelPanel, FlightFigure, FlightRecordData
 from app.figures.overlays import select_individual_flights
 from app.figures.theme import ThemeName
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
-_INPUTS: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
-    "takeoff": ("Thrust (of full)", {"thrust": "Thrust", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
-    "pitch-tracking": (
+_LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0)}
+"""Limits of commands."""
+_PANELS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
+    ("Climb rate (m/s)", "m/s", {"climb_rate_m_s": "Climb rate"}),
+    ("Throttle (of full)", "", {"thrust": "Throttle", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
+    ("Battery (V)", "V", {"battery_v": "Battery"}),
+    (
         "Pitch and elevator (rad)",
+        "rad",
         {"pitch_rad": "Pitch", "pitch_reference_rad": "Pitch reference", "elevator_rad": "Elevator"},
     ),
-}
-"""Channels below the scored output in a flight's figure, by experiment: the axis title, and the channels with their
-titles."""
+)
+"""Panels below the scored output in a flight's figure, where they were recorded: the axis title, the unit, and the
+channels with their titles."""
 _CONFIDENCE: Final = 0.9
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
 
@@ -89,6 +97,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     rows = history.trials_of(session, campaign_id)
     flown = [row for row in rows if row.state in history.FLOWN]
     set_point, reference = _goal(campaign)
+    first_valid = min((row.number for row in rows if row.state == TrialState.VALID), default=math.inf)
     bare = History(
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
@@ -96,7 +105,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         gains=experiment.space.gains,
         set_point=set_point,
         reference=reference,
-        flights=tuple(map(_flight, flown)),
+        flights=tuple(_flight(row, corrected=row.number > first_valid) for row in flown),
         proposal=_next_flight(session, campaign, rows, experiment.output),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
@@ -110,26 +119,28 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
 
 
-def _flight(row: TrialRow) -> FlightData:
-    """A flight without its curve."""
+def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
+    """A flight without its curve; `corrected`: whether a valid flight before it had corrected the model."""
+    interval = _interval(row.predicted_interval)
+    predicts = is_informative(None if interval is None else interval.low, corrected=corrected)
     return FlightData(
         number=row.number,
         gains=row.gains,
         outcome="not yet judged" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
         curve=None,
         error=row.error,
-        predicted_error=row.predicted_error,
-        interval=_interval(row.predicted_interval),
+        predicted_error=row.predicted_error if predicts else None,
+        interval=interval if predicts else None,
         glitches=_glitches(row),
     )
 
 
 def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
-    """Scatter of repeated flights, including the experiment's prior; None without a valid flight, and while it is not
-    known."""
+    """Scatter of repeated flights, including the experiment's prior; None without a valid flight, while it is not
+    known, and if there is none."""
     groups = groups_of(history.flown_gains(rows))
     scatter = pool_scatter(groups, prior)
-    if not groups or not scatter.known:
+    if not groups or scatter.reported is None:
         return None
     best = select_winner(groups, scatter)
     half = scatter.half_width(1.0 + 1.0 / best.size, _CONFIDENCE)
@@ -197,23 +208,37 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
     none."""
     planned = next((row for row in rows if row.state in _UNFLOWN), None)
     if planned is not None:
-        return NextFlight(
-            number=planned.number,
-            gains=planned.gains,
-            predicted_error=planned.predicted_error,
-            interval=_interval(planned.predicted_interval),
-            **_predicted(session, _proposal_of(session, planned), output),
+        return _next(
+            NextFlight(
+                number=planned.number,
+                gains=planned.gains,
+                predicted_error=planned.predicted_error,
+                interval=_interval(planned.predicted_interval),
+                **_predicted(session, _proposal_of(session, planned), output),
+            ),
+            rows,
         )
     proposal = repository.latest_proposal(session, campaign.id)
     if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
         return None
-    return NextFlight(
-        number=max((row.number for row in rows), default=0) + 1,
-        gains=proposal.gains,
-        predicted_error=proposal.predicted_error,
-        interval=_interval(proposal.interval),
-        **_predicted(session, proposal, output),
+    return _next(
+        NextFlight(
+            number=max((row.number for row in rows), default=0) + 1,
+            gains=proposal.gains,
+            predicted_error=proposal.predicted_error,
+            interval=_interval(proposal.interval),
+            **_predicted(session, proposal, output),
+        ),
+        rows,
     )
+
+
+def _next(flight: NextFlight, rows: Sequence[TrialRow]) -> NextFlight:
+    """The flight without an error, interval and band that say nothing; the model's curve stays."""
+    corrected = any(row.state == TrialState.VALID for row in rows)
+    if is_informative(None if flight.interval is None else flight.interval.low, corrected=corrected):
+        return flight
+    return replace(flight, predicted_error=None, interval=None, band=None)
 
 
 class _Predicted(TypedDict):
@@ -245,8 +270,6 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)
     best = history.best_of(trials)
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
-    channels = {} if record is None else record.channels
-    inputs_title, drawn = _INPUTS.get(experiment.name, ("", {}))
     predicted = _predicted(session, _proposal_of(session, row), experiment.output)
     return FlightRecordData(
         number=row.number,
@@ -260,8 +283,18 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         glitches=_glitches(row),
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,
-        inputs={
-            title: _curve(record, name) for name, title in drawn.items() if record is not None and name in channels
-        },
-        inputs_title=inputs_title,
+        panels=() if record is None else tuple(_panels(record)),
+        events=() if record is None or experiment.output != "altitude_m" else flight_events(record),
     )
+
+
+def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
+    for title, unit, channels in _PANELS:
+        recorded = [name for name in channels if name in record.channels]
+        if recorded:
+            yield ChannelPanel(
+                title=title,
+                unit=unit,
+                curves={channels[name]: _curve(record, name) for name in recorded},
+                limits=_LIMITS.get(recorded[0]),
+            )

@@ -17,6 +17,7 @@ from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.gate import space_of
+from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import Proposal, band_channels
 from app.db.session import Database
 from app.figures.scale import thin_by_bends, thinned
@@ -67,21 +68,23 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
     if predicted is None:
         predictor = cache.get(digest, lambda: flight_predictor(definition, flights, donor))
         predicted = None if predictor is None else predictor.predict(gains)
-    return _view(gains, predicted, experiment_of(definition).output)
+    corrected = any(row.state == TrialState.VALID for row in trials)
+    return _view(gains, predicted, experiment_of(definition).output, corrected=corrected)
 
 
-def _view(gains: Gains, predicted: Proposal | None, output: str) -> GainsPrediction:
+def _view(gains: Gains, predicted: Proposal | None, output: str, *, corrected: bool) -> GainsPrediction:
     error = None if predicted is None else predicted.predicted_error
     if predicted is None or error is None or not math.isfinite(error):  # a model may diverge
         return GainsPrediction(
             gains=dict(gains), predicted_error=None, interval=None, curve=None, lower=None, upper=None
         )
     interval = predicted.interval
+    predicts = is_informative(None if interval is None else interval.lower, corrected=corrected)
     lower, upper = (_edge(predicted.predicted, channel) for channel in band_channels(output))
     return GainsPrediction(
         gains=dict(gains),
-        predicted_error=error,
-        interval=None if interval is None else Interval.model_validate(interval, from_attributes=True),
+        predicted_error=error if predicts else None,
+        interval=Interval.model_validate(interval, from_attributes=True) if predicts and interval else None,
         curve=_curve(predicted.predicted, output),
         lower=lower,
         upper=upper,

@@ -414,15 +414,17 @@ class TrackRecord(BaseModel):
 
 
 class CampaignStatistics(BaseModel):
-    """Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all
-    repeats and the experiment's prior; null while unknown, that is before the first repeat under an autopilot whose
-    scatter was never measured. `optimism` is how much the best is expected to look better than it is because it was
-    chosen, and `shrunk_error` its error corrected for that."""
+    """Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all repeats and the
+    experiment's prior; null while unknown, that is before the first repeat under an autopilot whose scatter was never
+    measured, and zero if all repeats gave the same error. `scatter_source` says where it is from. `optimism` is how
+    much the best is expected to look better than it is because it was chosen, and `shrunk_error` its error corrected
+    for that."""
 
     error_unit: str
     confidence: float
     sigma: float | None
     degrees_of_freedom: float
+    scatter_source: str
     groups: list[RepeatGroup]
     comparison: Comparison | None
     drift: Drift | None

@@ -18,11 +18,12 @@ from app.campaigns.schemas import (
     Trend,
 )
 from app.core.experiments.base import Experiment
-from app.core.formatting import format_gains, percent, plus_minus, short
-from app.core.statistics.comparisons import Group, drift_of, optimism, pool_scatter, trend_of
+from app.core.formatting import count, format_gains, percent, plus_minus, short
+from app.core.statistics.comparisons import Group, PooledScatter, drift_of, optimism, pool_scatter, trend_of
 from app.core.tuning import predictions
 from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
-from app.db.models import CampaignRow, TrialRow
+from app.db.models import CampaignRow, TrialRow, VehicleRow
+from app.fleet import service as fleet
 
 _SURE: Final = 0.9
 _NO_OPTIMISM: Final = 0.05
@@ -38,26 +39,49 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     now = compare_winner(definition, experiment, flights)
     scatter = pool_scatter((), experiment.scatter) if now is None else now.scatter
     expected = 0.0
-    if now is not None and scatter.known:
+    if now is not None and scatter.reported is not None:
         expected = optimism(
             [group.mean for group in now.groups], [group.standard_error(scatter) for group in now.groups]
         )
     record = predictions.track_record(flights)
-    drift = None if now is None else _drift(experiment, now)
+    drift = None if now is None or scatter.identical else _drift(experiment, now)
     return CampaignStatistics(
         error_unit=experiment.error_unit,
         confidence=definition.stop.confidence,
-        sigma=scatter.sigma if scatter.known else None,
+        sigma=0.0 if scatter.identical else scatter.reported,
         degrees_of_freedom=scatter.degrees_of_freedom if scatter.known else 0.0,
+        scatter_source=_scatter_source(experiment, () if now is None else now.groups, scatter, row.vehicle),
         groups=[] if now is None else [_group(now, group) for group in now.groups],
         comparison=None if now is None else _comparison(experiment, now),
         drift=drift,
         trends=[] if now is None else _trends(experiment, max(now.groups, key=lambda group: group.size), trials),
         optimism=expected,
-        shrunk_error=None if now is None or not scatter.known else now.winner.mean + expected,
+        shrunk_error=None if now is None or scatter.reported is None else now.winner.mean + expected,
         track_record=TrackRecord.model_validate(record, from_attributes=True),
         notes=[] if now is None else _notes(experiment, now, expected, drift, record),
     )
+
+
+def _scatter_source(
+    experiment: Experiment, groups: Sequence[Group], scatter: PooledScatter, vehicle: VehicleRow
+) -> str:
+    """What the scatter of one flight was estimated from: repeats, prior, or both."""
+    prior, repeats = experiment.scatter, sum(group.size - 1 for group in groups)
+    estimate = f"prior estimate of {short(prior.sd)} {experiment.error_unit}"
+    if not scatter.known:
+        return "Not measured for this autopilot, and no gain set has been flown twice. Fly a gain set again."
+    if scatter.identical:
+        finding = f"{count(repeats, 'repeat')} gave the same error"
+        if vehicle.is_real or not fleet.can_fly(vehicle):
+            return f"{finding}, to the last digit. Check that no log was imported twice."
+        assumed = f" Comparisons still assume the {estimate}." if prior.measured else ""
+        return f"No scatter in this simulation: {finding}.{assumed}"
+    if not prior.measured:
+        return f"From {count(repeats, 'repeat')}."
+    worth = f"{prior.degrees_of_freedom:g} degrees of freedom"
+    if not repeats:
+        return f"From a {estimate} ({worth}): no gain set has been flown twice."
+    return f"From {count(repeats, 'repeat')} and a {estimate} ({worth})."
 
 
 def standing_of(row: CampaignRow, trials: Sequence[TrialRow]) -> ComparisonState | None:

@@ -34,6 +34,7 @@ from app.common.schemas import Gate, Interval, Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
+from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
@@ -166,6 +167,9 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         stop=stop["stop"], reason=stop["reason"] or "", sentence=stop["why"], threshold=stop["threshold"]
     )
     advice = _advice(row, verdict)
+    interval = None if row.interval is None else Interval.model_validate(row.interval)
+    lower = None if interval is None else interval.lower
+    predicts = is_informative(lower, corrected=best is not None)
     return Proposal(
         id=row.id,
         campaign_id=row.campaign_id,
@@ -175,8 +179,8 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         gains=row.gains,
         changes=_changes(now, row.gains),
         choices=_choices(campaign, row, trials, advice),
-        predicted_error=row.predicted_error,
-        interval=None if row.interval is None else Interval.model_validate(row.interval),
+        predicted_error=row.predicted_error if predicts else None,
+        interval=interval if predicts else None,
         explanation=_EXPLANATION.validate_python(row.explanation),
         gate=Gate.model_validate(row.gate),
         stop_verdict=verdict,

@@ -46,6 +46,10 @@ class ComparedFlight(BaseModel):
     error: float | None
     group: GroupBrief | None
     scatter: float | None
+    rise_time_s: float | None
+    settling_time_s: float | None
+    overshoot_m: float | None
+    steady_state_error_m: float | None
     flown_at: datetime | None
     settings: list[FlightSetting]
 

@@ -105,7 +105,11 @@ def _flight(side: ComparisonFlight, settings: list[FlightSetting]) -> ComparedFl
         group=None
         if group is None
         else GroupBrief(mean=group.mean, standard_error=group.known_error(side.scatter), n=group.size),
-        scatter=side.scatter.sigma if side.scatter.known else None,
+        scatter=side.scatter.reported,
+        rise_time_s=row.rise_time_s,
+        settling_time_s=row.settling_time_s,
+        overshoot_m=row.overshoot_m,
+        steady_state_error_m=row.steady_state_error_m,
         flown_at=row.flown_at,
         settings=settings,
     )

@@ -274,6 +274,9 @@ class TrialRow(Base, Reported):
     trajectory_id: Mapped[int | None] = mapped_column(ForeignKey("trajectory.id"), unique=True)
     error: Mapped[float | None]
     overshoot_m: Mapped[float | None]
+    rise_time_s: Mapped[float | None]
+    settling_time_s: Mapped[float | None]
+    steady_state_error_m: Mapped[float | None]
     curve: Mapped[list[list[float]] | None]
     ending: Mapped[Ending | None] = mapped_column(String)
     abort_cause: Mapped[AbortCause | None] = mapped_column(String)

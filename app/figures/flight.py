@@ -1,28 +1,48 @@
-"""One flight: altitude with prediction, set point and reference, and the thrust below it."""
+"""One flight as in a log viewer: altitude with prediction, set point and reference, and below it, over the same time,
+its deviation, climb rate, throttle and battery, with the flight's events.
+"""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import numpy as np
 
+from app.core.records.flight_events import FlightEvent
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
+from app.figures.base import Card, Column, Table, Trace, ready, scatter, table_of_curves
 from app.figures.data import Band, Curve, Range
+from app.figures.deviations import deviation_axis, deviation_of, is_step
 from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 POINTS: Final = 1200
 TABLE_ROWS: Final = 34
+_GAP: Final = 0.035
+_OUTPUT_SHARE: Final = 2.0
+"""Height of the output's panel, in heights of the others."""
+
+_NAME_SHARE: Final = 0.09
+"""Length of an event's name, as a share of the figure's height."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelPanel:
+    """Further channels by title, all in one `unit`, empty for shares; the axis has the `title`.
+
+    `limits` are those between which a command acts, None if there are none: outside them it is saturated.
+    """
+
+    title: str
+    unit: str = ""
+    curves: Mapping[str, Curve]
+    limits: Range | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecordData:
-    """One recorded flight.
-
-    `inputs` are further channels by title (Thrust, Feed-forward, …), all in the unit named in `inputs_title`.
-    """
+    """One recorded flight, with what else was recorded in `panels`, from top to bottom."""
 
     number: int
     output_title: str
@@ -35,13 +55,17 @@ class FlightRecordData:
     glitches: tuple[Range, ...] = ()
     best: Curve | None = None
     best_number: int | None = None
-    inputs: Mapping[str, Curve] = field(default_factory=dict)
-    inputs_title: str = "Thrust (of full)"
+    panels: tuple[ChannelPanel, ...] = ()
+    events: tuple[FlightEvent, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class FlightFigure:
-    """Table columns: `time_s`, `measured`, `set_point`, `predicted` (if known), then the inputs by title."""
+    """Table columns: `time_s`, `measured`, `set_point`, `predicted` (if known), then the other channels by title.
+
+    Every trace carries `meta`: `role` (set point, reference, best, prediction, flight, band, glitch, deviation, input,
+    saturated). All panels share one axis of time, so that they zoom together and the cursor reads all of them.
+    """
 
     record: FlightRecordData
     theme: ThemeName = "light"
@@ -56,9 +80,12 @@ class FlightFigure:
     def compute(self) -> Card:
         palette, curve = PALETTES[self.theme], self.record.curve
         assert curve is not None
-        inputs = [self._input(palette, index, title) for index, title in enumerate(self.record.inputs)]
-        traces = [*self._outputs(palette, curve), *inputs]
+        traces = [*self._outputs(palette, curve), *self._deviation(palette, curve), *self._channels(palette)]
         return ready(self, traces, self._layout(palette, curve), summary=self._summary(), table=self._table(curve))
+
+    @property
+    def _has_deviation(self) -> bool:
+        return is_step(self.record.set_point)
 
     def _outputs(self, palette: Palette, curve: Curve) -> list[Trace]:
         """The flight with its context curves, and its glitches on top."""
@@ -70,25 +97,67 @@ class FlightFigure:
             *glitch_traces(palette, record.number, curve, record.glitches, record.output_unit),
         ]
 
+    def _deviation(self, palette: Palette, curve: Curve) -> list[Trace]:
+        record = self.record
+        if not self._has_deviation:
+            return []
+        deviation = deviation_of(curve, record.set_point)
+        drawn = _line("Deviation", deviation, palette.ink, 1.75, "deviation", record.output_unit)
+        return [{**drawn, "yaxis": "y2", "showlegend": False}]
+
+    def _channels(self, palette: Palette) -> list[Trace]:
+        colours = (palette.ink, *palette.gains)
+        traces: list[Trace] = []
+        for place, panel in enumerate(self.record.panels, start=2 + self._has_deviation):
+            axis: Trace = {"yaxis": f"y{place}"}
+            if len(panel.curves) == 1:
+                axis["showlegend"] = False
+            for index, (title, curve) in enumerate(panel.curves.items()):
+                colour, dash = colours[index % len(colours)], ("solid", "dash", "dot")[index % 3]
+                traces.append({**_line(title, curve, colour, 1.5, "input", panel.unit, dash), **axis})
+            if panel.limits is not None:
+                traces += [one | axis for one in _saturated(palette, next(iter(panel.curves.values())), panel.limits)]
+        return traces
+
     def _layout(self, palette: Palette, curve: Curve) -> dict[str, object]:
-        """The output on top, the inputs below it if there are any."""
+        """The output on top, twice as high as each panel below it."""
         record, goal = self.record, self.record.set_point
         low, high, _ = robust_span(
             [curve.values], low=min(0.0, float(goal.values.min())), high=max(0.0, float(goal.values.max()))
         )
+        places = _places(len(record.panels) + self._has_deviation)
         output = f"{record.output_title} ({record.output_unit})"
-        place = [0.36, 1.0] if record.inputs else [0.0, 1.0]
-        axes: dict[str, object] = {"yaxis": theme.titled(palette, output, domain=place, range=[low, high])}
-        if record.inputs:
-            axes["yaxis2"] = theme.titled(palette, record.inputs_title, domain=[0.0, 0.28], nticks=4)
+        axes: dict[str, object] = {"yaxis": theme.titled(palette, output, domain=places[0], range=[low, high])}
+        if self._has_deviation:
+            axes["yaxis2"] = deviation_axis(palette, goal, record.output_unit, domain=places[1])
+        for place, panel in enumerate(record.panels, start=2 + self._has_deviation):
+            axes[f"yaxis{place}"] = theme.titled(palette, panel.title, domain=places[place - 1], nticks=4)
         begin = float(curve.time_s[0]) - 0.01 * float(goal.time_s[-1])
         axes["xaxis"] = theme.titled(
             palette,
             "Time since the command (s)",
-            anchor="y2" if record.inputs else "y",
+            anchor=f"y{theme.suffix(len(places))}",
             range=[begin, float(curve.time_s[-1])],
+            showspikes=True,
+            spikemode="across",
+            spikesnap="cursor",
+            spikethickness=1,
+            spikedash="solid",
+            spikecolor=palette.dim,
+            hoverformat=".2f",
+            unifiedhovertitle={"text": "%{x} s"},
         )
-        return theme.layout(palette, uirevision="flight", **axes)
+        return theme.layout(
+            palette,
+            hovermode="x unified",
+            hoversubplots="axis",
+            shapes=[_mark(palette, event) for event in record.events],
+            annotations=[_name(palette, event, index) for index, event in enumerate(record.events)],
+            margin=dict(theme.SIGNED_MARGIN_PX),
+            meta={"panels": len(places)},
+            uirevision="flight",
+            **axes,
+        )
 
     def _context(self, palette: Palette) -> list[Trace]:
         record, unit = self.record, self.record.output_unit
@@ -100,14 +169,6 @@ class FlightFigure:
         if record.predicted is not None:
             drawn.append(_line("Predicted", record.predicted, palette.prediction, 2, "prediction", unit, "dash"))
         return drawn
-
-    def _input(self, palette: Palette, index: int, title: str) -> Trace:
-        colour = (palette.ink, *palette.gains)[index % (1 + len(palette.gains))]
-        dash = ("solid", "dash", "dot")[index % 3]
-        return {
-            **_line(title, self.record.inputs[title], colour, 1.5, "input", "", dash),
-            "yaxis": "y2",
-        }
 
     def _summary(self) -> str:
         record = self.record
@@ -127,10 +188,73 @@ class FlightFigure:
         if record.predicted is not None:
             named.append((Column("predicted", "Predicted", record.output_unit, 3), record.predicted))
         named += [
-            (Column(title.lower().replace(" ", "_"), title, "", 3), inputs) for title, inputs in record.inputs.items()
+            (Column(title.lower().replace(" ", "_"), title, "", 3), channel)
+            for panel in record.panels
+            for title, channel in panel.curves.items()
         ]
         seconds = np.linspace(float(curve.time_s[0]), float(curve.time_s[-1]), TABLE_ROWS)
         return table_of_curves(seconds.tolist(), 2, named)
+
+
+def _places(below: int) -> list[list[float]]:
+    """Bottom and top of the output's panel and of each of those below it, as shares of the figure."""
+    height = (1.0 - _GAP * below) / (_OUTPUT_SHARE + below)
+    tops = [1.0, *(1.0 - _OUTPUT_SHARE * height - _GAP - index * (height + _GAP) for index in range(below))]
+    return [[max(0.0, top - (height if index else _OUTPUT_SHARE * height)), top] for index, top in enumerate(tops)]
+
+
+def _saturated(palette: Palette, command: Curve, limits: Range) -> Sequence[Trace]:
+    """Where the command is at a limit after it first left the lower one; no trace if it never is."""
+    started = np.maximum.accumulate(command.values > limits.low)
+    held = started & ((command.values >= limits.high) | (command.values <= limits.low))
+    if not held.any():
+        return ()
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], held, [False])).astype(np.int8)))
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        x += [round(float(command.time_s[at]), 3) for at in (first, end - 1)] + [None]
+        y += [float(command.values[at]) for at in (first, end - 1)] + [None]
+    return (
+        scatter(
+            "Saturated",
+            (x[:-1], y[:-1]),
+            role="saturated",
+            mode="lines+markers",
+            line=theme.line(palette.bad, 5),
+            marker=theme.solid(palette.bad, size=5),
+            showlegend=True,
+        ),
+    )
+
+
+def _mark(palette: Palette, event: FlightEvent) -> dict[str, object]:
+    """A vertical line through all panels."""
+    return {
+        "type": "line",
+        "x0": event.time_s,
+        "x1": event.time_s,
+        "y0": 0,
+        "y1": 1,
+        "yref": "paper",
+        "layer": "below",
+        "line": {"color": palette.dim, "width": 1, "dash": "dot"},
+    }
+
+
+def _name(palette: Palette, event: FlightEvent, index: int) -> dict[str, object]:
+    """The event's name along its line, below that of the one before it, which may be close."""
+    return {
+        "text": event.name,
+        "x": event.time_s,
+        "y": 1 - _NAME_SHARE * index,
+        "yref": "paper",
+        "xanchor": "left",
+        "yanchor": "top",
+        "textangle": -90,
+        "showarrow": False,
+        "font": {"size": 12, "color": palette.dim},
+    }
 
 
 def _line(
@@ -140,5 +264,5 @@ def _line(
     style = theme.line(colour, width, dash)
     if unit is None:
         return scatter(name, thin_by_bends(curve.time_s, curve.values), role=role, line=style)
-    hover = reading(name, unit)
+    hover = f"{name}: %{{y:.3f}} {unit}".rstrip() + "<extra></extra>"
     return scatter(name, thinned(curve.time_s, curve.values, POINTS), role=role, line=style, hovertemplate=hover)

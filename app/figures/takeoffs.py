@@ -1,4 +1,6 @@
-"""All flights over set point and reference trajectory: the best emphasised, the next one's prediction dashed."""
+"""All flights over set point and reference trajectory, and their deviation from the set point below: the best
+emphasised, the next one's prediction dashed.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +9,8 @@ from typing import Any, ClassVar, Final
 from app.core.formatting import count
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
-from app.figures.data import Curve, FlightData, History
+from app.figures.data import Curve, FlightData, History, Range
+from app.figures.deviations import deviation_axis, deviation_of, is_step
 from app.figures.overlays import (
     PERCENTILES,
     Envelope,
@@ -25,6 +28,12 @@ CURVE_POINTS: Final = 500
 ALL_POINTS: Final = 12_000
 HEADROOM: Final = 1.15
 """Room above the set point for the next flight, as a factor on the set point."""
+OPENING_S: Final = (-0.3, 8.0)
+"""Time range at first: the climb and the overshoot."""
+DEVIATION_SHARE: Final = 0.3
+"""Height of the lower panel, as a share of the figure."""
+_PANEL_GAP: Final = 0.07
+_DEVIATION_POINTS: Final = 160
 SHARED_LEGEND: Final = {"earlier": "Earlier", "invalid": "Not counted"}
 """Standings whose flights look alike and share a legend entry."""
 TABLE_TIMES_S: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 25.0, 30.0)
@@ -37,10 +46,14 @@ class TrajectoriesFigure:
     one) with `prediction_lower` and `prediction_upper` (if its band is known), at those `TABLE_TIMES_S` that lie within
     the experiment.
 
-    Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, band, glitch, live,
-    pointed, off scale) and, for flights, `trial` and `standing` (best, latest, earlier, invalid, unjudged); a flight's
-    `uid` is `flight-` and its number. The traces `live` and `pointed` are empty: a page fills the first during a
-    flight, the second with the flight under the pointer if that one has no curve of its own.
+    Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, band,
+    glitch, live, pointed, off scale) and, for flights, `trial` and `standing` (best, latest, baseline, earlier,
+    invalid, unjudged); a flight's `uid` is `flight-` and its number, that of its deviation `deviation-` and its number.
+    The traces `live` and `pointed` are empty: a page fills the first during a flight, the second with the flight under
+    the pointer if that one has no curve of its own.
+
+    The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. A set point
+    of zero has no deviations: they would repeat the output.
     """
 
     history: History
@@ -68,20 +81,21 @@ class TrajectoriesFigure:
             *self._goals(palette),
         ]
         curves = [flight.curve for flight in drawn if flight.curve is not None]
+        low, high, outside = self._span(drawn)
+        traces += self._deviations(palette, drawn)
         traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
         for flight in drawn:
             traces += glitch_traces(palette, flight.number, flight.curve, flight.glitches, history.output_unit)
         traces += [*self._legend(palette, drawn), *self._prediction(palette)]
         traces += [self._empty(palette, "live", "Flying now"), self._empty(palette, "pointed", "Pointed at")]
-        low, high, outside = self._span(drawn)
         for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
             label, text = str(flight.number), f"Flight {flight.number}"
             traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.number, text=text))
-        unit = history.output_unit
         layout = theme.layout(
             palette,
-            xaxis=theme.titled(palette, "Time since the command (s)", range=self._time_range()),
-            yaxis=theme.titled(palette, f"{history.output_title} ({unit})", range=[low, high], nticks=7),
+            **self._axes(palette, low, high),
+            margin=dict(theme.SIGNED_MARGIN_PX),
+            meta={"whole_s": self._whole_s},
             uirevision="takeoffs",
         )
         summary = self._summary(sum(index < len(drawn) for index in outside))
@@ -91,8 +105,64 @@ class TrajectoriesFigure:
     def _lasts_s(self) -> float:
         return float(self.history.set_point.time_s[-1])
 
-    def _time_range(self) -> list[float]:
+    @property
+    def _whole_s(self) -> list[float]:
         return [-0.01 * self._lasts_s, self._lasts_s]
+
+    def _axes(self, palette: Palette, low: float, high: float) -> dict[str, object]:
+        """The output on top, its deviation from the set point below it, over one axis of time."""
+        history, unit = self.history, self.history.output_unit
+        opening = [OPENING_S[0], min(OPENING_S[1], self._lasts_s)]
+        both = is_step(history.set_point)
+        place = [DEVIATION_SHARE + _PANEL_GAP, 1.0] if both else [0.0, 1.0]
+        axes: dict[str, object] = {
+            "xaxis": theme.titled(palette, "Time since the command (s)", range=opening, anchor="y2" if both else "y"),
+            "yaxis": theme.titled(
+                palette, f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7
+            ),
+        }
+        if both:
+            axes["yaxis2"] = deviation_axis(palette, history.set_point, unit, domain=[0.0, DEVIATION_SHARE])
+        return axes
+
+    def _deviations(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
+        """Output − set point of each flight and of the prediction, in the lower panel."""
+        if not is_step(self.history.set_point):
+            return []
+        unit, proposal = self.history.output_unit, self.history.proposal
+        points = max(60, min(_DEVIATION_POINTS, ALL_POINTS // 3 // max(1, len(drawn))))
+        own = [
+            self._trace(
+                f"Flight {flight.number}, deviation",
+                deviation_of(flight.curve, self.history.set_point),
+                points,
+                role="deviation",
+                about={"trial": flight.number, "standing": standing},
+                uid=f"deviation-{flight.number}",
+                line=_style(palette, standing),
+                legendgroup=standing,
+                showlegend=False,
+                yaxis="y2",
+                hovertemplate=reading(f"Flight {flight.number}, deviation", unit, form="+.3f"),
+            )
+            for flight in sorted(drawn, key=self._weight)
+            if flight.curve is not None
+            for standing in [self._standing(flight)]
+        ]
+        if proposal is None or proposal.curve is None:
+            return own
+        predicted = self._trace(
+            "Predicted deviation",
+            deviation_of(proposal.curve, self.history.set_point),
+            points,
+            role="deviation",
+            about={"standing": "prediction"},
+            line=_style(palette, "prediction"),
+            showlegend=False,
+            yaxis="y2",
+            hovertemplate=reading(f"Flight {proposal.number}, predicted deviation", unit, form="+.3f"),
+        )
+        return [*own, predicted]
 
     def _span(self, drawn: list[FlightData]) -> tuple[float, float, tuple[int, ...]]:
         """From the ground to above the set point; if the set point is zero, the range of the first flight."""
@@ -112,11 +182,15 @@ class TrajectoriesFigure:
             return "invalid"
         if flight is self.history.best:
             return "best"
+        if flight is self.history.latest and flight.gains == self.history.flights[0].gains:
+            return "latest" if len(self.history.flights) == 1 else "baseline"
         return "latest" if flight is self.history.latest else "earlier"
 
     def _weight(self, flight: FlightData) -> tuple[int, int]:
         """Drawing order: the most important flights last, on top."""
-        return ("invalid", "earlier", "latest", "unjudged", "best").index(self._standing(flight)), flight.number
+        return ("invalid", "earlier", "baseline", "latest", "unjudged", "best").index(
+            self._standing(flight)
+        ), flight.number
 
     def _flight(self, palette: Palette, flight: FlightData, points: int) -> Trace:
         assert flight.curve is not None
@@ -124,6 +198,7 @@ class TrajectoriesFigure:
         label = {
             "best": f"{flight.number} · best",
             "latest": f"{flight.number} · latest",
+            "baseline": f"{flight.number} · latest, baseline",
             "earlier": f"{flight.number}",
             "invalid": f"{flight.number} · {flight.outcome}",
             "unjudged": f"{flight.number} · {flight.outcome}",
@@ -186,7 +261,7 @@ class TrajectoriesFigure:
                 CURVE_POINTS,
                 role="prediction",
                 about={"trial": proposal.number},
-                line=theme.line(palette.prediction, 2.25, "dash"),
+                line=_style(palette, "prediction"),
                 legendrank=899,
                 hovertemplate=reading(f"Flight {proposal.number}, predicted", self.history.output_unit),
             )
@@ -209,7 +284,12 @@ class TrajectoriesFigure:
     def _trace(
         self, name: str, curve: Curve, points: int, *, role: str, about: Mapping[str, object], **style: Any
     ) -> Trace:
-        drawn = thinned(curve.time_s, curve.values, points, self.history.window)
+        window = self.history.window
+        drawn = (
+            thinned(curve.time_s, curve.values, points // 2, Range(*OPENING_S))
+            if window is None
+            else thinned(curve.time_s, curve.values, points, window)
+        )
         return scatter(name, drawn, role=role, about=about, **style)
 
     def _summary(self, outside: int) -> str:
@@ -254,6 +334,8 @@ def _style(palette: Palette, standing: str) -> dict[str, object]:
     return {
         "best": theme.line(palette.best, 3),
         "latest": theme.line(palette.ink, 2),
+        "baseline": theme.line(palette.earlier, 1.75, "longdash"),
+        "prediction": theme.line(palette.prediction, 2.25, "dash"),
         "earlier": theme.line(palette.earlier, 1.25),
         "invalid": theme.line(palette.bad, 1.25, "dot"),
         "unjudged": theme.line(palette.ink, 2, "longdash"),

@@ -13,6 +13,10 @@ MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({"l": 48, "r": 14, "t": 1
 """Room for an axis with its title: if a margin grows while drawing, Plotly draws the whole chart a second time."""
 
 
+SIGNED_MARGIN_PX: Final[Mapping[str, int]] = MappingProxyType({**MARGIN_PX, "l": 62, "r": 18})
+"""The same for signed numbers on the axis at the left, and a number at the right end of the abscissa."""
+
+
 @dataclass(frozen=True, slots=True)
 class Palette:
     """Colours by role. Lines keep 3:1 against the surface, text 4.5:1."""

@@ -106,16 +106,61 @@ def test_a_flight_of_a_proposal_carries_its_interval_and_is_held_against_it(
     client: TestClient, database: Database
 ) -> None:
     campaign = create_ready_campaign(client, database)
-    proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
-    assert proposal["advice"]["kind"] == proposal["recommended"] == "baseline"
+    path = f"/api/campaigns/{campaign['id']}"
+    create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), modelled(DEFAULT))
+    run_jobs(database)
+    proposal = get(client, f"{path}/proposal")["proposal"]
     assert proposal["interval"]["lower"] < proposal["predicted_error"] < proposal["interval"]["upper"]
-    flown = create_flown_trial(client, database, campaign["id"], 3.0)
+    create_trial(client, campaign["id"], proposal_id=proposal["id"], fly={"speed": None})
+    flown = land(database, lift_off(database), modelled(proposal["gains"]))
+    [_, flown] = get(client, f"{path}/trials")["items"]
     assert flown["predicted_interval"] == proposal["interval"]
     assert flown["inside_interval"]
-    record = get(client, f"/api/campaigns/{campaign['id']}/statistics")["track_record"]
+    record = get(client, f"{path}/statistics")["track_record"]
     assert (record["inside"], record["of"], record["share"]) == (1, 1, 1.0)
     own = create_trial(client, campaign["id"], gains=DEFAULT)
     assert (own["predicted_interval"], own["inside_interval"]) == (None, None)
+
+
+def test_a_first_prediction_that_allows_any_flight_is_none_and_does_not_count_as_kept(
+    client: TestClient, database: Database
+) -> None:
+    """The uncorrected model allows 0 … 2.2 m."""
+    campaign = create_ready_campaign(client, database)
+    path = f"/api/campaigns/{campaign['id']}"
+    proposal = get(client, f"{path}/proposal")["proposal"]
+    assert proposal["advice"]["kind"] == proposal["recommended"] == "baseline"
+    assert (proposal["predicted_error"], proposal["interval"]) == (None, None)
+    create_trial(client, campaign["id"], proposal_id=proposal["id"], fly={"speed": None})
+    land(database, lift_off(database), modelled(proposal["gains"]))
+    [flown] = get(client, f"{path}/trials")["items"]
+    assert (flown["predicted_error"], flown["predicted_interval"], flown["inside_interval"]) == (None, None, None)
+    assert "predicted" not in flown["verdict"]
+    record = get(client, f"{path}/statistics")["track_record"]
+    assert (record["inside"], record["of"]) == (0, 0)
+    assert record["sentence"] == "No prediction has been tested by a flight yet."
+
+
+def test_repeats_of_a_simulation_without_scatter_get_none(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database)
+    path = f"/api/campaigns/{campaign['id']}"
+    prior = "prior estimate of 0.0105 m"
+    for flights in (1, 2, 3):
+        create_trial(client, campaign["id"], gains=DEFAULT, fly={"speed": None})
+        land(database, lift_off(database), modelled(DEFAULT))
+        found = get(client, f"{path}/statistics")
+        if flights == 1:
+            assert found["sigma"] == pytest.approx(0.0105)
+            assert (
+                found["scatter_source"] == f"From a {prior} (4 degrees of freedom): no gain set has been flown twice."
+            )
+    assert (found["sigma"], found["groups"][0]["standard_error"], found["drift"]) == (0.0, None, None)
+    assert found["scatter_source"] == (
+        f"No scatter in this simulation: 2 repeats gave the same error. Comparisons still assume the {prior}."
+    )
+    [*_, last] = get(client, f"{path}/trials")["items"]
+    assert last["group"] == {"mean": last["error"], "standard_error": None, "n": 3}
 
 
 def test_a_variant_is_computed_from_the_flights(client: TestClient, database: Database) -> None:

@@ -114,6 +114,10 @@ class Dashboard:
         heading = self.page.get_by_role("heading", name=re.compile(rf"^{re.escape(title)}"))
         return self.page.locator("section").filter(has=heading)
 
+    def open_tab(self, title: str) -> None:
+        """One of the tabs below a campaign's charts."""
+        self.page.get_by_role("tab", name=title).click()
+
     def choose_speed(self, label: Literal["1×", "10×", "Max"]) -> None:
         self.page.get_by_role("radiogroup", name="Simulated at").get_by_text(label, exact=True).click()
 

@@ -154,7 +154,25 @@ def test_choosing_a_flight_of_the_crowd_gives_it_a_curve_of_its_own(page_of_many
     assert chosen["width"] == max(others)
 
 
-def test_a_zoom_shows_more_of_each_record_and_a_double_click_all_again(page_of_many: Dashboard) -> None:
+def test_the_chart_opens_at_the_first_8_s_and_shows_the_whole_flight_on_request(page_of_many: Dashboard) -> None:
+    def seconds() -> list[float]:
+        shown: list[float] = page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range")
+        return shown
+
+    assert seconds() == [-0.3, 8]
+    best = best_of(page_of_many)
+    deviation = page_of_many.trace("takeoffs", "deviation", trial=best["trial_number"])
+    assert deviation is not None
+    time_s, altitude_m = page_of_many.record(best["trial_id"])
+    np.testing.assert_allclose(deviation["y"], np.interp(deviation["x"], time_s, altitude_m - 3.0), atol=5e-3)
+    spans = page_of_many.page.get_by_role("radiogroup", name="Time shown")
+    spans.get_by_text("Whole flight").click()
+    page_of_many.until(lambda: seconds() == [pytest.approx(-0.326), 32.6])
+    spans.get_by_text("First 8 s").click()
+    page_of_many.until(lambda: seconds() == [-0.3, 8])
+
+
+def test_a_zoom_shows_more_of_each_record_and_a_double_click_the_whole_flight(page_of_many: Dashboard) -> None:
     best = best_of(page_of_many)
 
     def drawn() -> Json:
@@ -168,9 +186,9 @@ def test_a_zoom_shows_more_of_each_record_and_a_double_click_all_again(page_of_m
     middle = box["y"] + 0.5 * box["height"]
     start, end = (box["x"] + share * box["width"] for share in (0.3, 0.4))
     brush(page_of_many, (start, middle), (end, middle))
-    page_of_many.until(lambda: len(drawn()["x"]) > before + 200)
+    page_of_many.until(lambda: len(drawn()["x"]) != before)
     seconds = page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range")
-    assert 8.0 < seconds[0] < seconds[1] < 15.0
+    assert 1.9 < seconds[0] < seconds[1] < 3.3
     time_s, altitude_m = page_of_many.record(best["trial_id"])
     x, y = (np.array(drawn()[axis]) for axis in ("x", "y"))
     inside = (x >= seconds[0]) & (x <= seconds[1])
@@ -178,4 +196,6 @@ def test_a_zoom_shows_more_of_each_record_and_a_double_click_all_again(page_of_m
     assert inside.sum() == pytest.approx(min(500, recorded.sum()), abs=3)
     np.testing.assert_allclose(y[inside], np.interp(x[inside], time_s, altitude_m), atol=2e-3)
     page_of_many.page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
-    page_of_many.until(lambda: len(drawn()["x"]) == before)
+    whole = [pytest.approx(-0.326), 32.6]
+    page_of_many.until(lambda: page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range") == whole)
+    page_of_many.until(lambda: len(drawn()["x"]) == 500)

@@ -230,3 +230,35 @@ def test_an_empty_page_teaches_and_finds_campaigns_by_name(dashboard: Dashboard,
     expect(page.get_by_role("checkbox")).to_have_count(len(flown.late))
     page.get_by_role("textbox", name="Search campaigns by name").fill("no such campaign")
     expect(page.get_by_text("No campaigns with flights match.")).to_be_visible()
+
+
+def test_the_table_of_runs_sorts_hides_columns_and_compares_the_selected_flights(
+    dashboard: Dashboard, states: States
+) -> None:
+    campaign_id = states.campaign(strategy="calibrated", flights=3)
+    trials = dashboard.trials(campaign_id)
+    dashboard.open_campaign(campaign_id)
+    table = dashboard.page.get_by_role("region", name="All flights")
+    rows = table.locator("tbody tr[data-flight]")
+
+    def order() -> list[int]:
+        return [int(number) for number in rows.evaluate_all("all => all.map(one => one.dataset.flight)")]
+
+    by_error = [one["number"] for one in sorted(trials, key=lambda one: one["error"])]
+    heading = table.get_by_role("columnheader", name="Error", exact=False).first
+    for expected, sort in ((by_error, "ascending"), (by_error[::-1], "descending"), ([1, 2, 3], None)):
+        heading.get_by_role("button", name="Error", exact=True).click()
+        dashboard.until(lambda expected=expected: order() == expected)
+        assert heading.get_attribute("aria-sort") == sort
+    dashboard.page.get_by_text("Columns", exact=True).click()
+    dashboard.page.get_by_role("checkbox", name="Overshoot").uncheck()
+    expect(table.get_by_role("columnheader", name="Overshoot")).to_have_count(0)
+    dashboard.page.reload()
+    expect(table.get_by_role("columnheader", name="Settling time")).to_be_visible()
+    expect(table.get_by_role("columnheader", name="Overshoot")).to_have_count(0)
+    for number in (3, 1):
+        table.get_by_role("checkbox", name=f"Select flight {number}").check()
+    dashboard.page.get_by_role("link", name="Compare 2 selected flights").click()
+    expect(dashboard.page).to_have_url(re.compile(rf"trial={trials[2]['id']}&trial={trials[0]['id']}$"))
+    compared = dashboard.page.get_by_role("region", name="Flights compared")
+    expect(compared).to_contain_text(f"{trials[2]['rise_time_s']:.2f} s")

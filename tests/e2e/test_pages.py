@@ -242,6 +242,7 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
             page.mouse.move(0, 0)  # else it may point at a chart, which shows its tools then
         close_it_again(dashboard)
     if name in WITH_LANDSCAPE:
+        dashboard.open_tab("Error landscape")
         expect(dashboard.plot("Error landscape")).to_be_visible()
     assert refused == []
 

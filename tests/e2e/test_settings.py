@@ -169,6 +169,7 @@ def test_screen_readers_always_get_announcements_and_speech_only_when_switched_o
 
 ASKED = {
     "What is the error?", "What is the predicted error?", "What is the interval?", "What is the overshoot?",
+    "What is the rise time?", "What is the settling time?", "What is the steady-state error?",
     "How do the flights correct the model?", "How are gains checked?", "How is the scatter estimated?",
     "What is the standard error?", "When is a difference significant?", "What do the lines mean?",
     "What does the next flight have to beat?", "What are the fitted parameters?",
@@ -180,6 +181,7 @@ def test_every_number_that_one_may_ask_about_is_explained_by_keyboard(dashboard:
     campaign_id = states.campaign(strategy="calibrated", stop=patient, flights=2)
     states.repeat(campaign_id)
     dashboard.open_campaign(campaign_id)
+    dashboard.open_tab("Statistics")
     questions = dashboard.page.locator("main button[aria-haspopup=dialog]:visible")
 
     def offered() -> set[str]:

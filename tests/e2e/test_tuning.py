@@ -64,6 +64,7 @@ def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error
     said = dashboard.get(f"/campaigns/{campaign_id}/statistics")
     [group] = [one for one in said["groups"] if len(one["trial_numbers"]) > 1]
     assert group["mean"] == pytest.approx(np.mean([one["error"] for one in flown[1:]]), abs=1e-9)
+    dashboard.open_tab("Statistics")
     panel = dashboard.panel("Statistics")
     row = panel.get_by_role("row").filter(has_text="2, 3")
     expect(row).to_contain_text(printed(group["mean"], group["standard_error"]))

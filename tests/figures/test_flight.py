@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.figures.data import Curve
-from app.figures.flight import FlightFigure, FlightRecordData
+from app.core.records.flight_events import FlightEvent
+from app.figures.data import Curve, Range
+from app.figures.flight import ChannelPanel, FlightFigure, FlightRecordData
 from tests.figures.builders import REFERENCE, SET_POINT, TIME_S, climb, layout, trace, traces
 
 THRUST = Curve(TIME_S, np.full_like(TIME_S, 0.63))
@@ -18,7 +19,8 @@ RECORD = FlightRecordData(
     predicted=climb(0.3),
     best=climb(0.2),
     best_number=2,
-    inputs={"Thrust": THRUST, "Feed-forward": THRUST},
+    panels=(ChannelPanel(title="Throttle (of full)", curves={"Thrust": THRUST, "Feed-forward": THRUST}),),
+    events=(FlightEvent(0.0, "Command"), FlightEvent(0.4, "Lift-off")),
 )
 
 
@@ -30,17 +32,54 @@ def test_a_flight_is_drawn_over_prediction_best_and_goal_with_its_commands_below
         "best",
         "prediction",
         "flight",
+        "deviation",
         "input",
         "input",
     ]
     assert max(trace(card, "flight")["y"]) == pytest.approx(climb(0.4).values.max(), abs=1e-4)
-    assert [one["yaxis"] for one in traces(card) if one["meta"]["role"] == "input"] == ["y2", "y2"]
+    assert [one["yaxis"] for one in traces(card) if one["meta"]["role"] == "input"] == ["y3", "y3"]
     assert card.summary == "Altitude of flight 3: highest 3.40 m at 2.0 s."
 
 
-def test_an_imported_flight_without_commands_uses_the_whole_height() -> None:
-    card = FlightFigure(replace(RECORD, inputs={})).compute()
+def test_an_imported_flight_without_commands_has_only_its_deviation_below() -> None:
+    card = FlightFigure(replace(RECORD, panels=())).compute()
+    assert [name for name in layout(card) if name.startswith("yaxis")] == ["yaxis", "yaxis2"]
+    assert layout(card)["yaxis2"]["domain"][0] == pytest.approx(0.0)
+
+
+def test_a_tracking_error_is_not_drawn_a_second_time_as_its_own_deviation() -> None:
+    zero = Curve(TIME_S, np.zeros_like(TIME_S))
+    card = FlightFigure(replace(RECORD, set_point=zero, reference=None, panels=())).compute()
     assert layout(card)["yaxis"]["domain"] == [0.0, 1.0]
+    assert "deviation" not in {one["meta"]["role"] for one in traces(card)}
+
+
+def test_all_panels_share_one_time_axis_so_that_one_cursor_reads_them_all() -> None:
+    card = FlightFigure(RECORD).compute()
+    drawn = layout(card)
+    assert {one.get("xaxis", "x") for one in traces(card)} == {"x"}
+    assert (drawn["hovermode"], drawn["hoversubplots"], drawn["xaxis"]["anchor"]) == ("x unified", "axis", "y3")
+    bounds = [drawn[name]["domain"] for name in ("yaxis", "yaxis2", "yaxis3")]
+    assert bounds[0][0] > bounds[1][1] > bounds[1][0] > bounds[2][1]
+
+
+def test_events_stand_on_the_time_line() -> None:
+    drawn = layout(FlightFigure(RECORD).compute())
+    assert [(one["text"], one["x"]) for one in drawn["annotations"]] == [("Command", 0.0), ("Lift-off", 0.4)]
+    assert [one["x0"] for one in drawn["shapes"]] == [0.0, 0.4]
+
+
+def test_throttle_is_marked_where_it_is_saturated_but_not_at_rest_before_it_starts() -> None:
+    command = np.full_like(TIME_S, 0.6)
+    command[TIME_S < 0.5] = 0.0
+    command[(TIME_S >= 1.0) & (TIME_S <= 2.0)] = 1.0
+    command[(TIME_S >= 4.0) & (TIME_S <= 4.5)] = 0.0
+    panel = ChannelPanel(
+        title="Throttle (of full)", curves={"Throttle": Curve(TIME_S, command)}, limits=Range(0.0, 1.0)
+    )
+    marked = trace(FlightFigure(replace(RECORD, panels=(panel,))).compute(), "saturated")
+    assert marked["x"] == [pytest.approx(1.0), pytest.approx(2.0), None, pytest.approx(4.0), pytest.approx(4.5)]
+    assert marked["y"] == [1.0, 1.0, None, 0.0, 0.0]
 
 
 def test_a_flight_without_a_record_is_shown_as_such() -> None:
@@ -59,3 +98,9 @@ def test_the_table_reads_the_record_at_even_times() -> None:
         "feed-forward",
     ]
     assert list(card.table.rows[0]) == pytest.approx([0.0, 0.0073, 3.0, 0.0055, 0.63, 0.63], abs=1e-4)
+
+
+def test_throttle_that_is_never_at_a_limit_is_not_marked() -> None:
+    panel = ChannelPanel(title="Throttle (of full)", curves={"Throttle": THRUST}, limits=Range(0.0, 1.0))
+    card = FlightFigure(replace(RECORD, panels=(panel,))).compute()
+    assert "saturated" not in {one["meta"]["role"] for one in traces(card)}

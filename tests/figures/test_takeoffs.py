@@ -11,7 +11,8 @@ from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, la
 
 def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() -> None:
     card = TrajectoriesFigure(history(proposal=proposal(1))).compute()
-    assert [one["meta"]["role"] for one in traces(card)] == ["set point", "reference", "prediction", "live", "pointed"]
+    assert [one["meta"]["role"] for one in traces(card)] == [
+        "set point", "reference", "deviation", "prediction", "live", "pointed"]  # fmt: skip
     assert set(trace(card, "set point")["y"]) == {3.0}
     assert trace(card, "live")["x"] == []
 
@@ -92,6 +93,35 @@ def test_an_error_around_zero_is_shown_on_both_sides() -> None:
     card = TrajectoriesFigure(replace(history(first, second), set_point=zero, reference=None)).compute()
     low, high = layout(card)["yaxis"]["range"]
     assert (low, high) == (pytest.approx(-0.19, abs=0.03), pytest.approx(0.19, abs=0.03))
+
+
+def test_the_chart_opens_at_the_climb_with_the_deviation_below_and_knows_the_whole_flight() -> None:
+    card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 0.2, overshoot_m=0.5), proposal=proposal(3))).compute()
+    drawn = layout(card)
+    assert drawn["xaxis"]["range"] == [-0.3, 8.0]
+    assert drawn["meta"]["whole_s"] == [pytest.approx(-0.326), 32.6]
+    assert drawn["yaxis2"]["range"] == [pytest.approx(-0.6), pytest.approx(0.6)]
+    deviation = trace(card, "deviation", trial=2)
+    assert (deviation["yaxis"], deviation.get("xaxis", "x"), deviation["showlegend"]) == ("y2", "x", False)
+    expected = np.interp(deviation["x"], TIME_S, climb(0.5).values - 3.0)
+    np.testing.assert_allclose(deviation["y"], expected, atol=1e-4)
+    assert trace(card, "deviation", standing="prediction")["line"] == trace(card, "prediction")["line"]
+
+
+def test_an_error_around_zero_is_its_own_deviation() -> None:
+    zero = Curve(TIME_S, np.zeros_like(TIME_S))
+    card = TrajectoriesFigure(replace(history(flight(1, 0.3)), set_point=zero, reference=None)).compute()
+    assert "yaxis2" not in layout(card)
+    assert "deviation" not in {one["meta"]["role"] for one in traces(card)}
+
+
+def test_a_baseline_flown_last_does_not_outshout_the_best() -> None:
+    again = replace(flight(3, 0.3), gains=flight(1, 0.3).gains)
+    card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 0.1), again)).compute()
+    baseline, best = trace(card, "flight", trial=3), trace(card, "flight", trial=2)
+    assert (baseline["meta"]["standing"], baseline["name"]) == ("baseline", "Flight 3 · latest, baseline")
+    assert baseline["line"]["width"] < best["line"]["width"]
+    assert baseline["line"]["color"] == trace(card, "flight", trial=1)["line"]["color"]
 
 
 def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others() -> None:

@@ -30,7 +30,7 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains
 from app.core.policy import Gains
 from app.core.records.glitches import find_glitches, repaired
-from app.core.records.metrics import overshoot
+from app.core.records.step_response import StepResponse, step_response
 from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.stop_rules import landing_battery_v
 from app.db import trajectories
@@ -95,7 +95,7 @@ class Score:
 
     error: float | None
     refusal: str
-    overshoot: float | None
+    response: StepResponse | None
     curve: list[list[float]]
 
 
@@ -110,7 +110,9 @@ def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool =
     return Score(
         error=error,
         refusal=refusal,
-        overshoot=None if flown is None else overshoot(trajectory.time_s, flown, experiment.set_point),
+        response=None
+        if flown is None
+        else step_response(trajectory.time_s, flown, experiment.set_point, float(experiment.grid_s[-1])),
         curve=_curve(experiment, trajectory),
     )
 
@@ -154,7 +156,10 @@ def capture(
     row.repaired_error = (
         score(experiment, repaired(experiment, recorded, glitches), accept_gaps=True).error if glitches else None
     )
-    row.overshoot_m, row.curve = judged.overshoot, judged.curve
+    keep_response(row, judged.response)
+    if ending == "aborted":
+        row.settling_time_s = row.steady_state_error_m = None
+    row.curve = judged.curve
     row.landing_battery_v = landing_battery_v(recorded)
     row.ending = ending
     if ending == "aborted":
@@ -169,6 +174,14 @@ def capture(
     row.error = judged.error  # shown before a person classifies the flight, which scores it again
     if fleet.is_classed_automatically(campaign.vehicle):
         _classify(row, reason or "the measurement is invalid" if ending == "invalid" else judged.refusal)
+
+
+def keep_response(row: TrialRow, response: StepResponse | None) -> None:
+    """Store a flight's step response with its trial."""
+    if response is None:
+        return
+    row.rise_time_s, row.settling_time_s = response.rise_time_s, response.settling_time_s
+    row.overshoot_m, row.steady_state_error_m = response.overshoot, response.steady_state_error
 
 
 def _classify(row: TrialRow, refusal: str) -> None:

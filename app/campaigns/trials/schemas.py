@@ -181,6 +181,14 @@ class Trial(BaseModel):
     group: Annotated[GroupBrief | None, Field(description="all valid flights of the same gains; null before the first")]
     comparisons: list[TrialComparison]
     overshoot_m: float | None
+    rise_time_s: Annotated[float | None, Field(description="from 10 to 90 % of the set point; null if never reached")]
+    settling_time_s: Annotated[
+        float | None,
+        Field(description="from the command until the output stays within ±5 % of the set point; null if it does not"),
+    ]
+    steady_state_error_m: Annotated[
+        float | None, Field(description="mean of output − set point over the last 5 s of the window")
+    ]
     verdict: Annotated[
         str, Field(description="comparison of the flight with the best before it and with its prediction")
     ]

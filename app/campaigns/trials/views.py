@@ -24,6 +24,7 @@ from app.core.formatting import percent
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
+from app.core.tuning.predictions import is_informative
 from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.fleet import service as fleet
 
@@ -142,7 +143,7 @@ def _view(
     flight: FlightRow | None,
     rehearsed: bool,
 ) -> Trial:
-    interval = None if row.predicted_interval is None else Interval.model_validate(row.predicted_interval)
+    predicted_error, interval = _prediction(row, field)
     return Trial(
         id=row.id,
         version=row.version,
@@ -154,12 +155,15 @@ def _view(
         read_back=row.read_back,
         proposal_id=row.proposal_id,
         error=row.error,
-        predicted_error=row.predicted_error,
+        predicted_error=predicted_error,
         predicted_interval=interval,
         inside_interval=_is_inside(interval, row),
         group=_group(row, field),
         comparisons=comparisons(row, field),
         overshoot_m=row.overshoot_m,
+        rise_time_s=row.rise_time_s,
+        settling_time_s=row.settling_time_s,
+        steady_state_error_m=row.steady_state_error_m,
         verdict=verdict(row, field, get_experiment(campaign.experiment).error_unit, _flown_before(row, field)),
         reason=row.reason,
         abort_cause=row.abort_cause,
@@ -177,6 +181,15 @@ def _view(
         flown_at=row.flown_at,
         actions=_actions(campaign, row, flight, rehearsed),
     )
+
+
+def _prediction(row: TrialRow, field: ReferenceFlights) -> tuple[float | None, Interval | None]:
+    """The predicted error and its interval; both None if they said nothing."""
+    interval = None if row.predicted_interval is None else Interval.model_validate(row.predicted_interval)
+    lower = None if interval is None else interval.lower
+    if not is_informative(lower, corrected=field.best_before(row.number) is not None):
+        return None, None
+    return row.predicted_error, interval
 
 
 def _is_inside(interval: Interval | None, row: TrialRow) -> bool | None:
@@ -210,7 +223,7 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
         case TrialState.VALID if row.error is not None:
             compared = _compared(row.error, field.best_before(row.number), unit)
             outcome = f" {_once_more(again)}" if again else f": {compared}"
-            return f"{row.error:.3f} {unit}{outcome}{_against_prediction(row, unit)}."
+            return f"{row.error:.3f} {unit}{outcome}{_against_prediction(row, field, unit)}."
         case TrialState.ABORTED:
             return f"Aborted: {row.reason}"
         case TrialState.INVALID:
@@ -248,8 +261,9 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
     return f"{abs(gain):.3f} {unit}{share} {relation} {than}"
 
 
-def _against_prediction(row: TrialRow, unit: str) -> str:
-    return "" if row.predicted_error is None else f"; {row.predicted_error:.3f} {unit} was predicted"
+def _against_prediction(row: TrialRow, field: ReferenceFlights, unit: str) -> str:
+    predicted_error, _ = _prediction(row, field)
+    return "" if predicted_error is None else f"; {predicted_error:.3f} {unit} was predicted"
 
 
 def _record(trial: TrialRow) -> RecordBrief | None:

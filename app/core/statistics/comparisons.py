@@ -38,11 +38,18 @@ class PooledScatter:
     """Flight-to-flight scatter: a standard deviation in the error's unit, and its degrees of freedom.
 
     A scatter that is not `known` is an order of magnitude: it may be used to rank policies, but is never reported.
+    Neither is one whose repeats were all `identical`, as those of a simulation without scatter are: it is the prior's.
     """
 
     sigma: float
     degrees_of_freedom: float
     known: bool = True
+    identical: bool = False
+
+    @property
+    def reported(self) -> float | None:
+        """The standard deviation of one flight; None if it is not known or there is none."""
+        return self.sigma if self.known and not self.identical else None
 
     def half_width(self, variance: float, confidence: float) -> float:
         """Half width of the two-sided interval of a quantity with variance `variance`·σ²."""
@@ -65,7 +72,7 @@ class Group:
 
     @cached_property
     def mean(self) -> float:
-        return self.errors[0] if self.size == 1 else float(np.mean(self.errors))
+        return self.errors[0] if len(set(self.errors)) == 1 else float(np.mean(self.errors))
 
     @property
     def squares(self) -> float:
@@ -78,8 +85,8 @@ class Group:
         return scatter.sigma / sqrt(self.size)
 
     def known_error(self, scatter: PooledScatter) -> float | None:
-        """The standard error; None while the scatter is not known."""
-        return self.standard_error(scatter) if scatter.known else None
+        """The standard error; None while the scatter is not known, and if there is none."""
+        return None if scatter.reported is None else self.standard_error(scatter)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,7 +169,8 @@ def pool_scatter(groups: Sequence[Group], prior: Scatter) -> PooledScatter:
     worth = prior.degrees_of_freedom if prior.measured else 0.0
     freedom = worth + repeats
     squares = worth * prior.sd**2 + sum(group.squares for group in groups)
-    return PooledScatter(sigma=float(np.sqrt(squares / freedom)), degrees_of_freedom=freedom)
+    identical = repeats > 0 and all(group.squares == 0.0 for group in groups)
+    return PooledScatter(sigma=float(np.sqrt(squares / freedom)), degrees_of_freedom=freedom, identical=identical)
 
 
 def select_winner(groups: Sequence[Group], scatter: PooledScatter) -> Group:

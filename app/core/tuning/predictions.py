@@ -61,12 +61,21 @@ class TrackRecord:
         return self.inside / self.of if self.of else None
 
 
+def is_informative(lower: float | None, *, corrected: bool) -> bool:
+    """Whether a prediction with an interval from `lower` on says anything.
+
+    Before the first valid flight the model is not `corrected`. An interval that then reaches down to zero (0 … 2.2 m)
+    allows any flight, and is no prediction.
+    """
+    return corrected or lower is None or lower > 0.0
+
+
 def track_record(flights: Sequence[Flight]) -> TrackRecord:
     """Compute the track record of the predictions that the flights carry.
 
     The direction counts where new gains were predicted to change the best error before them; repeated gains predict no
-    change. The predictions are not trustworthy once at least three flights went in the other direction, and more than
-    went in the predicted one.
+    change. A prediction that is not informative is not counted. The predictions are not trustworthy once at least
+    three flights went in the other direction, and more than went in the predicted one.
     """
     inside = of = agreeing = disagreeing = 0
     best: float | None = None
@@ -75,7 +84,12 @@ def track_record(flights: Sequence[Flight]) -> TrackRecord:
         if flight.outcome != "valid" or flight.error is None:
             continue
         prediction, gains = flight.predicted, frozenset(flight.gains.items())
-        if prediction is not None and prediction.lower is not None and prediction.upper is not None:
+        if (
+            prediction is not None
+            and prediction.lower is not None
+            and prediction.upper is not None
+            and is_informative(prediction.lower, corrected=best is not None)
+        ):
             of += 1
             inside += prediction.lower <= flight.error <= prediction.upper
         if prediction is not None and best is not None and gains not in seen:

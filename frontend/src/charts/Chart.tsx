@@ -26,6 +26,8 @@ interface Props {
   onChoose?: ((trial: number) => void) | undefined;
   /** Called with the zoomed time range; null for the whole range. */
   onWindow?: ((window: TimeRange | null) => void) | undefined;
+  /** Called on a double click, which also undoes the zoom. */
+  onReset?: (() => void) | undefined;
   curveOf?: CurveOf | undefined;
   /** Build of the chart library; constant for the lifetime of the chart. */
   build?: Build | undefined;
@@ -46,7 +48,7 @@ function wholeOf({ layout }: PlotlyFigure): TimeRange | null {
   return xaxis?.range ?? null;
 }
 
-export function Chart({ figure, label, height, liveTrial = null, onChoose, onWindow, curveOf, build }: Props) {
+export function Chart({ figure, label, height, liveTrial = null, onChoose, onWindow, onReset, curveOf, build }: Props) {
   const element = useRef<HTMLDivElement & PlotlyElement>(null);
   const [plotly, setPlotly] = useState<Plotly | null>(null); // once it has drawn
   const [broken, setBroken] = useState<string | null>(null);
@@ -67,7 +69,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
           layoutFor(figure, target.clientWidth),
           CONFIG,
         );
-        listen(target, figure.data, { whole: wholeOf(figure), onChoose, onWindow });
+        listen(target, figure.data, { whole: wholeOf(figure), onChoose, onWindow, onReset });
         setPlotly(library);
         setBroken(null);
       } catch (error) {
@@ -77,7 +79,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
     return () => {
       wanted = false;
     };
-  }, [figure, liveTrial, onChoose, onWindow, build]);
+  }, [figure, liveTrial, onChoose, onWindow, onReset, build]);
 
   useEffect(() => {
     const target = element.current;

@@ -26,6 +26,7 @@ interface Props {
   liveTrial?: number | null;
   onChoose?: (trial: number) => void;
   onWindow?: (window: TimeRange | null) => void;
+  onReset?: () => void;
   curveOf?: CurveOf;
   build?: Build;
   tools?: ReactNode;
@@ -47,6 +48,7 @@ export function FigurePanel({
   liveTrial,
   onChoose,
   onWindow,
+  onReset,
   curveOf,
   build,
   tools,
@@ -100,6 +102,7 @@ export function FigurePanel({
           liveTrial={liveTrial ?? null}
           onChoose={onChoose}
           onWindow={onWindow}
+          onReset={onReset}
           curveOf={curveOf}
           build={build}
         />

@@ -53,7 +53,7 @@ interface Point {
 export interface PlotlyElement extends HTMLElement {
   layout?: { yaxis?: { range?: [number, number] } };
   on?(event: "plotly_click" | "plotly_hover", listener: (event: { points: Point[] }) => void): void;
-  on?(event: "plotly_unhover", listener: () => void): void;
+  on?(event: "plotly_unhover" | "plotly_doubleclick", listener: () => void): void;
   on?(event: "plotly_relayout", listener: (event: Record<string, unknown>) => void): void;
   removeAllListeners?(event: string): void;
 }
@@ -66,13 +66,20 @@ export interface Listeners {
   whole: TimeRange | null;
   onChoose?: ((flight: number) => void) | undefined;
   onWindow?: ((window: TimeRange | null) => void) | undefined;
+  /** Called on a double click, which also undoes the zoom. */
+  onReset?: (() => void) | undefined;
 }
 
 const SETTLED_MS = 250;
 
 /** Report hovered and clicked flights, and the time range after a zoom has settled. */
-export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, onChoose, onWindow }: Listeners): void {
-  for (const event of ["click", "hover", "unhover", "relayout"]) chart.removeAllListeners?.(`plotly_${event}`);
+export function listen(
+  chart: PlotlyElement,
+  traces: readonly Trace[],
+  { whole, onChoose, onWindow, onReset }: Listeners,
+): void {
+  for (const event of ["click", "hover", "unhover", "doubleclick", "relayout"])
+    chart.removeAllListeners?.(`plotly_${event}`);
   const flightOf = ([point]: Point[]) => (point ? flightAt(traces, point.curveNumber, point.x) : null);
   chart.on?.("plotly_click", ({ points }) => {
     const flight = flightOf(points);
@@ -80,6 +87,7 @@ export function listen(chart: PlotlyElement, traces: readonly Trace[], { whole, 
   });
   chart.on?.("plotly_hover", ({ points }) => chart.matches(":hover") && pointAt(flightOf(points)));
   chart.on?.("plotly_unhover", () => chart.matches(":hover") && pointAt(null));
+  chart.on?.("plotly_doubleclick", () => onReset?.());
   chart.onmouseleave = () => pointAt(null);
   let settling: ReturnType<typeof setTimeout> | undefined;
   chart.on?.("plotly_relayout", (event) => {
@@ -117,11 +125,12 @@ export function followPointing(
     wanted = flight;
     clearTimeout(dwelling);
     for (const group of chart.querySelectorAll("[data-pointed]")) group.removeAttribute("data-pointed");
-    const group = flight === null ? null : chart.querySelector(`.scatterlayer .traceflight-${flight}`);
-    group?.setAttribute("data-pointed", "");
-    chart.toggleAttribute("data-pointing", group !== null);
-    if (spare >= 0 && (lent || (flight !== null && group === null))) {
-      dwelling = setTimeout(() => void lend(group === null ? flight : null), DWELL_MS);
+    const curves = chart.querySelectorAll(`:is(.traceflight-${flight}, .tracedeviation-${flight})`);
+    for (const one of curves) one.setAttribute("data-pointed", "");
+    const drawn = curves.length > 0;
+    chart.toggleAttribute("data-pointing", drawn);
+    if (spare >= 0 && (lent || (flight !== null && !drawn))) {
+      dwelling = setTimeout(() => void lend(drawn ? null : flight), DWELL_MS);
     }
     if (!chart.matches(":hover")) label(flight === null ? [] : marksOver(traces, flight));
   });

@@ -58,6 +58,8 @@ export function withPrediction(traces: readonly Trace[], prediction: DrawnPredic
 }
 
 const FADED = 0.22;
+/** Roles of a flight's own curves. */
+const CURVES = new Set(["flight", "deviation"]);
 
 /** Highlight the selected flight and fade the others; set point, prediction and live curve are unchanged. */
 export function withChosen(traces: readonly Trace[], trial: number | null): Trace[] {
@@ -65,9 +67,9 @@ export function withChosen(traces: readonly Trace[], trial: number | null): Trac
     return [...traces];
   }
   return traces.map((trace) => {
-    if (trace.meta?.role !== "flight") return trace;
-    return trace.meta.trial === trial
-      ? { ...trace, line: { ...trace.line, width: 3.5 }, showlegend: true }
+    if (!CURVES.has(trace.meta?.role ?? "")) return trace;
+    return trace.meta?.trial === trial
+      ? { ...trace, line: { ...trace.line, width: 3.5 }, ...(trace.meta?.role === "flight" && { showlegend: true }) }
       : { ...trace, opacity: FADED };
   });
 }
@@ -79,7 +81,7 @@ const NUMBERED = new Set([...FLOWN, "off scale", "best", "predicted"]);
 /** The flight of a chart point, from Plotly's event; null for others. */
 export function flightAt(traces: readonly Trace[], curveNumber: number, x: unknown): number | null {
   const meta = traces[curveNumber]?.meta;
-  if (meta?.role === "flight" || meta?.role === "glitch") return meta.trial ?? null;
+  if (CURVES.has(meta?.role ?? "") || meta?.role === "glitch") return meta?.trial ?? null;
   if (meta?.role === undefined || !NUMBERED.has(meta.role)) return null;
   return meta.trial ?? (typeof x === "number" ? x : null);
 }
@@ -139,6 +141,12 @@ export function roomFor(range: readonly [number, number], values: readonly numbe
   const peak = values.reduce((highest, value) => Math.max(highest, value), Number.NEGATIVE_INFINITY);
   const [low, high] = range;
   return peak <= high ? [low, high] : [low, low + 1.1 * (peak - low)];
+}
+
+/** The time range of the whole flight, which the axis may not show at first. */
+export function wholeFlight({ layout }: PlotlyFigure): TimeRange | null {
+  const { meta } = layout as { meta?: { whole_s?: TimeRange } };
+  return meta?.whole_s ?? null;
 }
 
 /** The layout with its first x axis limited to `range`; unchanged for null. */

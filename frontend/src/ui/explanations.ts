@@ -121,6 +121,20 @@ export const EXPLANATIONS = explained({
     question: "What is the overshoot?",
     answer: ["The maximum height above the set point; 0 if the flight stayed below it."],
   },
+  riseTime: {
+    question: "What is the rise time?",
+    answer: ["The time from 10\u00a0% to 90\u00a0% of the set point."],
+  },
+  settlingTime: {
+    question: "What is the settling time?",
+    answer: [
+      "The time from the command until the altitude stays within ±5\u00a0% of the set point: 0.15 m for a takeoff to 3 m. A flight that is outside the band at the end did not settle.",
+    ],
+  },
+  steadyStateError: {
+    question: "What is the steady-state error?",
+    answer: ["The mean distance from the set point over the last 5 s; positive above it."],
+  },
   warmStart: {
     question: "What is a warm start?",
     answer: [

@@ -2,15 +2,21 @@ import { Button } from "@mantine/core";
 import type { InfiniteData, InfiniteQueryObserverResult } from "@tanstack/react-query";
 import { useState } from "react";
 
-/** The last rows of a long table, and a first row with a button that shows more. */
-export function useLastRows<T>(rows: readonly T[], columns: number, what: string, kept: (row: T) => boolean) {
+/** The last rows of a long table, and a row with a button that shows more. */
+export function useLastRows<T>(
+  rows: readonly T[],
+  columns: number,
+  what: string,
+  kept: (row: T) => boolean,
+  order: "earlier" | "further" = "earlier",
+) {
   const [count, setCount] = useState(ROWS);
   const hidden = Math.max(0, rows.length - count);
   const more = hidden > 0 && (
     <tr>
       <td colSpan={columns} style={{ textAlign: "left" }}>
         <Button variant="default" onClick={() => setCount(count + MORE_ROWS)}>
-          Show {Math.min(MORE_ROWS, hidden)} earlier {what} ({hidden} hidden)
+          Show {Math.min(MORE_ROWS, hidden)} {order} {what} ({hidden} hidden)
         </Button>
       </td>
     </tr>

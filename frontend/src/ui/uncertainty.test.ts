@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import { confidenceText, decimalsOf, intervalText, percent, plusMinus, rangeText, scatterSource } from "./uncertainty";
+import { confidenceText, decimalsOf, intervalText, percent, plusMinus, rangeText } from "./uncertainty";
 
 describe("a number with its uncertainty", () => {
   test.each([
@@ -35,10 +35,4 @@ test("an interval shows both ends, in the digits of an error, and its confidence
 test("a share is a percentage, and certainty is not claimed", () => {
   expect([percent(0.9), percent(0.995), percent(1)]).toEqual(["90\u00a0%", "99.5\u00a0%", "100\u00a0%"]);
   expect([confidenceText(0.93), confidenceText(0.9999)]).toEqual(["93\u00a0%", "more than 99\u00a0%"]);
-});
-
-test("where the scatter is known from, or what to do while it is not", () => {
-  expect(scatterSource(0, 4)).toBe("No repeats yet: prior estimate, 4 degrees of freedom.");
-  expect(scatterSource(1, 5)).toBe("From 1 repeat, 5 degrees of freedom.");
-  expect(scatterSource(0, null)).toContain("Fly a gain set again");
 });

@@ -1,7 +1,7 @@
 /** Numbers with their uncertainty, rounded to it: 0.105 ± 0.012 m, not 0.10537 ± 0.0123. */
 
 import type { Interval } from "../api/types";
-import { count, NOTHING, percentText, withUnit } from "./format";
+import { NOTHING, percentText, withUnit } from "./format";
 
 const MOST_DIGITS = 6;
 /** An uncertainty with a smaller leading digit keeps two digits: rounding 0.012 to 0.01 would lose too much. */
@@ -61,12 +61,4 @@ export function percent(share: number): string {
 /** A confidence as text; never 100 %. */
 export function confidenceText(confidence: number): string {
   return confidence > 0.995 ? `more than ${percent(0.99)}` : percent(confidence);
-}
-
-/** Source of the estimated scatter of one flight; `freedom`: its degrees of freedom, null if it is unknown. */
-export function scatterSource(repeats: number, freedom: number | null): string {
-  if (freedom === null)
-    return "Not measured for this autopilot, and no gain set has been flown twice. Fly a gain set again.";
-  const from = repeats === 0 ? "No repeats yet: prior estimate" : `From ${count(repeats, "repeat")}`;
-  return `${from}, ${Number(freedom.toFixed(1))} degrees of freedom.`;
 }

@@ -303,10 +303,11 @@ export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finishe
 /**
  * CampaignStatistics
  *
- * Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all
- * repeats and the experiment's prior; null while unknown, that is before the first repeat under an autopilot whose
- * scatter was never measured. `optimism` is how much the best is expected to look better than it is because it was
- * chosen, and `shrunk_error` its error corrected for that.
+ * Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all repeats and the
+ * experiment's prior; null while unknown, that is before the first repeat under an autopilot whose scatter was never
+ * measured, and zero if all repeats gave the same error. `scatter_source` says where it is from. `optimism` is how
+ * much the best is expected to look better than it is because it was chosen, and `shrunk_error` its error corrected
+ * for that.
  */
 export type CampaignStatistics = {
     /**
@@ -325,6 +326,10 @@ export type CampaignStatistics = {
      * Degrees Of Freedom
      */
     degrees_of_freedom: number;
+    /**
+     * Scatter Source
+     */
+    scatter_source: string;
     /**
      * Groups
      */
@@ -691,6 +696,22 @@ export type ComparedFlight = {
      * Scatter
      */
     scatter: number | null;
+    /**
+     * Rise Time S
+     */
+    rise_time_s: number | null;
+    /**
+     * Settling Time S
+     */
+    settling_time_s: number | null;
+    /**
+     * Overshoot M
+     */
+    overshoot_m: number | null;
+    /**
+     * Steady State Error M
+     */
+    steady_state_error_m: number | null;
     /**
      * Flown At
      */
@@ -3342,6 +3363,24 @@ export type Trial = {
      * Overshoot M
      */
     overshoot_m: number | null;
+    /**
+     * Rise Time S
+     *
+     * from 10 to 90 % of the set point; null if never reached
+     */
+    rise_time_s: number | null;
+    /**
+     * Settling Time S
+     *
+     * from the command until the output stays within ±5 % of the set point; null if it does not
+     */
+    settling_time_s: number | null;
+    /**
+     * Steady State Error M
+     *
+     * mean of output − set point over the last 5 s of the window
+     */
+    steady_state_error_m: number | null;
     /**
      * Verdict
      *

@@ -6,26 +6,28 @@ import { memo, useCallback, useDeferredValue, useEffect, useRef, useState } from
 import { type TimeRange, useCampaignFigure, useCurveOf, useLandscape } from "../../api/queries";
 import type { Campaign, FigureCard, GainsPrediction, Trial } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { type PlotlyFigure, withChosen, withPrediction, withTimeRange } from "../../charts/traces";
+import { type PlotlyFigure, wholeFlight, withChosen, withPrediction, withTimeRange } from "../../charts/traces";
 import classes from "./CampaignPage.module.css";
 import type { Preview } from "./useNextFlight";
 
 /** Height of the lower charts: enough for a panel of each gain. */
 const LOWER_PX = 300;
 const PANEL_PX = 84;
-const FIRST_SECONDS = [-0.3, 8] as const;
 /** For more flights the server draws an envelope, and one flight's curve on request. */
 const EACH_DRAWN = 30;
 
+/** The server's figure opens at the first 8 s. */
+type Span = "first" | "whole";
+
 function useDressed(
   chosen: number | null,
-  span: string,
+  span: Span,
   prediction: GainsPrediction | null,
 ): (figure: PlotlyFigure) => PlotlyFigure {
   return useCallback(
     (figure) => ({
       data: withPrediction(withChosen(figure.data, chosen), prediction),
-      layout: withTimeRange(figure.layout, span === "first" ? FIRST_SECONDS : null),
+      layout: withTimeRange(figure.layout, span === "whole" ? wholeFlight(figure) : null),
     }),
     [chosen, span, prediction],
   );
@@ -43,18 +45,23 @@ interface CurvesProps {
 /** The curves of all flights with the set point and the next prediction. */
 export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen, preview, onChoose }: CurvesProps) {
   const theme = useComputedColorScheme("light");
-  const [picked, setPicked] = useState("whole");
+  const [picked, setPicked] = useState<Span>("first");
   const span = useDeferredValue(picked);
   const [zoom, setZoom] = useState<TimeRange | null>(null);
+  const [whole, setWhole] = useState<TimeRange | null>(null);
   const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme, {
-    window: zoom ?? (span === "first" ? FIRST_SECONDS : null),
+    window: zoom ?? (span === "whole" ? whole : null),
     flight: campaign.trials.flown > EACH_DRAWN ? chosen : null,
   });
   const curveOf = useCurveOf(trials, campaign.definition.experiment ?? "takeoff");
-  const pick = (value: string): void => {
+  const figure = takeoffs.data?.figure as unknown as PlotlyFigure | null | undefined;
+  const known = figure ? wholeFlight(figure) : null;
+  if (known !== null && known.join() !== whole?.join()) setWhole(known);
+  const pick = useCallback((value: Span): void => {
     setPicked(value);
     setZoom(null);
-  };
+  }, []);
+  const showAll = useCallback(() => pick("whole"), [pick]);
   return (
     <FigurePanel
       title={takeoffs.data?.title ?? "Curves"}
@@ -67,6 +74,7 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
       liveTrial={campaign.flying?.trial_id ?? null}
       onChoose={onChoose}
       onWindow={setZoom}
+      onReset={showAll}
       curveOf={curveOf}
       tools={
         <SegmentedControl

@@ -1,4 +1,4 @@
-import { Box, SimpleGrid, Skeleton, Stack, useComputedColorScheme } from "@mantine/core";
+import { SimpleGrid, Skeleton, Stack, Tabs, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
@@ -116,9 +116,22 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt="var(--gap)">
         <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
       </SimpleGrid>
-      <Landscape campaignId={campaign.id} />
-      <Box mt="var(--gap)">{read !== null && <Statistics campaignId={campaign.id} />}</Box>
-      <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
+      <Tabs defaultValue="flights" mt="var(--gap)">
+        <Tabs.List>
+          <Tabs.Tab value="flights">Flights</Tabs.Tab>
+          <Tabs.Tab value="statistics">Statistics</Tabs.Tab>
+          <Tabs.Tab value="landscape">Error landscape</Tabs.Tab>
+        </Tabs.List>
+        <Tabs.Panel value="flights">
+          <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
+        </Tabs.Panel>
+        <Tabs.Panel value="statistics" pt="var(--gap)">
+          {read !== null && <Statistics campaignId={campaign.id} />}
+        </Tabs.Panel>
+        <Tabs.Panel value="landscape">
+          <Landscape campaignId={campaign.id} />
+        </Tabs.Panel>
+      </Tabs>
     </>
   );
 }

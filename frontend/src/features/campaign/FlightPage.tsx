@@ -1,11 +1,13 @@
 import { Anchor, Box, Skeleton, Title, useComputedColorScheme } from "@mantine/core";
 import { Link, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
+import type { FigureCard } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { grouped } from "../../ui/format";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
+import classes from "./CampaignPage.module.css";
 import { GateChecks } from "./GateChecks";
 import { VerdictPanel } from "./VerdictPanel";
 
@@ -14,6 +16,15 @@ export function FlightPage() {
   const [campaign, trial] = [Number(campaignId), Number(trialId)];
   if (!Number.isInteger(campaign) || !Number.isInteger(trial)) return <NotFoundPage />;
   return <FlightById campaignId={campaign} trialId={trial} />;
+}
+
+const ALTITUDE_PX = 330;
+const PANEL_PX = 125;
+
+/** Room for the altitude and for each panel below it. */
+function recordHeight(card: FigureCard | undefined): number {
+  const { meta } = (card?.figure?.["layout"] ?? {}) as { meta?: { panels?: number } };
+  return ALTITUDE_PX + PANEL_PX * ((meta?.panels ?? 4) - 1);
 }
 
 /** One flight: its curve and commands, then its verdict. */
@@ -37,7 +48,9 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
       <Title order={1} mb={12}>
         Flight {number}
       </Title>
-      <FigurePanel title="Record" card={figure.data} error={figure.error} height={480} />
+      <div className={classes["record"]}>
+        <FigurePanel title="Record" card={figure.data} error={figure.error} height={recordHeight(figure.data)} />
+      </div>
       <Box mt="var(--gap)">
         <VerdictPanel
           trial={trial.data}

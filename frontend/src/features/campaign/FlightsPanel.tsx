@@ -1,22 +1,21 @@
-import { Anchor, Skeleton } from "@mantine/core";
-import { IconStarFilled } from "@tabler/icons-react";
-import { memo, useEffect, useRef } from "react";
+import { Anchor, Button, Checkbox, Group, Skeleton } from "@mantine/core";
+import { useLocalStorage } from "@mantine/hooks";
+import { IconArrowDown, IconArrowUp, IconStarFilled } from "@tabler/icons-react";
+import { memo, useEffect, useMemo, useRef, useState } from "react";
 import { Link } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
 import { onPointed, pointAt } from "../../charts/pointing";
-import { StateBadge } from "../../ui/Badges";
-import { gainText, NOTHING, withUnit } from "../../ui/format";
+import { count } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { useLastRows } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
-import { trialStateLabel, wasFlown } from "../../ui/states";
-import { rangeText } from "../../ui/uncertainty";
+import { wasFlown } from "../../ui/states";
 import { useGainTitles } from "../../ui/units";
-import { FlightMarkers, PredictionResult } from "./FlightMarkers";
 import classes from "./FlightsPanel.module.css";
-import { sentenceOf } from "./verdict";
+import { type RunColumn, runColumns } from "./runColumns";
+import { nextOrder, type Order, sortedBy, toggledName } from "./runs";
 
 interface Props {
   campaign: Campaign;
@@ -27,30 +26,51 @@ interface Props {
   onChoose: (trialNumber: number) => void;
 }
 
-/** The table of all flights, with a link to compare them. */
+const NO_TITLES: Readonly<Record<string, string>> = {};
+
+/** The table of all flights: columns to choose, sorted by any of them, and rows to compare. */
 export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown, unit, onChoose }: Props) {
-  const compare = (
-    <Anchor component={Link} to={`/compare?campaign=${campaign.id}`} py={12}>
-      Compare flights
-    </Anchor>
-  );
+  const [selected, setSelected] = useState<readonly number[]>([]);
   return (
-    <Panel title="All flights" className={classes["panel"]} tools={trials?.length ? compare : null}>
+    <Panel
+      title="All flights"
+      className={classes["panel"]}
+      tools={trials?.length ? <CompareLink campaign={campaign.id} selected={selected} /> : null}
+    >
       {trials === null && <Skeleton height={320} radius="md" />}
       {trials?.length === 0 && <Note>No flights yet. Flights appear here with their gains and errors.</Note>}
       {trials !== null && trials.length > 0 && (
-        <TrialsTable campaign={campaign} trials={trials} shown={shown} unit={unit} onChoose={onChoose} />
+        <TrialsTable
+          campaign={campaign}
+          trials={trials}
+          shown={shown}
+          unit={unit}
+          onChoose={onChoose}
+          selected={selected}
+          onSelect={(trial) =>
+            setSelected(selected.includes(trial) ? selected.filter((one) => one !== trial) : [...selected, trial])
+          }
+        />
       )}
     </Panel>
   );
 });
 
-interface TrialsTableProps {
-  campaign: Campaign;
-  trials: readonly Trial[];
-  shown: number | null;
-  unit: string;
-  onChoose: (trialNumber: number) => void;
+/** The selected flights in the order in which they were selected: the first is the reference. */
+function CompareLink({ campaign, selected }: { campaign: number; selected: readonly number[] }) {
+  if (selected.length < 2) {
+    return (
+      <Anchor component={Link} to={`/compare?campaign=${campaign}`} py={12}>
+        Compare flights
+      </Anchor>
+    );
+  }
+  const query = new URLSearchParams(selected.map((trial) => ["trial", String(trial)]));
+  return (
+    <Button component={Link} to={`/compare?${query}`} variant="default">
+      Compare {count(selected.length, "selected flight")}
+    </Button>
+  );
 }
 
 function flightOf(target: EventTarget): number | null {
@@ -58,14 +78,38 @@ function flightOf(target: EventTarget): number | null {
   return row === null ? null : Number(row.dataset["flight"]);
 }
 
-/** The campaign's flights as in the paper's Table 1: gains, error, prediction, state and verdict. */
-function TrialsTable({ campaign, trials, shown, unit, onChoose }: TrialsTableProps) {
-  const names = Object.keys(trials[0]?.gains ?? {});
-  const titles = useGainTitles(campaign.definition.experiment ?? "");
+/** Columns that this browser shows other than by default: extra ones shown, others hidden. */
+function useChosenColumns(columns: readonly RunColumn[]) {
+  const [changed, setChanged] = useLocalStorage<string[]>({
+    key: "gainline-run-columns",
+    defaultValue: [],
+    getInitialValueInEffect: false,
+  });
+  const isShown = ({ id, extra = false }: RunColumn) => extra === changed.includes(id);
+  return { visible: columns.filter(isShown), isShown, toggle: (id: string) => setChanged(toggledName(changed, id)) };
+}
+
+interface TrialsTableProps extends Props {
+  trials: readonly Trial[];
+  selected: readonly number[];
+  onSelect: (trialId: number) => void;
+}
+
+function TrialsTable({ campaign, trials, shown, unit, onChoose, selected, onSelect }: TrialsTableProps) {
+  const titles = useGainTitles(campaign.definition.experiment ?? "") ?? NO_TITLES;
+  const columns = useMemo(() => runColumns(trials, titles, unit), [trials, titles, unit]);
+  const { visible, isShown, toggle } = useChosenColumns(columns);
+  const [order, setOrder] = useState<Order | null>(null);
+  const by = visible.find(({ id }) => id === order?.column);
+  const rows = useMemo(
+    () => (by && order ? [...sortedBy(trials, by.value, order.descending)].reverse() : trials),
+    [trials, by, order],
+  );
   const body = useRef<HTMLTableSectionElement>(null);
   const best = campaign.best?.trial_id;
   const isKept = ({ id, number }: Trial) => id === best || number === shown;
-  const { more, listed } = useLastRows(trials, names.length + 5, "flights", isKept);
+  const last = useLastRows(rows, visible.length + 2, "flights", isKept, by ? "further" : "earlier");
+  const listed = by ? [...last.listed].reverse() : last.listed;
   useEffect(
     () =>
       onPointed((flight) => {
@@ -75,87 +119,130 @@ function TrialsTable({ campaign, trials, shown, unit, onChoose }: TrialsTablePro
     [],
   );
   return (
-    <ScrollTable label="All flights" className={classes["table"]}>
-      <thead>
-        <tr>
-          <th scope="col">Flight</th>
-          {names.map((name) => (
-            <th key={name} scope="col">
-              {name} {titles[name] && <small>{titles[name]}</small>}
-            </th>
+    <>
+      <details className={classes["columns"]}>
+        <summary>Columns</summary>
+        <Group gap="4px 20px" py={8}>
+          {columns.map((column) => (
+            <Checkbox
+              key={column.id}
+              label={column.title}
+              checked={isShown(column)}
+              onChange={() => toggle(column.id)}
+            />
           ))}
-          <th scope="col">
-            Error <HelpTip topic="error" />
-          </th>
-          <th scope="col">
-            Predicted <HelpTip topic="interval" />
-          </th>
-          <th scope="col" className={classes["text"]}>
-            State
-          </th>
-          <th scope="col" className={classes["text"]}>
-            Verdict
-          </th>
-        </tr>
-      </thead>
-      <tbody
-        ref={body}
-        onPointerOver={({ target }) => pointAt(flightOf(target))}
-        onPointerLeave={() => pointAt(null)}
-        onFocus={({ target }) => pointAt(flightOf(target))}
-        onBlur={() => pointAt(null)}
-      >
-        {more}
-        {listed.map((trial) => {
-          const isBest = trial.id === best;
-          return (
-            <tr
+        </Group>
+      </details>
+      <ScrollTable label="All flights" className={classes["table"]}>
+        <thead>
+          <tr>
+            <th>
+              <span className="visually-hidden">Selected</span>
+            </th>
+            <th scope="col">Flight</th>
+            {visible.map((column) => (
+              <Heading key={column.id} column={column} order={order} onSort={setOrder} />
+            ))}
+          </tr>
+        </thead>
+        <tbody
+          ref={body}
+          onPointerOver={({ target }) => pointAt(flightOf(target))}
+          onPointerLeave={() => pointAt(null)}
+          onFocus={({ target }) => pointAt(flightOf(target))}
+          onBlur={() => pointAt(null)}
+        >
+          {!by && last.more}
+          {listed.map((trial) => (
+            <Run
               key={trial.id}
-              data-flight={trial.number}
-              data-best={isBest || undefined}
-              data-shown={trial.number === shown || undefined}
-            >
-              <th scope="row">
-                {wasFlown(trial.state) ? (
-                  <button
-                    type="button"
-                    aria-pressed={trial.number === shown}
-                    aria-label={`Flight ${trial.number}${isBest ? ", best" : ""}`}
-                    onClick={() => onChoose(trial.number)}
-                  >
-                    {trial.number}
-                    {isBest && <IconStarFilled size={15} aria-hidden />}
-                  </button>
-                ) : (
-                  <span>{trial.number}</span>
-                )}
-              </th>
-              {names.map((name) => (
-                <td key={name} title={String(trial.gains[name] ?? "")}>
-                  {gainText(trial.gains[name] ?? Number.NaN)}
-                </td>
-              ))}
-              <td className={classes["error"]}>{withUnit(trial.error, unit)}</td>
-              <td>
-                <span className={classes["predicted"]}>
-                  {withUnit(trial.predicted_error, unit)}
-                  <PredictionResult trial={trial} brief />
-                </span>
-                {trial.predicted_interval && (
-                  <small className={classes["range"]}>{rangeText(trial.predicted_interval, unit)}</small>
-                )}
-              </td>
-              <td className={classes["text"]}>
-                <span className={classes["state"]}>
-                  <StateBadge words={trialStateLabel(trial.state)} />
-                  <FlightMarkers trial={trial} />
-                </span>
-              </td>
-              <td className={`${classes["text"]} ${classes["verdict"]}`}>{sentenceOf(trial) || NOTHING}</td>
-            </tr>
-          );
-        })}
-      </tbody>
-    </ScrollTable>
+              trial={trial}
+              columns={visible}
+              isBest={trial.id === best}
+              isShown={trial.number === shown}
+              isSelected={selected.includes(trial.id)}
+              onChoose={onChoose}
+              onSelect={onSelect}
+            />
+          ))}
+          {by && last.more}
+        </tbody>
+      </ScrollTable>
+    </>
+  );
+}
+
+interface HeadingProps {
+  column: RunColumn;
+  order: Order | null;
+  onSort: (order: Order | null) => void;
+}
+
+function Heading({ column: { id, title, detail, topic, className }, order, onSort }: HeadingProps) {
+  const own = order?.column === id ? order : null;
+  const Icon = own?.descending ? IconArrowDown : IconArrowUp;
+  return (
+    <th
+      scope="col"
+      className={className}
+      aria-sort={own === null ? undefined : own.descending ? "descending" : "ascending"}
+    >
+      <button type="button" title={`Sort by ${title}`} onClick={() => onSort(nextOrder(order, id))}>
+        {title}
+        {own && <Icon size={15} aria-hidden />}
+      </button>{" "}
+      {topic && <HelpTip topic={topic} />}
+      {detail && <small>{detail}</small>}
+    </th>
+  );
+}
+
+interface RunProps {
+  trial: Trial;
+  columns: readonly RunColumn[];
+  isBest: boolean;
+  isShown: boolean;
+  isSelected: boolean;
+  onChoose: (trialNumber: number) => void;
+  onSelect: (trialId: number) => void;
+}
+
+function Run({ trial, columns, isBest, isShown, isSelected, onChoose, onSelect }: RunProps) {
+  const { id, number, state } = trial;
+  return (
+    <tr data-flight={number} data-best={isBest || undefined} data-shown={isShown || undefined}>
+      <td className={classes["pick"]}>
+        {wasFlown(state) && (
+          <label>
+            <input
+              type="checkbox"
+              aria-label={`Select flight ${number}`}
+              checked={isSelected}
+              onChange={() => onSelect(id)}
+            />
+          </label>
+        )}
+      </td>
+      <th scope="row">
+        {wasFlown(state) ? (
+          <button
+            type="button"
+            aria-pressed={isShown}
+            aria-label={`Flight ${number}${isBest ? ", best" : ""}`}
+            onClick={() => onChoose(number)}
+          >
+            {number}
+            {isBest && <IconStarFilled size={15} aria-hidden />}
+          </button>
+        ) : (
+          <span>{number}</span>
+        )}
+      </th>
+      {columns.map((column) => (
+        <td key={column.id} className={column.className}>
+          {column.cell(trial)}
+        </td>
+      ))}
+    </tr>
   );
 }

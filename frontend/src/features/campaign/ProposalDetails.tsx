@@ -22,7 +22,10 @@ interface PredictedErrorProps {
 export function PredictedError({ predicted, isCurrent, best, unit }: PredictedErrorProps) {
   const { predicted_error: error = null, interval = null } = predicted ?? {};
   const change = percentChange(error, best);
-  if (error === null && isCurrent) return <Note fz="body">No prediction: there is no model of these gains.</Note>;
+  if (error === null && isCurrent) {
+    const none = best === null ? "No prediction yet." : "No prediction: there is no model of these gains.";
+    return <Note fz="body">{none}</Note>;
+  }
   return (
     <div className={`${classes["predicted"]} numbers`} data-stale={!isCurrent || undefined} aria-busy={!isCurrent}>
       <span>

@@ -12,7 +12,7 @@ import { Panel } from "../../ui/Panel";
 import { useLastRows } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
 import table from "../../ui/ScrollTable.module.css";
-import { confidenceText, percent, plusMinus, scatterSource } from "../../ui/uncertainty";
+import { confidenceText, percent, plusMinus } from "../../ui/uncertainty";
 import classes from "./Statistics.module.css";
 import { VERDICTS } from "./verdict";
 
@@ -104,27 +104,27 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
 function Scatter({
   sigma,
   degrees_of_freedom: freedom,
+  scatter_source: source,
   groups,
   error_unit: unit,
   optimism,
   shrunk_error,
 }: CampaignStatistics) {
-  const repeats = groups.reduce((sum, group) => sum + group.errors.length - 1, 0);
   return (
     <Aside className={classes["fact"] ?? ""}>
       <h3>
         Scatter of one flight
         <HelpTip topic="scatter" />
       </h3>
-      {sigma === null ? (
-        <p className={classes["big"]}>Not known yet</p>
+      {!sigma ? (
+        <p className={classes["big"]}>{sigma === 0 ? "None" : "Not known yet"}</p>
       ) : (
         <p className={`${classes["big"]} numbers`}>
           {plusMinus(sigma, sigma / Math.sqrt(2 * freedom), unit)}
           <small>± standard error</small>
         </p>
       )}
-      <p>{scatterSource(repeats, sigma === null ? null : freedom)}</p>
+      <p>{source}</p>
       {sigma !== null && optimism > 0.1 * sigma && shrunk_error !== null && (
         <p className={`${classes["fine"]} numbers`}>
           Selection bias: the best of {groups.length} looks {plusMinus(optimism, null, unit)} better than it is. Likely

@@ -14,6 +14,7 @@ import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { trialStateLabel } from "../../ui/states";
+import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
 import { confidenceText, intervalText, plusMinus } from "../../ui/uncertainty";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
@@ -107,7 +108,9 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± scatter of one flight)</small> : null}
         </Fact>
         <Fact title="Predicted" topic="predicted">
-          {withUnit(trial.predicted_error, unit)}{" "}
+          {trial.predicted_error === null && bestBefore === null
+            ? "No prediction yet"
+            : withUnit(trial.predicted_error, unit)}{" "}
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <PredictionResult trial={trial} />
         </Fact>
@@ -121,11 +124,12 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
             {group.standard_error !== null && <small>(± standard error)</small>}
           </Fact>
         )}
-        {trial.overshoot_m !== null && (
-          <Fact title="Overshoot" topic="overshoot">
-            {withUnit(trial.overshoot_m, "m", 2)}
-          </Fact>
-        )}
+        {hasStepResponse(trial) &&
+          MEASURES.map((measure) => (
+            <Fact key={measure.name} title={measure.title} topic={measure.topic}>
+              {measureText(trial, measure)}
+            </Fact>
+          ))}
         <Fact title="Gains" wide>
           <span className={classes["gains"]}>
             <GainList gains={trial.gains} experiment={experiment} />

@@ -7,9 +7,11 @@ import type { FigureCard } from "../../api/types";
 import type { PlotlyFigure } from "../../charts/traces";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { count, gainText, NOTHING } from "../../ui/format";
+import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { trialStateLabel } from "../../ui/states";
+import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
 import { confidenceText, plusMinus } from "../../ui/uncertainty";
 import { VERDICTS } from "../campaign/verdict";
@@ -28,6 +30,7 @@ export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) 
   const { flights, gains, pairs, error_unit: unit } = comparison;
   const [first] = flights;
   if (first === undefined) return null;
+  const measures = flights.some(hasStepResponse) ? MEASURES : [];
   const several = flights.some(({ campaign_id }) => campaign_id !== first.campaign_id);
   return (
     <ScrollTable label="Flights compared" className={classes["table"]}>
@@ -36,6 +39,11 @@ export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) 
           <th scope="col">Flight</th>
           <th scope="col">Error</th>
           <th scope="col">Against {first.label}</th>
+          {measures.map(({ name, title, topic }) => (
+            <th key={name} scope="col">
+              {title} <HelpTip topic={topic} />
+            </th>
+          ))}
           {gains.map(({ title, unit: of }) => (
             <th key={`${title} ${of}`} scope="col">
               {title}
@@ -59,6 +67,9 @@ export function ComparisonTable({ comparison, pens, onFirst, onRemove }: Props) 
             <td>
               <Against pair={againstFirst(pairs, first.trial_id, flight.trial_id)} first={first.label} unit={unit} />
             </td>
+            {measures.map((measure) => (
+              <td key={measure.name}>{measureText(flight, measure)}</td>
+            ))}
             {gains.map((difference) => (
               <td key={`${difference.title} ${difference.unit}`}>
                 <Value difference={difference} index={index} />

@@ -1,0 +1,49 @@
+"""Events on the time line of a recorded takeoff: command, lift-off, abort, landing."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from app.core.records.trajectory import Trajectory
+
+AIRBORNE_M: Final = 0.1
+"""Altitude above which the vehicle has left the ground."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightEvent:
+    """What happened, at a time in seconds since the command."""
+
+    time_s: float
+    name: str
+
+
+def flight_events(trajectory: Trajectory) -> tuple[FlightEvent, ...]:
+    """The events that the record shows, in order.
+
+    Lift-off: the first sample above 0.1 m. Abort: the set point, where it was recorded, returns to the ground. Landing:
+    the first sample at or below 0.1 m after the last one above. Only the command, if there is no altitude.
+    """
+    time_s, channels = trajectory.time_s, trajectory.channels
+    found = [FlightEvent(0.0, "Command")]
+    if "altitude_m" not in channels or not len(time_s):
+        return tuple(found)
+    airborne = np.flatnonzero((time_s >= 0.0) & (channels["altitude_m"] > AIRBORNE_M))
+    if airborne.size:
+        found.append(FlightEvent(float(time_s[airborne[0]]), "Lift-off"))
+    if (abort := _abort(trajectory)) is not None:
+        found.append(FlightEvent(float(time_s[abort]), "Abort"))
+    if airborne.size and airborne[-1] < len(time_s) - 1:
+        found.append(FlightEvent(float(time_s[airborne[-1] + 1]), "Landing"))
+    return tuple(sorted(found, key=lambda event: event.time_s))
+
+
+def _abort(trajectory: Trajectory) -> int | None:
+    """Index of the first sample after the command whose set point is below half of the highest."""
+    set_point = trajectory.channels.get("set_point_m")
+    if set_point is None or not set_point.max() > 0.0:
+        return None
+    commanded = np.flatnonzero(set_point > 0.5 * set_point.max())
+    dropped = np.flatnonzero(set_point[commanded[0] :] <= 0.5 * set_point.max())
+    return int(commanded[0] + dropped[0]) if dropped.size else None

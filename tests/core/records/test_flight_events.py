@@ -1,0 +1,35 @@
+import numpy as np
+
+from app.core.records.flight_events import flight_events
+from app.core.records.trajectory import Samples, Trajectory
+
+TIME_S = np.arange(-1.0, 11.0)
+
+
+def events_of(**channels: Samples) -> list[tuple[float, str]]:
+    found = flight_events(Trajectory(TIME_S, channels, "jsbsim", "simulation"))
+    return [(event.time_s, event.name) for event in found]
+
+
+def test_a_completed_takeoff_has_its_command_and_its_lift_off() -> None:
+    altitude_m = np.clip(TIME_S - 1.0, 0.0, 3.0)
+    assert events_of(altitude_m=altitude_m, set_point_m=np.where(TIME_S >= 0, 3.0, 0.0)) == [
+        (0.0, "Command"),
+        (2.0, "Lift-off"),
+    ]
+
+
+def test_an_aborted_flight_shows_when_its_set_point_returned_to_the_ground_and_when_it_landed() -> None:
+    altitude_m = np.interp(TIME_S, [0, 3, 8], [0.0, 3.0, 0.0])
+    set_point_m = np.where((TIME_S >= 0) & (TIME_S < 4), 3.0, 0.0)
+    assert events_of(altitude_m=altitude_m, set_point_m=set_point_m) == [
+        (0.0, "Command"),
+        (1.0, "Lift-off"),
+        (4.0, "Abort"),
+        (8.0, "Landing"),
+    ]
+
+
+def test_a_vehicle_that_stays_on_the_ground_has_only_a_command() -> None:
+    assert events_of(altitude_m=np.zeros_like(TIME_S), set_point_m=np.zeros_like(TIME_S)) == [(0.0, "Command")]
+    assert events_of(pitch_rad=np.zeros_like(TIME_S)) == [(0.0, "Command")]
