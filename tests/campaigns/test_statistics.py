@@ -9,6 +9,7 @@ from app.core.policy import Gains
 from app.db.session import Database
 from app.vehicles.base import FlightRecord
 from tests.builders import (
+    Json,
     climb_error,
     create_campaign,
     create_flown_trial,
@@ -113,7 +114,7 @@ def test_a_flight_of_a_proposal_carries_its_interval_and_is_held_against_it(
     proposal = get(client, f"{path}/proposal")["proposal"]
     assert proposal["interval"]["lower"] < proposal["predicted_error"] < proposal["interval"]["upper"]
     create_trial(client, campaign["id"], proposal_id=proposal["id"], fly={"speed": None})
-    flown = land(database, lift_off(database), modelled(proposal["gains"]))
+    land(database, lift_off(database), modelled(proposal["gains"]))
     [_, flown] = get(client, f"{path}/trials")["items"]
     assert flown["predicted_interval"] == proposal["interval"]
     assert flown["inside_interval"]
@@ -146,6 +147,7 @@ def test_repeats_of_a_simulation_without_scatter_get_none(client: TestClient, da
     campaign = create_ready_campaign(client, database)
     path = f"/api/campaigns/{campaign['id']}"
     prior = "prior estimate of 0.0105 m"
+    found: Json = {}
     for flights in (1, 2, 3):
         create_trial(client, campaign["id"], gains=DEFAULT, fly={"speed": None})
         land(database, lift_off(database), modelled(DEFAULT))

@@ -4,6 +4,7 @@ import csv
 import re
 import struct
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 from xml.etree import ElementTree
@@ -241,14 +242,14 @@ def test_the_table_of_runs_sorts_hides_columns_and_compares_the_selected_flights
     table = dashboard.page.get_by_role("region", name="All flights")
     rows = table.locator("tbody tr[data-flight]")
 
-    def order() -> list[int]:
-        return [int(number) for number in rows.evaluate_all("all => all.map(one => one.dataset.flight)")]
+    def is_order(expected: list[int]) -> bool:
+        return [int(one) for one in rows.evaluate_all("all => all.map(one => one.dataset.flight)")] == expected
 
     by_error = [one["number"] for one in sorted(trials, key=lambda one: one["error"])]
     heading = table.get_by_role("columnheader", name="Error", exact=False).first
     for expected, sort in ((by_error, "ascending"), (by_error[::-1], "descending"), ([1, 2, 3], None)):
         heading.get_by_role("button", name="Error", exact=True).click()
-        dashboard.until(lambda expected=expected: order() == expected)
+        dashboard.until(partial(is_order, expected))
         assert heading.get_attribute("aria-sort") == sort
     dashboard.page.get_by_text("Columns", exact=True).click()
     dashboard.page.get_by_role("checkbox", name="Overshoot").uncheck()
