@@ -102,7 +102,7 @@ def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
     """Begun and ended on the page; its flights are written."""
     page = dashboard.page
     expect(dashboard.panel("Rehearse first")).to_contain_text("Not rehearsed yet")
-    expect(dashboard.button("Stage")).to_have_count(0)
+    expect(page.get_by_role("button", name=STAGE)).to_have_count(0)
     picture(dashboard, "rehearse")
     dashboard.button("Rehearse on a simulation").click()
     expect(page.get_by_text("This is a rehearsal")).to_be_visible()
@@ -111,15 +111,14 @@ def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
     states.rehearse(campaign_id)
     expect(page.get_by_text("Rehearsal passed")).to_be_visible()
     page.get_by_role("link", name=f"{NAME} on Number 1").click()
-    expect(dashboard.button("Stage")).to_be_visible()
+    expect(page.get_by_role("button", name=STAGE)).to_be_visible()
 
 
 # ---- at the vehicle
 
 
 def press(dashboard: Dashboard, label: re.Pattern[str]) -> None:
-    """The first button that is called so: the recommended one stands above the others."""
-    dashboard.page.get_by_role("button", name=label).first.click()
+    dashboard.page.get_by_role("button", name=label).click()
 
 
 def planned(dashboard: Dashboard, campaign_id: int, choose: Callable[[], None]) -> Json:
