@@ -59,7 +59,8 @@ def test_gains_that_the_gate_refused_spoil_it() -> None:
 def campaign(client: TestClient, database: Database) -> Json:
     """On a real vehicle that is connected; nothing rehearsed."""
     drone = create_connected(client, database, real=True)
-    return create_campaign_on(client, database, drone, rehearsed=False, definition={"strategy": "gradient"})
+    definition = {"strategy": "gradient", "stop": {"kind": "paper"}}
+    return create_campaign_on(client, database, drone, rehearsed=False, definition=definition)
 
 
 def rehearse(client: TestClient, campaign: Json) -> Json:
