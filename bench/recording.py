@@ -20,7 +20,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
@@ -29,14 +29,13 @@ from app.core.clock import ScaledClock
 from app.simdrone.body import new_body
 from app.simdrone.drone import Drone, Server
 from app.simdrone.registry import get_autopilot
-from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, Sample
+from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialResult
-from app.vehicles.mavlink.trial_reactions import Plan
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 
@@ -115,13 +114,9 @@ def be_vehicle(pipe: Connection, autopilot: str, address: UdpAddress) -> None:
 
 
 class LongRecord(MavlinkVehicle):
-    """The usual vehicle, except for the length of its record; `kept_ms` are the time stamps of its samples."""
+    """The usual vehicle; `kept_ms` are the time stamps of its samples."""
 
-    record_s = DEFAULT_S
     kept_ms: tuple[int, ...] = ()
-
-    def _plan(self, ground: Ground) -> Plan:
-        return replace(super()._plan(ground), record_s=self.record_s)
 
     def _record(self, flown: TrialResult, ground: Ground) -> FlightRecord:
         self.kept_ms = tuple(round(kept.position.time_boot_s * 1000.0) for kept in flown.samples)
@@ -166,9 +161,9 @@ def fly(autopilot: str, options: dict[str, OptionValue], meter: Meter) -> tuple[
     """Fly a whole trial and return its record, with the count of each time stamp in it."""
     vehicle = LongRecord(options, GAINS[autopilot], is_real=False)
     try:
-        vehicle.record_s = meter.until_s
         vehicle.stage(GAINS[autopilot])
-        record = vehicle.fly(FlightOptions(seed=1), on_sample=meter.see, should_stop=lambda: None)
+        order = FlightOptions(seed=1, window_s=meter.until_s - RECORDED_BEYOND_S)
+        record = vehicle.fly(order, on_sample=meter.see, should_stop=lambda: None)
     finally:
         vehicle.close()
     if len(vehicle.kept_ms) != len(record.trajectory.time_s):

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.vehicles.base import FlightOptions, OptionValue, Vehicle, VehicleError
+from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, OptionValue, Vehicle, VehicleError
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.trial_machine import Plan
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.registry import open_vehicle
 from tests.vehicles.flying import never, unwatched
@@ -20,14 +19,14 @@ from tests.vehicles.peers.mavsdk_vehicle import GAINS as SAFE
 
 TUNED = {"MPC_Z_P": 1.25, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.05, "MPC_Z_VEL_I_ACC": 1.7}
 RECORD_S = 6.0
-ORDER = FlightOptions(seed=1)
+ORDER = FlightOptions(seed=1, window_s=RECORD_S - RECORDED_BEYOND_S)
+"""The record is shorter, because time is real."""
 
 
 @pytest.fixture(autouse=True)
 def generic_autopilot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All that differs from PX4 is the make in the heartbeat; and the record is shorter, because time is real."""
+    """All that differs from PX4 is the make in the heartbeat."""
     monkeypatch.setattr(type(PROFILES["px4"]), "autopilot", MAKE)
-    monkeypatch.setattr("app.vehicles.mavlink.vehicle.Plan", partial(Plan, record_s=RECORD_S))
 
 
 def options_at(port: int) -> dict[str, OptionValue]:
