@@ -116,13 +116,13 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt="var(--gap)">
         <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
       </SimpleGrid>
-      <Tabs defaultValue="flights" mt="var(--gap)">
+      <Tabs defaultValue="flights" mt="var(--gap)" keepMounted={false}>
         <Tabs.List>
           <Tabs.Tab value="flights">Flights</Tabs.Tab>
           <Tabs.Tab value="statistics">Statistics</Tabs.Tab>
           <Tabs.Tab value="landscape">Error landscape</Tabs.Tab>
         </Tabs.List>
-        <Tabs.Panel value="flights">
+        <Tabs.Panel value="flights" keepMounted>
           <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
         </Tabs.Panel>
         <Tabs.Panel value="statistics" pt="var(--gap)">
