@@ -46,8 +46,8 @@ function useEvaluated<Result>(
 }
 
 const KEPT_MS = 60_000;
-/** The gate takes longer than a prediction, and is asked once the gains are at rest. */
-const AT_REST_MS = 80;
+/** The gate takes longer than a prediction, which is drawn first. */
+const AT_REST_MS = 150;
 
 export interface Evaluation {
   prediction: Evaluated<GainsPrediction>;
