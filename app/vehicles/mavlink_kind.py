@@ -65,13 +65,11 @@ def _vehicle(
 ) -> "MavlinkVehicle":
     """Open the vehicle. It counts as REAL unless it is on this computer: other simulation hosts are not known here.
 
-    Options that did not exist when the vehicle was registered have their defaults. The modules that talk to a vehicle
-    are imported here, so that only the process that opens one loads them.
+    The modules that talk to a vehicle are imported here, so that only the process that opens one loads them.
     """
     from app.vehicles.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415
     from app.vehicles.mocap.opening import open_source  # noqa: PLC0415
 
-    options = {each.name: each.default for each in MAVLINK.options} | dict(options)
     clock = ScaledClock(float(options["clock_speed"]))
     place = str(options["second_source"])
     source = open_source(place, clock) if place else None
