@@ -173,8 +173,8 @@ FOUND: Final = [
     (case(PlannedFault("abort", State.SET_GAINS, 2.0)), "aborted", "safe"),
     # a restart while the gains were staged: the trial flew on the autopilot's own; Paparazzi forgets what was set
     (case(PlannedFault("reboot", State.SET_GAINS, 3.0), staged_s=8.0), "refused", "safe"),
-    # and PX4 keeps it
-    (case(PlannedFault("reboot", State.SET_GAINS, 3.0), autopilot="px4", staged_s=8.0), "completed", "safe"),
+    # PX4 keeps it, but is no longer staged either
+    (case(PlannedFault("reboot", State.SET_GAINS, 3.0), autopilot="px4", staged_s=8.0), "refused", "safe"),
     # seed 20261388: a lift-off that could not be seen, for the link was lost, passed for none
     (case(PlannedFault("link-lost", State.TAKEOFF, 0.53, 1.34)), "invalid", "safe"),
     # seed 20262209: gains that overshoot to the flight plan's own ceiling passed for a landing of its own

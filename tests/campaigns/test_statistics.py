@@ -210,7 +210,7 @@ def test_a_variant_is_what_the_advice_means_where_the_best_gains_are_outside_the
 def test_exactly_one_of_proposal_gains_and_variant_is_taken(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     path = f"/api/campaigns/{campaign['id']}/trials"
-    for body in ({}, {"variant": "repeat", "gains": DEFAULT}):
+    for body in ({}, {"variant": "repeat", "proposal_id": 1}, {"gains": DEFAULT, "proposal_id": 1}):
         answer = client.post(path, json=body)
         assert "exactly one of them is required" in problems_of(answer)["proposal_id"]
 
