@@ -10,6 +10,7 @@ from tests.e2e.dashboard import Dashboard, Json
 
 FLIGHTS = 1000
 SAMPLES = 4000
+WHOLE_FLIGHT_S = pytest.approx([-0.326, 32.6], abs=0.01)
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +168,7 @@ def test_the_chart_opens_at_the_first_8_s_and_shows_the_whole_flight_on_request(
     np.testing.assert_allclose(deviation["y"], np.interp(deviation["x"], time_s, altitude_m - 3.0), atol=5e-3)
     spans = page_of_many.page.get_by_role("radiogroup", name="Time shown")
     spans.get_by_text("Whole flight").click()
-    page_of_many.until(lambda: seconds() == [pytest.approx(-0.326), 32.6])
+    page_of_many.until(lambda: seconds() == WHOLE_FLIGHT_S)
     spans.get_by_text("First 8 s").click()
     page_of_many.until(lambda: seconds() == [-0.3, 8])
 
@@ -196,6 +197,7 @@ def test_a_zoom_shows_more_of_each_record_and_a_double_click_the_whole_flight(pa
     assert inside.sum() == pytest.approx(min(500, recorded.sum()), abs=3)
     np.testing.assert_allclose(y[inside], np.interp(x[inside], time_s, altitude_m), atol=2e-3)
     page_of_many.page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
-    whole = [pytest.approx(-0.326), 32.6]
-    page_of_many.until(lambda: page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range") == whole)
+    page_of_many.until(
+        lambda: page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range") == WHOLE_FLIGHT_S
+    )
     page_of_many.until(lambda: len(drawn()["x"]) == 500)
