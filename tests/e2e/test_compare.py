@@ -242,14 +242,15 @@ def test_the_table_of_runs_sorts_hides_columns_and_compares_the_selected_flights
     table = dashboard.page.get_by_role("region", name="All flights")
     rows = table.locator("tbody tr[data-flight]")
 
-    def is_order(expected: list[int]) -> bool:
-        return [int(one) for one in rows.evaluate_all("all => all.map(one => one.dataset.flight)")] == expected
+    def is_ordered(expected: list[int]) -> bool:
+        shown = rows.evaluate_all("all => all.map(one => one.dataset.flight)")
+        return [int(number) for number in shown] == expected
 
     by_error = [one["number"] for one in sorted(trials, key=lambda one: one["error"])]
     heading = table.get_by_role("columnheader", name="Error", exact=False).first
     for expected, sort in ((by_error, "ascending"), (by_error[::-1], "descending"), ([1, 2, 3], None)):
         heading.get_by_role("button", name="Error", exact=True).click()
-        dashboard.until(partial(is_order, expected))
+        dashboard.until(partial(is_ordered, expected))
         assert heading.get_attribute("aria-sort") == sort
     dashboard.page.get_by_text("Columns", exact=True).click()
     dashboard.page.get_by_role("checkbox", name="Overshoot").uncheck()
