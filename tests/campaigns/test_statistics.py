@@ -151,7 +151,8 @@ def test_repeats_of_a_simulation_without_scatter_get_none(client: TestClient, da
     def fly() -> Json:
         create_trial(client, campaign["id"], gains=DEFAULT, fly={"speed": None})
         land(database, lift_off(database), modelled(DEFAULT))
-        return get(client, f"{path}/statistics")
+        statistics: Json = get(client, f"{path}/statistics")
+        return statistics
 
     found = fly()
     assert found["sigma"] == pytest.approx(0.0105)

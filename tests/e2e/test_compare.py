@@ -115,16 +115,18 @@ def test_the_verdict_and_what_differs_are_the_apis(dashboard: Dashboard, flown: 
     for note in found["notes"]:
         expect(verdict).to_contain_text(note)
     for index, flight in enumerate(found["flights"]):
-        shown = row(page, index)
-        expect(shown).to_contain_text(f"{flight['label']}Flight {flight['number']}")
-        expect(shown).to_contain_text(printed(flight["group"]["mean"], flight["group"]["standard_error"]))
+        line = row(page, index)
+        expect(line).to_contain_text(f"{flight['label']}Flight {flight['number']}")
+        expect(line).to_contain_text(printed(flight["group"]["mean"], flight["group"]["standard_error"]))
     pair = next(one for one in found["pairs"] if (one["against_id"], one["trial_id"]) == (trials[0], trials[2]))
     assert pair["verdict"] in {"better", "worse"}, pair
     expect(row(page, 2)).to_contain_text(pair["verdict"].capitalize())
     expect(row(page, 2)).to_contain_text(printed(abs(pair["difference"]), pair["standard_error"]))
     expect(row(page, 1)).to_contain_text("Same gains")
     titles = page.get_by_role("region", name="Flights compared").locator("thead th").all_inner_texts()
-    assert [title.split(" (")[0].strip() for title in titles][3:-1] == [one["title"] for one in found["gains"]]
+    step_response = ["Rise time", "Settling time", "Overshoot", "Steady-state error"]
+    shown = [title.split(" (")[0].strip() for title in titles][3:-1]
+    assert shown == step_response + [one["title"] for one in found["gains"]]
     settings = page.get_by_role("region", name="Settings that differ").locator("tbody tr")
     for index, difference in enumerate(found["settings"]):
         expect(settings.nth(index)).to_contain_text(difference["title"])
