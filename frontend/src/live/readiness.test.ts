@@ -39,6 +39,10 @@ test.each([AWAY, UNANSWERED, STALLED])("in flight nothing is taken back, and the
   expect([found.steps, found.lost, found.losses.length]).toEqual([flying.steps, [], 1]);
 });
 
+test.each([AWAY, UNANSWERED, STALLED])("after the landing there is nothing to take back or to say", (page) => {
+  for (const answered of REACHED.slice(4)) expect(readinessNow(answered, page)).toBe(answered);
+});
+
 test("what the server has taken back stays so beside what the page takes back", () => {
   const silent: TrialReadiness = {
     steps: ["control"],

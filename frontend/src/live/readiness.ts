@@ -62,8 +62,14 @@ function pageLoss({ answerAgeS, isServerAway, stalledS }: PageState, isInFlight:
   };
 }
 
+/** Whether the flight is over: nothing is left to be ready for. */
+function isDown({ steps }: TrialReadiness): boolean {
+  return steps.includes("landed");
+}
+
 /** The server's answer, as far as the page may still rely on it. */
 export function readinessNow(answered: TrialReadiness, page: PageState): Readiness {
+  if (isDown(answered)) return answered;
   const isInFlight = answered.steps.includes("in flight");
   const loss = pageLoss(page, isInFlight);
   if (loss === null) return answered;
@@ -89,7 +95,7 @@ export function useReadiness(trialId: number, vehicleId: number | null): Readine
       clearStall();
       return { readiness, at: momentNow() };
     },
-    refetchInterval: ASK_MS,
+    refetchInterval: ({ state }) => (state.data !== undefined && isDown(state.data.readiness) ? false : ASK_MS),
     retry: false,
   });
   const now = useMoment();
