@@ -25,6 +25,7 @@ from app.fleet.views import (
     is_registered_one_by_one,
     needs_staging,
     options_of,
+    settings_of,
     vehicle_view,
 )
 from app.vehicles.registry import VEHICLE_KINDS, get_kind
@@ -130,6 +131,17 @@ def require_ready(session: Session, row: VehicleRow, action: str) -> None:
         raise ConflictError(f"{row.name} is not connected.", hint="Connect it on its page, then try again.")
     check_action(VEHICLE_ACTIONS, action, row.state, row.name)
     require_idle(session, row)
+
+
+def require_window_fits(row: VehicleRow, window_s: float) -> None:
+    """Raise ConflictError when the vehicle cannot fly for as long as the scored window needs."""
+    longest_s = get_kind(row.kind).longest_window_s(settings_of(row))
+    if window_s > longest_s:
+        raise ConflictError(
+            f"{row.name} flies for at most {longest_s:g} s of scored window, but the campaign's is {window_s:g} s: its "
+            "flight plan would land it before the end.",
+            hint="Raise the time limit of Takeoff in its flight plan, then plan_time_s; or choose a shorter window.",
+        )
 
 
 def require_idle(session: Session, row: VehicleRow) -> None:

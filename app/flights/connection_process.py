@@ -55,7 +55,7 @@ Staging = Literal["none", "staged", "silent", "lost"]
 """Of the flight that waits for its take-off: nothing staged, the staged gains read back, a silence since then, or the
 gains no longer on the vehicle."""
 _NOT_READY: Final[Mapping[Staging, str]] = {
-    "silent": "nothing is received from the vehicle",
+    "silent": "nothing was received from the vehicle for 2 s",
     "lost": "the staged gains are no longer on the vehicle",
 }
 
@@ -273,7 +273,8 @@ class VehicleProcess(FlightLoop):
         )
 
     def _unready(self, condition: Condition) -> UnreadyReason:
-        if self._staging == "silent" or self._is_silent(condition):
+        is_blind = self._staging == "staged" and not condition.position_hz
+        if self._staging == "silent" or is_blind or self._is_silent(condition):
             return "link silent"
         return "gains unknown" if self._staging == "lost" or not condition.held else ""
 

@@ -41,11 +41,12 @@ _BY_HAND: Final = "If it does not descend, use its own remote control."
 LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
     {
         "worker away": LossText(
-            what="The worker does not answer, so nothing can be commanded.",
-            way_on="It restarts by itself within seconds; start a separate one with `gainline worker`. Then stage the "
-            "flight again.",
+            what="The worker does not answer. Nothing can be commanded.",
+            way_on="Gainline restarts its own worker within seconds. Start a separate one with gainline worker. Then "
+            "stage the flight again.",
             what_in_flight="The worker does not answer.",
-            way_on_in_flight=f"The process that has the link lands the vehicle. {_BY_HAND}",
+            way_on_in_flight="If it has ended, the vehicle lands now; otherwise the flight goes on to its end. If in "
+            "doubt, use the vehicle's own remote control.",
         ),
         "not connected": LossText(
             what="The vehicle is not connected.",
@@ -60,7 +61,7 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "link silent": LossText(
-            what="Nothing has been received from the vehicle for 2 s.",
+            what="Nothing current has been received from the vehicle for 2 s.",
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
             what_in_flight="Nothing has been received from the vehicle for 2 s.",
             way_on_in_flight=f"Land is repeated until the vehicle confirms it. {_BY_HAND}",
@@ -87,7 +88,7 @@ _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
         TrialState.PLANNED: "control",
         TrialState.STAGED: "staged",
         TrialState.FLYING: "in flight",
-        TrialState.LOST: "in flight",
+        TrialState.LOST: "landed",
         TrialState.CAPTURED: "landed",
         TrialState.VALID: "reviewed",
         TrialState.ABORTED: "reviewed",
@@ -96,6 +97,12 @@ _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
     }
 )
 _IN_FLIGHT: Final = STEPS.index("in flight")
+_WITHOUT_LINK: Final = LossText(
+    what="The worker does not answer. Nothing can be flown.",
+    way_on="Gainline restarts its own worker within seconds. Start a separate one with gainline worker.",
+    what_in_flight="The worker does not answer.",
+    way_on_in_flight="If it has ended, the simulated flight is lost.",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,15 +153,18 @@ def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
     elif standing.trial is TrialState.STAGED and standing.take_off_requested:
         reached = "held"
     steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
+    if standing.trial is TrialState.LOST:  # whether it has landed is not known
+        return Readiness(steps=steps[:-1], lost=steps[-1:], losses=())
     if len(steps) > _IN_FLIGHT + 1 or not steps:
         return Readiness(steps=steps, lost=(), losses=())
     kinds = _losses(standing, report)
+    texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        return Readiness(steps=steps, lost=(), losses=_in_flight(kinds))
+        return Readiness(steps=steps, lost=(), losses=_in_flight(kinds, texts))
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
-    kept = min((_count(LOSSES[kind].keeps) for kind in kinds), default=len(steps))
-    losses = tuple(Loss(kind=kind, what=LOSSES[kind].what, way_on=LOSSES[kind].way_on) for kind in kinds)
+    kept = min((_count(texts[kind].keeps) for kind in kinds), default=len(steps))
+    losses = tuple(Loss(kind=kind, what=texts[kind].what, way_on=texts[kind].way_on) for kind in kinds)
     return Readiness(steps=steps[:kept], lost=steps[kept:], losses=losses)
 
 
@@ -191,12 +201,11 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     return status.unready or None
 
 
-def _in_flight(kinds: list[LossKind]) -> tuple[Loss, ...]:
-    texts = ((kind, LOSSES[kind]) for kind in kinds)
+def _in_flight(kinds: list[LossKind], texts: Mapping[LossKind, LossText]) -> tuple[Loss, ...]:
     return tuple(
-        Loss(kind=kind, what=text.what_in_flight, way_on=text.way_on_in_flight)
-        for kind, text in texts
-        if text.what_in_flight
+        Loss(kind=kind, what=texts[kind].what_in_flight, way_on=texts[kind].way_on_in_flight)
+        for kind in kinds
+        if texts[kind].what_in_flight
     )
 
 

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import LOCAL_CLI, RequestContext
 from app.campaigns import history, rehearsals
 from app.campaigns import service as campaigns
+from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_flight_state
 from app.campaigns.trials import service as trials
 from app.campaigns.trials.schemas import AbortAnswer, FlightOrder, NewTrial, Trial
@@ -100,6 +101,7 @@ def request_flight(
             hint="Stage the trial; its operator then starts the take-off on the fly page.",
         )
     rehearsals.require_rehearsed(session, campaign)
+    fleet.require_window_fits(vehicle, experiment_of_campaign(campaign).window_s)
     fleet.require_ready(session, vehicle, mode)
     require_not_controlled_by_other(vehicle, context)
     now = utc_now()

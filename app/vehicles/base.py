@@ -48,6 +48,8 @@ class Sample:
 
 RECORDED_BEYOND_S: Final = 0.4
 """Time recorded after the end of the scored window."""
+LAND_COMMAND_S: Final = 2.0
+"""Time left after the record to command the landing, before a flight plan would land the vehicle by itself."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

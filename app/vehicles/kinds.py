@@ -1,5 +1,6 @@
 """Kinds of vehicle: description, options, and how a vehicle is opened."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,10 @@ def _never(_options: Options, _simulation_hosts: Hosts) -> bool:
     return False
 
 
+def _unlimited(_options: Options) -> float:
+    return math.inf
+
+
 def _accept_any_gains(_options: Options, _gains: Gains) -> None:
     """Accept all gains: a simulation flies whatever its controller can hold."""
 
@@ -47,7 +52,7 @@ class VehicleKind:
     `find_conflicts(options, hosts)` names options that are valid one by one but not together;
     `is_simulation(options, hosts)` returns whether a vehicle of a real kind is a simulation.
     `check_gains(options, gains)` raises GainsError for gains that are never written to such a vehicle, even if a person
-    overrules the gate.
+    overrules the gate. `longest_window_s(options)` is the longest window, s, that such a vehicle can fly.
     """
 
     name: str
@@ -63,6 +68,7 @@ class VehicleKind:
     is_simulation: Callable[[Options, Hosts], bool] = _never
     experiments_for: Callable[[Options], tuple[str, ...]] | None = None
     check_gains: Callable[[Options, Gains], None] = _accept_any_gains
+    longest_window_s: Callable[[Options], float] = _unlimited
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Experiments that a vehicle with these complete, checked options can fly; the first is the default."""

@@ -1,5 +1,6 @@
 """The kind `mavlink`: vehicles with Paparazzi, ArduCopter or PX4, controlled over a MAVLink link."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from app.core.clock import ScaledClock
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
-from app.vehicles.base import ConnectedVehicle, Identity, Vehicle, VehicleOption
+from app.vehicles.base import LAND_COMMAND_S, RECORDED_BEYOND_S, ConnectedVehicle, Identity, Vehicle, VehicleOption
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.profiles import PROFILES
@@ -90,6 +91,13 @@ def _vehicle(
         if source is not None:
             source.close()
         raise
+
+
+def _longest_window_s(options: Options) -> float:
+    """Under Paparazzi the flight plan on board lands the vehicle after its own time limit."""
+    if options["autopilot"] != "paparazzi":
+        return math.inf
+    return float(options["plan_time_s"]) - RECORDED_BEYOND_S - LAND_COMMAND_S
 
 
 def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]:
@@ -186,4 +194,5 @@ MAVLINK: Final = VehicleKind(
     is_simulation=is_simulated,
     experiments_for=_experiments,
     check_gains=_check_gains,
+    longest_window_s=_longest_window_s,
 )

@@ -93,13 +93,15 @@ def test_a_link_that_is_gone_for_a_minute_is_never_under_a_green_ready_to_fly(
     assert stepper(page) == ["done", "done", "open", "open", "open", "open"]
     os.kill(drone.pid, signal.SIGSTOP)
     try:
-        expect(losses(page)).to_contain_text("Nothing has been received from the vehicle for 2 s. Check its power")
+        expect(losses(page)).to_contain_text(
+            "Nothing current has been received from the vehicle for 2 s. Check its power"
+        )
         expect(word(dashboard)).to_have_text(NOT_READY)
         expect(hold_button(page)).to_be_disabled()
         assert stepper(page) == ["done", "lost", "open", "open", "open", "open"]
         expect(page.get_by_label("read back")).to_have_count(0)
         page.clock.fast_forward(60_000)
-        expect(losses(page)).to_contain_text(["Nothing has been received from the vehicle for 2 s."])
+        expect(losses(page)).to_contain_text(["Nothing current has been received from the vehicle for 2 s."])
         expect(word(dashboard)).to_have_text(NOT_READY)
         expect(hold_button(page)).to_be_disabled()
     finally:
@@ -146,7 +148,7 @@ def test_a_page_that_stood_still_takes_readiness_back_until_it_has_read_the_stat
     with_hold = re.compile("/readiness$")
     page.route(with_hold, lambda route: route.abort())
     page.clock.fast_forward(30_000)
-    expect(losses(page).first).to_contain_text(re.compile(r"This page stood still for (29|3\d) s"))
+    expect(losses(page).first).to_contain_text(re.compile(r"This page was frozen for (29|3\d) s"))
     expect(word(dashboard)).to_have_text(NOT_READY)
     expect(hold_button(page)).to_be_disabled()
     page.unroute(with_hold)

@@ -1,5 +1,7 @@
 """Every state of a flight against every loss: what holds, what is taken back, and what is said."""
 
+from dataclasses import replace
+
 import pytest
 
 from app.common.errors import ConflictError
@@ -67,7 +69,8 @@ def up_to(step: ReadinessStep | None) -> tuple[ReadinessStep, ...]:
 def test_without_a_loss_every_step_up_to_the_reached_one_holds(name: str) -> None:
     state, flags, reached = REACHED[name]
     found = readiness_of(standing(state, flags), GOOD)
-    assert (found.steps, found.lost, found.losses) == (up_to(reached), (), ())
+    assert (found.steps, found.losses) == (up_to(reached), ())
+    assert found.lost == (("landed",) if name == "lost" else ())
     assert found.is_ready == (name == "staged")
 
 
@@ -90,7 +93,7 @@ def test_before_take_off_a_loss_takes_steps_back_and_refuses_the_take_off(name: 
 
 
 @pytest.mark.parametrize("loss", REPORTS)
-@pytest.mark.parametrize("name", ["in flight", "lost"])
+@pytest.mark.parametrize("name", ["in flight"])
 def test_in_flight_a_loss_takes_nothing_back_and_says_what_to_do_now(name: str, loss: str) -> None:
     state, flags, _ = REACHED[name]
     report, vehicle, kind = REPORTS[loss]
@@ -103,8 +106,8 @@ def test_in_flight_a_loss_takes_nothing_back_and_says_what_to_do_now(name: str, 
 
 
 @pytest.mark.parametrize("loss", REPORTS)
-@pytest.mark.parametrize("name", ["captured", "valid", "aborted", "invalid", "cancelled"])
-def test_after_the_landing_a_loss_changes_nothing(name: str, loss: str) -> None:
+@pytest.mark.parametrize("name", ["lost", "captured", "valid", "aborted", "invalid", "cancelled"])
+def test_once_the_flight_is_over_a_loss_changes_nothing(name: str, loss: str) -> None:
     state, flags, reached = REACHED[name]
     report, vehicle, _ = REPORTS[loss]
     assert readiness_of(standing(state, flags, vehicle), report).steps == up_to(reached)
@@ -127,7 +130,10 @@ def test_control_that_was_never_taken_is_no_loss() -> None:
 def test_a_simulation_without_a_link_needs_only_the_worker() -> None:
     linkless = Standing(trial=TrialState.PLANNED, vehicle=VehicleState.READY, has_link=False, has_control=True)
     assert readiness_of(linkless, VehicleReport(worker=True)).losses == ()
-    assert [each.kind for each in readiness_of(linkless, VehicleReport(worker=False)).losses] == ["worker away"]
+    [away] = readiness_of(linkless, VehicleReport(worker=False)).losses
+    assert (away.kind, "tage" in away.way_on) == ("worker away", False)
+    [away] = readiness_of(replace(linkless, trial=TrialState.FLYING), VehicleReport(worker=False)).losses
+    assert (away.kind, "remote control" in away.way_on) == ("worker away", False)
 
 
 def test_every_loss_that_can_be_met_in_flight_says_what_the_operator_does_then() -> None:

@@ -414,7 +414,7 @@ def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json
     assert trial(client, planned)["flight"]["state"] == "cancelled"
 
 
-LOST = {"link silent": "Nothing has been received from the vehicle for 2 s.", "gains unknown": "has restarted"}
+LOST = {"link silent": "Nothing current has been received from the vehicle for 2 s.", "gains unknown": "has restarted"}
 
 
 @pytest.mark.parametrize("unready", LOST)
@@ -448,3 +448,14 @@ def test_a_vehicle_of_which_no_status_has_come_does_not_take_off(client: TestCli
     operator = control_header(client, real) | OUR_PAGE
     answer = client.post(f"/api/trials/{staged['id']}/take-off", headers=operator)
     assert (answer.status_code, "not connected" in answer.json()["detail"]) == (409, True)
+
+
+def test_a_window_that_its_flight_plan_does_not_fit_is_refused_before_it_is_staged(
+    client: TestClient, database: Database, real: Json
+) -> None:
+    definition = {"experiment_options": {"window_s": 60.0}}
+    planned = create_trial(client, create_campaign_on(client, database, real, definition=definition)["id"])
+    refused = client.post(f"/api/trials/{planned['id']}/stage")
+    assert refused.status_code == 409
+    assert "at most 42.6 s of scored window, but the campaign's is 60 s" in refused.json()["detail"]
+    assert "plan_time_s" in refused.json()["hint"]

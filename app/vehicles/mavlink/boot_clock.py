@@ -14,6 +14,9 @@ BACK_S: Final = 1.0
 """If the clock goes back by less than this, the packet was late."""
 RESTARTED_S: Final = 0.4
 """Time for which another clock goes on alone before it is the vehicle's."""
+BEHIND_S: Final = 20.0
+"""A clock that fell behind ours by more than this was not only late: the vehicle restarted while nothing was heard."""
+_DRIFT: Final = 0.1
 _SAME_CLOCK_S: Final = 0.5
 
 
@@ -52,7 +55,8 @@ class RestartCounter:
             self._take_other(position, now_s)
 
     def _is_expected(self, last: Position, position: Position, now_s: float) -> bool:
-        return 0.0 < position.time_boot_s - last.time_boot_s <= now_s - self._last_s + AHEAD_S
+        gained_s, passed_s = position.time_boot_s - last.time_boot_s, now_s - self._last_s
+        return gained_s > 0.0 and (1.0 - _DRIFT) * passed_s - BEHIND_S <= gained_s <= passed_s + AHEAD_S
 
     def _take_other(self, position: Position, now_s: float) -> None:
         other = self._other

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
-from app.vehicles.base import CheckItem, Identity, SafeGainsError, VehicleError
+from app.vehicles.base import LAND_COMMAND_S, CheckItem, Identity, SafeGainsError, VehicleError
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
 from app.vehicles.mavlink.events import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
@@ -25,8 +25,6 @@ POSITIONS_HZ: Final = 40.0
 SECONDARY_HZ: Final = 10.0
 ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight of this program was interrupted."
 _LISTEN_S: Final = 0.1
-_LAND_COMMAND_S: Final = 2.0
-"""Time left after the record to command the landing, before the flight plan would land the vehicle by itself."""
 _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
@@ -318,7 +316,7 @@ def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radiu
 
 def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
     """Check that the flight plan does not land the vehicle before its record of `record_s` is complete."""
-    needed_s = record_s + _LAND_COMMAND_S
+    needed_s = record_s + LAND_COMMAND_S
     passed = needed_s <= plan_time_s
     return CheckItem(
         name="flight time",

@@ -246,9 +246,8 @@ class MavlinkVehicle:
             raise VehicleError("It does not send its position, so it may have restarted.", hint=_STAGE_AGAIN)
         if restarted or self._gains.staged is None:
             raise VehicleError("It restarted, so its gains are no longer those staged.", hint=_STAGE_AGAIN)
-        item = self._gains.check()
-        if not item.passed:
-            raise VehicleError(f"It no longer holds the staged gains but {item.found}.", hint=_STAGE_AGAIN)
+        if (held := self._gains.read()) != self._gains.staged:
+            raise VehicleError(f"It holds {written(held)}, not the staged gains.", hint=_STAGE_AGAIN)
 
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
@@ -458,7 +457,7 @@ class MavlinkVehicle:
     def _require_staged(self) -> None:
         if self._gains.staged is None:
             raise VehicleError(
-                "No gains were staged, or the vehicle has restarted since; it was not flown.",
+                "No gains were staged, or the vehicle has restarted since: it was not flown.",
                 hint="Stage the gains, compare what is read back, then fly.",
             )
 

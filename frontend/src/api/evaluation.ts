@@ -35,6 +35,7 @@ function useEvaluated<Result>(
     enabled: asked !== null,
     placeholderData: keepPreviousData,
     gcTime: KEPT_MS,
+    retry: false,
   });
   const isAsked = asked === gains || (asked !== null && gains !== null && sameGains(asked, gains));
   if (!isAsked && !isFetching) setAsked(gains);

@@ -56,5 +56,5 @@ test("what the server has taken back stays so beside what the page takes back", 
 });
 
 test("a stalled page says for how long", () => {
-  expect(readinessNow(READY, STALLED).losses[0]?.what).toContain("stood still for 12 s");
+  expect(readinessNow(READY, STALLED).losses[0]?.what).toContain("was frozen for 12 s");
 });

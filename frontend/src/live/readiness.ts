@@ -26,7 +26,7 @@ const ANSWER_S = 4;
 /** Without a tick for this long, the page or the whole tablet stood still. */
 const STALL_S = 2;
 
-interface Loss {
+export interface Loss {
   kind: TrialReadiness["losses"][number]["kind"] | "server away" | "page stalled";
   what: string;
   way_on: string;
@@ -48,23 +48,23 @@ function pageLoss({ answerAgeS, isServerAway, stalledS }: PageState, isInFlight:
   if (stalledS > 0) {
     return {
       kind: "page stalled",
-      what: `This page stood still for ${Math.round(stalledS)} s. What it shows is older than that.`,
+      what: `This page was frozen for ${Math.round(stalledS)} s. Its data is out of date.`,
       way_on: "The state is being read again.",
     };
   }
   if (!isServerAway && answerAgeS <= ANSWER_S) return null;
   return {
     kind: "server away",
-    what: "The server does not answer. What this page shows is no longer current.",
+    what: "The server does not answer. The data on this page is out of date.",
     way_on: isInFlight
       ? "ABORT is sent again until the server answers. If the vehicle does not descend, use its own remote control."
       : "Nothing can be commanded from here. Check the network and the computer that runs Gainline.",
   };
 }
 
-/** Whether the flight is over: nothing is left to be ready for. */
-function isDown({ steps }: TrialReadiness): boolean {
-  return steps.includes("landed");
+/** Whether the flight is over, or its end unknown: nothing is left to be ready for. */
+function isDown({ steps, lost }: TrialReadiness): boolean {
+  return steps.includes("landed") || lost.includes("landed");
 }
 
 /** The server's answer, as far as the page may still rely on it. */
@@ -86,16 +86,16 @@ export function readinessNow(answered: TrialReadiness, page: PageState): Readine
 export function useReadiness(trialId: number, vehicleId: number | null): Readiness | null {
   const token = useOwnLease(vehicleId)?.token ?? "";
   const { state } = useConnection();
-  const [stalledS, clearStall] = useStall();
+  const stall = useStall();
   const asked = useQuery({
     queryKey: ["trial", trialId, "readiness", token],
     queryFn: async () => {
+      const at = momentNow();
       const headers = vehicleId === null ? {} : controlHeader(vehicleId);
-      const readiness = await answer(getReadiness({ path: { trial_id: trialId }, headers }));
-      clearStall();
-      return { readiness, at: momentNow() };
+      return { readiness: await answer(getReadiness({ path: { trial_id: trialId }, headers })), at };
     },
     refetchInterval: ({ state }) => (state.data !== undefined && isDown(state.data.readiness) ? false : ASK_MS),
+    refetchIntervalInBackground: true,
     retry: false,
   });
   const now = useMoment();
@@ -104,22 +104,27 @@ export function useReadiness(trialId: number, vehicleId: number | null): Readine
   return readinessNow(readiness, {
     answerAgeS: secondsBetween(at, now),
     isServerAway: state === "away",
-    stalledS,
+    stalledS: stall !== null && stall.endedAt.wallMs > at.wallMs ? stall.seconds : 0,
   });
 }
 
-/** How long the page stood still, until cleared. */
-function useStall(): [stalledS: number, clear: () => void] {
-  const [stalledS, setStalledS] = useState(0);
+interface Stall {
+  seconds: number;
+  endedAt: Moment;
+}
+
+/** The last time that this page stood still. */
+function useStall(): Stall | null {
+  const [stall, setStall] = useState<Stall | null>(null);
   const seen = useRef<Moment>(momentNow());
   useEffect(() => {
     const ticking = setInterval(() => {
       const now = momentNow();
-      const gapS = secondsBetween(seen.current, now);
+      const seconds = secondsBetween(seen.current, now);
       seen.current = now;
-      if (gapS > STALL_S) setStalledS(gapS);
+      if (seconds > STALL_S) setStall({ seconds, endedAt: now });
     }, 250);
     return () => clearInterval(ticking);
   }, []);
-  return [stalledS, () => setStalledS(0)];
+  return stall;
 }

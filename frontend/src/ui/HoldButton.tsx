@@ -80,6 +80,9 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
   const release = (event: PointerEvent<HTMLButtonElement>): void => {
     if (event.pointerId === pointer.current) letGo();
   };
+  const cancel = (event: PointerEvent<HTMLButtonElement>): void => {
+    if (event.pointerId === pointer.current) interrupt();
+  };
   return (
     <div>
       <button
@@ -90,7 +93,7 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
         aria-describedby={note}
         onPointerDown={press}
         onPointerUp={release}
-        onPointerCancel={release}
+        onPointerCancel={cancel}
         onPointerLeave={release}
         onContextMenu={(event) => event.preventDefault()}
       >
@@ -103,7 +106,7 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
       </button>
       {interrupted && (
         <p role="status" className={classes["interrupted"]}>
-          Hold interrupted: nothing was sent. Hold again.
+          Hold interrupted: nothing was sent.{!disabled && " Hold again."}
         </p>
       )}
       <p id={note} className={classes["note"]}>

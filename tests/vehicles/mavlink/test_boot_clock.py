@@ -31,6 +31,15 @@ def test_a_clock_that_begins_anew_is_one_restart() -> None:
     assert restarts_of(BEFORE, every_40_ms(10.0, from_s=12.0, boot_s=1.5)) == 1
 
 
+def test_a_restart_during_a_long_silence_counts_although_the_clock_is_ahead_of_the_last_one_heard() -> None:
+    young = every_40_ms(2.0, from_s=0.0, boot_s=40.0)
+    assert restarts_of(young, every_40_ms(2.0, from_s=120.0, boot_s=60.0)) == 1
+
+
+def test_a_long_silence_without_a_restart_is_none() -> None:
+    assert restarts_of(BEFORE, every_40_ms(2.0, from_s=610.0, boot_s=1108.0)) == 0
+
+
 def test_every_further_restart_counts() -> None:
     again = every_40_ms(10.0, from_s=12.0, boot_s=1.5)
     assert restarts_of(BEFORE, again, every_40_ms(10.0, from_s=24.0, boot_s=1.5)) == 2

@@ -46,7 +46,7 @@ interface CurvesProps {
 export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen, preview, onChoose }: CurvesProps) {
   const theme = useComputedColorScheme("light");
   const [picked, setPicked] = useState<Span>("first");
-  const span = useDeferredValue(picked);
+  const span = useDeferredValue(campaign.flying === null ? picked : "whole");
   const [zoom, setZoom] = useState<TimeRange | null>(null);
   const [whole, setWhole] = useState<TimeRange | null>(null);
   const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme, {

@@ -65,7 +65,10 @@ function CompareLink({ campaign, selected }: { campaign: number; selected: reado
       </Anchor>
     );
   }
-  const query = new URLSearchParams(selected.map((trial) => ["trial", String(trial)]));
+  const query = new URLSearchParams([
+    ["campaign", String(campaign)],
+    ...selected.map((trial): [string, string] => ["trial", String(trial)]),
+  ]);
   return (
     <Button component={Link} to={`/compare?${query}`} variant="default">
       Compare {count(selected.length, "selected flight")}

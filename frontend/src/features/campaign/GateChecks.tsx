@@ -19,7 +19,7 @@ export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
   if (gate === null || !isCurrent) {
     return (
       <Note className={classes["checking"] ?? ""} role="status">
-        Gate: checking…
+        Checking the gate…
       </Note>
     );
   }
@@ -47,7 +47,7 @@ export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
           })}
         </ul>
         <Note fz="fine" mt={10}>
-          Checked before every flight, for proposed and manual gains.
+          Checked before every flight, for proposed and own gains.
           <HelpTip topic="gate" />
         </Note>
       </div>

@@ -67,7 +67,8 @@ export function gainRows(
 /** `×1.27`; the difference where a factor says nothing. */
 export function changeText(now: number, next: number): string {
   if (now === next) return "same";
-  if (next / now > 0 && Number.isFinite(next / now)) return `×${Number((next / now).toPrecision(3))}`;
+  const factor = Number((next / now).toPrecision(3));
+  if (factor > 0 && Number.isFinite(factor) && factor !== 1) return `×${factor}`;
   return `${next > now ? "+" : "−"}${gainText(Math.abs(next - now))}`;
 }
 

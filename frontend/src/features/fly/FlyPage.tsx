@@ -8,7 +8,7 @@ import type { Campaign, Trial, Vehicle } from "../../api/types";
 import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicle } from "../../api/vehicles";
 import { Chart } from "../../charts/Chart";
-import { type PlotlyFigure, withChosen } from "../../charts/traces";
+import { type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
 import type { AbortControl } from "../../live/flights";
 import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
@@ -19,7 +19,7 @@ import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
-import { endOfTime, type FlyStep, flyStateLabel, flyStep } from "./flyScreen";
+import { type FlyStep, flyStateLabel, flyStep } from "./flyScreen";
 import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
@@ -71,11 +71,18 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const readiness = useReadiness(trial.id, vehicle?.id ?? null);
   const isReady = readiness?.is_ready ?? false;
   const isHeld = isReady || readiness?.steps.includes("staged") === true;
-  const { word, tone } = flyStateLabel(trial, step, status, { quarantined, isReady });
+  const { word, tone } = flyStateLabel(trial, step, status, { quarantined, readiness });
   const isFlying = step === "flying";
   const watching = useReadOnlyReason(vehicle);
   const barred = BARRED.has(step) && (quarantined || watching !== null);
-  const steps = { campaign, trial, step, abort, isReady, isBlocked: readiness !== null && readiness.losses.length > 0 };
+  const steps = {
+    campaign,
+    trial,
+    step,
+    abort,
+    isReady,
+    isBlocked: readiness?.losses.some(({ kind }) => kind !== "gains unknown") === true,
+  };
   return (
     <div className={classes["screen"]} data-step={step}>
       <div className={classes["head"]}>
@@ -102,7 +109,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           status={status}
           hasLink={vehicle !== null}
           isFlying={isFlying}
-          endS={endOfTime(figure?.layout)}
+          endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}
         />
         <div className={classes["chart"]}>
           {figure !== null && (
@@ -138,7 +145,10 @@ function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure |
   const card = useCampaignFigure(campaign.id, "takeoffs", theme).data;
   const raw = card?.figure;
   const dress = useCallback(
-    (drawn: PlotlyFigure): PlotlyFigure => ({ ...drawn, data: withChosen(drawn.data, trial.number) }),
+    (drawn: PlotlyFigure): PlotlyFigure => ({
+      data: withChosen(drawn.data, trial.number),
+      layout: withTimeRange(drawn.layout, wholeFlight(drawn)),
+    }),
     [trial.number],
   );
   const figure = useMemo(() => (raw ? dress(raw as unknown as PlotlyFigure) : null), [raw, dress]);

@@ -5,7 +5,7 @@ import classes from "./ReadinessStepper.module.css";
 const TITLES: Record<ReadinessStep, string> = {
   control: "Control",
   staged: "Staged",
-  held: "Held",
+  held: "Hold",
   "in flight": "In flight",
   landed: "Landed",
   reviewed: "Reviewed",

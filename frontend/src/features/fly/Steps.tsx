@@ -62,7 +62,7 @@ export function LinkedSteps({
     case "over":
       return (
         <>
-          <SafeGainsResult flight={trial.flight} />
+          <SafeGainsResult trial={trial} />
           <FlightReviewCard campaign={campaign} trial={trial} />
         </>
       );
@@ -70,14 +70,16 @@ export function LinkedSteps({
 }
 
 /** Whether the vehicle was left with its safe gains. */
-function SafeGainsResult({ flight }: Pick<Trial, "flight">) {
-  if (flight === null) return null;
+function SafeGainsResult({ trial: { flight, flown_at } }: { trial: Trial }) {
+  if (flight === null || flown_at === null) return null;
   if (flight.safe_gains_restored === true)
     return <p className={classes["quiet"]}>Safe gains restored and read back.</p>;
   return (
     <p role="alert" className={classes["checks"]}>
-      The safe gains were not read back after this flight: the gains on the vehicle are unknown. Inspect it before you
-      fly again.
+      {flight.safe_gains_restored === null
+        ? "It is not known whether the safe gains were restored."
+        : "The safe gains are not on the vehicle."}{" "}
+      Inspect it before the next flight.
     </p>
   );
 }

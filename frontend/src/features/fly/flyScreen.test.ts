@@ -1,7 +1,8 @@
 import { expect, test } from "vitest";
 import type { Trial } from "../../api/types";
+import type { Loss } from "../../live/readiness";
 import { aged, statusFrom } from "../../live/vehicleStatus";
-import { endOfTime, flyStateLabel, flyStep, gainTicks, isSaturated, secondsLeft } from "./flyScreen";
+import { flyStateLabel, flyStep, gainTicks, isSaturated, secondsLeft } from "./flyScreen";
 
 type Flight = NonNullable<Trial["flight"]>;
 
@@ -39,32 +40,42 @@ test("a trial is planned, staged, flown and judged; the stream may run ahead of 
 
 test("the word in flight is the vehicle's own step, and a silent vehicle is never in flight", () => {
   const trial = { state: "flying", flight } as const;
-  expect(flyStateLabel(trial, "flying", statusAt("record", 0.1), { quarantined: false, isReady: true })).toEqual({
+  expect(flyStateLabel(trial, "flying", statusAt("record", 0.1), { quarantined: false, readiness: null })).toEqual({
     word: "In flight",
     tone: "busy",
   });
-  expect(flyStateLabel(trial, "flying", statusAt("abort-land", 0.1), { quarantined: false, isReady: true }).tone).toBe(
-    "bad",
-  );
-  expect(flyStateLabel(trial, "flying", statusAt("record", 4), { quarantined: false, isReady: true }).word).toBe(
+  expect(
+    flyStateLabel(trial, "flying", statusAt("abort-land", 0.1), { quarantined: false, readiness: null }).tone,
+  ).toBe("bad");
+  expect(flyStateLabel(trial, "flying", statusAt("record", 4), { quarantined: false, readiness: null }).word).toBe(
     "Link lost",
   );
-  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: false, isReady: true }).word).toBe(
+  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: false, readiness: null }).word).toBe(
     "Starting",
   );
-  expect(flyStateLabel(trial, "flying", null, { quarantined: false, isReady: true }).word).toBe("Flying");
-  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: true, isReady: true }).word).toBe(
+  expect(flyStateLabel(trial, "flying", null, { quarantined: false, readiness: null }).word).toBe("Flying");
+  expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: true, readiness: null }).word).toBe(
     "Quarantined",
   );
-  expect(flyStateLabel({ state: "lost", flight }, "judge", null, { quarantined: false, isReady: true }).word).toBe(
+  expect(flyStateLabel({ state: "lost", flight }, "judge", null, { quarantined: false, readiness: null }).word).toBe(
     "Lost",
   );
 });
 
 test("a staged vehicle is ready only while its readiness holds", () => {
   const staged = { state: "staged", flight } as const;
-  const label = (isReady: boolean) => flyStateLabel(staged, "staged", null, { quarantined: false, isReady });
-  expect([label(true).word, label(false).word]).toEqual(["Gains set, ready to fly", "Not ready to fly"]);
+  const label = (...kinds: Loss["kind"][]) => {
+    const losses = kinds.map((kind) => ({ kind, what: "", way_on: "" }));
+    const readiness = { steps: [], lost: [], losses, is_ready: kinds.length === 0 };
+    return flyStateLabel(staged, "staged", null, { quarantined: false, readiness }).word;
+  };
+  expect([label(), label("link silent"), label("control ended")]).toEqual([
+    "Gains set, ready to fly",
+    "Not ready to fly",
+    "Gains set",
+  ]);
+  const unknown = flyStateLabel(staged, "staged", null, { quarantined: false, readiness: null });
+  expect(unknown.word).toBe("Checking readiness");
 });
 
 test("a gain is ticked only when the vehicle holds exactly what it was asked to", () => {
@@ -74,10 +85,9 @@ test("a gain is ticked only when the vehicle holds exactly what it was asked to"
   expect(gainTicks({ kp: 283 }, { kp: 283 }, { kp: 1 })[0]?.confirmed).toBe(true);
 });
 
-test("the countdown ends with the figure's time axis", () => {
-  const end = endOfTime({ xaxis: { range: [-0.3, 30] } });
-  expect([end, secondsLeft(12.5, end), secondsLeft(31, end), secondsLeft(undefined, end)]).toEqual([30, 17.5, 0, null]);
-  expect([endOfTime(undefined), endOfTime({ xaxis: {} }), secondsLeft(1, null)]).toEqual([null, null, null]);
+test("the countdown ends with the record", () => {
+  expect([secondsLeft(12.5, 30), secondsLeft(31, 30), secondsLeft(undefined, 30)]).toEqual([17.5, 0, null]);
+  expect(secondsLeft(1, null)).toBeNull();
 });
 
 test("all the thrust there is, is saturated", () => {

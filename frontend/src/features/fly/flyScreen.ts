@@ -1,6 +1,7 @@
 /** State of the fly screen: step, label, gains, remaining time. */
 
 import type { Trial, TrialState } from "../../api/types";
+import type { Readiness } from "../../live/readiness";
 import { type Aged, stepWord } from "../../live/vehicleStatus";
 import { type StateLabel, trialStateLabel } from "../../ui/states";
 
@@ -57,12 +58,19 @@ const IN_FLIGHT: ReadonlySet<string> = new Set([
   "restore",
 ]);
 
+function stagedLabel(readiness: Readiness | null): StateLabel {
+  if (readiness === null) return { word: "Checking readiness", tone: "busy" };
+  if (readiness.is_ready) return WORDS.staged;
+  const isOnlyControl = readiness.losses.every(({ kind }) => kind === "control ended");
+  return isOnlyControl ? { word: "Gains set", tone: "quiet" } : { word: "Not ready to fly", tone: "bad" };
+}
+
 /** Main label. For a vehicle with a link, `status` has the step; a stale one is never "In flight". */
 export function flyStateLabel(
   trial: Standing,
   step: FlyStep,
   status: Aged | null,
-  { quarantined, isReady }: { quarantined: boolean; isReady: boolean },
+  { quarantined, readiness }: { quarantined: boolean; readiness: Readiness | null },
 ): StateLabel {
   if (step === "flying" && status !== null) {
     if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
@@ -74,8 +82,7 @@ export function flyStateLabel(
   }
   if (quarantined) return { word: "Quarantined", tone: "bad" };
   if (step === "over" || (step === "judge" && trial.state === "lost")) return trialStateLabel(trial.state);
-  if (step === "staged" && !isReady) return { word: "Not ready to fly", tone: "bad" };
-  return WORDS[step];
+  return step === "staged" ? stagedLabel(readiness) : WORDS[step];
 }
 
 export interface GainTick {
@@ -100,14 +107,6 @@ export function gainTicks(asked: Gains, readBack: Gains | null, held: Gains): Ga
 export function secondsLeft(lastS: number | undefined, endS: number | null): number | null {
   if (lastS === undefined || endS === null) return null;
   return Math.max(0, endS - lastS);
-}
-
-/** End of a figure's first x axis: the length of the experiment, in seconds. */
-export function endOfTime(layout: Readonly<Record<string, unknown>> | undefined): number | null {
-  const axis = layout?.["xaxis"];
-  if (typeof axis !== "object" || axis === null || !("range" in axis) || !Array.isArray(axis.range)) return null;
-  const end: unknown = axis.range[1];
-  return typeof end === "number" ? end : null;
 }
 
 const FULL_THRUST = 0.995;
