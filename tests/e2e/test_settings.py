@@ -181,6 +181,7 @@ def test_every_number_that_one_may_ask_about_is_explained_by_keyboard(dashboard:
     campaign_id = states.campaign(strategy="calibrated", stop=patient, flights=2)
     states.repeat(campaign_id)
     dashboard.open_campaign(campaign_id)
+    dashboard.choose_proposed(campaign_id)
     dashboard.open_tab("Statistics")
     questions = dashboard.page.locator("main button[aria-haspopup=dialog]:visible")
 

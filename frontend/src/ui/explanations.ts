@@ -123,7 +123,9 @@ export const EXPLANATIONS = explained({
   },
   riseTime: {
     question: "What is the rise time?",
-    answer: ["The time from 10\u00a0% to 90\u00a0% of the set point."],
+    answer: [
+      "The time that the altitude takes from 10\u00a0% to 90\u00a0% of the set point. It shows how fast the vehicle climbs.",
+    ],
   },
   settlingTime: {
     question: "What is the settling time?",
@@ -133,7 +135,7 @@ export const EXPLANATIONS = explained({
   },
   steadyStateError: {
     question: "What is the steady-state error?",
-    answer: ["The mean distance from the set point over the last 5 s; positive above it."],
+    answer: ["The mean deviation from the set point over the last 5 s of the window; positive above the set point."],
   },
   warmStart: {
     question: "What is a warm start?",

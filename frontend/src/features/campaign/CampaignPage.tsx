@@ -116,7 +116,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt="var(--gap)">
         <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
       </SimpleGrid>
-      <Tabs defaultValue="flights" mt="var(--gap)" keepMounted={false}>
+      <Tabs defaultValue="flights" mt="var(--gap)" keepMounted={false} classNames={{ tab: classes["tab"] ?? "" }}>
         <Tabs.List>
           <Tabs.Tab value="flights">Flights</Tabs.Tab>
           <Tabs.Tab value="statistics">Statistics</Tabs.Tab>
