@@ -16,6 +16,7 @@ from app.core.experiments.base import Envelope, prior_distribution
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.definition_checks import problems_of
+from tests.core.tuning.flying import compiled_only
 
 TAKEOFF = Takeoff()
 TWIN_MODEL = np.array([0.61, 0.3, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -260,6 +261,7 @@ def test_a_window_lies_between_10_and_60_s(window_s: float, refused: bool) -> No
     assert [problem.field for problem in problems] == ["experiment_options.window_s"] * refused
 
 
+@compiled_only
 def test_good_gains_pass_the_gate_with_the_shortest_and_the_longest_window() -> None:
     everywhere = prior_distribution(TAKEOFF)
     envelope = Envelope(ceiling_m=4.5, safe_gains=TAKEOFF.space.mapping(TAKEOFF.space.default))
