@@ -1,11 +1,14 @@
 """Predictions of any gains: the proposal's own model, asked again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, predict_repeat
+from app.core.tuning.calibration import MAX_FLIGHTS
+from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategy import Proposal
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
@@ -106,3 +109,12 @@ def test_gains_that_were_not_flown_are_no_repeat() -> None:
 
 def test_without_a_model_there_is_no_predictor() -> None:
     assert flight_predictor(Definition(experiment="takeoff-px4", strategy="manual"), []) is None
+
+
+def test_only_the_first_flight_and_those_of_the_fit_need_their_records() -> None:
+    flights = [replace(fly(number, START), error=0.5 - 0.01 * number) for number in range(1, MAX_FLIGHTS + 4)]
+    last = flights[-1].number
+    assert modelled_flights(Definition(), flights) == {1, *range(last - MAX_FLIGHTS + 1, last + 1)}
+    assert modelled_flights(Definition(), [replace(flights[0], outcome="aborted")]) == frozenset()
+    every = {flight.number for flight in flights}
+    assert modelled_flights(Definition(experiment="pitch-tracking", strategy="identified"), flights) == every
