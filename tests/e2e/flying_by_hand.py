@@ -5,7 +5,8 @@ import re
 from playwright.sync_api import Locator, Page, expect
 
 from tests.e2e.dashboard import Dashboard
-from tests.runtime.drones import Drone
+from tests.e2e.states import States
+from tests.runtime.drones import TRIED, Drone
 
 DRONE_SPEED = 3.0
 """Of the drone's time: a flight takes eleven seconds. The ground's time is real, so the drone is never late. A stall of
@@ -32,6 +33,14 @@ def register(dashboard: Dashboard, drone: Drone) -> int:
     dashboard.post(f"/vehicles/{vehicle_id}/connect")
     in_state(dashboard, vehicle_id, "ready")
     return vehicle_id
+
+
+def plan(states: States, vehicle_id: int) -> int:
+    """A trial of gains other than the safe ones, in a rehearsed campaign of its own."""
+    once = {"kind": "budget", "max_flights": 1}
+    campaign_id = states.campaign("mavlink", name="Up to 3 m", vehicle_id=vehicle_id, stop=once)
+    states.rehearse(campaign_id)
+    return states.plan(campaign_id, TRIED)
 
 
 def disconnect(dashboard: Dashboard, vehicle_id: int) -> None:

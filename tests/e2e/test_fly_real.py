@@ -21,6 +21,7 @@ from tests.e2e.flying_by_hand import (
     in_state,
     line_of,
     middle_of,
+    plan,
     register,
     see_it_fly,
     stage,
@@ -55,10 +56,7 @@ def dashboard(open_dashboard: Opener, shared_server: Server) -> Dashboard:
 def trial_id(dashboard: Dashboard, states: States, vehicle_id: int) -> Iterator[int]:
     """A trial of gains other than the safe ones, in a separate campaign, the fly screen open."""
     in_state(dashboard, vehicle_id, "ready")
-    once = {"kind": "budget", "max_flights": 1}
-    campaign_id = states.campaign("mavlink", name="Up to 3 m", vehicle_id=vehicle_id, stop=once)
-    states.rehearse(campaign_id)
-    trial = states.plan(campaign_id, TRIED)
+    trial = plan(states, vehicle_id)
     dashboard.open(f"/fly/{trial}")
     yield trial
     if state_of(dashboard, trial) in {"staged", "flying"}:
