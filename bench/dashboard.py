@@ -269,14 +269,20 @@ def said(what: str, figure: float, limit: float, unit: str) -> bool:
     return figure <= limit
 
 
+def find_chromium() -> str | None:
+    """Path of a Chromium; None if there is none, which is printed."""
+    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        print("no Chromium found; install one, or name it in CHROMIUM")
+    return found
+
+
 def main() -> int:
     asked = argparse.ArgumentParser(prog="bench.dashboard")
     asked.add_argument("--rounds", type=int, default=3, help="number of rounds; the quickest counts")
     asked.add_argument("--flights", type=int, default=1000, help="flights of the large campaign")
     options = asked.parse_args()
-    chromium = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
-    if chromium is None:
-        print("no Chromium found; install one, or name it in CHROMIUM")
+    if (chromium := find_chromium()) is None:
         return 1
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))

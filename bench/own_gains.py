@@ -10,8 +10,6 @@ changes load and compile what the others use and do not count. Exits with 1 if t
 
 import argparse
 import contextlib
-import os
-import shutil
 import sys
 import tempfile
 import time
@@ -24,7 +22,7 @@ from playwright.sync_api import Page, sync_playwright
 
 from app.campaigns.schemas import Definition, StopRule
 from app.client import Client
-from bench.dashboard import FLAGS, NAMES, server
+from bench.dashboard import FLAGS, find_chromium, server
 
 LIMIT_MS: Final = 100.0
 WARM_UP: Final = 5
@@ -84,9 +82,7 @@ def main() -> int:
     asked.add_argument("--changes", type=int, default=100, help="number of changes of a gain")
     asked.add_argument("--flights", type=int, default=4, help="flights before")
     options = asked.parse_args()
-    chromium = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
-    if chromium is None:
-        print("no Chromium found; install one, or name it in CHROMIUM")
+    if (chromium := find_chromium()) is None:
         return 1
     with contextlib.ExitStack() as stack:
         address = stack.enter_context(server(Path(stack.enter_context(tempfile.TemporaryDirectory()))))

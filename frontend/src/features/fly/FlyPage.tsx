@@ -70,7 +70,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const quarantined = vehicle !== null && (vehicle.state === "quarantined" || (status?.status.concern ?? "") !== "");
   const readiness = useReadiness(trial.id, vehicle?.id ?? null);
   const isReady = readiness?.is_ready ?? false;
-  const isHeld = isReady || readiness?.steps.includes("staged") === true;
+  const isHeld = readiness?.steps.includes("staged") === true;
   const { word, tone } = flyStateLabel(trial, step, status, { quarantined, readiness });
   const isFlying = step === "flying";
   const watching = useReadOnlyReason(vehicle);
