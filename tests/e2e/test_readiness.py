@@ -32,8 +32,6 @@ from tests.e2e.states import States
 from tests.flights.test_readiness import GOOD, REACHED, REPORTS, standing
 from tests.runtime.drones import TRIED, Drone
 
-ROUND_S = 5.0
-"""Longer than a round of the sequence numbers: a vehicle that is back sooner is taken for a second one, quarantined."""
 SILENT_FOR = """seconds => new Promise(done => {
     const stream = new EventSource("/api/events");
     stream.addEventListener("vehicle", event => {
@@ -131,7 +129,7 @@ def test_after_a_restart_of_the_drone_no_tick_stands_beside_gains_that_it_no_lon
     """Observed defect: the old read-back kept its ticks, and *Check now* was disabled."""
     page = dashboard.page
     drone.switch_off()
-    page.evaluate(SILENT_FOR, ROUND_S)
+    page.evaluate(SILENT_FOR, 0.5)
     drone.switch_on()
     expect(page.get_by_text(re.compile("It restarted, so its gains are no longer those staged"))).to_be_visible()
     expect(page.get_by_label("read back")).to_have_count(0)

@@ -1,7 +1,8 @@
 """Detection of two vehicles that use the same system id.
 
-Two vehicles that send at the same time use every sequence number twice, with different contents, and report two times.
-Packets that are repeated, late or out of order do neither.
+Two vehicles that send at the same time use every sequence number twice, with different contents, each going on where
+it was, and report two times. Packets that are repeated, late or out of order do neither; a vehicle that restarts uses
+numbers again, but does not go on with the former ones.
 """
 
 from collections import deque
@@ -26,6 +27,9 @@ _LATE: Final = 100
 """An unused number less than this behind the latest is of a delayed packet."""
 _OF_A_ROUND: Final = 0.9
 """Share of a cycle of sequence numbers after which one may be used again."""
+_LOST: Final = 32
+"""A sequence of numbers goes on with one less than this ahead of its last."""
+_SEQUENCES: Final = 8
 
 
 @dataclass(slots=True)
@@ -40,6 +44,7 @@ class DuplicateDetector:
 
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
+        self._sequences = _Sequences()
         self._rate = _Rate()
         self._count = 0
         self._at_instant = (float("-inf"), 0)
@@ -79,6 +84,7 @@ class DuplicateDetector:
         is_taken = used is not None and self._is_of_this_round(used, now_s)
         if used is not None and is_taken and used.frame == frame:
             return False
+        is_return = self._sequences.is_return(number, now_s)
         ahead = (number - self._latest) % NUMBERS
         if ahead < NUMBERS // 2:
             self._latest = number
@@ -87,7 +93,7 @@ class DuplicateDetector:
         is_late = behind <= _LATE and not is_taken
         late = behind if is_late else 0
         self._used[number] = _Used(now_s - late / self._rate.number_hz, self._count - late, frame)
-        if is_taken:
+        if is_taken and is_return:
             self._repeated_numbers.append(now_s)
         return not is_late
 
@@ -116,6 +122,24 @@ class DuplicateDetector:
         self._clock = max(self._clocks, default=0) + 1
         recent = {clock: known for clock, known in self._clocks.items() if now_s - known[1] < WITHIN_S}
         self._clocks = {**recent, self._clock: (offset_s, now_s)}
+
+
+class _Sequences:
+    """Last numbers of the recent sequences, in the order of use, the latest first."""
+
+    def __init__(self) -> None:
+        self._last: list[tuple[int, float]] = []
+
+    def is_return(self, number: int, now_s: float) -> bool:
+        """Assign a number to the nearest sequence; return whether that is not the one that the number before was of."""
+        self._last = [(last, at_s) for last, at_s in self._last if now_s - at_s < WITHIN_S][:_SEQUENCES]
+        ahead = [(number - last - 1) % NUMBERS for last, _ in self._last]
+        nearest = min(range(len(ahead)), key=ahead.__getitem__, default=None)
+        is_new = nearest is None or ahead[nearest] >= _LOST
+        if nearest is not None and not is_new:
+            del self._last[nearest]
+        self._last.insert(0, (number, now_s))
+        return not is_new and nearest != 0
 
 
 class _Rate:

@@ -87,6 +87,27 @@ def test_a_reboot_is_no_second_vehicle() -> None:
     assert heard([*before, *after])[0] == ""
 
 
+@pytest.mark.parametrize("lost", [0.0, 0.3])
+@pytest.mark.parametrize("at_s", [10.1, 10.5, 11.5, 12.9])
+@pytest.mark.parametrize("last_number", range(0, 256, 32))
+def test_a_reboot_within_a_round_of_sequence_numbers_is_no_second_vehicle(
+    last_number: int, at_s: float, lost: float
+) -> None:
+    chance = random.Random(1)
+    before = said("before", seconds=10.0, number=last_number - 680)
+    after = said("after", seconds=10.0, at_s=at_s, boot_s=2.0)
+    assert heard(packet for packet in [*before, *after] if chance.random() >= lost)[0] == ""
+
+
+@pytest.mark.parametrize("ahead", range(0, 256, 32))
+def test_two_vehicles_on_a_lossy_link_are_noticed(ahead: int) -> None:
+    chance = random.Random(1)
+    both = [*said("one"), *said("other", number=ahead, at_s=3.005, rate_hz=61.0)]
+    doubt, at_s = heard(packet for packet in both if chance.random() > 0.5)
+    assert doubt
+    assert at_s < 3.005 + 3.0
+
+
 @pytest.mark.parametrize("ahead", range(0, 256, 16))
 @pytest.mark.parametrize("older_s", [0.0, 0.3, 5.0, 3600.0])
 def test_two_vehicles_are_noticed_before_a_missing_lift_off_is_judged(ahead: int, older_s: float) -> None:
