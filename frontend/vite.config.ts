@@ -44,5 +44,11 @@ export default defineConfig({
     rolldownOptions: { output: { postBanner: compiledWhole } },
   },
   // A document for each file, as ever, but not a process for each: making those took ten times as long as the tests.
-  test: { environment: "jsdom", include: ["src/**/*.test.{ts,tsx}"], pool: "vmThreads", restoreMocks: true },
+  test: {
+    environment: "jsdom",
+    include: ["src/**/*.test.{ts,tsx}"],
+    pool: "vmThreads",
+    restoreMocks: true,
+    testTimeout: 60_000, // a busy neighbour is no failure
+  },
 });

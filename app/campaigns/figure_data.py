@@ -31,6 +31,7 @@ from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise
 from app.figures.flight import ChannelPanel, FlightFigure, FlightRecordData
 from app.figures.overlays import select_individual_flights
 from app.figures.theme import ThemeName
+from app.vehicles.registry import get_kind
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
@@ -112,11 +113,16 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         curves_title=_CURVES.get(experiment.output, "Flight curves"),
         window=view.window,
         chosen=view.chosen,
+        altitude_limit_m=_altitude_limit(campaign, experiment.output),
     )
     if not curves:
         return bare
     drawn = _curves(session, flown, select_individual_flights(bare, view.chosen), experiment.output)
     return replace(bare, flights=tuple(replace(flight, curve=drawn.get(flight.number)) for flight in bare.flights))
+
+
+def _altitude_limit(campaign: CampaignRow, output: str) -> float | None:
+    return get_kind(campaign.vehicle.kind).altitude_limit_m if output == "altitude_m" else None
 
 
 def _flight(row: TrialRow, *, corrected: bool) -> FlightData:

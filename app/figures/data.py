@@ -110,7 +110,8 @@ class History:
     `stop_improvement` is the share of the best error by which a flight must be lower to count as an improvement, None
     if the stop rule has no such condition. `flights` are in the order of their numbers. `noise` is None while it is not
     known. `window` is the visible time range, s, which is drawn with more points; None for all. `chosen` is the number
-    of a flight that is always drawn.
+    of a flight that is always drawn. `altitude_limit_m` is the height at which the vehicle's flight is aborted, None if
+    there is no such limit.
     """
 
     output_title: str
@@ -126,6 +127,7 @@ class History:
     curves_title: str = "Takeoff curves"
     window: Range | None = None
     chosen: int | None = None
+    altitude_limit_m: float | None = None
 
     @cached_property
     def valid(self) -> tuple[FlightData, ...]:

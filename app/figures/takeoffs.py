@@ -47,10 +47,11 @@ class TrajectoriesFigure:
     the experiment.
 
     Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, band,
-    glitch, live, pointed, off scale) and, for flights, `trial` and `standing` (best, latest, baseline, earlier,
+    glitch, limit, live, pointed, off scale) and, for flights, `trial` and `standing` (best, latest, baseline, earlier,
     invalid, unjudged); a flight's `uid` is `flight-` and its number, that of its deviation `deviation-` and its number.
     The traces `live` and `pointed` are empty: a page fills the first during a flight, the second with the flight under
-    the pointer if that one has no curve of its own.
+    the pointer if that one has no curve of its own. The altitude limit, `limit`, is hidden: the page on which a flight
+    is observed shows it.
 
     The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. A set point
     of zero has no deviations: they would repeat the output.
@@ -79,6 +80,7 @@ class TrajectoriesFigure:
             *envelope_traces(palette, envelope, history.output_unit),
             *band_traces(palette, band),
             *self._goals(palette),
+            *self._altitude_limit(palette),
         ]
         curves = [flight.curve for flight in drawn if flight.curve is not None]
         low, high, outside = self._span(drawn)
@@ -248,6 +250,21 @@ class TrajectoriesFigure:
             )
             for place, (name, curve, dash) in enumerate(goals)
             if curve is not None
+        ]
+
+    def _altitude_limit(self, palette: Palette) -> list[Trace]:
+        limit_m = self.history.altitude_limit_m
+        if limit_m is None:
+            return []
+        return [
+            scatter(
+                "Altitude limit: abort",
+                (self._whole_s, [limit_m, limit_m]),
+                role="limit",
+                line=theme.line(palette.bad, 2, "longdashdot"),
+                legendrank=901,
+                visible=False,
+            )
         ]
 
     def _prediction(self, palette: Palette) -> list[Trace]:

@@ -46,6 +46,8 @@ class Sample:
         return self.channels[channel]
 
 
+ALTITUDE_LIMIT_M: Final = 4.5
+"""Height above the ground under a vehicle with a link at which its flight is aborted."""
 RECORDED_BEYOND_S: Final = 0.4
 """Time recorded after the end of the scored window."""
 LAND_COMMAND_S: Final = 2.0

@@ -53,6 +53,7 @@ class VehicleKind:
     `is_simulation(options, hosts)` returns whether a vehicle of a real kind is a simulation.
     `check_gains(options, gains)` raises GainsError for gains that are never written to such a vehicle, even if a person
     overrules the gate. `longest_window_s(options)` is the longest window, s, that such a vehicle can fly.
+    `altitude_limit_m` is the height above the ground at which its flight is aborted; None if there is no such limit.
     """
 
     name: str
@@ -69,6 +70,7 @@ class VehicleKind:
     experiments_for: Callable[[Options], tuple[str, ...]] | None = None
     check_gains: Callable[[Options, Gains], None] = _accept_any_gains
     longest_window_s: Callable[[Options], float] = _unlimited
+    altitude_limit_m: float | None = None
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Experiments that a vehicle with these complete, checked options can fly; the first is the default."""

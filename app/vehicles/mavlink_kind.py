@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Final
 from app.core.clock import ScaledClock
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
-from app.vehicles.base import LAND_COMMAND_S, RECORDED_BEYOND_S, ConnectedVehicle, Identity, Vehicle, VehicleOption
+from app.vehicles.base import (
+    ALTITUDE_LIMIT_M,
+    LAND_COMMAND_S,
+    RECORDED_BEYOND_S,
+    ConnectedVehicle,
+    Identity,
+    Vehicle,
+    VehicleOption,
+)
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.profiles import PROFILES
@@ -195,4 +203,5 @@ MAVLINK: Final = VehicleKind(
     experiments_for=_experiments,
     check_gains=_check_gains,
     longest_window_s=_longest_window_s,
+    altitude_limit_m=ALTITUDE_LIMIT_M,
 )

@@ -76,6 +76,14 @@ def test_the_band_of_the_prediction_lies_below_every_curve() -> None:
     assert list(card.table.rows[-1][-2:]) == pytest.approx([2.8, 3.2], abs=1e-4)
 
 
+def test_the_altitude_limit_is_there_for_the_page_that_observes_a_flight_and_hidden_on_others() -> None:
+    limit = trace(TrajectoriesFigure(replace(history(), altitude_limit_m=4.5)).compute(), "limit")
+    assert limit["y"] == [4.5, 4.5]
+    assert limit["x"][1] == pytest.approx(32.6)
+    assert limit["visible"] is False
+    assert "limit" not in {one["meta"]["role"] for one in traces(TrajectoriesFigure(history()).compute())}
+
+
 def test_a_glitch_is_marked_on_the_curve_where_it_happened() -> None:
     card = TrajectoriesFigure(history(flight(1, 0.3, glitches=(Range(5.0, 5.2), Range(9.0, 9.1))))).compute()
     marked = trace(card, "glitch", trial=1)

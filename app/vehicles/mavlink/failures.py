@@ -9,6 +9,8 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal
 
+from app.vehicles.base import ALTITUDE_LIMIT_M
+
 Outcome = Literal["refused", "aborted", "invalid", "quarantine"]
 """refused: nothing flew. aborted: a safety limit was exceeded, which counts against the gains. invalid: the measurement
 is unusable. quarantine: as invalid, and the vehicle's state is uncertain."""
@@ -212,7 +214,7 @@ class Limits:
     stuck_s: float = 0.25
     lost_s: float = 0.5
     slow_s: float = 3.0
-    ceiling_m: float = 4.5
+    ceiling_m: float = ALTITUDE_LIMIT_M
     radius_m: float = 5.0
     climb_rate_m_s: float = 4.0
     impact_m_s: float = 2.0

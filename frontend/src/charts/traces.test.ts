@@ -9,6 +9,7 @@ import {
   traceWithRole,
   windowFrom,
   withChosen,
+  withLimit,
   withLive,
   withPrediction,
   withTimeRange,
@@ -27,6 +28,19 @@ test("the live trace takes what has been measured, and only that trace", () => {
   expect(drawn[3]).toMatchObject({ x: [0.1, 0.2], y: [0, 0.05], showlegend: true });
   expect(drawn.slice(0, 3)).toEqual(traces.slice(0, 3));
   expect(withLive(traces, null)).toEqual(traces);
+});
+
+test("the altitude limit is shown within the axis, and nothing changes without one", () => {
+  const limit: Trace = { meta: { role: "limit" }, x: [0, 32], y: [4.5, 4.5], visible: false };
+  const drawn = withLimit({ data: [...traces, limit], layout: { yaxis: { range: [0, 3.5], nticks: 7 } } });
+  expect(drawn.data.at(-1)?.["visible"]).toBe(true);
+  const { range, nticks } = drawn.layout["yaxis"] as { range: [number, number]; nticks: number };
+  expect(range[0]).toBe(0);
+  expect(range[1]).toBeGreaterThan(4.5);
+  expect(range[1]).toBeLessThan(5);
+  expect(nticks).toBe(7);
+  const without = { data: traces, layout: {} };
+  expect(withLimit(without)).toBe(without);
 });
 
 test("a chosen flight stands out and the others step back", () => {

@@ -143,6 +143,21 @@ export function roomFor(range: readonly [number, number], values: readonly numbe
   return peak <= high ? [low, high] : [low, low + 1.1 * (peak - low)];
 }
 
+const LIMIT_SHARE = 0.94;
+
+/** The figure with the altitude limit, which it hides otherwise, and room for it; unchanged without a limit. */
+export function withLimit(figure: PlotlyFigure): PlotlyFigure {
+  const limit = figure.data[traceWithRole(figure.data, "limit")];
+  const highest = limit?.y?.[0];
+  if (typeof highest !== "number") return figure;
+  const { yaxis } = figure.layout as { yaxis?: { range?: [number, number] } };
+  const [low, high] = yaxis?.range ?? [0, highest];
+  return {
+    data: figure.data.map((trace) => (trace === limit ? { ...trace, visible: true } : trace)),
+    layout: { ...figure.layout, yaxis: { ...yaxis, range: [low, Math.max(high, highest / LIMIT_SHARE)] } },
+  };
+}
+
 /** The time range of the whole flight, which the axis may not show at first. */
 export function wholeFlight({ layout }: PlotlyFigure): TimeRange | null {
   const { meta } = layout as { meta?: { whole_s?: TimeRange } };

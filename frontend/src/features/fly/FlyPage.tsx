@@ -8,7 +8,7 @@ import type { Campaign, Trial, Vehicle } from "../../api/types";
 import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicle } from "../../api/vehicles";
 import { Chart } from "../../charts/Chart";
-import { type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
+import { type PlotlyFigure, wholeFlight, withChosen, withLimit, withTimeRange } from "../../charts/traces";
 import type { AbortControl } from "../../live/flights";
 import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
@@ -145,10 +145,10 @@ function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure |
   const card = useCampaignFigure(campaign.id, "takeoffs", theme).data;
   const raw = card?.figure;
   const dress = useCallback(
-    (drawn: PlotlyFigure): PlotlyFigure => ({
-      data: withChosen(drawn.data, trial.number),
-      layout: withTimeRange(drawn.layout, wholeFlight(drawn)),
-    }),
+    (drawn: PlotlyFigure): PlotlyFigure => {
+      const { data, layout } = withLimit(drawn);
+      return { data: withChosen(data, trial.number), layout: withTimeRange(layout, wholeFlight(drawn)) };
+    },
     [trial.number],
   );
   const figure = useMemo(() => (raw ? dress(raw as unknown as PlotlyFigure) : null), [raw, dress]);
