@@ -27,7 +27,7 @@ from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
 from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
 
 GAINLINE = Path(sys.executable).parent / "gainline"
-SPEED: Final = 3
+SPEED: Final = 2
 """Of the drone's time. The ground's is that of life, so that a busy machine does not make time-outs pass."""
 HELD: Final[Mapping[str, Mapping[str, float]]] = {
     "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I": 1.0, "PSC_ACCZ_D": 0.0},
@@ -102,7 +102,7 @@ def test_a_set_is_flown_by_hand_between_processes_in_real_time(tmp_path: Path) -
 @pytest.mark.parametrize("by", ["gainline run", "the fleet"])
 def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(data_dir: Path, by: str) -> None:
     folder = data_dir / "trial-parameters"
-    with UdpRig("px4", speed=SPEED) as rig:
+    with UdpRig("px4", speed=1.0) as rig:
         autopilot = rig.drone.autopilot
         for name, value in {"NAV_DLL_ACT": 3, "GF_ACTION": 5, "GF_MAX_VER_DIST": 10}.items():
             autopilot.parameters[name] = value  # type: ignore[attr-defined]
@@ -110,8 +110,10 @@ def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(data_dir: 
             until(lambda: rig.drone.body.altitude_m > 1.0 or process.poll() is not None)
             assert process.poll() is None, "it ended before it flew"
             process.kill()
+        rig.speed = 20.0
         assert (autopilot.held("MIS_TAKEOFF_ALT"), len(list(folder.iterdir()))) == (3.0, 1)
         until(lambda: not autopilot.armed)  # by its own failsafe
+        rig.speed = 1.0
         if by == "the fleet":
             assert MAVLINK.connect is not None
             pinned = Identity(system_id=1, autopilot="px4", version="1.16.0")
@@ -128,9 +130,7 @@ def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(data_dir: 
 def flying_run(rig: UdpRig, *more: str) -> Iterator[subprocess.Popen[bytes]]:
     address = rig.options()["address"]
     named = ("--vehicle", f"mavlink:{address}", "--max-flights", "1", *more)
-    with subprocess.Popen(
-        [GAINLINE, "run", "px4-takeoff", *named], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
+    with subprocess.Popen([GAINLINE, "run", "px4-takeoff", *named]) as process:
         try:
             yield process
         finally:

@@ -97,9 +97,21 @@ def create_instead(
     headers: dict[str, str] | None = None,
 ) -> None:
     """Press "Create campaign" on its page, with another request behind it."""
+    open_form(dashboard, path=path, url=url, method=method, body=body, headers=headers)
+    dashboard.button("Create campaign").click()
+
+
+def open_form(
+    dashboard: Dashboard,
+    *,
+    path: str | None = None,
+    url: str | None = None,
+    method: str | None = None,
+    body: str | bytes | None = None,
+    headers: dict[str, str] | None = None,
+) -> None:
     instead(dashboard, "/campaigns", path=path, url=url, method=method, body=body, headers=headers)
     dashboard.open("/new")
-    dashboard.button("Create campaign").click()
 
 
 @contextmanager
@@ -150,11 +162,11 @@ def _a_campaign_that_never_was(dashboard: Dashboard, _server: Server, _states: S
 @provokes(BusyError)
 def _a_vehicle_asked_while_it_is_still_being_asked(dashboard: Dashboard, server: Server, states: States) -> None:
     options = {"address": "udp:127.0.0.1:14993@14992", "simulated": True}
-    dashboard.open("/")
     vehicle = states.vehicle("Busy", options=options)
+    open_form(dashboard, path=f"/vehicles/{vehicle}/connect", body="{}")
     with stopped_worker(server):
         dashboard.post(f"/vehicles/{vehicle}/connect")
-        create_instead(dashboard, path=f"/vehicles/{vehicle}/connect", body="{}")
+        dashboard.button("Create campaign").click()
         expect(dashboard.page.get_by_role("alert")).to_be_visible()
 
 

@@ -17,9 +17,9 @@ from tests.vehicles.mavlink.speaking import free_port
 OUR_PAGE = {"Sec-Fetch-Site": "same-origin"}
 SAFE = {"kp": 283, "ki": 13, "kd": 82}
 TRIED = {"kp": 300, "ki": 20, "kd": 90}
-SPEED = 3.0
+SPEED = 2.0
 """Of a drone's time. The ground's is real, so that a busy machine does not make time-outs pass. A stall of the machine
-is three times longer in the drone's time, and its clock may gain 2 s on the ground's."""
+is twice as long in the drone's time, and its clock may gain 2 s on the ground's."""
 
 
 class Drone:

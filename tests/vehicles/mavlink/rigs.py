@@ -149,7 +149,7 @@ class UdpRig(_Heard):
         self, autopilot: str = "paparazzi", faults: Sequence[str] = (), *, mocap: str = "", speed: float = _SPEED
     ) -> None:
         super().__init__(autopilot)
-        self._speed = speed
+        self.speed = speed
         self._outlet = open_outlet(parse_source(mocap)) if mocap else None
         self.drone = switched_on(autopilot, options={"scatter": 0.0}, faults=faults, outlet=self._outlet)
         self._ports = free_port(), free_port()
@@ -186,7 +186,7 @@ class UdpRig(_Heard):
         time.sleep(max(self.wall_s(seconds), 0.0))
 
     def wall_s(self, seconds: float) -> float:
-        return seconds / self._speed
+        return seconds / self.speed
 
     # ---- the ground side
 
@@ -214,7 +214,7 @@ class UdpRig(_Heard):
                     self._lookers[looker] = False
                 for frame in frames:
                     self._transport.write(frame)
-                time.sleep(_TICKS_AT_ONCE * TICK_S / self._speed)
+                time.sleep(_TICKS_AT_ONCE * TICK_S / self.speed)
                 if frames:
                     self._wait_for_lookers()
         except BaseException as error:  # noqa: BLE001 - told by the other thread
