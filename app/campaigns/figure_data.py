@@ -18,7 +18,7 @@ from app.common.schemas import OptionValue
 from app.common.states import TrialState
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Scatter
-from app.core.records.flight_events import flight_events
+from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
 from app.core.tuning.predictions import is_informative
@@ -291,10 +291,12 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         best_number=None if other is None else other.number,
         panels=() if record is None else tuple(_panels(record)),
         events=() if record is None or experiment.output != "altitude_m" else flight_events(record),
+        notes=pinned_notes(row.note),
     )
 
 
 def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
+    """The further channels; of a real flight also the interval between samples, which shows where the link lost some."""
     for title, unit, channels in _PANELS:
         recorded = [name for name in channels if name in record.channels]
         if recorded:
@@ -304,3 +306,6 @@ def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
                 curves={channels[name]: _curve(record, name) for name in recorded},
                 limits=_LIMITS.get(recorded[0]),
             )
+    if record.clock != "simulation" and len(record.time_s) > 1:
+        interval = Curve(record.time_s[1:], np.diff(record.time_s))
+        yield ChannelPanel(title="Interval (s)", unit="s", curves={"Since the sample before": interval})

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.core.records.flight_events import FlightEvent
 from app.figures import theme
-from app.figures.base import Card, Column, Table, Trace, ready, scatter, table_of_curves
+from app.figures.base import Card, Column, Table, Trace, literal, ready, scatter, table_of_curves
 from app.figures.data import Band, Curve, Range
 from app.figures.deviations import deviation_axis, deviation_of, is_step
 from app.figures.overlays import band_traces, glitch_traces
@@ -25,6 +25,8 @@ _OUTPUT_SHARE: Final = 2.0
 
 _NAME_SHARE: Final = 0.09
 """Length of an event's name, as a share of the figure's height."""
+_NOTE_LETTERS: Final = 36
+"""Longer notes are shortened to fit into the output's panel."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +59,7 @@ class FlightRecordData:
     best_number: int | None = None
     panels: tuple[ChannelPanel, ...] = ()
     events: tuple[FlightEvent, ...] = ()
+    notes: tuple[FlightEvent, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +67,8 @@ class FlightFigure:
     """Table columns: `time_s`, `measured`, `set_point`, `predicted` (if known), then the other channels by title.
 
     Every trace carries `meta`: `role` (set point, reference, best, prediction, flight, band, glitch, deviation, input,
-    saturated). All panels share one axis of time, so that they zoom together and the cursor reads all of them.
+    saturated). Events and pinned notes are lines with their names. All panels share one axis of time, so that they zoom
+    together and the cursor reads all of them.
     """
 
     record: FlightRecordData
@@ -151,8 +155,14 @@ class FlightFigure:
             palette,
             hovermode="x unified",
             hoversubplots="axis",
-            shapes=[_mark(palette, event) for event in record.events],
-            annotations=[_name(palette, event, index) for index, event in enumerate(record.events)],
+            shapes=[
+                *(_mark(event, palette.dim) for event in record.events),
+                *(_mark(note, palette.prediction) for note in record.notes),
+            ],
+            annotations=[
+                *(_name(palette, event, index) for index, event in enumerate(record.events)),
+                *(_note(palette, note, places[0][0]) for note in record.notes),
+            ],
             margin=dict(theme.SIGNED_MARGIN_PX),
             meta={"panels": len(places)},
             uirevision="flight",
@@ -228,7 +238,7 @@ def _saturated(palette: Palette, command: Curve, limits: Range) -> Sequence[Trac
     )
 
 
-def _mark(palette: Palette, event: FlightEvent) -> dict[str, object]:
+def _mark(event: FlightEvent, colour: str) -> dict[str, object]:
     """A vertical line through all panels."""
     return {
         "type": "line",
@@ -238,22 +248,33 @@ def _mark(palette: Palette, event: FlightEvent) -> dict[str, object]:
         "y1": 1,
         "yref": "paper",
         "layer": "below",
-        "line": {"color": palette.dim, "width": 1, "dash": "dot"},
+        "line": {"color": colour, "width": 1, "dash": "dot"},
     }
 
 
 def _name(palette: Palette, event: FlightEvent, index: int) -> dict[str, object]:
     """The event's name along its line, below that of the one before it, which may be close."""
+    return _along(event.time_s, event.name, palette.dim, y=1 - _NAME_SHARE * index, yanchor="top")
+
+
+def _note(palette: Palette, note: FlightEvent, bottom: float) -> dict[str, object]:
+    """The note along its line, upward from the bottom of the output's panel."""
+    text = note.name if len(note.name) <= _NOTE_LETTERS else f"{note.name[: _NOTE_LETTERS - 1].rstrip()}…"
+    return _along(
+        note.time_s, literal(text), palette.prediction, y=bottom, yanchor="bottom", hovertext=literal(note.name)
+    )
+
+
+def _along(time_s: float, text: str, colour: str, **place: object) -> dict[str, object]:
     return {
-        "text": event.name,
-        "x": event.time_s,
-        "y": 1 - _NAME_SHARE * index,
+        "text": text,
+        "x": time_s,
         "yref": "paper",
         "xanchor": "left",
-        "yanchor": "top",
         "textangle": -90,
         "showarrow": False,
-        "font": {"size": 12, "color": palette.dim},
+        "font": {"size": 12, "color": colour},
+        **place,
     }
 
 

@@ -1,6 +1,6 @@
 """Queries on jobs."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from datetime import datetime
 
 from sqlalchemy import func, select, update
@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
 from app.common.states import JobState
-from app.db.models import JobRow
+from app.db.models import CampaignRow, JobRow
 
 
 def get_one(session: Session, job_id: int) -> JobRow:
@@ -38,6 +38,13 @@ def page(
     if before_id is not None:
         wanted = wanted.where(JobRow.id < before_id)
     return session.scalars(wanted.order_by(JobRow.id.desc()).limit(limit + 1)).all(), total
+
+
+def campaign_names(session: Session, rows: Iterable[JobRow]) -> dict[int, str]:
+    """Names of the jobs' campaigns by id."""
+    ids = {row.campaign_id for row in rows if row.campaign_id is not None}
+    named = select(CampaignRow.id, CampaignRow.name).where(CampaignRow.id.in_(ids))
+    return dict(session.execute(named).tuples().all())
 
 
 def first_waiting(session: Session, kinds: Collection[str]) -> JobRow | None:

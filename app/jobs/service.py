@@ -5,7 +5,7 @@ For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it co
 `cancel_superseded_job`; `requeue_job` and `requeue_or_fail_job` when it has to end before that.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Final
@@ -32,6 +32,7 @@ class Job(BaseModel):
     name: Annotated[str, Field(description="variant, for the kinds that have several; empty otherwise")]
     state: JobState
     campaign_id: int | None
+    campaign_name: str | None
     problem: Trouble | None
     done_share: Annotated[float | None, Field(description="0 … 1 while it runs, if the kind reports progress")]
     doing: Annotated[str, Field(description="current step")]
@@ -225,11 +226,11 @@ def list_jobs(
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     rows, total = repository.page(session, states=states, campaign_id=campaign_id, before_id=before, limit=limit)
     following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    return Page(items=[job_view(row) for row in rows[:limit]], total=total, next_cursor=following)
+    return Page(items=job_views(session, rows[:limit]), total=total, next_cursor=following)
 
 
 def get_job(session: Session, job_id: int) -> Job:
-    return job_view(repository.get_one(session, job_id))
+    return job_view(session, repository.get_one(session, job_id))
 
 
 def get_log(session: Session, job_id: int, data_dir: Path, *, limit: int) -> JobLog:
@@ -246,7 +247,7 @@ def cancel_job(session: Session, job_id: int) -> Job:
     _move(row, JobState.CANCELLED)
     row.finished_at, row.lease_until = utc_now(), None
     session.flush()
-    return job_view(row)
+    return job_view(session, row)
 
 
 def retry_job(session: Session, job_id: int) -> Job:
@@ -257,16 +258,26 @@ def retry_job(session: Session, job_id: int) -> Job:
     row.attempts, row.problem, row.finished_at = 0, None, None
     row.done_share, row.doing = None, ""
     session.flush()
-    return job_view(row)
+    return job_view(session, row)
 
 
-def job_view(row: JobRow) -> Job:
+def job_view(session: Session, row: JobRow) -> Job:
+    return job_views(session, [row])[0]
+
+
+def job_views(session: Session, rows: Sequence[JobRow]) -> list[Job]:
+    names = repository.campaign_names(session, rows)
+    return [_view(row, None if row.campaign_id is None else names.get(row.campaign_id)) for row in rows]
+
+
+def _view(row: JobRow, campaign_name: str | None) -> Job:
     return Job(
         id=row.id,
         kind=row.kind,
         name=_ordered(row),
         state=row.state,
         campaign_id=row.campaign_id,
+        campaign_name=campaign_name,
         problem=job_problem(row),
         done_share=row.done_share,
         doing=row.doing,

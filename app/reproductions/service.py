@@ -70,7 +70,7 @@ def request_run(session: Session, name: str, *, full: bool) -> Job:
     row = jobs.latest_ordered(session, REPRODUCTION_JOB, name, ACTIVE_STATES) or jobs.enqueue_job(
         session, REPRODUCTION_JOB, order={"name": name, "full": full}
     )
-    return jobs.job_view(row)
+    return jobs.job_view(session, row)
 
 
 def figure(session: Session, name: str, figure_name: str, theme: ThemeName) -> Card:
@@ -111,7 +111,7 @@ def _open_job(session: Session, each: Reproduction, latest: JobRow | None) -> Jo
         row = jobs.latest_ordered(session, REPRODUCTION_JOB, each.name, CAME_TO_NOTHING)
         if row is None or (latest is not None and row.id < latest.id):
             return None
-    return jobs.job_view(row)
+    return jobs.job_view(session, row)
 
 
 def _latest_run(row: JobRow) -> schemas.LatestRun | None:

@@ -58,9 +58,9 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     job_id = dashboard.post("/reproductions/variability/run")["id"]
     kill_until_given_up(dashboard, empty_server, job_id)
     states.reproduce("controller")
-    groups = page.get_by_role("main").get_by_role("list", name=re.compile("jobs", re.IGNORECASE))
+    groups = page.get_by_role("main").get_by_role("region", name=re.compile("jobs$"))
     expect(groups.nth(1)).to_be_visible()
-    first = groups.first.get_by_role("listitem").first
+    first = groups.first.locator("tbody").first
     expect(first).to_contain_text(f"Job {job_id}")
     expect(first.get_by_text("Failed", exact=True)).to_be_visible()
     job = dashboard.get(f"/jobs/{job_id}")
@@ -75,11 +75,11 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     expect(lines).to_have_count(told["total"])
     assert {line["details"]["exit_code"] for line in told["lines"] if "exit_code" in line["details"]} == {"-9"}
     first.get_by_role("button", name=f"Retry job {job_id}").click()
-    card = page.get_by_role("list", name="Active jobs").get_by_role("listitem").first
-    expect(card).to_contain_text(f"Job {job_id}")
-    expect(card.get_by_role("progressbar")).to_be_visible()
-    card.get_by_role("button", name=f"Cancel job {job_id}").click()
-    over = page.get_by_role("list", name="Finished jobs")
+    active = page.get_by_role("region", name="Active jobs").locator("tbody").first
+    expect(active).to_contain_text(f"Job {job_id}")
+    expect(active.get_by_role("progressbar")).to_be_visible()
+    active.get_by_role("button", name=f"Cancel job {job_id}").click()
+    over = page.get_by_role("region", name="Finished jobs")
     expect(over.get_by_text("Cancelled", exact=True)).to_be_visible()
 
 
@@ -90,7 +90,7 @@ def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, empty_
     dashboard.until(lambda: bool(dashboard.get("/reproductions/controller")["rows"]))
     dashboard.open("/jobs")
     filters = page.get_by_role("radiogroup", name="Jobs shown")
-    expect(page.get_by_role("list", name="Finished jobs").get_by_role("listitem").first).to_be_visible()
+    expect(page.get_by_role("region", name="Finished jobs").locator("tbody").first).to_be_visible()
     filters.get_by_text("Failed", exact=True).click()
     expect(page.get_by_text("No failed jobs.")).to_be_visible()
     filters.get_by_text("Finished", exact=True).click()

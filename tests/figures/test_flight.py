@@ -54,6 +54,16 @@ def test_a_tracking_error_is_not_drawn_a_second_time_as_its_own_deviation() -> N
     assert "deviation" not in {one["meta"]["role"] for one in traces(card)}
 
 
+def test_a_pinned_note_stands_at_its_time_shortened_and_without_markup() -> None:
+    long = FlightEvent(9.0, "the battery was swapped for the one with the <b>red</b> tape")
+    drawn = layout(FlightFigure(replace(RECORD, notes=(FlightEvent(2.5, "wobble"), long))).compute())
+    assert [shape["x0"] for shape in drawn["shapes"]][-2:] == [2.5, 9.0]
+    short, shortened = drawn["annotations"][-2:]
+    assert (short["x"], short["text"], short["hovertext"]) == (2.5, "wobble", "wobble")
+    assert shortened["text"] == "the battery was swapped for the one…"
+    assert shortened["hovertext"].endswith("&lt;b&gt;red&lt;/b&gt; tape")
+
+
 def test_all_panels_share_one_time_axis_so_that_one_cursor_reads_them_all() -> None:
     card = FlightFigure(RECORD).compute()
     drawn = layout(card)

@@ -48,7 +48,9 @@ def test_a_campaign_waits_for_one_proposal_at_a_time(client: TestClient) -> None
     campaign = create_campaign(client)
     for _ in range(3):
         assert client.post(f"/api/campaigns/{campaign['id']}/proposal").status_code == 202
-    assert get(client, f"/api/jobs?campaign_id={campaign['id']}")["total"] == 1
+    jobs_of = get(client, f"/api/jobs?campaign_id={campaign['id']}")
+    assert jobs_of["total"] == 1
+    assert jobs_of["items"][0]["campaign_name"] == campaign["name"]
 
 
 def test_a_silent_workers_job_waits_again_and_its_result_is_not_taken(database: Database) -> None:

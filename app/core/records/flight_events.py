@@ -1,5 +1,6 @@
-"""Events on the time line of a recorded takeoff: command, lift-off, abort, landing."""
+"""Events on the time line of a recorded takeoff: command, lift-off, abort, landing, and pinned notes."""
 
+import re
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,6 +10,7 @@ from app.core.records.trajectory import Trajectory
 
 AIRBORNE_M: Final = 0.1
 """Altitude above which the vehicle has left the ground."""
+_PINNED: Final = re.compile(r"\s*(-?\d{1,4}(?:\.\d{1,6})?)\s?s\s?[:–-]\s?(\S.*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,17 @@ def flight_events(trajectory: Trajectory) -> tuple[FlightEvent, ...]:
         found.append(FlightEvent(float(time_s[abort]), "Abort"))
     if airborne.size and airborne[-1] < len(time_s) - 1:
         found.append(FlightEvent(float(time_s[airborne[-1] + 1]), "Landing"))
-    return tuple(sorted(found, key=lambda event: event.time_s))
+    return tuple(sorted(found, key=_time))
+
+
+def pinned_notes(note: str) -> tuple[FlightEvent, ...]:
+    """The lines of a flight's note that begin with a time, as in "2.4 s: wobble", in order of time."""
+    lines = filter(None, map(_PINNED.fullmatch, note.splitlines()))
+    return tuple(sorted((FlightEvent(float(line[1]), line[2].strip()) for line in lines), key=_time))
+
+
+def _time(event: FlightEvent) -> float:
+    return event.time_s
 
 
 def _abort(trajectory: Trajectory) -> int | None:

@@ -24,6 +24,8 @@ interface Props {
   height: number | null;
   liveTrial?: number | null;
   onChoose?: ((trial: number) => void) | undefined;
+  /** Called with the x value that is clicked. */
+  onPlace?: ((x: number) => void) | undefined;
   /** Called with the zoomed time range; null for the whole range. */
   onWindow?: ((window: TimeRange | null) => void) | undefined;
   /** Called on a double click, which also undoes the zoom. */
@@ -48,7 +50,18 @@ function wholeOf({ layout }: PlotlyFigure): TimeRange | null {
   return xaxis?.range ?? null;
 }
 
-export function Chart({ figure, label, height, liveTrial = null, onChoose, onWindow, onReset, curveOf, build }: Props) {
+export function Chart({
+  figure,
+  label,
+  height,
+  liveTrial = null,
+  onChoose,
+  onPlace,
+  onWindow,
+  onReset,
+  curveOf,
+  build,
+}: Props) {
   const element = useRef<HTMLDivElement & PlotlyElement>(null);
   const [plotly, setPlotly] = useState<Plotly | null>(null); // once it has drawn
   const [broken, setBroken] = useState<string | null>(null);
@@ -69,7 +82,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
           layoutFor(figure, target.clientWidth),
           CONFIG,
         );
-        listen(target, figure.data, { whole: wholeOf(figure), onChoose, onWindow, onReset });
+        listen(target, figure.data, { whole: wholeOf(figure), onChoose, onPlace, onWindow, onReset });
         setPlotly(library);
         setBroken(null);
       } catch (error) {
@@ -79,7 +92,7 @@ export function Chart({ figure, label, height, liveTrial = null, onChoose, onWin
     return () => {
       wanted = false;
     };
-  }, [figure, liveTrial, onChoose, onWindow, onReset, build]);
+  }, [figure, liveTrial, onChoose, onPlace, onWindow, onReset, build]);
 
   useEffect(() => {
     const target = element.current;

@@ -25,6 +25,7 @@ interface Props {
   dressed?: (figure: PlotlyFigure) => PlotlyFigure;
   liveTrial?: number | null;
   onChoose?: (trial: number) => void;
+  onPlace?: ((x: number) => void) | undefined;
   onWindow?: (window: TimeRange | null) => void;
   onReset?: () => void;
   curveOf?: CurveOf;
@@ -47,6 +48,7 @@ export function FigurePanel({
   dressed,
   liveTrial,
   onChoose,
+  onPlace,
   onWindow,
   onReset,
   curveOf,
@@ -101,6 +103,7 @@ export function FigurePanel({
           height={height}
           liveTrial={liveTrial ?? null}
           onChoose={onChoose}
+          onPlace={onPlace}
           onWindow={onWindow}
           onReset={onReset}
           curveOf={curveOf}

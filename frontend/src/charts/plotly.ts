@@ -65,6 +65,8 @@ export interface Listeners {
   /** The time range of the figure without a zoom. */
   whole: TimeRange | null;
   onChoose?: ((flight: number) => void) | undefined;
+  /** Called with the x value that is clicked. */
+  onPlace?: ((x: number) => void) | undefined;
   onWindow?: ((window: TimeRange | null) => void) | undefined;
   /** Called on a double click, which also undoes the zoom. */
   onReset?: (() => void) | undefined;
@@ -76,7 +78,7 @@ const SETTLED_MS = 250;
 export function listen(
   chart: PlotlyElement,
   traces: readonly Trace[],
-  { whole, onChoose, onWindow, onReset }: Listeners,
+  { whole, onChoose, onPlace, onWindow, onReset }: Listeners,
 ): void {
   for (const event of ["click", "hover", "unhover", "doubleclick", "relayout"])
     chart.removeAllListeners?.(`plotly_${event}`);
@@ -84,6 +86,8 @@ export function listen(
   chart.on?.("plotly_click", ({ points }) => {
     const flight = flightOf(points);
     if (flight !== null) onChoose?.(flight);
+    const x = points[0]?.x;
+    if (typeof x === "number") onPlace?.(x);
   });
   chart.on?.("plotly_hover", ({ points }) => chart.matches(":hover") && pointAt(flightOf(points)));
   chart.on?.("plotly_unhover", () => chart.matches(":hover") && pointAt(null));

@@ -1,6 +1,6 @@
 import numpy as np
 
-from app.core.records.flight_events import flight_events
+from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import Samples, Trajectory
 
 TIME_S = np.arange(-1.0, 11.0)
@@ -33,3 +33,12 @@ def test_an_aborted_flight_shows_when_its_set_point_returned_to_the_ground_and_w
 def test_a_vehicle_that_stays_on_the_ground_has_only_a_command() -> None:
     assert events_of(altitude_m=np.zeros_like(TIME_S), set_point_m=np.zeros_like(TIME_S)) == [(0.0, "Command")]
     assert events_of(pitch_rad=np.zeros_like(TIME_S)) == [(0.0, "Command")]
+
+
+def test_the_lines_of_a_note_that_begin_with_a_time_are_pinned_to_it() -> None:
+    note = "Windy today.\n 12.5 s: gust from the door\n2 s – first wobble\n-0.5s: props still\nthe 3 s: no pin\n4 s:"
+    assert [(event.time_s, event.name) for event in pinned_notes(note)] == [
+        (-0.5, "props still"),
+        (2.0, "first wobble"),
+        (12.5, "gust from the door"),
+    ]

@@ -1945,6 +1945,10 @@ export type Job = {
      * Campaign Id
      */
     campaign_id: number | null;
+    /**
+     * Campaign Name
+     */
+    campaign_name: string | null;
     problem: Trouble | null;
     /**
      * Done Share

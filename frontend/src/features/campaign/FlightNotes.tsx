@@ -1,6 +1,6 @@
 import { Button, FileButton, Group, InputBase } from "@mantine/core";
 import { IconCamera, IconTrash } from "@tabler/icons-react";
-import { useState } from "react";
+import { useEffect, useRef, useState } from "react";
 import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/records";
 import type { Trial } from "../../api/types";
 import { ErrorNotice } from "../../ui/Notices";
@@ -8,18 +8,29 @@ import classes from "./Verdict.module.css";
 
 const PICTURES = "image/jpeg,image/png,image/webp";
 
+/** The time in the record, in seconds since the command, at which a line of the note is to be pinned. */
+export interface NotePin {
+  timeS: number;
+}
+
+interface Props {
+  trial: Trial;
+  /** A new pin adds its line to the note. */
+  pin?: NotePin | null;
+}
+
 /** Note and photos of a flight; a tablet takes photos with its camera. */
-export function FlightNotes({ trial }: { trial: Trial }) {
+export function FlightNotes({ trial, pin = null }: Props) {
   const { data: photos = [], error } = usePhotos(trial.id);
   const { add, remove } = usePhotoActions(trial.id);
   const [asked, setAsked] = useState<number | null>(null);
   const doomed = photos.findIndex(({ id }) => id === asked);
-  const kept = trial.note !== "" || photos.length > 0;
+  const kept = trial.note !== "" || photos.length > 0 || pin !== null;
   return (
     <details className={classes["notes"]} open={kept || undefined}>
       <summary>Note and photos</summary>
       {/* The key keeps unsaved text when a review changes the trial's version. */}
-      <Note key={`${trial.id} ${trial.note}`} trial={trial} />
+      <Note key={`${trial.id} ${trial.note}`} trial={trial} pin={pin} />
       {photos.length > 0 && (
         <ul className={classes["photos"]}>
           {photos.map(({ id }, index) => (
@@ -67,8 +78,16 @@ export function FlightNotes({ trial }: { trial: Trial }) {
   );
 }
 
-function Note({ trial }: { trial: Trial }) {
+function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
   const [note, setNote] = useState(trial.note);
+  const text = useRef<HTMLTextAreaElement>(null);
+  const pinned = useRef(pin);
+  useEffect(() => {
+    if (pin === null || pinned.current === pin) return;
+    pinned.current = pin;
+    setNote((before) => withPin(before, pin.timeS));
+    text.current?.focus();
+  }, [pin]);
   const save = useNote(trial);
   return (
     <form
@@ -80,6 +99,8 @@ function Note({ trial }: { trial: Trial }) {
     >
       <InputBase
         component="textarea"
+        ref={text}
+        description="A line that begins with a time, such as “2.4 s: wobble”, is marked in the record."
         multiline
         label={`Note on flight ${trial.number}`}
         rows={2}
@@ -95,4 +116,10 @@ function Note({ trial }: { trial: Trial }) {
       <ErrorNotice error={save.error} />
     </form>
   );
+}
+
+/** The note with another line, which begins with a time. */
+function withPin(note: string, timeS: number): string {
+  const before = note.trimEnd();
+  return `${before}${before && "\n"}${timeS.toFixed(1)} s: `;
 }

@@ -1,4 +1,6 @@
-import { Anchor, Box, Skeleton, Title, useComputedColorScheme } from "@mantine/core";
+import { Anchor, Box, Button, Skeleton, Title, useComputedColorScheme } from "@mantine/core";
+import { IconPin } from "@tabler/icons-react";
+import { useCallback, useState } from "react";
 import { Link, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
 import type { FigureCard } from "../../api/types";
@@ -8,6 +10,7 @@ import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./CampaignPage.module.css";
+import type { NotePin } from "./FlightNotes";
 import { GateChecks } from "./GateChecks";
 import { VerdictPanel } from "./VerdictPanel";
 
@@ -36,6 +39,12 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   const figure = useFlightFigure(trialId, theme);
   const experiment = campaign?.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
+  const [pinning, setPinning] = useState(false);
+  const [pin, setPin] = useState<NotePin | null>(null);
+  const place = useCallback((timeS: number) => {
+    setPin({ timeS });
+    setPinning(false);
+  }, []);
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
   if (trial.error) return <NotFound error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
@@ -49,7 +58,25 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
         Flight {number}
       </Title>
       <div className={classes["record"]}>
-        <FigurePanel title="Record" card={figure.data} error={figure.error} height={recordHeight(figure.data)} />
+        <FigurePanel
+          title="Record"
+          card={figure.data}
+          error={figure.error}
+          height={recordHeight(figure.data)}
+          onPlace={pinning ? place : undefined}
+          tools={
+            record !== null && (
+              <Button
+                variant={pinning ? "light" : "default"}
+                aria-pressed={pinning}
+                leftSection={<IconPin size={18} aria-hidden />}
+                onClick={() => setPinning(!pinning)}
+              >
+                {pinning ? "Select a time in the chart" : "Pin note"}
+              </Button>
+            )
+          }
+        />
       </div>
       <Box mt="var(--gap)">
         <VerdictPanel
@@ -59,6 +86,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
           unit={unit}
           experiment={experiment}
           own
+          pin={pin}
         />
       </Box>
       <Box mt="var(--gap)" px={18} py={4} c="dimmed" fz="small">

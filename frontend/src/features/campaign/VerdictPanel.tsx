@@ -18,7 +18,7 @@ import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
 import { confidenceText, intervalText, plusMinus } from "../../ui/uncertainty";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
-import { FlightNotes } from "./FlightNotes";
+import { FlightNotes, type NotePin } from "./FlightNotes";
 import { AbortCause, FlightReview } from "./FlightReview";
 import { speedOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
@@ -34,6 +34,7 @@ interface Props {
   experiment: string;
   /** Whether this is the flight's own page, which needs no link to itself. */
   own?: boolean;
+  pin?: NotePin | null;
 }
 
 /** `error` against `other`; the same if their texts are equal. */
@@ -68,7 +69,7 @@ function Fact({ title, topic, wide = false, children }: FactProps) {
 }
 
 /** Result of a flight: compared with the best before it and with its prediction, and its review. */
-export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = false }: Props) {
+export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = false, pin = null }: Props) {
   const bestBefore = bestBeforeOf(trial, trials);
   const statistics = useStatistics(trial.campaign_id).data;
   const campaign = useCampaign(trial.campaign_id).data;
@@ -171,7 +172,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           </Anchor>
         )}
       </Group>
-      <FlightNotes trial={trial} />
+      <FlightNotes trial={trial} pin={pin} />
       {campaign && isBest && campaign.state !== "finished" && <PromoteGains campaign={campaign} />}
     </Panel>
   );

@@ -12,8 +12,8 @@ import { DataTable } from "../../ui/DataTable";
 import { ErrorNotice } from "../../ui/Notices";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
+import row from "../../ui/RowCard.module.css";
 import { Time } from "../../ui/Time";
-import jobs from "../jobs/JobCard.module.css";
 import classes from "./Checks.module.css";
 import { allowances, checkStateLabel, gainsText, KINDS, signalsTable } from "./checks";
 
@@ -39,7 +39,7 @@ export function CheckResult({ checkId, upload, onCheck }: Props) {
         <p className={classes["sentence"]} data-passed={check.passed || undefined}>
           {check.sentence}
         </p>
-        <p className={`${jobs["facts"]} numbers`}>
+        <p className={`${row["facts"]} numbers`}>
           <span>{KINDS[check.kind]}</span>
           <span>
             gains {check.gains === null ? "" : gainsText(check.gains)} {check.gains_from}

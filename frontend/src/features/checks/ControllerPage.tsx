@@ -11,7 +11,6 @@ import { addPage } from "../../ui/paging";
 import row from "../../ui/RowCard.module.css";
 import { Time } from "../../ui/Time";
 import { useTitle } from "../../ui/useTitle";
-import jobs from "../jobs/JobCard.module.css";
 import { CheckForm } from "./CheckForm";
 import { CheckResult } from "./CheckResult";
 import { checkStateLabel, KINDS } from "./checks";
@@ -73,19 +72,19 @@ function EarlierChecks({ shown }: { shown: number }) {
       )}
       <ul className={classes["list"]} aria-label="Earlier checks">
         {found.map(({ id, file_name, kind, passed, checked_at }) => (
-          <li key={id} className={`${row["card"]} ${jobs["job"]}`}>
-            <div className={`${row["what"]} ${jobs["what"]}`}>
+          <li key={id} className={`${row["card"]} ${row["top"]}`}>
+            <div className={`${row["what"]} ${row["spaced"]}`}>
               <Title order={3} fz="body">
                 <Anchor
                   component={Link}
                   to={`/controller/${id}`}
-                  className={jobs["link"]}
+                  className={row["link"]}
                   aria-current={id === shown || undefined}
                 >
                   {file_name}
                 </Anchor>
               </Title>
-              <p className={`${jobs["facts"]} numbers`}>
+              <p className={`${row["facts"]} numbers`}>
                 <StateBadge words={checkStateLabel(passed)} />
                 <span>{KINDS[kind]}</span>
                 <Time at={checked_at} />

@@ -3,10 +3,9 @@ import { useState } from "react";
 import { JOBS_PAGE, type JobState, useJobs, useReproductions } from "../../api/jobs";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
-import classes from "../../ui/Page.module.css";
 import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";
-import { JobCard } from "./JobCard";
+import { JobTable } from "./JobTable";
 
 type GroupName = "failed" | "open" | "over";
 type Filter = "all" | GroupName;
@@ -87,11 +86,7 @@ function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, o
       <Title order={2} c="dimmed" fz="body" mb={10}>
         {title}
       </Title>
-      <ul className={classes["list"]} aria-label={title}>
-        {items.map((job) => (
-          <JobCard key={job.id} job={job} titles={titles} />
-        ))}
-      </ul>
+      <JobTable label={title} jobs={items} titles={titles} />
       {query.hasNextPage && (
         <Box mt={20} ta="center">
           <Button

@@ -16,7 +16,7 @@ import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
-import { JobProgress } from "./JobCard";
+import { JobProgress } from "./JobTable";
 import { type ComparedColumn, comparedColumns, duration, grouped, isUnderWay, measure, ratioSpan } from "./jobs";
 import classes from "./ReproductionCard.module.css";
 

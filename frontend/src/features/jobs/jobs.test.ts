@@ -18,6 +18,7 @@ const JOB: Job = {
   name: "table1",
   state: "running",
   campaign_id: null,
+  campaign_name: null,
   problem: null,
   done_share: 0.387,
   doing: "jsbsim: 285, 44, 82 flown",
@@ -55,11 +56,10 @@ test("a job is named after what it does and leads to where that is seen", () => 
   expect(jobTitle(JOB, titles)).toBe("Table 1");
   expect(jobTitle(JOB, new Map())).toBe("table1");
   expect(jobLink(JOB)).toBe("/reproductions#table1");
-  const proposal: Job = { ...JOB, kind: "proposal", name: "", campaign_id: 4 };
-  expect(jobTitle(proposal, titles)).toBe("Next gains of campaign 4");
-  expect(jobLink(proposal)).toBe("/campaigns/4");
-  const landscape: Job = { ...JOB, kind: "landscape", name: "campaign 4", campaign_id: 4 };
-  expect(jobTitle(landscape, titles)).toBe("Error landscape of campaign 4");
+  const proposal: Job = { ...JOB, kind: "proposal", name: "", campaign_id: 4, campaign_name: "Twin, session 1" };
+  expect(jobTitle(proposal, titles)).toBe("Next gains");
+  expect(jobLink(proposal)).toBeNull();
+  expect(jobTitle({ ...proposal, kind: "landscape", name: "campaign 4" }, titles)).toBe("Error landscape");
 });
 
 test("rows stand under their headings, and the nearness to the paper is that of the first with ratios", () => {

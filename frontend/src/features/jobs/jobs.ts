@@ -45,16 +45,15 @@ export function progressText({ state, done_share: share, doing, remaining_s: lef
 }
 
 /** Title of a job. `titles` are those of the reproductions by name. */
-export function jobTitle({ kind, name, campaign_id }: Job, titles: ReadonlyMap<string, string>): string {
-  if (kind === "proposal") return campaign_id === null ? "Next gains" : `Next gains of campaign ${campaign_id}`;
-  if (kind === "landscape" && campaign_id !== null) return `Error landscape of campaign ${campaign_id}`;
+export function jobTitle({ kind, name }: Job, titles: ReadonlyMap<string, string>): string {
+  if (kind === "proposal") return "Next gains";
+  if (kind === "landscape") return "Error landscape";
   if (kind === "reproduction") return titles.get(name) ?? name;
   return name === "" ? kind : `${kind} ${name}`;
 }
 
-/** Link to the result of a job. */
-export function jobLink({ kind, name, campaign_id }: Job): string | null {
-  if (campaign_id !== null) return `/campaigns/${campaign_id}`;
+/** Link to the result of a job that has no campaign. */
+export function jobLink({ kind, name }: Job): string | null {
   return kind === "reproduction" ? `/reproductions#${name}` : null;
 }
 
