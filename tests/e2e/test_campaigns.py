@@ -39,7 +39,7 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
         expect(row).to_contain_text(f"{trial['error']:.3f} m")
         dashboard.wait_for_flight(number)
         assert_drawn_as_recorded(dashboard, trial)
-        expect(finished.or_(dashboard.fly_button)).to_be_visible(timeout=30_000)
+        expect(finished.or_(dashboard.button(f"Fly flight {number + 1}"))).to_be_visible(timeout=30_000)
         if finished.is_visible():
             break
     trials = dashboard.trials(campaign_id)

@@ -10,24 +10,28 @@ from tests.e2e.dashboard import Dashboard
 from tests.e2e.test_verdict import open_flight
 
 FINISHED = re.compile("^(Converged|Flight budget used)")
-RECOMMENDED = re.compile(r"^(Fly flight \d+|Fly now)$")
 CANDIDATE = "Candidate: not yet confirmed by repeat flights."
 CONFIRMED = "Confirmed: better than the first gains in repeat flights."
 
 
 def fly_on(dashboard: Dashboard, campaign_id: int, *, steps: bool = False) -> None:
     """Fly what is recommended, or with `steps` what is proposed, until the campaign is finished."""
-    finished = dashboard.page.get_by_role("heading", name=FINISHED)
-    fly = dashboard.page.get_by_role("button", name=RECOMMENDED).and_(dashboard.page.locator(":enabled"))
+    page = dashboard.page
+    finished = page.get_by_role("heading", name=FINISHED)
     for _ in range(12):
+        flown = [trial["number"] for trial in dashboard.trials(campaign_id) if trial["error"] is not None]
+        number = max(flown, default=0) + 1
+        card = page.locator("section").filter(has=page.get_by_role("heading", name=re.compile(rf"\b{number}\b")))
+        fly = card.get_by_role("button", name=re.compile(rf"^(Fly flight {number}|Fly now)$")).and_(
+            page.locator(":enabled")
+        )
         expect(finished.or_(fly)).to_be_visible(timeout=30_000)
         if finished.is_visible():
             return
-        flown = sum(trial["error"] is not None for trial in dashboard.trials(campaign_id))
         if steps:
             dashboard.choose_proposed(campaign_id)
         fly.click()
-        dashboard.wait_for_flight(flown + 1)
+        dashboard.wait_for_flight(number)
     raise AssertionError("the campaign does not end")
 
 

@@ -1,31 +1,20 @@
 import { ActionIcon, Title } from "@mantine/core";
 import { IconKeyboard } from "@tabler/icons-react";
-import { useEffect, useRef } from "react";
+import { useRef } from "react";
 import { useLocation } from "react-router";
 import { Note } from "../ui/Note";
 import classes from "./KeyboardHelp.module.css";
-import { commandOf, keysOf } from "./keys";
-
-function isTyping(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && target.matches("input, textarea, select, [contenteditable]");
-}
+import { keysOf } from "./keys";
+import { useKeys } from "./useKeys";
 
 /** Keyboard shortcuts of this page, opened by a button or `?`. Non-modal, and it does not cover the abort button. */
 export function KeyboardHelp() {
   const { pathname } = useLocation();
   const dialog = useRef<HTMLDialogElement>(null);
-  useEffect(() => {
-    function onKey(event: KeyboardEvent): void {
-      const command = commandOf(event, isTyping(event.target));
-      if (command === "help") dialog.current?.togglePopover();
-      const search = document.querySelector<HTMLInputElement>("main search input");
-      if (command !== "search" || search === null) return;
-      event.preventDefault();
-      search.focus();
-    }
-    document.addEventListener("keydown", onKey);
-    return () => document.removeEventListener("keydown", onKey);
-  }, []);
+  useKeys({
+    help: () => dialog.current?.togglePopover(),
+    search: () => document.querySelector<HTMLInputElement>("main search input")?.focus(),
+  });
   return (
     <>
       <ActionIcon

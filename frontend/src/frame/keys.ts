@@ -13,8 +13,19 @@ const EVERYWHERE: readonly Key[] = [
   { keys: ["?"], does: "Show these shortcuts." },
 ];
 
+const JUMP: Key = { keys: ["j", "k"], does: "Next or previous flight." };
+
 const OF_PAGES: readonly { page: RegExp; keys: readonly Key[] }[] = [
   { page: /^\/$/, keys: [{ keys: ["/"], does: "Focus the search field." }] },
+  {
+    page: /^\/campaigns\/\d+$/,
+    keys: [
+      JUMP,
+      { keys: ["x"], does: "Select the shown flight for comparison, or deselect it." },
+      { keys: ["c"], does: "Compare the selected flights." },
+    ],
+  },
+  { page: /^\/campaigns\/\d+\/flights\//, keys: [JUMP] },
   {
     page: /^\/campaigns\/|^\/compare/,
     keys: [
@@ -31,10 +42,19 @@ export function keysOf(path: string): Key[] {
 
 type Press = Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "altKey">;
 
-const COMMANDS: Readonly<Record<string, "help" | "search">> = { "?": "help", "/": "search" };
+export type Command = "help" | "search" | "next" | "previous" | "select" | "compare";
+
+const COMMANDS: Readonly<Record<string, Command>> = {
+  "?": "help",
+  "/": "search",
+  j: "next",
+  k: "previous",
+  x: "select",
+  c: "compare",
+};
 
 /** Command of a key press; null while the user types. */
-export function commandOf({ key, ctrlKey, metaKey, altKey }: Press, isTyping: boolean): "help" | "search" | null {
+export function commandOf({ key, ctrlKey, metaKey, altKey }: Press, isTyping: boolean): Command | null {
   return isTyping || ctrlKey || metaKey || altKey ? null : (COMMANDS[key] ?? null);
 }
 

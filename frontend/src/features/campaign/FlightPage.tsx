@@ -1,12 +1,14 @@
 import { Anchor, Box, Button, Skeleton, Title, useComputedColorScheme } from "@mantine/core";
 import { IconPin } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
-import { Link, useParams } from "react-router";
+import { Link, useNavigate, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
 import type { FigureCard } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { useKeys } from "../../frame/useKeys";
 import { grouped } from "../../ui/format";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
+import { wasFlown } from "../../ui/states";
 import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./CampaignPage.module.css";
@@ -45,6 +47,14 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
     setPin({ timeS });
     setPinning(false);
   }, []);
+  const navigate = useNavigate();
+  const flown = trials.filter(({ state }) => wasFlown(state));
+  const at = flown.findIndex(({ id }) => id === trialId);
+  const jump = (by: number) => {
+    const next = at < 0 ? undefined : flown[at + by];
+    if (next !== undefined) void navigate(`/campaigns/${campaignId}/flights/${next.id}`);
+  };
+  useKeys({ next: () => jump(1), previous: () => jump(-1) });
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
   if (trial.error) return <NotFound error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;

@@ -2,9 +2,10 @@ import { Anchor, Button, Checkbox, Group, Skeleton } from "@mantine/core";
 import { useLocalStorage } from "@mantine/hooks";
 import { IconArrowDown, IconArrowUp, IconStarFilled } from "@tabler/icons-react";
 import { memo, useEffect, useMemo, useRef, useState } from "react";
-import { Link } from "react-router";
+import { Link, useNavigate } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
 import { onPointed, pointAt } from "../../charts/pointing";
+import { useKeys } from "../../frame/useKeys";
 import { count } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
@@ -31,6 +32,21 @@ const NO_TITLES: Readonly<Record<string, string>> = {};
 /** The table of all flights: columns to choose, sorted by any of them, and rows to compare. */
 export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown, unit, onChoose }: Props) {
   const [selected, setSelected] = useState<readonly number[]>([]);
+  const navigate = useNavigate();
+  const select = (trial: number) =>
+    setSelected(selected.includes(trial) ? selected.filter((one) => one !== trial) : [...selected, trial]);
+  const flown = (trials ?? []).filter(({ state }) => wasFlown(state));
+  const at = flown.findIndex(({ number }) => number === shown);
+  const jump = (by: number) => {
+    const next = flown[at + by];
+    if (next !== undefined) onChoose(next.number);
+  };
+  useKeys({
+    next: () => jump(1),
+    previous: () => jump(-1),
+    select: () => flown[at] && select(flown[at].id),
+    compare: () => void navigate(comparison(campaign.id, selected)),
+  });
   return (
     <Panel
       title="All flights"
@@ -47,30 +63,30 @@ export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown
           unit={unit}
           onChoose={onChoose}
           selected={selected}
-          onSelect={(trial) =>
-            setSelected(selected.includes(trial) ? selected.filter((one) => one !== trial) : [...selected, trial])
-          }
+          onSelect={select}
         />
       )}
     </Panel>
   );
 });
 
-/** The selected flights in the order in which they were selected: the first is the reference. */
+/** Address of the comparison of the selected flights, in the order of selection: the first is the reference. */
+function comparison(campaign: number, selected: readonly number[]): string {
+  const trials = selected.map((trial): [string, string] => ["trial", String(trial)]);
+  return `/compare?${new URLSearchParams([["campaign", String(campaign)], ...trials])}`;
+}
+
 function CompareLink({ campaign, selected }: { campaign: number; selected: readonly number[] }) {
+  const address = comparison(campaign, selected);
   if (selected.length < 2) {
     return (
-      <Anchor component={Link} to={`/compare?campaign=${campaign}`} py={12}>
+      <Anchor component={Link} to={address} py={12}>
         Compare flights
       </Anchor>
     );
   }
-  const query = new URLSearchParams([
-    ["campaign", String(campaign)],
-    ...selected.map((trial): [string, string] => ["trial", String(trial)]),
-  ]);
   return (
-    <Button component={Link} to={`/compare?${query}`} variant="default">
+    <Button component={Link} to={address} variant="default">
       Compare {count(selected.length, "selected flight")}
     </Button>
   );
