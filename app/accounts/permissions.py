@@ -90,6 +90,11 @@ UNLOCK_HINT: Final = (
     "Open the link that the terminal printed at startup, or run `gainline unlock` on the computer that runs "
     "Gainline and open the link that it prints."
 )
+_FOR_SCRIPTS: Final = "Send the token that `gainline unlock --script` prints as `Authorization: Bearer TOKEN`."
+
+STAGED_BY_SCRIPT: Final = (
+    "A script can propose gains and stage the flight; the operator then holds the button on the fly page."
+)
 
 
 def is_allowed(act: Permission, caller: Caller) -> bool:
@@ -136,7 +141,8 @@ def _elsewhere(act: Permission, caller: Caller, vehicle: str) -> NotAllowedError
 def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
     return NotAllowedError(
         f"The request came {caller.because}. Reading is allowed from there; everything else needs this server's token.",
-        hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer TOKEN`.",
+        hint=UNLOCK_HINT,
+        script_hint=_FOR_SCRIPTS,
     )
 
 
@@ -144,12 +150,13 @@ def _locked(act: Permission, vehicle: str) -> NotAllowedError:
     if act is Permission.TAKE_OFF:
         return NotAllowedError(
             f"{vehicle} is a real vehicle: only its operator can start the take-off, in an unlocked browser.",
-            hint=f"{UNLOCK_HINT} A script can propose gains and stage the flight.",
+            hint=UNLOCK_HINT,
+            script_hint=STAGED_BY_SCRIPT,
         )
     return NotAllowedError(
         f"{vehicle} is a real vehicle, and the request has no key that permits commanding it.",
-        hint=f"{UNLOCK_HINT} A script sends what `gainline unlock --script` prints as `Authorization: Bearer "
-        "TOKEN`. Abort and land need no key.",
+        hint=f"{UNLOCK_HINT} Abort and land need no key.",
+        script_hint=f"{_FOR_SCRIPTS} Abort and land need no key.",
     )
 
 

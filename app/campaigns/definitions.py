@@ -96,7 +96,7 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
         raise InputError(
             "Invalid campaign.",
             problems=tuple(problems),
-            hint="Correct the named fields and send it again; nothing was changed.",
+            hint="Correct the named fields, then try again; nothing was changed.",
         )
     return definition, options
 

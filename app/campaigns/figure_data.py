@@ -296,7 +296,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
 
 
 def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
-    """The further channels; of a real flight also the interval between samples, which shows where the link lost some."""
+    """The further channels; of a real flight also the interval between samples, which shows losses of the link."""
     for title, unit, channels in _PANELS:
         recorded = [name for name in channels if name in record.channels]
         if recorded:

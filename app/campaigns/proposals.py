@@ -127,7 +127,7 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
     if is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
             f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
-            hint="Request the campaign's proposal again and decide on the new one.",
+            hint="Decide on the new proposal, which is shown once it is computed.",
         )
     return row
 
@@ -138,7 +138,7 @@ def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalR
     if row is None or is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
             f"The next gains of campaign {campaign.id} are not computed yet.",
-            hint="Try again in a moment; request the campaign's proposal to see when they are ready.",
+            hint="Wait until they are computed, then try again.",
         )
     return row
 
@@ -174,7 +174,7 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
         raise ConflictError(
             f"The start gains of campaign {campaign.id} are not computed yet; the step limits of your own gains are "
             "measured from them.",
-            hint="Try again in a moment; request the campaign's proposal to see when they are ready.",
+            hint="Wait until they are computed, then try again.",
         )
     return latest.gains
 

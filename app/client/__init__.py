@@ -336,7 +336,8 @@ def _refusal(answer: httpx2.Response) -> RefusedError:
             hint="Check that the address belongs to a Gainline server of this version.",
         )
     problems = tuple(Problem(problem.field, problem.reason, problem.offer) for problem in details.problems)
-    return kind(details.detail, hint=details.hint, problems=problems, status=details.status, title=details.title)
+    hint = details.script_hint or details.hint
+    return kind(details.detail, hint=hint, problems=problems, status=details.status, title=details.title)
 
 
 def _content(record: Record) -> bytes:

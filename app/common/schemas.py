@@ -82,13 +82,15 @@ class ProblemField(BaseModel):
 
 
 class Problem(BaseModel):
-    """An error (RFC 9457): what happened, what to do about it, and the fields concerned."""
+    """An error (RFC 9457): what happened, what to do about it, and the fields concerned. `script_hint` is what a script
+    does about it, where that differs from what a person does; empty otherwise."""
 
     type: str
     title: str
     status: int
     detail: str
     hint: str
+    script_hint: str = ""
     problems: list[ProblemField]
 
 

@@ -25,12 +25,16 @@ class Problem:
 
 
 class GainlineError(Exception):
-    """An error with a `message` (what happened and what it means) and a `hint` (what to do about it)."""
+    """An error with a `message` (what happened and what it means) and a `hint` (what to do about it).
 
-    def __init__(self, message: str, *, hint: str, problems: tuple[Problem, ...] = ()) -> None:
+    `script_hint` is what a script does about it, where that differs; pages do not show it.
+    """
+
+    def __init__(self, message: str, *, hint: str, problems: tuple[Problem, ...] = (), script_hint: str = "") -> None:
         super().__init__(message)
         self.message = message
         self.hint = hint
+        self.script_hint = script_hint
         self.problems = problems
 
     def __str__(self) -> str:

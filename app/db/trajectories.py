@@ -79,7 +79,7 @@ def _require_storable(columns: list[str], table: Table) -> None:
     if table.shape[1] == 0:
         raise TrajectoryError(
             "This record is empty.",
-            hint="Send a record with at least two samples.",
+            hint="Choose a record with at least two samples.",
             problems=(Problem(_TIME, "has no samples"),),
         )
     finite = np.isfinite(table)
@@ -87,7 +87,7 @@ def _require_storable(columns: list[str], table: Table) -> None:
         column, sample = (int(index) for index in np.argwhere(~finite)[0])
         raise TrajectoryError(
             "This record contains a number that cannot be stored.",
-            hint="Correct the record and send it again.",
+            hint="Correct the record, then upload it again.",
             problems=(Problem(columns[column], f"is not finite, or larger than 3.4e38, at sample {sample}"),),
         )
     if (np.diff(table[0]) <= 0).any():

@@ -12,7 +12,7 @@ from typing import Final
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
-from app.accounts.permissions import Permission, RequestContext, require
+from app.accounts.permissions import STAGED_BY_SCRIPT, Permission, RequestContext, require
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.states import ActKind, ActState
 from app.db.models import VehicleActRow, VehicleRow
@@ -101,7 +101,8 @@ def require_control(row: VehicleRow, context: RequestContext) -> str:
     if not context.from_our_page:
         raise NotAllowedError(
             f"{row.name} is a real vehicle: only its operator can start the take-off, in the browser.",
-            hint="A script can propose gains and stage the flight; the operator then holds the button on the fly page.",
+            hint="Hold the button on the flight's fly page.",
+            script_hint=STAGED_BY_SCRIPT,
         )
     operator = require_not_controlled_by_other(row, context)
     if not operator:

@@ -112,7 +112,8 @@ def _no_choice(field: str, reason: str) -> InputError:
     return InputError(
         "Invalid vehicle.",
         problems=(Problem(f"vehicle.{field}", reason),),
-        hint="Register the vehicle on the fleet page (POST /api/vehicles) and give its id.",
+        hint="Register the vehicle on the page Vehicles, then choose it for the campaign.",
+        script_hint="Register the vehicle with POST /api/vehicles and give its `id`.",
     )
 
 

@@ -49,8 +49,8 @@ _KINDS: Final[Mapping[type[GainlineError], tuple[HTTPStatus, str]]] = {
     UnconfirmedError: (HTTPStatus.CONFLICT, "Confirmation needed"),
     InputError: (HTTPStatus.UNPROCESSABLE_ENTITY, "Unusable input"),
     UnavailableError: (HTTPStatus.SERVICE_UNAVAILABLE, "Not available"),
-    StorageError: (HTTPStatus.SERVICE_UNAVAILABLE, "Storage trouble"),
-    LinkDownError: (HTTPStatus.SERVICE_UNAVAILABLE, "Worker out of reach"),
+    StorageError: (HTTPStatus.SERVICE_UNAVAILABLE, "Storage error"),
+    LinkDownError: (HTTPStatus.SERVICE_UNAVAILABLE, "Worker unreachable"),
     GainlineError: (HTTPStatus.INTERNAL_SERVER_ERROR, "Error"),
 }
 """Status and title; a class that is not listed has those of its nearest listed base class."""
@@ -97,6 +97,7 @@ def _problem(
     problems: Iterable[ProblemField] = (),
     *,
     title: str = "",
+    script_hint: str = "",
     headers: Mapping[str, str] | None = None,
 ) -> Response:
     kind = f"urn:gainline:{title.lower().replace(' ', '-')}" if title else "about:blank"
@@ -106,6 +107,7 @@ def _problem(
         status=status,
         detail=detail,
         hint=hint,
+        script_hint=script_hint,
         problems=list(problems),
     )
     # A quoted part of the request may hold a lone surrogate, which UTF-8 cannot encode.
@@ -130,6 +132,7 @@ def problem_response(error: GainlineError) -> Response:
             for problem in error.problems
         ],
         title=title,
+        script_hint=error.script_hint,
     )
 
 
@@ -139,7 +142,7 @@ async def _invalid_request(_request: Request, error: Exception) -> Response:
     return _problem(
         HTTPStatus.UNPROCESSABLE_ENTITY,
         "The request has invalid fields; nothing was changed.",
-        "Correct the named fields and send the request again.",
+        "Correct the named fields, then try again.",
         problems,
         title="Unusable input",
     )

@@ -49,6 +49,8 @@ def test_a_refusal_names_the_vehicle_and_the_way_out() -> None:
         require(Permission.REAL, Caller(), "Bee")
     assert "gainline unlock" in locked.value.hint
     assert "Abort and land need no key" in locked.value.hint
+    assert "Bearer" not in locked.value.hint, "a page shows the hint"
+    assert "Bearer" in locked.value.script_hint
     with pytest.raises(NotAllowedError, match=r"from another device \(192.0.2.9\)"):
         require(Permission.REAL, Caller(RequestOrigin.ELSEWHERE, Key.BROWSER, because=ELSEWHERE), "Bee")
     with pytest.raises(NotAllowedError, match="is reachable over the network"):

@@ -375,6 +375,8 @@ def _is_told(dashboard: Dashboard, told: list[Json], title: str) -> None:
     dashboard.until(lambda: shown() != [])
     problem = shown()[-1]
     assert problem["hint"]
+    if problem["script_hint"]:
+        expect(dashboard.page.locator("body")).not_to_contain_text(problem["script_hint"], use_inner_text=True)
     for text in (problem["hint"], *(one["reason"] for one in problem["problems"])):
         expect(dashboard.page.locator("body")).to_contain_text(text, use_inner_text=True, ignore_case=True)
 

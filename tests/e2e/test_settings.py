@@ -89,7 +89,7 @@ def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
 
 def test_a_refused_backup_shows_the_reason_instead_of_a_failed_download(dashboard: Dashboard) -> None:
     dashboard.open("/settings")
-    problem = {"title": "Storage trouble", "status": 507, "detail": "There is too little disk space for a copy.",
+    problem = {"title": "Storage error", "status": 507, "detail": "There is too little disk space for a copy.",
                "hint": "Free some disk space."}  # fmt: skip
     dashboard.page.route("**/api/system/backup", lambda route: route.fulfill(status=507, json=problem))
     dashboard.button("Download backup").click()

@@ -124,7 +124,7 @@ def test_a_campaign_names_the_registered_vehicle_that_flies_it(client: TestClien
     missing = client.post("/api/campaigns", json={"name": "A", "vehicle": {"kind": "mavlink"}})
     assert missing.status_code == 422
     assert "each vehicle of this kind is registered" in problems_of(missing)["vehicle.id"]
-    assert "POST /api/vehicles" in missing.json()["hint"]
+    assert "POST /api/vehicles" in missing.json()["script_hint"]
     one, two = register(client, "One"), register(client, "Two", real=True)
     campaign = create_campaign_on(client, database, two)
     shown = campaign["vehicle"]

@@ -18,6 +18,7 @@ from app.core.experiments import get_experiment
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.vehicles.simulated import simulate_takeoff, trajectory_of
 from app.vehicles.twin import TWIN, TwinFlight
+from app.web.errors import _KINDS
 from tests.runtime.processes import Serving, environment
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "api.md"
@@ -80,6 +81,13 @@ def test_every_call_is_in_the_document(client: TestClient) -> None:
     assert {call for call in calls if call not in TEXT} == set()
     written = set(re.findall(r"`(?:GET|POST|PATCH|DELETE) /api[^`]*`", TEXT)) - {"`GET /api/health)`"}
     assert written - calls == set()
+
+
+def test_every_kind_of_error_is_in_the_document_with_its_status_and_title() -> None:
+    rows = {line.strip() for line in TEXT.splitlines() if line.lstrip().startswith("| ")}
+    for status, title in _KINDS.values():
+        name = title.lower().replace(" ", "-")
+        assert any(row.startswith(f"| {status.value} | `{name}` | {title} |") for row in rows), title
 
 
 def test_every_field_of_a_definition_is_in_the_document() -> None:

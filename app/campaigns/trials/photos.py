@@ -50,7 +50,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
         size = f"{MAX_BYTES / 2**20:g} MiB"
         raise TooLargeError(
             "The photo is too large; nothing was stored.",
-            hint=f"Send at most {size}; reduce the resolution in the camera's settings.",
+            hint=f"Choose one of at most {size}; reduce the resolution in the camera's settings.",
             problems=(Problem("file", f"is larger than {size}"),),
         )
     if not content:

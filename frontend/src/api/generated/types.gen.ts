@@ -4057,7 +4057,8 @@ export type ProblemField = {
 /**
  * Problem
  *
- * An error (RFC 9457): what happened, what to do about it, and the fields concerned.
+ * An error (RFC 9457): what happened, what to do about it, and the fields concerned. `script_hint` is what a script
+ * does about it, where that differs from what a person does; empty otherwise.
  */
 export type Problem = {
     /**
@@ -4080,6 +4081,10 @@ export type Problem = {
      * Hint
      */
     hint: string;
+    /**
+     * Script Hint
+     */
+    script_hint?: string;
     /**
      * Problems
      */
