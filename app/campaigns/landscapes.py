@@ -18,6 +18,7 @@ from app.campaigns.proposals import is_stale, read_history
 from app.common.errors import GainlineError
 from app.common.states import JobState
 from app.core.experiments import experiment_of
+from app.core.formatting import percent
 from app.core.tuning.gate import space_of
 from app.core.tuning.landscape import Landscape, LandscapePlan, free_gains
 from app.db.models import CampaignRow, JobRow, JsonObject, ProposalRow
@@ -116,6 +117,8 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
         "The model is being evaluated at several hundred gain sets around the flown and the proposed ones. This "
         "takes seconds, or half a minute with the calibrated model. The landscape appears here automatically."
     )
+    if job is not None and job.state == JobState.RUNNING and job.done_share:
+        reason = f"{percent(job.done_share)} done: {job.doing}. The landscape appears here automatically."
     return LandscapeAnswer(_card(reason), wanted=wanted)
 
 

@@ -17,6 +17,7 @@ from app.processes.pool import ComputePool
 
 POINTS_PER_BATCH: Final = 48
 """Number of gain sets of a landscape per request to the pool, which limits how long a proposal has to wait."""
+PROGRESS_EVERY_S: Final = 2.0
 
 _log = structlog.get_logger(__name__)
 
@@ -55,6 +56,7 @@ class LandscapeJob:
     pool: ComputePool
     _: KW_ONLY
     worker: str
+    lease_s: float
 
     def __call__(self, job: ClaimedJob) -> None:
         """Compute the landscape of the stored proposal in batches and store it.
@@ -71,8 +73,17 @@ class LandscapeJob:
             raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
         points = survey.points()
         parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
-        errors = np.concatenate([self.pool.run(predict_points, survey.predict_errors, part) for part in parts])
-        result = landscapes.as_json(survey.landscape(errors), job.order)
+        errors, told_s = [], started_s
+        for done, part in enumerate(parts):
+            if monotonic() - told_s >= PROGRESS_EVERY_S:
+                told_s = monotonic()
+                self._report(job, done / len(parts), f"{done * POINTS_PER_BATCH} of {len(points)} gain sets evaluated")
+            errors.append(self.pool.run(predict_points, survey.predict_errors, part))
+        result = landscapes.as_json(survey.landscape(np.concatenate(errors)), job.order)
         with self.database.write() as session:
             jobs.finish_job(session, job.id, worker=self.worker, result=result)
         _log.info("landscape stored", points=len(points), seconds=round(monotonic() - started_s, 3))
+
+    def _report(self, job: ClaimedJob, share: float, doing: str) -> None:
+        with self.database.write() as session:
+            jobs.report_progress(session, job.id, share, doing, worker=self.worker, lease_s=self.lease_s)

@@ -43,8 +43,8 @@ def page(
 def campaign_names(session: Session, rows: Iterable[JobRow]) -> dict[int, str]:
     """Names of the jobs' campaigns by id."""
     ids = {row.campaign_id for row in rows if row.campaign_id is not None}
-    named = select(CampaignRow.id, CampaignRow.name).where(CampaignRow.id.in_(ids))
-    return dict(session.execute(named).tuples().all())
+    named = session.execute(select(CampaignRow.id, CampaignRow.name).where(CampaignRow.id.in_(ids)))
+    return {row.id: row.name for row in named}
 
 
 def first_waiting(session: Session, kinds: Collection[str]) -> JobRow | None:

@@ -218,10 +218,11 @@ class Worker:
         reproducer = ReproductionJob(
             database, worker=self._name, lease_s=self._settings.lease_s, closing=self._ending.event
         )
+        landscaper = LandscapeJob(database, landscape_pool, worker=self._name, lease_s=self._settings.lease_s)
         performed = (
             (PROPOSAL_JOB, proposer, SPARE_PROCESSORS),
             (REPRODUCTION_JOB, reproducer, REPRODUCTIONS_AT_ONCE),
-            (LANDSCAPE_JOB, LandscapeJob(database, landscape_pool, worker=self._name), LANDSCAPES_AT_ONCE),
+            (LANDSCAPE_JOB, landscaper, LANDSCAPES_AT_ONCE),
         )
         return tuple(
             JobRunner(

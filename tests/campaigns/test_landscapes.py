@@ -99,6 +99,16 @@ def test_the_path_goes_through_the_gains_of_the_trials(
     assert [row[4] for row in tried] == pytest.approx([step["predicted_error"] for step in ladder])
 
 
+def test_the_page_says_how_far_the_landscape_is(client: TestClient, database: Database, campaign_id: int) -> None:
+    card_of(client, campaign_id)
+    with database.write() as session:
+        job = jobs.claim_job(session, worker=WORKER, kinds=(landscapes.LANDSCAPE_JOB,), lease_s=30.0)
+        assert job is not None
+        jobs.report_progress(session, job.id, 0.4, "192 of 480 gain sets evaluated", worker=WORKER, lease_s=30.0)
+    reason = card_of(client, campaign_id)["reason"]
+    assert reason.startswith("40\u00a0% done: 192 of 480 gain sets evaluated.")
+
+
 def test_another_proposal_has_a_landscape_of_its_own(client: TestClient, database: Database, campaign_id: int) -> None:
     card_of(client, campaign_id)
     run_landscapes(database)
@@ -114,7 +124,7 @@ def test_one_that_the_flights_overtake_is_withdrawn_and_asked_for_anew_once_its_
     card_of(client, campaign_id)
     classify(client, campaign_id, "invalid")
     with ComputePool(1, prepare=int) as pool:
-        runner = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER),
+        runner = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER, lease_s=9.0),
                     room=1, worker=WORKER, lease_s=30.0)  # fmt: skip
         claimed = runner.claim()
         assert claimed is not None

@@ -16,6 +16,9 @@ RESTARTED_S: Final = 0.4
 """Time for which another clock goes on alone before it is the vehicle's."""
 BEHIND_S: Final = 20.0
 """A clock that fell behind ours by more than this was not only late: the vehicle restarted while nothing was heard."""
+KNOWN_BY: Final = 10
+"""Positions by a clock before it is known to be the vehicle's. Fewer may be a stranger's, heard before the vehicle's
+own positions were requested."""
 _DRIFT: Final = 0.1
 _SAME_CLOCK_S: Final = 0.5
 
@@ -45,12 +48,14 @@ class RestartCounter:
         self.restarts = 0
         self._last: Position | None = None
         self._last_s = 0.0
+        self._heard = 0
         self._other: OtherClock | None = None
 
     def take(self, position: Position, now_s: float) -> None:
         """Process a position received at `now_s` by our clock."""
         if self._last is None or self._is_expected(self._last, position, now_s):
             self._last, self._last_s, self._other = position, now_s, None
+            self._heard += 1
         elif not -BACK_S <= position.time_boot_s - self._last.time_boot_s <= 0.0:  # otherwise it is late or repeated
             self._take_other(position, now_s)
 
@@ -64,5 +69,5 @@ class RestartCounter:
         if now_s - first_s < RESTARTED_S:
             self._other = OtherClock(first_s=first_s, last_s=now_s, last=position)
         else:
-            self.restarts += 1
-            self._last, self._last_s, self._other = position, now_s, None
+            self.restarts += self._heard >= KNOWN_BY
+            self._last, self._last_s, self._other, self._heard = position, now_s, None, 1

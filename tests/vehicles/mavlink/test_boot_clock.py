@@ -59,6 +59,18 @@ def test_packets_by_another_clock_that_does_not_go_on_are_no_restart(others: lis
     assert restarts_of(BEFORE, others, every_40_ms(10.0, from_s=12.0, boot_s=512.0)) == 0
 
 
+@pytest.mark.parametrize(
+    "strangers", [[(0.0, 0.2)], [(float(n), 3600.0 + n) for n in range(8)]], ids=["one packet", "one every second"]
+)
+def test_a_stranger_heard_before_the_vehicles_own_positions_were_requested_is_no_restart(
+    strangers: list[Received],
+) -> None:
+    begun_s = strangers[-1][0] + 0.5
+    every_second = [(begun_s + float(n), 3600.0 + begun_s + n) for n in range(10) if len(strangers) > 1]
+    own = every_40_ms(10.0, from_s=begun_s, boot_s=5.0)
+    assert restarts_of(strangers, sorted([*own, *every_second])) == 0
+
+
 def test_a_second_vehicle_with_the_same_ids_is_no_restart() -> None:
     both = sorted(every_40_ms(10.0, from_s=10.0, boot_s=510.0) + every_40_ms(10.0, from_s=10.02, boot_s=7.0))
     assert restarts_of(BEFORE, both) == 0

@@ -37,10 +37,12 @@ interface Props {
   campaign: Campaign;
   trials: readonly Trial[];
   onChoose: (trialNumber: number) => void;
+  /** Whether another card has the next action. */
+  isSecondary: boolean;
 }
 
 /** The campaign's result, and its next actions. */
-export function FinishedCard({ campaign, trials, onChoose }: Props) {
+export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props) {
   const archive = useArchive(campaign.id);
   const reopen = useReopen(campaign.id);
   const isCandidate = campaign.standing === "candidate";
@@ -84,7 +86,7 @@ export function FinishedCard({ campaign, trials, onChoose }: Props) {
         )}
         {campaign.actions.includes("reopen") && (
           <Button
-            variant={isCandidate ? "filled" : "default"}
+            variant={isCandidate && !isSecondary ? "filled" : "default"}
             leftSection={<IconRepeat size={20} aria-hidden />}
             loading={reopen.isPending}
             onClick={() => reopen.mutate({ flights: FURTHER_FLIGHTS, plan: isCandidate ? [...CONFIRMATION] : [] })}

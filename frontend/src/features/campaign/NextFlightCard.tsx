@@ -21,15 +21,22 @@ interface Props extends CampaignStatus {
 
 /** The next action of the campaign, in every state. */
 export function NextFlightCard(props: Props) {
+  const { rehearses } = props.campaign;
+  return rehearses === null ? <Step {...props} /> : <RehearsalStep {...props} rehearses={rehearses} />;
+}
+
+/** Once the rehearsal has passed, the next action is the real campaign. */
+function RehearsalStep({ rehearses, ...props }: Props & { rehearses: number }) {
+  const real = useCampaign(rehearses).data;
   return (
-    <>
-      {props.campaign.rehearses !== null && <RehearsalNote campaignId={props.campaign.rehearses} />}
-      <Step {...props} />
-    </>
+    <Stack gap="var(--gap)">
+      {real !== undefined && <RehearsalNote real={real} />}
+      <Step {...props} isSecondary={real?.rehearsal.state === "passed"} />
+    </Stack>
   );
 }
 
-function Step({ campaign, next, trials, onChoose, onPreview }: Props) {
+function Step({ campaign, next, trials, onChoose, onPreview, isSecondary = false }: Props & { isSecondary?: boolean }) {
   const step = nextStep(campaign, next, trials);
   // Kept here, so that the error of a refused record is still shown when its trial becomes a planned one.
   const upload = useUploadRecord(campaign.id);
@@ -37,7 +44,7 @@ function Step({ campaign, next, trials, onChoose, onPreview }: Props) {
     case "flying":
       return <FlyingCard campaign={campaign} trial={trials.find(({ id }) => id === step.trialId)} step={step} />;
     case "finished":
-      return <FinishedCard campaign={campaign} trials={trials} onChoose={onChoose} />;
+      return <FinishedCard campaign={campaign} trials={trials} onChoose={onChoose} isSecondary={isSecondary} />;
     case "rehearse":
       return <RehearsalCard campaign={campaign} />;
     case "planned":
@@ -52,6 +59,7 @@ function Step({ campaign, next, trials, onChoose, onPreview }: Props) {
           trials={trials}
           upload={upload}
           onPreview={onPreview}
+          isSecondary={isSecondary}
         />
       );
     case "judge":

@@ -26,10 +26,12 @@ interface Props {
   trials: readonly Trial[];
   upload: RecordUpload;
   onPreview: ShowPreview;
+  /** Whether another card has the next action. */
+  isSecondary: boolean;
 }
 
 /** The next flight: one choice of gains, what is predicted for them, and the button that flies them. */
-export function ProposalCard({ campaign, proposal, trials, upload, onPreview }: Props) {
+export function ProposalCard({ campaign, proposal, trials, upload, onPreview, isSecondary }: Props) {
   const chosen = useNextFlight(campaign, proposal, onPreview);
   const experiment = campaign.definition.experiment ?? "";
   const units = useUnits(experiment);
@@ -56,7 +58,14 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview }: 
         {isRefused && chosen.gate !== null && chosen.choice === undefined && (
           <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />
         )}
-        <FlightButtons campaign={campaign} proposal={proposal} chosen={chosen} number={number} upload={upload} />
+        <FlightButtons
+          campaign={campaign}
+          proposal={proposal}
+          chosen={chosen}
+          number={number}
+          upload={upload}
+          isSecondary={isSecondary}
+        />
         <div>
           {chosen.choice?.proposed && (
             <ProposalExplanation explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />
@@ -88,10 +97,11 @@ interface ButtonsProps {
   chosen: ChosenFlight;
   number: number;
   upload: RecordUpload;
+  isSecondary: boolean;
 }
 
 /** Flies exactly the gains shown, once these have been predicted and have passed the gate. */
-function FlightButtons({ campaign, proposal, chosen, number, upload }: ButtonsProps) {
+function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary }: ButtonsProps) {
   const [speed, setSpeed] = useSpeed();
   const create = useCreateTrial(campaign);
   const { worker } = useConnection();
@@ -100,12 +110,12 @@ function FlightButtons({ campaign, proposal, chosen, number, upload }: ButtonsPr
   const isReady = gains !== null && isChecked && isPredicted && gate?.passed === true;
   const trial = trialOf(proposal, chosen.choice, gains ?? {});
   const order = { fly: { speed: speedOf(speed) } };
-  const stopIsAdvised = proposal.recommended === "stop";
+  const isAdvised = proposal.recommended !== "stop" && !isSecondary;
   const button = (label: string, isMain: boolean, onClick: () => void) => (
     <Button
       fullWidth
       size="lg"
-      variant={isMain && !stopIsAdvised ? "filled" : "default"}
+      variant={isMain && isAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
       loading={create.isPending}
       disabled={!isReady || !worker}

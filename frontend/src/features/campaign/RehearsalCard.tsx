@@ -1,7 +1,6 @@
 import { Anchor, Button, Stack } from "@mantine/core";
 import { Link, useNavigate } from "react-router";
 import { useRehearse } from "../../api/mutations";
-import { useCampaign } from "../../api/queries";
 import type { Campaign } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { Note } from "../../ui/Note";
@@ -49,25 +48,34 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
   );
 }
 
+const WRAPPED = { h: "auto", mih: 56, py: 8, styles: { label: { whiteSpace: "normal" } } } as const;
+
 const STANDING: Partial<Record<Campaign["rehearsal"]["state"], string>> = {
   missing: "Not rehearsed yet:",
   "under way": "In progress:",
   failed: "Failed:",
 };
 
-/** Note on a rehearsal's page, with a link to the real campaign. */
-export function RehearsalNote({ campaignId }: { campaignId: number }) {
-  const real = useCampaign(campaignId).data;
-  if (real === undefined) return null;
-  const passed = real.rehearsal.state === "passed";
+/** Note on a rehearsal's page, with the way to the real campaign: the next action once the rehearsal has passed. */
+export function RehearsalNote({ real }: { real: Campaign }) {
+  const name = `${real.name} on ${real.vehicle.name}`;
+  if (real.rehearsal.state === "passed") {
+    return (
+      <Panel title="Rehearsal passed">
+        <Button component={Link} to={`/campaigns/${real.id}`} fullWidth size="lg" {...WRAPPED}>
+          Open {name}
+        </Button>
+      </Panel>
+    );
+  }
   return (
     <Aside tone="good" className={classes["advice"] ?? ""}>
       <p>
-        <strong>{passed ? "Rehearsal passed" : "This is a rehearsal"}</strong>
+        <strong>This is a rehearsal</strong>
         <span>
-          {passed ? "Continue with the real campaign: " : "Required by the real campaign: "}
-          <Anchor component={Link} to={`/campaigns/${campaignId}`}>
-            {real.name} on {real.vehicle.name}
+          Required by the real campaign:{" "}
+          <Anchor component={Link} to={`/campaigns/${real.id}`}>
+            {name}
           </Anchor>
         </span>
       </p>
