@@ -31,6 +31,7 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     campaign_id = dashboard.when_ready(dashboard.campaign_id)
     dashboard.choose_speed("Max")
     finished = page.get_by_role("heading", name=re.compile("^(Converged|Flight budget used)"))
+    dashboard.open_tab("Flights")
     for number in range(1, 8):
         dashboard.fly()
         row = page.get_by_role("row").filter(has=page.get_by_role("rowheader", name=re.compile(rf"^Flight {number}\b")))
@@ -50,6 +51,7 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     expect(dashboard.panel("Converged").or_(dashboard.panel("Flight budget used"))).to_contain_text(
         f"Best: flight {best['number']}"
     )
+    dashboard.open_tab("Error and gains")
     dashboard.until(lambda: len((dashboard.trace("errors", "measured") or {"y": []})["y"]) == len(errors))
     measured, running = dashboard.trace("errors", "measured"), dashboard.trace("errors", "best so far")
     assert measured is not None

@@ -63,6 +63,7 @@ def test_a_thousand_flights_are_drawn_as_an_envelope_with_those_that_matter(page
     first_page = {trial["number"]: trial["error"] for trial in page_of_many.trials(page_of_many.campaign_id)}
     shown = dict(zip(measured["x"], measured["y"], strict=True))
     assert all(shown[number] == pytest.approx(error, abs=1e-6) for number, error in first_page.items() if error)
+    page_of_many.open_tab("Flights")
     rows = page_of_many.page.locator("tbody tr[data-flight]")
     expect(row(page_of_many, FLIGHTS)).to_be_visible()
     assert 50 <= rows.count() <= 52
@@ -77,12 +78,11 @@ def test_a_chart_finds_room_for_its_axes_and_is_drawn_once(page_of_many: Dashboa
         assert again is None, chart
 
 
-def test_a_flight_that_is_pointed_at_stands_out_as_curve_mark_and_row(page_of_many: Dashboard) -> None:
+def test_a_flight_that_is_pointed_at_stands_out_as_curve_and_row(page_of_many: Dashboard) -> None:
     number = best_of(page_of_many)["trial_number"]
+    page_of_many.open_tab("Flights")
     row(page_of_many, number).hover()
     expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
-    label = page_of_many.plot("errors").locator(".hoverlayer .hovertext")
-    expect(label).to_contain_text(f"Flight {number}")
     row(page_of_many, number).get_by_role("button").focus()
     expect(row(page_of_many, number)).to_have_attribute("data-pointed", "")
     plain = FLIGHTS - 20
@@ -126,7 +126,7 @@ def point_at(dashboard: Dashboard, place: tuple[float, float], flight: int) -> N
     dashboard.until(is_pointed_at)
 
 
-def test_a_mark_points_at_its_curve_and_its_row(page_of_many: Dashboard) -> None:
+def test_a_mark_points_at_its_curve_its_row_and_its_gains(page_of_many: Dashboard) -> None:
     number = best_of(page_of_many)["trial_number"]
     chart = page_of_many.plot("errors")
     chart.scroll_into_view_if_needed()
@@ -137,6 +137,8 @@ def test_a_mark_points_at_its_curve_and_its_row(page_of_many: Dashboard) -> None
     place = place_of(chart, number)
     point_at(page_of_many, place, number)
     expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
+    label = page_of_many.plot("gains").locator(".hoverlayer .hovertext")
+    expect(label.first).to_contain_text(f"Flight {number}")
     page_of_many.page.mouse.move(5, 5)
     expect(row(page_of_many, number)).not_to_have_attribute("data-pointed", "")
     page_of_many.page.mouse.move(*place)
@@ -146,6 +148,7 @@ def test_a_mark_points_at_its_curve_and_its_row(page_of_many: Dashboard) -> None
 
 def test_choosing_a_flight_of_the_crowd_gives_it_a_curve_of_its_own(page_of_many: Dashboard) -> None:
     plain = FLIGHTS - 20
+    page_of_many.open_tab("Flights")
     assert page_of_many.trace("takeoffs", "flight", trial=plain) is None
     row(page_of_many, plain).get_by_role("button").click()
     page_of_many.wait_for_flight(plain)

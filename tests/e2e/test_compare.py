@@ -241,6 +241,7 @@ def test_the_table_of_runs_sorts_hides_columns_and_compares_the_selected_flights
     campaign_id = states.campaign(strategy="calibrated", flights=3)
     trials = dashboard.trials(campaign_id)
     dashboard.open_campaign(campaign_id)
+    dashboard.open_tab("Flights")
     table = dashboard.page.get_by_role("region", name="All flights")
     rows = table.locator("tbody tr[data-flight]")
 

@@ -161,7 +161,7 @@ NAMES = (
     "new-vehicle", "vehicle", "shared-vehicle", "fly", "controller", "controller-check", "reproductions", "compare",
     "jobs", "settings", "missing",
 )  # fmt: skip
-WITH_LANDSCAPE = ("ready", "under-way", "finished", "elsewhere", "overruled", "pitch")
+WITH_TABS = ("ready", "under-way", "finished", "elsewhere", "overruled", "pitch")
 
 
 @pytest.fixture(scope="module")
@@ -241,7 +241,12 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
             page.keyboard.press("Escape")
             page.mouse.move(0, 0)  # else it may point at a chart, which shows its tools then
         close_it_again(dashboard)
-    if name in WITH_LANDSCAPE:
+        if name in WITH_TABS:
+            dashboard.open_tab("Flights")
+            dashboard.settled(theme)
+            refused += [*overflow(dashboard, f"{state}, flights,"), *violations(page)]
+            dashboard.open_tab("Error and gains")
+    if name in WITH_TABS:
         dashboard.open_tab("Error landscape")
         expect(dashboard.plot("Error landscape")).to_be_visible()
     assert refused == []

@@ -68,6 +68,7 @@ def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error
     panel = dashboard.panel("Statistics")
     row = panel.get_by_role("row").filter(has_text="2, 3")
     expect(row).to_contain_text(printed(group["mean"], group["standard_error"]))
+    dashboard.open_tab("Error and gains")
     dashboard.until(lambda: dashboard.trace("errors", "repeats") is not None)
     repeats, measured = dashboard.trace("errors", "repeats"), dashboard.trace("errors", "measured")
     assert repeats is not None and measured is not None  # noqa: PT018

@@ -113,15 +113,18 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
             ))}
         </div>
       </div>
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt="var(--gap)">
-        <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
-      </SimpleGrid>
-      <Tabs defaultValue="flights" mt="var(--gap)" keepMounted={false} classNames={{ tab: classes["tab"] ?? "" }}>
+      <Tabs defaultValue="trends" mt="var(--gap)" keepMounted={false} classNames={{ tab: classes["tab"] ?? "" }}>
         <Tabs.List>
+          <Tabs.Tab value="trends">Error and gains</Tabs.Tab>
           <Tabs.Tab value="flights">Flights</Tabs.Tab>
           <Tabs.Tab value="statistics">Statistics</Tabs.Tab>
           <Tabs.Tab value="landscape">Error landscape</Tabs.Tab>
         </Tabs.List>
+        <Tabs.Panel value="trends" pt="var(--gap)">
+          <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)">
+            <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
+          </SimpleGrid>
+        </Tabs.Panel>
         <Tabs.Panel value="flights" keepMounted>
           <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
         </Tabs.Panel>
