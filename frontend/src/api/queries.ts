@@ -58,10 +58,14 @@ export function useCampaign(campaignId: number) {
   });
 }
 
+const COMPUTING_POLL_MS = 2000;
+
+/** The next gains. While they are computed they are also asked for, in case their event is lost. */
 export function useProposal(campaignId: number) {
   return useQuery({
     queryKey: ["campaign", campaignId, "proposal"],
     queryFn: () => answer(getProposal({ path: { campaign_id: campaignId } })),
+    refetchInterval: ({ state }) => (state.data?.state === "computing" ? COMPUTING_POLL_MS : false),
   });
 }
 

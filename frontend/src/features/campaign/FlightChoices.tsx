@@ -6,11 +6,12 @@ import classes from "./NextFlight.module.css";
 interface Props {
   proposal: Proposal;
   chosen: ChoiceName;
+  disabled: boolean;
   onChoose: (choice: ChoiceName) => void;
 }
 
 /** One choice of what to fly next. */
-export function FlightChoices({ proposal, chosen, onChoose }: Props) {
+export function FlightChoices({ proposal, chosen, disabled, onChoose }: Props) {
   const recommended = proposal.choices.find((choice) => choice.recommended)?.kind;
   return (
     <Chip.Group value={chosen} onChange={(name) => onChoose(name as ChoiceName)}>
@@ -20,6 +21,7 @@ export function FlightChoices({ proposal, chosen, onChoose }: Props) {
             key={name}
             name="gains-to-fly"
             value={name}
+            disabled={disabled}
             variant="outline"
             classNames={{ label: classes["choice"] ?? "" }}
           >

@@ -1,5 +1,6 @@
 import { Button, Stack } from "@mantine/core";
 import { IconPlaneDeparture } from "@tabler/icons-react";
+import { useReadOnlyReason } from "../../api/access";
 import { type RecordUpload, useCreateTrial } from "../../api/mutations";
 import { offersOf } from "../../api/problems";
 import type { Campaign, Proposal, Trial } from "../../api/types";
@@ -32,7 +33,8 @@ interface Props {
 
 /** The next flight: one choice of gains, what is predicted for them, and the button that flies them. */
 export function ProposalCard({ campaign, proposal, trials, upload, onPreview, isSecondary }: Props) {
-  const chosen = useNextFlight(campaign, proposal, onPreview);
+  const isReadOnly = useReadOnlyReason(null) !== null;
+  const chosen = useNextFlight(campaign, proposal, onPreview, isReadOnly);
   const experiment = campaign.definition.experiment ?? "";
   const units = useUnits(experiment);
   const titles = useGainTitles(experiment);
@@ -42,7 +44,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   return (
     <Panel title={`Next flight: ${number}`}>
       <Stack gap={14}>
-        <FlightChoices proposal={proposal} chosen={chosen.name} onChoose={chosen.choose} />
+        <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable rows={chosen.rows} unit={units.gains} titles={titles} entry={chosen.entry} />
         {isEvaluated && (

@@ -44,8 +44,14 @@ function typedGains(gains: GainSet): Record<string, string> {
   return Object.fromEntries(Object.entries(gains).map(([name, value]) => [name, typedGain(value)]));
 }
 
-/** The choice of what to fly next, with everything that belongs to its gains. */
-export function useNextFlight(campaign: Campaign, proposal: Proposal, onPreview: ShowPreview): ChosenFlight {
+/** The choice of what to fly next, with everything that belongs to its gains. A device with read-only access may not
+ * request an evaluation of other gains than the proposed ones. */
+export function useNextFlight(
+  campaign: Campaign,
+  proposal: Proposal,
+  onPreview: ShowPreview,
+  isReadOnly: boolean,
+): ChosenFlight {
   const [name, setName] = useState(() => preselected(proposal));
   const [texts, setTexts] = useState(() => typedGains(proposal.gains));
   const experiment = useCatalogue().data?.experiments.find((one) => one.name === campaign.definition.experiment);
@@ -53,7 +59,7 @@ export function useNextFlight(campaign: Campaign, proposal: Proposal, onPreview:
   const own = useMemo(() => readGains(texts), [texts]);
   const gains = choice === undefined ? own.gains : choice.gains;
   const isProposal = choice?.proposed === true;
-  const { prediction, gate } = useEvaluation(campaign.id, proposal.id, isProposal ? null : gains);
+  const { prediction, gate } = useEvaluation(campaign.id, proposal.id, isProposal || isReadOnly ? null : gains);
   const preview = useMemo(
     () => (isProposal ? null : { prediction: prediction.result, isCurrent: prediction.isCurrent }),
     [isProposal, prediction.result, prediction.isCurrent],
