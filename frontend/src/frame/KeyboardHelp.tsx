@@ -52,7 +52,7 @@ export function KeyboardHelp() {
           ))}
         </dl>
         <Note mt={14} fz="small">
-          There is no shortcut for the take-off of a real vehicle: hold its button for 2 s.
+          A real vehicle cannot take off from the keyboard: hold the button on screen for 2 s.
         </Note>
       </dialog>
     </>

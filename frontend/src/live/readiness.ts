@@ -49,7 +49,7 @@ function pageLoss({ answerAgeS, isServerAway, stalledS }: PageState, isInFlight:
     return {
       kind: "page stalled",
       what: `This page was frozen for ${Math.round(stalledS)} s. Its data is out of date.`,
-      way_on: "The state is being read again.",
+      way_on: "The page is reading the current state.",
     };
   }
   if (!isServerAway && answerAgeS <= ANSWER_S) return null;
@@ -57,8 +57,8 @@ function pageLoss({ answerAgeS, isServerAway, stalledS }: PageState, isInFlight:
     kind: "server away",
     what: "The server does not answer. The data on this page is out of date.",
     way_on: isInFlight
-      ? "ABORT is sent again until the server answers. If the vehicle does not descend, use its own remote control."
-      : "Nothing can be commanded from here. Check the network and the computer that runs Gainline.",
+      ? "ABORT is re-sent until the server responds. If the vehicle does not descend, use its own remote control."
+      : "No commands can be sent from here. Check the network and the computer that runs Gainline.",
   };
 }
 

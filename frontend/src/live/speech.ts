@@ -99,7 +99,7 @@ const OUTCOMES: Readonly<Record<string, Sentence>> = {
   valid: say("Landed, valid"),
   invalid: say("Landed, invalid"),
   aborted: shout("Aborted, landed"),
-  lost: shout("Flight lost. Inspect the vehicle"),
+  lost: shout("Flight outcome unknown. Inspect the vehicle"),
 };
 
 /** `Landed, captured, 0.24 metres.`; null until the result is stored. */

@@ -26,7 +26,7 @@ export const EXPLANATIONS = explained({
   predicted: {
     question: "What is the predicted error?",
     answer: [
-      "The error of the model with these gains, corrected by the flights so far. Before the first flight there is no correction.",
+      "The error that the model predicts for a flight with these gains, corrected by the flights so far. Before the first flight there is no correction.",
     ],
   },
   interval: {
@@ -39,14 +39,14 @@ export const EXPLANATIONS = explained({
   bias: {
     question: "How do the flights correct the model?",
     answer: [
-      "By a bias. The difference between the best flight and the model with the same gains, sample by sample, is added to every prediction. The corrected model is exact at the flown gains and good close to them.",
+      "By a bias correction. The difference between the best flight and the model with the same gains, sample by sample, is added to every prediction. The corrected model is exact at the gains flown in the best flight and accurate near them.",
       "The strategy “calibrated” first fits the vehicle's parameters to the flights; the remaining difference is the bias.",
     ],
   },
   trustRegion: {
     question: "What is the trust region?",
     answer: [
-      "The largest step from the best gains flown. It grows when predictions hold, and shrinks when a flight disagrees or is aborted.",
+      "The largest step from the best gains flown. It grows when predictions hold, and shrinks when a flight contradicts its prediction or is aborted.",
     ],
   },
   fitted: {
@@ -58,13 +58,13 @@ export const EXPLANATIONS = explained({
   gradient: {
     question: "What is the gradient?",
     answer: [
-      "The change of the predicted error with each gain, computed by simulating the corrected model with slightly higher and lower values. Steps go against the gradient; the step with the lowest predicted error is flown.",
+      "The change of the predicted error with each gain, computed by simulating the corrected model with slightly higher and lower values. Steps follow the negative gradient; the step with the lowest predicted error is flown.",
     ],
   },
   gate: {
     question: "How are gains checked?",
     answer: [
-      "Integer overflow in the autopilot's 32-bit arithmetic is checked exactly. Altitude, divergence, oscillation and aborts are checked in simulated flights over the uncertainty of the vehicle's parameters.",
+      "Integer overflow in the autopilot's 32-bit arithmetic is checked exactly. Altitude, divergence, oscillation and aborts are checked in simulated flights that cover the uncertainty of the vehicle's parameters.",
     ],
   },
   glitch: {
@@ -84,7 +84,7 @@ export const EXPLANATIONS = explained({
     question: "What does the next flight have to beat?",
     answer: [
       "The threshold of the paper's stop rule: the best error minus the minimum improvement of this campaign (Settings, Stop). A flight above it counts as no improvement; two in a row end the campaign.",
-      "The band shows where another flight with the best gains could end by chance. A result inside it is no resolvable change.",
+      "The band shows how far the error of another flight with the best gains could vary by chance. A result inside it is not a resolvable change.",
     ],
   },
   scatter: {
@@ -96,7 +96,7 @@ export const EXPLANATIONS = explained({
   standardError: {
     question: "What is the standard error?",
     answer: [
-      "The uncertainty of a mean: the scatter of one flight divided by the square root of the number of flights. Four flights halve it.",
+      "The uncertainty of a mean: the flight-to-flight scatter divided by the square root of the number of flights. Four flights halve it.",
     ],
   },
   difference: {
@@ -108,13 +108,13 @@ export const EXPLANATIONS = explained({
   record: {
     question: "How good are the predictions?",
     answer: [
-      "The number of flights that ended inside their predicted 90\u00a0% interval, and the number whose error changed in the predicted direction.",
+      "The number of flights whose error fell inside the predicted 90\u00a0% interval, and the number whose error changed in the predicted direction.",
     ],
   },
   drift: {
     question: "What is drift?",
     answer: [
-      "A change of the error with the same gains over time, for example from battery, wind or wear. It compares the latest flight of the first gains with their first flight, so these gains must be flown again.",
+      "A change of the error with the same gains over time, for example from battery, wind or wear. The latest flight with the first gains is compared with the earliest, so the first gains must be flown at least twice.",
     ],
   },
   overshoot: {
@@ -124,7 +124,7 @@ export const EXPLANATIONS = explained({
   riseTime: {
     question: "What is the rise time?",
     answer: [
-      "The time that the altitude takes from 10\u00a0% to 90\u00a0% of the set point. It shows how fast the vehicle climbs.",
+      "The time that the altitude takes to rise from 10\u00a0% to 90\u00a0% of the set point. It shows how fast the vehicle climbs.",
     ],
   },
   settlingTime: {

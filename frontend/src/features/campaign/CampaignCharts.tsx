@@ -153,7 +153,7 @@ export function LandscapePanel({ campaignId }: { campaignId: number }) {
   return (
     <div ref={place} className={classes["place"]}>
       <FigurePanel
-        title="Error landscape of the model"
+        title="Error landscape predicted by the model"
         card={shown}
         error={landscape.error}
         wanted={seen}

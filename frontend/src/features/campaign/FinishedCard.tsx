@@ -23,7 +23,7 @@ const CONFIRMATION = ["repeat", "baseline", "repeat"] as const;
 const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meaning: string }> = {
   candidate: { word: "Candidate", meaning: "not yet confirmed by repeat flights." },
   confirmed: { word: "Confirmed", meaning: "better than the first gains in repeat flights." },
-  "not confirmed": { word: "Not confirmed", meaning: "repeat flights do not show that they are better." },
+  "not confirmed": { word: "Not confirmed", meaning: "repeat flights show no improvement over the first gains." },
 };
 
 /** The gains that were repeated, if they are others than those of the best flight. */
@@ -81,7 +81,8 @@ export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props)
         )}
         {isCandidate && (
           <Note fz="body">
-            Two repeats of the best gains and one flight of the first gains show whether they are better.
+            Two more flights with the best gains and one with the first gains will show whether the best gains are
+            better.
           </Note>
         )}
         {campaign.actions.includes("reopen") && (

@@ -100,7 +100,7 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
       <InputBase
         component="textarea"
         ref={text}
-        description="A line that begins with a time, such as “2.4 s: wobble”, is marked in the record."
+        description="A line that starts with a time, such as “2.4 s: wobble”, is marked on the record chart."
         multiline
         label={`Note on flight ${trial.number}`}
         rows={2}

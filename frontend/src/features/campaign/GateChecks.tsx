@@ -19,7 +19,7 @@ export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
   if (gate === null || !isCurrent) {
     return (
       <Note className={classes["checking"] ?? ""} role="status">
-        Checking the gate…
+        Running the gate checks…
       </Note>
     );
   }

@@ -67,8 +67,8 @@ function Step({ campaign, next, trials, onChoose, onPreview, isSecondary = false
         <Panel title={`Review flight ${step.trial.number}`}>
           <Text lh={1.45} mb={14}>
             {step.trial.state === "lost"
-              ? "The end of this flight is unknown. Classify it; then the next gains are proposed."
-              : "Classify this flight; then the next gains are proposed."}
+              ? "The end of this flight is unknown. The next gains are proposed after you review it."
+              : "The next gains are proposed after you review this flight."}
           </Text>
           <Button fullWidth onClick={() => onChoose(step.trial.number)}>
             Review flight {step.trial.number}

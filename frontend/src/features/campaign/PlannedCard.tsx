@@ -85,7 +85,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           disabled={!trial.actions.includes("cancel")}
           onClick={() => cancel.mutate(trial.id)}
         >
-          Cancel trial
+          Cancel planned flight
         </Button>
         <ErrorNotice error={fly.error ?? cancel.error} />
       </Stack>

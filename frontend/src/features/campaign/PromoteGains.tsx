@@ -51,7 +51,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
       }}
     >
       <Note fz="body">
-        After every flight and abort, {vehicle.name} then gets {gainsInBrackets(campaign.winner.gains)} instead of{" "}
+        After every flight and abort, {vehicle.name} will be set to {gainsInBrackets(campaign.winner.gains)} instead of{" "}
         {gainsInBrackets(vehicle.safe_gains)}.
       </Note>
       <TextInput

@@ -91,7 +91,7 @@ export function ProposalExplanation({ explanation, unit, gains }: ProposalExplan
           </span>
           {lesson && (
             <span>
-              <strong>Expected to learn:</strong> {lesson}
+              <strong>What this flight will show:</strong> {lesson}
             </span>
           )}
           {trust !== null && (
@@ -132,9 +132,9 @@ function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
           </tr>
           <tr className={classes["fitted"]}>
             <td>
-              now <strong>{plusMinus(value, standard_error, "")}</strong>
+              fitted <strong>{plusMinus(value, standard_error, "")}</strong>
             </td>
-            <td>before {plusMinus(nominal, prior_sd, "")}</td>
+            <td>prior {plusMinus(nominal, prior_sd, "")}</td>
           </tr>
         </tbody>
       ))}

@@ -68,7 +68,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
   if (comparison === null) {
     return (
       <Aside className={classes["fact"] ?? ""}>
-        <h3>Best against first gains</h3>
+        <h3>Best vs. baseline</h3>
         <p className={classes["big"]}>Same gains</p>
         <p>Nothing to compare: the first flight's gains are the best so far.</p>
       </Aside>
@@ -79,7 +79,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
   return (
     <Aside tone={toneOf(verdict)} className={classes["fact"] ?? ""}>
       <h3>
-        Best against first gains
+        Best vs. baseline
         <HelpTip topic="difference" />
       </h3>
       <p className={classes["big"]}>
@@ -113,7 +113,7 @@ function Scatter({
   return (
     <Aside className={classes["fact"] ?? ""}>
       <h3>
-        Scatter of one flight
+        Flight-to-flight scatter
         <HelpTip topic="scatter" />
       </h3>
       {!sigma ? (

@@ -106,7 +106,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       )}
       <dl className={`${classes["figures"]} numbers`}>
         <Fact title="Error" topic="error">
-          {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± scatter of one flight)</small> : null}
+          {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± flight-to-flight scatter)</small> : null}
         </Fact>
         <Fact title="Predicted" topic="predicted">
           {trial.predicted_error === null && bestBefore === null
@@ -115,7 +115,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <PredictionResult trial={trial} />
         </Fact>
-        <Fact title={bestBefore ? `Best before, flight ${bestBefore.number}` : "Best before"}>
+        <Fact title={bestBefore ? `Previous best, flight ${bestBefore.number}` : "Previous best"}>
           {withUnit(bestBefore?.error, unit)}{" "}
           {!asked && <Change error={trial.error} other={bestBefore?.error} unit={unit} />}
         </Fact>
@@ -199,9 +199,9 @@ function TrialComparisons({ trial, unit }: { trial: Trial; unit: string }) {
             <span>
               {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>},{" "}
               {confidence === null ? "" : `${confidenceText(confidence)} confidence, `}against{" "}
-              {against === "first" ? "the first" : "the best before"}, flight {trial_number}:{" "}
+              {against === "first" ? "the first" : "the previous best"}, flight {trial_number}:{" "}
               {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
-              <small>{standard_error === null ? "(no gains were flown twice)" : "(± standard error)"}</small>
+              <small>{standard_error === null ? "(no repeat flights yet)" : "(± standard error)"}</small>
             </span>
           </li>
         );

@@ -8,16 +8,16 @@ import { gainText, readNumber } from "../../ui/format";
 export type ChoiceName = FlightChoice["kind"] | "own";
 
 export const CHOICES: Record<ChoiceName, { label: string; hint: string }> = {
-  step: { label: "Step", hint: "The strategy's step." },
-  "smaller step": { label: "Smaller step", hint: "Halfway from the best gains to the step." },
-  repeat: { label: "Repeat", hint: "The best gains again: was the result luck?" },
-  baseline: { label: "Baseline", hint: "The first gains again: has the vehicle changed?" },
+  step: { label: "Step", hint: "The step proposed by the strategy." },
+  "smaller step": { label: "Smaller step", hint: "Halfway between the best gains and the full step." },
+  repeat: { label: "Repeat", hint: "Flies the best gains again to see whether the result was luck." },
+  baseline: { label: "Baseline", hint: "Flies the first gains again to check whether the vehicle has changed." },
   own: { label: "Own gains", hint: "" },
 };
 
 export const RECOMMENDED: Record<Proposal["recommended"], string> = {
-  step: "Fly the step",
-  repeat: "Repeat the best",
+  step: "Fly the proposed step",
+  repeat: "Repeat the best gains",
   baseline: "Fly the baseline",
   stop: "Stop the campaign",
 };

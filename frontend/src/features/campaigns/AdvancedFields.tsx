@@ -73,7 +73,7 @@ export function AdvancedFields(props: Props) {
 const STOPS: Record<StopKind, { label: string; line: string }> = {
   noise: {
     label: "No resolvable improvement",
-    line: "Ends when no further step would be resolvable, after the best and the first gains have been flown again.",
+    line: "Ends when no further step would bring a resolvable improvement and the best and first gains have been repeated.",
   },
   paper: {
     label: "No improvement",
@@ -121,7 +121,7 @@ function StopFields({ form, reasons, set }: Props) {
         />
       )}
       <NumberField
-        label="Stop below battery voltage"
+        label="Minimum battery voltage"
         placeholder="No limit"
         suffix=" V"
         value={form.minBatteryV}
@@ -196,7 +196,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
       {hasModel(catalogue, form.experiment) && unitsOf(catalogue, form.experiment).output === "m" && (
         <NumberField
           label="Gate ceiling"
-          description="Gains that could rise above it are refused"
+          description="Gains that could take the vehicle above this altitude are refused"
           suffix=" m"
           value={form.ceilingM}
           error={reasons["ceiling_m"]}

@@ -283,7 +283,7 @@ export function unreadable(form: CampaignForm, catalogue: Catalogue): string[] {
     ["Maximum flights", form.maxFlights],
     ["Improvement threshold", form.stop === "paper" ? form.improvementPercent : ""],
     ["Confidence", form.stop === "noise" ? form.confidencePercent : ""],
-    ["Stop below battery voltage", form.minBatteryV],
+    ["Minimum battery voltage", form.minBatteryV],
     ["Maximum first step", form.firstStepPercent],
     ["Maximum later step", form.stepPercent],
     ["Gate ceiling", form.ceilingM],

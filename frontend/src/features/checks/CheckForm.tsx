@@ -30,13 +30,13 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
       {!brief && (
         <Text maw="90ch" lh={1.45} mb={10}>
           The method requires an exact replica of the controller. Upload a recorded run of the autopilot's vertical
-          loop. It is replayed through the replica in the model, and every signal is compared, bit by bit where the
+          loop. It is replayed through the replica in the model, and every signal is compared, bit for bit where the
           recording allows it.
         </Text>
       )}
       <Text maw="90ch" lh={1.45} mb={10}>
         Drop a file here or choose one: Paparazzi's <code>.data</code> file with <code>VERT_LOOP</code> messages (add
-        its <code>.log</code>, which contains the gains), or a recording of every step as <code>.csv</code> or{" "}
+        its <code>.log</code>, which contains the gains), or a recording of every control step as <code>.csv</code> or{" "}
         <code>.csv.gz</code>. The file is not stored.
       </Text>
       <Group gap={10} align="end" mt={4} mb={10}>

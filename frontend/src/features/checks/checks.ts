@@ -10,7 +10,7 @@ export const RECORDINGS = ".data,.log,.csv,.gz,text/csv";
 
 export const KINDS: Record<ControllerCheckSummary["kind"], string> = {
   log: "Flight log",
-  trace: "Recording of every step",
+  trace: "Recording of every control step",
 };
 
 export function checkStateLabel(passed: boolean): StateLabel {

@@ -133,7 +133,7 @@ function ErrorCell({ flight: { error, group, scatter }, unit }: { flight: Compar
     return (
       <>
         <strong>{plusMinus(error, scatter, unit)}</strong>
-        {scatter !== null && <small className={classes["small"]}>± scatter of one flight</small>}
+        {scatter !== null && <small className={classes["small"]}>± flight-to-flight scatter</small>}
       </>
     );
   }
@@ -209,8 +209,8 @@ export function SettingsTable({ comparison: { flights, settings } }: { compariso
       {everywhere.length > 0 && <Settings flights={flights} settings={everywhere} title="Settings that differ" />}
       {somewhere.length > 0 && (
         <details className={classes["words"]}>
-          <summary>{count(somewhere.length, "setting")} of only some flights</summary>
-          <Settings flights={flights} settings={somewhere} title="Settings of some flights" />
+          <summary>{count(somewhere.length, "setting")} present in only some flights</summary>
+          <Settings flights={flights} settings={somewhere} title="Settings present in only some flights" />
         </details>
       )}
     </>

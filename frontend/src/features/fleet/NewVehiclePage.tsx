@@ -71,7 +71,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
     >
       <TextInput
         label="Name"
-        description="Shown on every page, for example the number on the hull"
+        description="Shown on every page, for example the number on the airframe"
         value={form.name}
         maxLength={120}
         error={reasons["name"]}
