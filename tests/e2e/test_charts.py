@@ -121,12 +121,12 @@ def point_at(dashboard: Dashboard, place: tuple[float, float], flight: int) -> N
     def is_pointed_at() -> bool:
         dashboard.page.mouse.move(place[0] - 3, place[1])
         dashboard.page.mouse.move(*place)
-        return row(dashboard, flight).get_attribute("data-pointed") == ""
+        return curve(dashboard, flight).get_attribute("data-pointed") == ""
 
     dashboard.until(is_pointed_at)
 
 
-def test_a_mark_points_at_its_curve_its_row_and_its_gains(page_of_many: Dashboard) -> None:
+def test_a_mark_points_at_its_curve_and_its_gains_and_chooses_its_flight(page_of_many: Dashboard) -> None:
     number = best_of(page_of_many)["trial_number"]
     chart = page_of_many.plot("errors")
     chart.scroll_into_view_if_needed()
@@ -136,14 +136,13 @@ def test_a_mark_points_at_its_curve_its_row_and_its_gains(page_of_many: Dashboar
     page_of_many.settled()
     place = place_of(chart, number)
     point_at(page_of_many, place, number)
-    expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
     label = page_of_many.plot("gains").locator(".hoverlayer .hovertext")
     expect(label.first).to_contain_text(f"Flight {number}")
     page_of_many.page.mouse.move(5, 5)
-    expect(row(page_of_many, number)).not_to_have_attribute("data-pointed", "")
+    expect(curve(page_of_many, number)).not_to_have_attribute("data-pointed", "")
     page_of_many.page.mouse.move(*place)
     page_of_many.page.mouse.click(*place)
-    expect(row(page_of_many, number)).to_have_attribute("data-shown", "true")
+    expect(page_of_many.panel(f"Flight {number}")).to_be_visible()
 
 
 def test_choosing_a_flight_of_the_crowd_gives_it_a_curve_of_its_own(page_of_many: Dashboard) -> None:

@@ -259,6 +259,7 @@ def test_the_table_of_runs_sorts_hides_columns_and_compares_the_selected_flights
     dashboard.page.get_by_role("checkbox", name="Overshoot").uncheck()
     expect(table.get_by_role("columnheader", name="Overshoot")).to_have_count(0)
     dashboard.page.reload()
+    dashboard.open_tab("Flights")
     expect(table.get_by_role("columnheader", name="Settling time")).to_be_visible()
     expect(table.get_by_role("columnheader", name="Overshoot")).to_have_count(0)
     for number in (3, 1):

@@ -243,9 +243,11 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
         close_it_again(dashboard)
         if name in WITH_TABS:
             dashboard.open_tab("Flights")
+            page.mouse.move(0, 0)
             dashboard.settled(theme)
             refused += [*overflow(dashboard, f"{state}, flights,"), *violations(page)]
             dashboard.open_tab("Error and gains")
+            page.mouse.move(0, 0)
     if name in WITH_TABS:
         dashboard.open_tab("Error landscape")
         expect(dashboard.plot("Error landscape")).to_be_visible()

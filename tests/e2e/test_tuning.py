@@ -68,6 +68,10 @@ def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error
     panel = dashboard.panel("Statistics")
     row = panel.get_by_role("row").filter(has_text="2, 3")
     expect(row).to_contain_text(printed(group["mean"], group["standard_error"]))
+    expect(panel).to_contain_text(
+        {"better": "Better", "worse": "Worse"}.get(said["comparison"]["verdict"], "Unresolved")
+    )
+    expect(panel).to_contain_text(f"{said['track_record']['inside']} of {said['track_record']['of']}")
     dashboard.open_tab("Error and gains")
     dashboard.until(lambda: dashboard.trace("errors", "repeats") is not None)
     repeats, measured = dashboard.trace("errors", "repeats"), dashboard.trace("errors", "measured")
@@ -75,10 +79,6 @@ def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error
     assert repeats["y"] == pytest.approx([group["mean"]], abs=1e-6)
     assert repeats["bars"] == pytest.approx([group["standard_error"]], abs=1e-6)
     assert measured["bar"] == pytest.approx(said["sigma"], abs=1e-6)
-    expect(panel).to_contain_text(
-        {"better": "Better", "worse": "Worse"}.get(said["comparison"]["verdict"], "Unresolved")
-    )
-    expect(panel).to_contain_text(f"{said['track_record']['inside']} of {said['track_record']['of']}")
     shown = dashboard.panel("Flight 3")
     expect(shown).to_contain_text(printed(group["mean"], group["standard_error"]))
 

@@ -6,8 +6,10 @@ import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } 
 import type { Campaign, Trial } from "../../api/types";
 import { loadPlotly } from "../../charts/plotly";
 import { pointAt } from "../../charts/pointing";
+import { useKeys } from "../../frame/useKeys";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
+import { wasFlown } from "../../ui/states";
 import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { ByFlightPanels, CurvesPanel, LandscapePanel } from "./CampaignCharts";
@@ -82,6 +84,12 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
     (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),
     [],
   );
+  const jump = (by: number) => {
+    const flown = trials.filter(({ state }) => wasFlown(state));
+    const next = flown[flown.findIndex(({ id }) => id === shown?.id) + by];
+    if (next !== undefined) choose(next.number);
+  };
+  useKeys({ next: () => jump(1), previous: () => jump(-1) });
   useEffect(() => () => pointAt(null), []);
   return (
     <>

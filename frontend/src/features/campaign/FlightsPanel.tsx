@@ -35,16 +35,9 @@ export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown
   const navigate = useNavigate();
   const select = (trial: number) =>
     setSelected(selected.includes(trial) ? selected.filter((one) => one !== trial) : [...selected, trial]);
-  const flown = (trials ?? []).filter(({ state }) => wasFlown(state));
-  const at = flown.findIndex(({ number }) => number === shown);
-  const jump = (by: number) => {
-    const next = flown[at + by];
-    if (next !== undefined) onChoose(next.number);
-  };
+  const chosen = trials?.find(({ number, state }) => number === shown && wasFlown(state));
   useKeys({
-    next: () => jump(1),
-    previous: () => jump(-1),
-    select: () => flown[at] && select(flown[at].id),
+    select: () => chosen && select(chosen.id),
     compare: () => void navigate(comparison(campaign.id, selected)),
   });
   return (
