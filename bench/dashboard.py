@@ -120,7 +120,7 @@ def drawn_s(page: Page, campaign_id: int) -> tuple[float, float]:
     """Return the time until the three charts were painted, and until the rows of the table were there too."""
     page.goto(f"/campaigns/{campaign_id}", wait_until="commit")
     page.locator("[data-drawn]").nth(2).wait_for()
-    page.locator("tbody tr[data-flight]").first.wait_for()
+    page.locator("tbody tr[data-flight]").first.wait_for(state="attached")
     page.evaluate(PAINTED)
     seen: Mapping[str, float] = page.evaluate("seen")
     return seen["charts"] / 1e3, seen["rows"] / 1e3
@@ -158,7 +158,9 @@ def use(page: Page) -> None:
             page.wait_for_timeout(30)
         page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
         page.wait_for_timeout(300)
+    page.get_by_role("tab", name="Flights").click()
     _rows(page)
+    page.get_by_role("tab", name="Error and gains").click()
     boxes[0].scroll_into_view_if_needed()
     _zoom(page)
     for span in ("First 8 s", "Whole flight"):
