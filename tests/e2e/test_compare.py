@@ -235,6 +235,31 @@ def test_an_empty_page_teaches_and_finds_campaigns_by_name(dashboard: Dashboard,
     expect(page.get_by_text("No campaigns with flights match.")).to_be_visible()
 
 
+def test_flights_are_shown_selected_and_compared_by_keys(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(strategy="calibrated", flights=3)
+    trials = dashboard.trials(campaign_id)
+    dashboard.open_campaign(campaign_id)
+    page = dashboard.page
+    expect(dashboard.panel("Flight 3")).to_be_visible()
+    slash = "new KeyboardEvent('keydown', {key: '/', bubbles: true, cancelable: true})"
+    assert page.evaluate(f"document.body.dispatchEvent({slash})"), "the browser's own, without a search field"
+    page.keyboard.press("k")
+    expect(dashboard.panel("Flight 2")).to_be_visible()
+    dashboard.open_tab("Flights")
+    page.keyboard.press("x")
+    expect(page.get_by_role("checkbox", name="Select flight 2")).to_be_checked()
+    page.keyboard.press("j")
+    expect(dashboard.panel("Flight 3")).to_be_visible()
+    page.keyboard.press("x")
+    page.keyboard.press("c")
+    expect(page).to_have_url(re.compile(rf"trial={trials[1]['id']}&trial={trials[2]['id']}$"))
+    page.goto(f"/campaigns/{campaign_id}/flights/{trials[2]['id']}")
+    expect(page.get_by_role("heading", name="Flight 3", level=1)).to_be_visible()
+    dashboard.settled()
+    page.keyboard.press("k")
+    expect(page).to_have_url(re.compile(rf"flights/{trials[1]['id']}$"))
+
+
 def test_the_table_of_runs_sorts_hides_columns_and_compares_the_selected_flights(
     dashboard: Dashboard, states: States
 ) -> None:

@@ -13,7 +13,11 @@ export function KeyboardHelp() {
   const dialog = useRef<HTMLDialogElement>(null);
   useKeys({
     help: () => dialog.current?.togglePopover(),
-    search: () => document.querySelector<HTMLInputElement>("main search input")?.focus(),
+    search: () => {
+      const search = document.querySelector<HTMLInputElement>("main search input");
+      search?.focus();
+      return search !== null;
+    },
   });
   return (
     <>

@@ -5,15 +5,14 @@ function isTyping(target: EventTarget | null): boolean {
   return target instanceof HTMLElement && target.matches("input, textarea, select, [contenteditable]");
 }
 
-/** Carry out a command when its key is pressed, unless the user types; the key then has no other effect. */
-export function useKeys(acts: Partial<Record<Command, () => void>>): void {
+/** Carry out a command when its key is pressed, unless the user types. The key then has no other effect, but for an act
+ * that returns false because there was nothing to do. */
+export function useKeys(acts: Partial<Record<Command, () => unknown>>): void {
   useEffect(() => {
     function onKey(event: KeyboardEvent): void {
       const command = commandOf(event, isTyping(event.target));
       const act = command === null ? undefined : acts[command];
-      if (act === undefined) return;
-      event.preventDefault();
-      act();
+      if (act !== undefined && act() !== false) event.preventDefault();
     }
     document.addEventListener("keydown", onKey);
     return () => document.removeEventListener("keydown", onKey);
