@@ -97,21 +97,9 @@ def create_instead(
     headers: dict[str, str] | None = None,
 ) -> None:
     """Press "Create campaign" on its page, with another request behind it."""
-    open_form(dashboard, path=path, url=url, method=method, body=body, headers=headers)
-    dashboard.button("Create campaign").click()
-
-
-def open_form(
-    dashboard: Dashboard,
-    *,
-    path: str | None = None,
-    url: str | None = None,
-    method: str | None = None,
-    body: str | bytes | None = None,
-    headers: dict[str, str] | None = None,
-) -> None:
     instead(dashboard, "/campaigns", path=path, url=url, method=method, body=body, headers=headers)
     dashboard.open("/new")
+    dashboard.button("Create campaign").click()
 
 
 @contextmanager
@@ -163,7 +151,8 @@ def _a_campaign_that_never_was(dashboard: Dashboard, _server: Server, _states: S
 def _a_vehicle_asked_while_it_is_still_being_asked(dashboard: Dashboard, server: Server, states: States) -> None:
     options = {"address": "udp:127.0.0.1:14993@14992", "simulated": True}
     vehicle = states.vehicle("Busy", options=options)
-    open_form(dashboard, path=f"/vehicles/{vehicle}/connect", body="{}")
+    instead(dashboard, "/campaigns", path=f"/vehicles/{vehicle}/connect", body="{}")
+    dashboard.open("/new")
     with stopped_worker(server):
         dashboard.post(f"/vehicles/{vehicle}/connect")
         dashboard.button("Create campaign").click()

@@ -6,10 +6,8 @@ import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } 
 import type { Campaign, Trial } from "../../api/types";
 import { loadPlotly } from "../../charts/plotly";
 import { pointAt } from "../../charts/pointing";
-import { useKeys } from "../../frame/useKeys";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
-import { wasFlown } from "../../ui/states";
 import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { ByFlightPanels, CurvesPanel, LandscapePanel } from "./CampaignCharts";
@@ -18,6 +16,7 @@ import classes from "./CampaignPage.module.css";
 import { FlightsPanel } from "./FlightsPanel";
 import { NextFlightCard, useCampaignStatus } from "./NextFlightCard";
 import { StatisticsPanel } from "./StatisticsPanel";
+import { useFlightKeys } from "./useFlightKeys";
 import type { Preview } from "./useNextFlight";
 import { VerdictPanel } from "./VerdictPanel";
 import { selectedTrial } from "./verdict";
@@ -84,12 +83,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
     (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),
     [],
   );
-  const jump = (by: number) => {
-    const flown = trials.filter(({ state }) => wasFlown(state));
-    const next = flown[flown.findIndex(({ id }) => id === shown?.id) + by];
-    if (next !== undefined) choose(next.number);
-  };
-  useKeys({ next: () => jump(1), previous: () => jump(-1) });
+  useFlightKeys(trials, shown?.id, ({ number }) => choose(number));
   useEffect(() => () => pointAt(null), []);
   return (
     <>

@@ -5,15 +5,14 @@ import { Link, useNavigate, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
 import type { FigureCard } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { useKeys } from "../../frame/useKeys";
 import { grouped } from "../../ui/format";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
-import { wasFlown } from "../../ui/states";
 import { useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./CampaignPage.module.css";
 import type { NotePin } from "./FlightNotes";
 import { GateChecks } from "./GateChecks";
+import { useFlightKeys } from "./useFlightKeys";
 import { VerdictPanel } from "./VerdictPanel";
 
 export function FlightPage() {
@@ -48,13 +47,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
     setPinning(false);
   }, []);
   const navigate = useNavigate();
-  const flown = trials.filter(({ state }) => wasFlown(state));
-  const at = flown.findIndex(({ id }) => id === trialId);
-  const jump = (by: number) => {
-    const next = at < 0 ? undefined : flown[at + by];
-    if (next !== undefined) void navigate(`/campaigns/${campaignId}/flights/${next.id}`);
-  };
-  useKeys({ next: () => jump(1), previous: () => jump(-1) });
+  useFlightKeys(trials, trialId, ({ id }) => void navigate(`/campaigns/${campaignId}/flights/${id}`));
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
   if (trial.error) return <NotFound error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;

@@ -16,7 +16,7 @@ import { wasFlown } from "../../ui/states";
 import { useGainTitles } from "../../ui/units";
 import classes from "./FlightsPanel.module.css";
 import { type RunColumn, runColumns } from "./runColumns";
-import { nextOrder, type Order, sortedBy, toggledName } from "./runs";
+import { nextOrder, type Order, sortedBy, toggled } from "./runs";
 
 interface Props {
   campaign: Campaign;
@@ -33,8 +33,7 @@ const NO_TITLES: Readonly<Record<string, string>> = {};
 export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown, unit, onChoose }: Props) {
   const [selected, setSelected] = useState<readonly number[]>([]);
   const navigate = useNavigate();
-  const select = (trial: number) =>
-    setSelected(selected.includes(trial) ? selected.filter((one) => one !== trial) : [...selected, trial]);
+  const select = (trial: number) => setSelected(toggled(selected, trial));
   const chosen = trials?.find(({ number, state }) => number === shown && wasFlown(state));
   useKeys({
     select: () => chosen && select(chosen.id),
@@ -98,7 +97,7 @@ function useChosenColumns(columns: readonly RunColumn[]) {
     getInitialValueInEffect: false,
   });
   const isShown = ({ id, extra = false }: RunColumn) => extra === changed.includes(id);
-  return { visible: columns.filter(isShown), isShown, toggle: (id: string) => setChanged(toggledName(changed, id)) };
+  return { visible: columns.filter(isShown), isShown, toggle: (id: string) => setChanged(toggled(changed, id)) };
 }
 
 interface TrialsTableProps extends Props {

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { nextOrder, sortedBy, toggledName } from "./runs";
+import { nextOrder, sortedBy, toggled } from "./runs";
 
 const runs = [
   { number: 1, error: 0.3 },
@@ -25,6 +25,6 @@ test("a title sorts rising, then falling, then by flight number again", () => {
 });
 
 test("a column is hidden and shown again", () => {
-  expect(toggledName(["kp"], "ki")).toEqual(["kp", "ki"]);
-  expect(toggledName(["kp", "ki"], "kp")).toEqual(["ki"]);
+  expect(toggled(["kp"], "ki")).toEqual(["kp", "ki"]);
+  expect(toggled(["kp", "ki"], "kp")).toEqual(["ki"]);
 });

@@ -27,7 +27,7 @@ export function sortedBy<T>(rows: readonly T[], value: (row: T) => Sortable, des
   return [...present, ...rows.filter((row) => value(row) === null)];
 }
 
-/** The names with one added or removed. */
-export function toggledName(names: readonly string[], name: string): string[] {
-  return names.includes(name) ? names.filter((one) => one !== name) : [...names, name];
+/** The items with one added or removed. */
+export function toggled<T>(items: readonly T[], item: T): T[] {
+  return items.includes(item) ? items.filter((one) => one !== item) : [...items, item];
 }

@@ -7,6 +7,7 @@ import { StateBadge } from "../../ui/Badges";
 import { count, utcTime } from "../../ui/format";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
+import row from "../../ui/RowCard.module.css";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
 import classes from "./Jobs.module.css";
@@ -111,7 +112,7 @@ function JobRows({ job, titles }: { job: Job; titles: ReadonlyMap<string, string
 
 function Linked({ to, children }: { to: string; children: ReactNode }) {
   return (
-    <Anchor component={Link} to={to} className={classes["link"]}>
+    <Anchor component={Link} to={to} className={row["link"]}>
       {children}
     </Anchor>
   );
