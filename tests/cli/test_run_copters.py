@@ -23,8 +23,9 @@ from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink_kind import MAVLINK
+from tests.ports import free_port
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
-from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
+from tests.vehicles.mavlink.speaking import LOOPBACK
 
 GAINLINE = Path(sys.executable).parent / "gainline"
 SPEED: Final = 2

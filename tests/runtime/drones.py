@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Self
 
+from tests.ports import free_port
 from tests.runtime.processes import PATIENCE_S, Serving, environment, stream, wait_for
-from tests.vehicles.mavlink.speaking import free_port
 
 OUR_PAGE = {"Sec-Fetch-Site": "same-origin"}
 SAFE = {"kp": 283, "ki": 13, "kd": 82}

@@ -234,13 +234,6 @@ def flying(autopilot: str, **settings: Any) -> Ground:
     return ground
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 def eventually(holds: Callable[[], bool], within_s: float = 20.0) -> None:
     """Raises AssertionError when it did not come to hold in so many seconds of this computer's clock."""
     until_s = time.monotonic() + within_s

@@ -18,7 +18,8 @@ from app.simdrone.drone import LARGEST_LAG_S
 from app.simdrone.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock
-from tests.simdrone.ground import Ground, UdpWire, dialect_of, eventually, flying, free_port, served, switched_on
+from tests.ports import free_port
+from tests.simdrone.ground import Ground, UdpWire, dialect_of, eventually, flying, served, switched_on
 from tests.simdrone.paparazzi import Pilot
 
 EXTREMES = {

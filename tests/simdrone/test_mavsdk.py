@@ -16,7 +16,8 @@ from mavsdk.plugins.param.param import Param
 from mavsdk.plugins.telemetry.telemetry import Telemetry
 
 from app.core.clock import ScaledClock
-from tests.simdrone.ground import eventually, free_port, served
+from tests.ports import free_port
+from tests.simdrone.ground import eventually, served
 
 SPEED = 5.0
 FOUND_WITHIN_S = 15.0

@@ -32,8 +32,9 @@ from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.mocap.addresses import parse as parse_source
 from app.vehicles.mocap.opening import open_source
+from tests.ports import free_port
 from tests.simdrone.ground import switched_on
-from tests.vehicles.mavlink.speaking import LOOPBACK, free_port
+from tests.vehicles.mavlink.speaking import LOOPBACK
 
 SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "paparazzi": {"kp": 283, "ki": 13, "kd": 82},

@@ -9,6 +9,7 @@ from typing import Final, Self
 from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
 from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message
 from app.vehicles.mavlink.link import Link, Received
+from tests.ports import free_port
 
 LOOPBACK: Final = "127.0.0.1"
 SOON_S: Final = 5.0
@@ -90,13 +91,6 @@ def heartbeat(speaker: FakeVehicleEndpoint, *, autopilot: int = 3, kind: int = 2
 def position(time_boot_ms: int, z: float = 0.0) -> dict[str, FieldValue]:
     """The fields of LOCAL_POSITION_NED."""
     return {"time_boot_ms": time_boot_ms, "x": 0.0, "y": 0.0, "z": z, "vx": 0.0, "vy": 0.0, "vz": 0.0}
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((LOOPBACK, 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def collect(link: Link, count: int) -> list[Received]:

@@ -14,7 +14,8 @@ import pytest
 
 from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress, UdpAddress, UdpInAddress
 from app.vehicles.mavlink.transports import BACKLOG, LinkError, Transport, open_transport
-from tests.vehicles.mavlink.speaking import LOOPBACK, SOON_S, becomes, free_port
+from tests.ports import free_port
+from tests.vehicles.mavlink.speaking import LOOPBACK, SOON_S, becomes
 
 
 def hear(transport: Transport, size: int) -> bytes:

@@ -11,7 +11,7 @@ from app.core.experiments.takeoff import Takeoff
 from app.core.records.glitches import find_glitches
 from app.vehicles.base import FlightRecord, OptionValue, VehicleError
 from app.vehicles.mavlink_kind import MAVLINK
-from tests.simdrone.ground import free_port
+from tests.ports import free_port
 from tests.vehicles.flying import SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_vehicle import fly

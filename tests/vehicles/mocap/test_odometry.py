@@ -17,7 +17,7 @@ from app.vehicles.mocap import odometry
 from app.vehicles.mocap.addresses import StreamAddress
 from app.vehicles.mocap.odometry import OdometrySource, StreamSource
 from app.vehicles.mocap.opening import open_source
-from tests.simdrone.ground import free_port
+from tests.ports import free_port
 from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, comes_true, news
 
 CLOCK = ScaledClock()

@@ -8,7 +8,8 @@ import pytest
 
 from app.core.clock import ScaledClock
 from app.simdrone.drone import Drone
-from tests.simdrone.ground import eventually, free_port, served
+from tests.ports import free_port
+from tests.simdrone.ground import eventually, served
 from tests.simdrone.paparazzi import CLIMB, HOLDING_POINT, LAND_HERE, START_ENGINE, SYSTEM, TAKEOFF
 from tests.vehicles.peers.mavproxy import MavProxy
 

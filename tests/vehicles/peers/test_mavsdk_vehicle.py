@@ -12,8 +12,8 @@ from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, OptionValue, Veh
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.registry import open_vehicle
+from tests.ports import free_port
 from tests.vehicles.flying import never, unwatched
-from tests.vehicles.mavlink.speaking import free_port
 from tests.vehicles.peers.mavsdk_vehicle import FLOATS, INTEGERS, MAKE, MavsdkVehicle
 from tests.vehicles.peers.mavsdk_vehicle import GAINS as SAFE
 
