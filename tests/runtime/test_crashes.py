@@ -133,11 +133,16 @@ def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> Non
 def test_a_flight_that_outlived_its_web_process_can_still_be_aborted(tmp_path: Path) -> None:
     first = Serving(tmp_path / "data")
     trial_id = in_the_air(first, first.campaign(), speed=1.0)
+    pids = children(first.worker_pid())
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)  # the flight now takes as long as a server takes to start
     os.kill(first.process.pid, signal.SIGKILL)
     first.stop()
     with Serving(tmp_path / "data") as second:
         second.worker_pid()
         assert second.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
         assert second.trial(trial_id, "aborted")["reason"] == "enough"
 
 
