@@ -5,17 +5,25 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
+import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.pool import QueuePool
 
 from app.common.settings import Settings
+from app.db import session as session_module
 from app.db.session import Database
 from app.live.messages import WorkerHello, live_address
 from app.live.server import LiveServer
 from tests.builders import get
 
 THREADS_OF_A_SERVER = 40
+
+
+@pytest.fixture
+def long_wait_for_the_database(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fifty requests begin to wait and are heard of again in it, on any machine. Before any connection is opened."""
+    monkeypatch.setattr(session_module, "_BUSY_TIMEOUT_MS", 60_000)
 
 
 def hello() -> WorkerHello:
@@ -35,6 +43,7 @@ def connections_in_use(database: Database) -> int:
     return pool.checkedout()
 
 
+@pytest.mark.usefixtures("long_wait_for_the_database")
 def test_an_abort_passes_while_every_thread_waits_for_the_database(
     client: TestClient, database: Database, settings: Settings
 ) -> None:

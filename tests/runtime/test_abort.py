@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.runtime.processes import Serving, stream
+from tests.runtime.processes import PATIENCE_S, Serving, stream
 
 WATCHERS = 5
 
@@ -25,10 +25,10 @@ class Watching:
         self.in_the_air = threading.Event()
         self._thread = threading.Thread(target=self._follow, args=(url,))
         self._thread.start()
-        assert self.connected.wait(10.0)
+        assert self.connected.wait(PATIENCE_S)
 
     def wait_for_the_end(self) -> None:
-        self._thread.join(20.0)
+        self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive()
 
     def _follow(self, url: str) -> None:
@@ -51,7 +51,7 @@ def test_a_watched_flight_at_the_speed_of_life_is_computed_in_step_and_ends_by_i
     campaign_id = serving.campaign(kind=kind)
     watchers = [Watching(serving.url) for _ in range(WATCHERS)]
     trial_id = serving.fly(campaign_id, speed=1.0)
-    assert watchers[0].in_the_air.wait(20.0)
+    assert watchers[0].in_the_air.wait(PATIENCE_S)
     assert serving.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
     assert serving.trial(trial_id, "aborted")["reason"] == "enough"
     for watcher in watchers:
