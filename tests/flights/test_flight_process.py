@@ -11,7 +11,6 @@ import pytest
 
 from app.common.data_folder import vehicle_lock
 from app.core.experiments import get_experiment
-from app.flights.flight_loop import LOCK_TIMEOUT_S
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import FlightPhase, Telemetry
@@ -183,6 +182,6 @@ def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_pa
         thread.start()
         thread.join(1.0)
         assert heard == []
-    thread.join(LOCK_TIMEOUT_S)
+    thread.join()
     assert len(only(heard, FlightLanded)) == 1
     flight_process.close()

@@ -103,7 +103,7 @@ def test_closing_the_pool_ends_a_long_task_at_once(tmp_path: Path) -> None:
         waiting.start()
         while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text():
             time.sleep(0.01)
-    waiting.join(5)
+    waiting.join()
     assert outcome == [CancelledError]
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
