@@ -81,8 +81,13 @@ def hold_button(page: Page) -> Locator:
 
 
 def hold(page: Page, for_ms: int) -> None:
-    """Press, and let the page's own clock run so far: it is one of `page.clock`."""
-    middle_of(page, hold_button(page))
+    """Press, and let the page's own clock run so far: it is one of `page.clock`.
+
+    It runs faster than the server answers, and an answer about readiness holds for 4 s: the press follows a new one.
+    """
+    with page.expect_response(re.compile("/readiness$")):
+        middle_of(page, hold_button(page))
+    expect(hold_button(page)).to_be_enabled()
     page.mouse.down()
     page.clock.run_for(for_ms)
     page.mouse.up()

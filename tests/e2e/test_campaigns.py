@@ -69,8 +69,7 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
 def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard, states: States) -> None:
     campaign_id = states.campaign(strategy="calibrated", flights=1)
     dashboard.open_campaign(campaign_id)
-    predicted = dashboard.trace("takeoffs", "prediction")
-    assert predicted is not None
+    predicted = dashboard.until(lambda: dashboard.trace("takeoffs", "prediction"))
     assert (predicted["meta"]["trial"], predicted["dash"]) == (2, "dash")
     assert max(predicted["y"]) > 2.5
     proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]

@@ -140,7 +140,7 @@ def test_a_mark_points_at_its_curve_and_its_gains_and_chooses_its_flight(page_of
     expect(label.first).to_contain_text(f"Flight {number}")
     page_of_many.page.mouse.move(5, 5)
     expect(curve(page_of_many, number)).not_to_have_attribute("data-pointed", "")
-    page_of_many.page.mouse.move(*place)
+    point_at(page_of_many, place, number)
     page_of_many.page.mouse.click(*place)
     expect(page_of_many.panel(f"Flight {number}")).to_be_visible()
 

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import Dashboard
+from tests.e2e.dashboard import Dashboard, Json
 from tests.e2e.states import States
 
 
@@ -51,9 +51,12 @@ def test_the_live_curve_grows_while_it_flies_and_the_button_aborts_at_once(
 
 def test_what_is_drawn_live_is_what_was_measured_and_becomes_the_record(dashboard: Dashboard, campaign_id: int) -> None:
     dashboard.fly()
-    wait_for_live(dashboard, 200)
-    live = dashboard.trace("takeoffs", "live")
-    assert live is not None
+
+    def drawn_live() -> Json | None:
+        curve = dashboard.trace("takeoffs", "live")
+        return curve if curve is not None and len(curve["x"]) >= 200 else None
+
+    live = dashboard.until(drawn_live)
     dashboard.until(lambda: dashboard.trials(campaign_id)[0]["state"] == "valid")
     [trial] = dashboard.trials(campaign_id)
     assert trial["speed"] == 10

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+from contextlib import suppress
 from pathlib import Path
 
 from playwright.sync_api import expect
@@ -43,7 +44,8 @@ def computing(server: Server) -> int | None:
 def kill_until_given_up(dashboard: Dashboard, server: Server, job_id: int) -> None:
     def killed() -> bool:
         if (pid := computing(server)) is not None:
-            os.kill(pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # one that was killed before, and collected just now
+                os.kill(pid, signal.SIGKILL)
         return bool(dashboard.get(f"/jobs/{job_id}")["state"] == "failed")
 
     dashboard.until(killed, within_s=120.0)

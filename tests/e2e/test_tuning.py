@@ -1,6 +1,7 @@
 """What the tuning engine knows, on the screen: intervals, repeats, refusals, glitches, warm starts, experiments."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,16 +20,14 @@ def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(
 ) -> None:
     campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
     dashboard.open_campaign(campaign_id)
-    curve, lower, upper = (dashboard.trace("takeoffs", *what[:1], **what[1]) for what in (
+    curve, lower, upper = (dashboard.until(partial(dashboard.trace, "takeoffs", *what[:1], **what[1])) for what in (
         ("prediction", {}), ("band", {"edge": "lower"}), ("band", {"edge": "upper"})))  # fmt: skip
-    assert curve is not None and lower is not None and upper is not None  # noqa: PT018
     middle = np.interp(curve["x"], lower["x"], lower["y"]), np.interp(curve["x"], upper["x"], upper["y"])
     assert (middle[0] <= np.array(curve["y"]) + 0.01).all()
     assert (middle[1] >= np.array(curve["y"]) - 0.01).all()
     assert (middle[1] - middle[0]).max() > 0.01
     interval = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["interval"]
-    drawn = dashboard.trace("errors", "interval")
-    assert drawn is not None
+    drawn = dashboard.until(lambda: dashboard.trace("errors", "interval"))
     assert (drawn["x"][-3:-1], drawn["y"][-3:-1]) == (
         [2, 2],
         pytest.approx([interval["lower"], interval["upper"]], abs=1e-6),
