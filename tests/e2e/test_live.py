@@ -1,5 +1,6 @@
 """Lost connections: the page shows them, never shows old values as current, and recovers without a click."""
 
+import fcntl
 import os
 import re
 import signal
@@ -26,6 +27,15 @@ def stopped(pid: int) -> Iterator[None]:
         yield
     finally:
         os.kill(pid, signal.SIGCONT)
+
+
+@contextmanager
+def killed_worker(server: Server) -> Iterator[None]:
+    """The next one, which would be there in two seconds, waits for the lock that the killed one has left."""
+    with (server.data_dir / "worker.lock").open() as lock:
+        os.kill(server.worker_pid(), signal.SIGKILL)
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def is_live(dashboard: Dashboard) -> None:
@@ -135,8 +145,8 @@ def test_a_restarted_server_is_shown_and_its_changes_arrive_automatically(
 
 def test_a_killed_worker_is_shown_until_it_is_back(dashboard: Dashboard, shared_server: Server) -> None:
     dashboard.open("/")
-    os.kill(shared_server.worker_pid(), signal.SIGKILL)
-    expect(dashboard.page.get_by_text("No worker is running.")).to_be_visible(timeout=LOST_MS)
+    with killed_worker(shared_server):
+        expect(dashboard.page.get_by_text("No worker is running.")).to_be_visible(timeout=LOST_MS)
     is_live(dashboard)
     expect(dashboard.page.get_by_text("No worker is running.")).to_have_count(0)
 
