@@ -6,8 +6,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import IO, Final
 
@@ -17,14 +19,15 @@ from typer.testing import CliRunner
 from app.campaigns.campaign_files import read_preset
 from app.cli.commands import app
 from app.core.clock import ScaledClock
+from app.simdrone.copter_parameters import Parameters
+from app.simdrone.px4 import Px4
 from app.vehicles.base import Identity
 from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink_kind import MAVLINK
 from tests.ports import free_port
-from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
+from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.speaking import LOOPBACK
 
 GAINLINE = Path(sys.executable).parent / "gainline"
@@ -99,50 +102,61 @@ def test_a_set_is_flown_by_hand_between_processes_in_real_time(tmp_path: Path) -
     see_sets_flown("ardupilot", 1, out, result.stdout)
 
 
+class FatalClimb(LockstepRig):
+    """At 1 m it hands over the drone's parameters, and ends the process that flies it."""
+
+    def __init__(self, parameters: Connection) -> None:
+        super().__init__("px4")
+        self._parameters = parameters
+
+    def tick(self) -> None:
+        super().tick()
+        if self.drone.body.altitude_m > 1.0:
+            self._parameters.send(px4_of(self).parameters)
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def px4_of(rig: LockstepRig) -> Px4:
+    assert isinstance(rig.drone.autopilot, Px4)
+    return rig.drone.autopilot
+
+
+def fly_into_death(parameters: Connection) -> None:
+    """`gainline run`, in a process of its own."""
+    rig = FatalClimb(parameters)
+    rig.switch_on_failsafes()
+    with pytest.MonkeyPatch.context() as patch:
+        rig.take_the_place_of_every_vehicle(patch)
+        CliRunner().invoke(app, ["run", "px4-takeoff", "--max-flights", "1"])
+
+
 @pytest.mark.complete
 @pytest.mark.parametrize("by", ["gainline run", "the fleet"])
-def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(data_dir: Path, by: str) -> None:
+def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(
+    data_dir: Path, by: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = data_dir / "trial-parameters"
-    with UdpRig("px4", speed=1.0) as rig:
-        autopilot = rig.drone.autopilot
-        for name, value in {"NAV_DLL_ACT": 3, "GF_ACTION": 5, "GF_MAX_VER_DIST": 10}.items():
-            autopilot.parameters[name] = value  # type: ignore[attr-defined]
-        with flying_run(rig) as process:
-            until(lambda: rig.drone.body.altitude_m > 1.0 or process.poll() is not None)
-            assert process.poll() is None, "it ended before it flew"
-            process.kill()
-        rig.speed = 20.0
-        assert (autopilot.held("MIS_TAKEOFF_ALT"), len(list(folder.iterdir()))) == (3.0, 1)
-        until(lambda: not autopilot.armed)  # by its own failsafe
-        rig.speed = 1.0
-        if by == "the fleet":
-            assert MAVLINK.connect is not None
-            pinned = Identity(system_id=1, autopilot="px4", version="1.16.0")
-            options = rig.options()
-            with closing(MAVLINK.connect(options, SAFE["px4"], pinned, folder, lambda: None)) as vehicle:
-                assert vehicle.concern == ""
-        else:
-            with flying_run(rig, "--set", "min_battery_v=50") as process:
-                assert process.wait() == 1, "its battery is too low for another flight"
-        assert (autopilot.held("MIS_TAKEOFF_ALT"), list(folder.iterdir())) == (2.5, [])
+    ours, theirs = Pipe(duplex=False)
+    run = get_context("spawn").Process(target=fly_into_death, args=(theirs,))
+    run.start()
+    theirs.close()
+    held: Parameters = ours.recv()
+    run.join()
+    assert run.exitcode == -signal.SIGKILL
+    assert (held["MIS_TAKEOFF_ALT"], len(list(folder.iterdir()))) == (3.0, 1)
 
-
-@contextmanager
-def flying_run(rig: UdpRig, *more: str) -> Iterator[subprocess.Popen[bytes]]:
-    address = rig.options()["address"]
-    named = ("--vehicle", f"mavlink:{address}", "--max-flights", "1", *more)
-    with subprocess.Popen([GAINLINE, "run", "px4-takeoff", *named]) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-def until(seen: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + 120.0
-    while not seen():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.02)
+    rig = LockstepRig("px4")  # landed by its own failsafe
+    px4_of(rig).parameters = held
+    if by == "the fleet":
+        pinned = Identity(system_id=1, autopilot="px4", version="1.16.0")
+        address = read_preset("px4-takeoff").vehicle.options["address"]
+        with closing(rig.connected(pinned, folder, address=address)) as vehicle:
+            assert vehicle.concern == ""
+    else:
+        rig.take_the_place_of_every_vehicle(monkeypatch)
+        result = CliRunner().invoke(app, ["run", "px4-takeoff", "--set", "min_battery_v=50"])
+        assert result.exit_code == 1, "its battery is too low for another flight"
+    assert (held["MIS_TAKEOFF_ALT"], list(folder.iterdir())) == (2.5, [])
 
 
 @pytest.mark.parametrize(

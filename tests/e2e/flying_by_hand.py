@@ -81,16 +81,18 @@ def hold_button(page: Page) -> Locator:
 
 
 def hold(page: Page, for_ms: int) -> None:
-    """Press, and let the page's own clock run so far: it is one of `page.clock`.
+    """Press, and let the page's own clock run so far, and no further: it is one of `page.clock`.
 
     It runs faster than the server answers, and an answer about readiness holds for 4 s: the press follows a new one.
     """
     with page.expect_response(re.compile("/readiness$")):
         middle_of(page, hold_button(page))
     expect(hold_button(page)).to_be_enabled()
+    page.clock.pause_at(float(page.evaluate("Date.now()")) / 1000 + 1)  # a second is no stall, and passed by nobody
     page.mouse.down()
     page.clock.run_for(for_ms)
     page.mouse.up()
+    page.clock.resume()
 
 
 def hold_until_it_flies(dashboard: Dashboard, trial_id: int) -> None:

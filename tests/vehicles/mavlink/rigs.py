@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
@@ -22,7 +23,7 @@ from app.simdrone.drone import Lockstep
 from app.simdrone.motion_capture import open_outlet
 from app.simdrone.registry import Make
 from app.vehicles import registry as open_module
-from app.vehicles.base import OptionValue
+from app.vehicles.base import Identity, OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse
 from app.vehicles.mavlink.dialects import Message, number, text
 from app.vehicles.mavlink.link import Link
@@ -131,15 +132,43 @@ class LockstepRig(Lockstep, _Heard):
 
     def take_the_place_of_every_vehicle(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Whoever opens a vehicle over MAVLink is given this one, with the options asked for."""
-        kind = replace(MAVLINK, open=lambda options, safe_gains, _: self.vehicle(safe_gains, **options))
+        kind = replace(MAVLINK, open=self._open)
         monkeypatch.setattr(open_module, "VEHICLE_KINDS", {**open_module.VEHICLE_KINDS, kind.name: kind})
 
-    def vehicle(self, safe_gains: Gains | None = None, **options: OptionValue) -> MavlinkVehicle:
+    def _open(
+        self, options: Mapping[str, OptionValue], safe_gains: Gains, trial_parameters: Path | None
+    ) -> MavlinkVehicle:
+        return self.vehicle(safe_gains, trial_parameters=trial_parameters, **options)
+
+    def vehicle(
+        self, safe_gains: Gains | None = None, *, trial_parameters: Path | None = None, **options: OptionValue
+    ) -> MavlinkVehicle:
         safe = SAFE[self.autopilot] if safe_gains is None else safe_gains
         chosen = self.options(**options)
         place = str(chosen["second_source"])
         source = open_source(place, self) if place else None
-        return MavlinkVehicle(chosen, safe, is_real=False, clock=self, source=source, transport=self)
+        return MavlinkVehicle(
+            chosen,
+            safe,
+            is_real=False,
+            clock=self,
+            trial_parameters=trial_parameters,
+            source=source,
+            transport=self,
+        )
+
+    def connected(self, identity: Identity, trial_parameters: Path, **options: OptionValue) -> MavlinkVehicle:
+        """As the fleet connects a vehicle that it knows."""
+        return MavlinkVehicle(
+            self.options(**options),
+            SAFE[self.autopilot],
+            is_real=False,
+            clock=self,
+            identity=identity,
+            observes=True,
+            trial_parameters=trial_parameters,
+            transport=self,
+        )
 
 
 class UdpRig(_Heard):
