@@ -35,11 +35,20 @@ from app.vehicles.registry import get_kind
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
 _CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
-_LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0)}
+_LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0), "throttle": Range(0.0, 1.0)}
 """Limits of commands."""
 _PANELS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     ("Climb rate (m/s)", "m/s", {"climb_rate_m_s": "Climb rate"}),
-    ("Throttle (of full)", "", {"thrust": "Throttle", "feed_forward": "Feed-forward", "feedback": "Feedback"}),
+    (
+        "Throttle (of full)",
+        "",
+        {
+            "thrust": "Throttle",
+            "throttle": "Reported throttle",
+            "feed_forward": "Feed-forward",
+            "feedback": "Feedback",
+        },
+    ),
     ("Battery (V)", "V", {"battery_v": "Battery"}),
     (
         "Pitch and elevator (rad)",

@@ -214,9 +214,11 @@ def _places(below: int) -> list[list[float]]:
 
 
 def _saturated(palette: Palette, command: Curve, limits: Range) -> Sequence[Trace]:
-    """Where the command is at a limit after it first left the lower one; no trace if it never is."""
-    started = np.maximum.accumulate(command.values > limits.low)
-    held = started & ((command.values >= limits.high) | (command.values <= limits.low))
+    """Where the command is at a limit between the first and the last time that it is above the lower one, while the
+    motors run; no trace if it never is."""
+    is_above = command.values > limits.low
+    runs = np.maximum.accumulate(is_above) & np.maximum.accumulate(is_above[::-1])[::-1]
+    held = runs & ((command.values >= limits.high) | (command.values <= limits.low))
     if not held.any():
         return ()
     edges = np.flatnonzero(np.diff(np.concatenate(([False], held, [False])).astype(np.int8)))

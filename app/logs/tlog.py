@@ -15,7 +15,7 @@ from typing import BinaryIO, Final, Protocol
 
 import numpy as np
 
-from app.core.records.trajectory import Samples
+from app.core.records.trajectory import THROTTLE_HOLDS_S, Samples
 from app.logs.base import (
     ARDUPILOT_SETS,
     PAPARAZZI,
@@ -219,6 +219,7 @@ class _Telemetry:
     _altitude_m: "array[float]" = field(default_factory=lambda: array("d"))
     _climb_rate_m_s: "array[float]" = field(default_factory=lambda: array("d"))
     _battery: list[tuple[float, float]] = field(default_factory=list)
+    _throttle: list[tuple[float, float]] = field(default_factory=list)
     _blocks: dict[int, str] = field(default_factory=dict)
     _activated: list[tuple[float, int]] = field(default_factory=list)
     _settings: list[Setting] = field(default_factory=list)
@@ -234,6 +235,7 @@ class _Telemetry:
         by_name = {
             "HEARTBEAT": self._heartbeat,
             "SYS_STATUS": self._status,
+            "VFR_HUD": self._reported_throttle,
             "SET_MODE": self._set_mode,
             "PARAM_VALUE": self._parameter,
             "PARAM_SET": self._parameter_asked,
@@ -287,6 +289,9 @@ class _Telemetry:
         if self._battery:
             times, volts = np.array(self._battery).T
             channels["battery_v"] = np.interp(np.array(self._time_s), times, volts)
+        if self._throttle:
+            times, shares = np.array(self._throttle).T
+            channels["throttle"] = _held(np.array(self._time_s), times, shares)
         return channels
 
     def _notes(self) -> Iterator[str]:
@@ -320,6 +325,11 @@ class _Telemetry:
         millivolt = int(message.voltage_battery)
         if self._is_vehicle(message) and 0 < millivolt < 0xFFFF and np.isfinite(self._now_s):
             self._battery.append((self._now_s, millivolt / 1000))
+
+    def _reported_throttle(self, message: _Message) -> None:
+        percent = int(message.throttle)
+        if self._is_vehicle(message) and 0 <= percent <= 100 and np.isfinite(self._now_s):
+            self._throttle.append((self._now_s, percent / 100))
 
     def _set_mode(self, message: _Message) -> None:
         if not self._is_vehicle(message):
@@ -370,3 +380,10 @@ class _Telemetry:
 
 def _command_name(command: int) -> str:
     return {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}[command]
+
+
+def _held(time_s: Samples, reported_s: Samples, values: Samples) -> Samples:
+    """The value last reported at each time; NaN before the first report, and where that is too long ago."""
+    last = np.searchsorted(reported_s, time_s, side="right") - 1
+    is_known = (last >= 0) & (time_s - reported_s[last] <= THROTTLE_HOLDS_S)
+    return np.where(is_known, values[last], np.nan)

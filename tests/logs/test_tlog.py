@@ -22,7 +22,8 @@ def test_a_recorded_flight_scores_as_its_csv_and_has_its_gains(name: str) -> Non
     assert TAKEOFF.error(flown.trajectory) == pytest.approx(from_csv, rel=1e-5)
     assert flown.gains == TLOGS[name]
     assert flown.begins_with == "the block Takeoff"
-    assert set(flown.trajectory.channels) == {"altitude_m", "climb_rate_m_s", "battery_v"}
+    assert set(flown.trajectory.channels) == {"altitude_m", "climb_rate_m_s", "battery_v", "throttle"}
+    assert np.median(flown.trajectory["throttle"][flown.trajectory.time_s > 5.0]) == pytest.approx(0.62, abs=0.02)
     assert flown.trajectory.clock == "vehicle"
 
 
@@ -206,3 +207,23 @@ def test_a_flight_that_never_left_the_ground_is_refused() -> None:
     log.fly(30.0, to_m=0.2)
     with pytest.raises(TrajectoryError, match="The log contains no takeoff"):
         read_takeoffs(io.BytesIO(log.content))
+
+
+def test_a_throttle_that_is_impossible_of_another_vehicle_or_too_old_is_left_out() -> None:
+    def flown_with(*percents: int | None) -> set[str]:
+        log = paparazzi_log()
+        for name in ("gui_v_kp", "gui_v_ki", "gui_v_kd"):
+            log.parameter(name, 100.0)
+        for second, percent in enumerate(percents):
+            if percent is not None:
+                log.vehicle("vfr_hud", 0.0, 0.0, 0, percent, 0.0, 0.0)
+            log.ground("vfr_hud", 0.0, 0.0, 0, 100, 0.0, 0.0)
+            log.fly(1.0, to_m=0.0 if second < 2 else 3.0)
+            if second == 1:
+                log.ground("script_item", 31, 0, 1, b"")
+        return set(read_takeoff(io.BytesIO(log.content)).trajectory.channels)
+
+    assert "throttle" in flown_with(0, 0, 60, 62, 62, 62, 62, 62)
+    assert "throttle" not in flown_with(*[None] * 8)
+    assert "throttle" not in flown_with(*[0xFFFF] * 8)
+    assert "throttle" not in flown_with(0, 0, 60, *[None] * 6)

@@ -24,6 +24,7 @@ CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
         "set_point_m": "m",
         "reference_m": "m",
         "thrust": "1",
+        "throttle": "1",
         "feed_forward": "1",
         "feedback": "1",
         "battery_v": "V",
@@ -42,9 +43,14 @@ CHANNEL_UNITS: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Known channels and their units.
 
-Thrust and its two parts are shares of full command (the autopilot's 9600 counts). Those of an aircraft in flight (angle
-of attack, altitude and speed change, pitch, thrust change, elevator) are deviations from trimmed flight.
+Thrust and its two parts are shares of full command (the autopilot's 9600 counts), recorded with every sample. Throttle
+is that share as a vehicle reports it, rarely and in whole percent: for display only, not to fit a model to. Those of an
+aircraft in flight (angle of attack, altitude and speed change, pitch, thrust change, elevator) are deviations from
+trimmed flight.
 """
+
+THROTTLE_HOLDS_S: Final = 4.0
+"""Longest time for which a reported throttle holds: three periods of Paparazzi, which reports it every 1.3 s."""
 
 
 @dataclass(frozen=True, slots=True)

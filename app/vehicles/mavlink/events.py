@@ -48,6 +48,13 @@ class Battery:
 
 
 @dataclass(frozen=True, slots=True)
+class Throttle:
+    """Throttle as the vehicle reports it: a `share` of full, 0 … 1."""
+
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
 class StatusText:
     """A status text, or of a longer one (with a `number`) the chunk at this `place`."""
 
@@ -133,6 +140,7 @@ Measurement = (
     Position
     | Heartbeat
     | Battery
+    | Throttle
     | StatusText
     | Parameter
     | CommandReply
@@ -284,12 +292,13 @@ class RestoreGains:
 
 @dataclass(frozen=True, slots=True)
 class RecordSample:
-    """A sample of the record, with its set point and the altitude of the second source."""
+    """A sample of the record, with its set point, the altitude of the second source, and the throttle if reported."""
 
     position: Position
     set_point_m: float
     battery_v: float | None
     second_m: float | None = None
+    throttle: float | None = None
 
 
 Command = PerformAction | SendGain | RequestGain | RestoreGains | RecordSample

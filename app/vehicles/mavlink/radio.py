@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from app.core.clock import Clock
+from app.core.records.trajectory import THROTTLE_HOLDS_S
 from app.vehicles.base import Condition
 from app.vehicles.mavlink.arming_checks import ArmingChecks
 from app.vehicles.mavlink.boot_clock import RestartCounter
@@ -23,6 +24,7 @@ from app.vehicles.mavlink.events import (
     Parameter,
     Position,
     StatusText,
+    Throttle,
     VehicleEvent,
     Version,
 )
@@ -54,6 +56,8 @@ class VehicleMemory:
     block: int | None = None
     block_s: float = float("-inf")
     battery_v: float | None = None
+    throttle: float | None = None
+    throttle_s: float = float("-inf")
     may_arm: bool | None = None
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
@@ -66,6 +70,10 @@ class VehicleMemory:
     def restarts(self) -> int:
         """Number of times that the vehicle has restarted since it was connected."""
         return self.restart_counter.restarts
+
+    def throttle_at(self, now_s: float) -> float | None:
+        """Return the throttle last reported, as a share of full; None without a recent report."""
+        return self.throttle if now_s - self.throttle_s <= THROTTLE_HOLDS_S else None
 
     def forget_vehicle(self) -> None:
         """Discard its identity and the results of its arming checks."""
@@ -85,6 +93,8 @@ class VehicleMemory:
             case Battery(voltage_v=volts, may_arm=may_arm):
                 self.battery_v = volts if volts is not None else self.battery_v
                 self.may_arm = may_arm
+            case Throttle(share=share):
+                self.throttle, self.throttle_s = share, now_s
             case VehicleEvent():
                 self.arming_checks.take(measurement)
             case Position():

@@ -22,7 +22,7 @@ Scored = Literal["vehicle", "mocap"]
 
 MAX_DIFFERENCE_M: Final = 0.3
 """Difference between the sources above which a disagreement is reported."""
-_STEPPED: Final = ("set_point_m",)
+_STEPPED: Final = ("set_point_m", "throttle")
 """Channels that jump: between two samples the first one is held."""
 
 
@@ -135,6 +135,8 @@ def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[st
     }
     if sample.battery_v is not None:
         channels["battery_v"] = sample.battery_v
+    if sample.throttle is not None:
+        channels["throttle"] = sample.throttle
     if sample.second_m is not None:
         second_m = sample.second_m - datum_m
         scored_m, other_m = (own_m, second_m) if scored == "vehicle" else (second_m, own_m)

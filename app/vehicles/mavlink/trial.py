@@ -1,7 +1,7 @@
 """Execution of a trial: passes received packets and requests to the trial machine, and carries out its commands."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.vehicles.base import Sample, ShouldStop, StopRequest, VehicleError
@@ -194,7 +194,8 @@ class TrialRunner:
                 case RestoreGains():
                     self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
                 case RecordSample():
-                    self._record_sample(command)
+                    throttle = self._radio.seen.throttle_at(self._radio.clock.now_s())
+                    self._record_sample(replace(command, throttle=throttle))
 
     def _perform(self, action: Action) -> None:
         self._sequence = CommandSequence(action, self._radio.profile.steps(action, self._radio.target), self._radio)

@@ -1,5 +1,14 @@
 import { expect, test } from "vitest";
-import { begun, extended, type LiveFlight, readingOf, telemetryFrom, underWay, withFlight } from "./telemetry";
+import {
+  begun,
+  extended,
+  isSaturated,
+  type LiveFlight,
+  readingOf,
+  telemetryFrom,
+  underWay,
+  withFlight,
+} from "./telemetry";
 
 const line = JSON.stringify({
   type: "telemetry",
@@ -20,14 +29,14 @@ test("telemetry grows the curve and updates the readings", () => {
   const flight = extended(begun(1, 5), news);
   expect(flight.timeS).toEqual([0.02, 0.04]);
   expect(flight.measured).toEqual([0.1, 0.2]);
-  expect([flight.thrust, flight.batteryV, flight.errorSoFar]).toEqual([0.9, 11.8, 2.9]);
+  expect([flight.throttle, flight.batteryV, flight.errorSoFar]).toEqual([0.9, 11.8, 2.9]);
 });
 
 test("another experiment sends other columns, the scored one second", () => {
   const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1, age_s: 0 };
   const columns = ["time_s", "pitch_error_rad", "elevator_rad"];
   const flight = extended(begun(1, 5), { ...news, columns, samples: [[1, -0.02, 0.1]] });
-  expect([flight.channel, flight.measured, flight.thrust, flight.batteryV]).toEqual([
+  expect([flight.channel, flight.measured, flight.throttle, flight.batteryV]).toEqual([
     "pitch_error_rad",
     [-0.02],
     null,
@@ -59,4 +68,23 @@ test("what waits on the ground, has landed or ended is not under way: Space is a
 test("a line that is no telemetry is left alone", () => {
   expect(telemetryFrom('{"type":"telemetry"}')).toBeNull();
   expect(telemetryFrom("null")).toBeNull();
+});
+
+test("a reported throttle is shown until its reports end", () => {
+  const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1, age_s: 0 };
+  const reported = { ...news, columns: ["time_s", "altitude_m", "throttle"], samples: [[1, 0.5, 0.62]] };
+  const flight = extended(begun(1, 5), reported);
+  expect(flight.throttle).toBe(0.62);
+  expect(extended(flight, { ...news, columns: ["time_s", "altitude_m"], samples: [] }).throttle).toBe(0.62);
+  expect(extended(flight, { ...news, columns: ["time_s", "altitude_m"], samples: [[2, 0.6]] }).throttle).toBeNull();
+});
+
+test.each([
+  [1, 0, true],
+  [0.62, 2, false],
+  [0, 2, true],
+  [0, 0.05, false],
+  [null, 2, false],
+])("throttle %s at %s m is saturated: %s", (throttle, altitude, expected) => {
+  expect(isSaturated({ ...begun(1, 5), throttle, measured: [altitude] })).toBe(expected);
 });

@@ -9,7 +9,8 @@ export interface LiveFlight {
   /** The scored channel: its name, and its value at each of `timeS`. */
   channel: string;
   measured: number[];
-  thrust: number | null;
+  /** Throttle now, as a share of full; null if the vehicle does not report it. */
+  throttle: number | null;
   batteryV: number | null;
   errorSoFar: number | null;
   phase: string;
@@ -36,7 +37,7 @@ export function begun(campaignId: number, trialId: number): LiveFlight {
     timeS: [],
     channel: "altitude_m",
     measured: [],
-    thrust: null,
+    throttle: null,
     batteryV: null,
     errorSoFar: null,
     phase: "flying",
@@ -60,10 +61,20 @@ export function extended(flight: LiveFlight, news: Telemetry): LiveFlight {
     timeS,
     channel: news.columns[1] ?? flight.channel,
     measured,
-    thrust: latest("thrust") ?? flight.thrust,
+    throttle: last === undefined ? flight.throttle : (latest("thrust") ?? latest("throttle") ?? null),
     batteryV: latest("battery_v") ?? flight.batteryV,
     errorSoFar: news.error_so_far ?? flight.errorSoFar,
   };
+}
+
+const FULL_THROTTLE = 0.995;
+const NO_THROTTLE = 0.005;
+const AIRBORNE_M = 0.1;
+
+/** Whether the throttle is at its maximum, or at zero in the air. */
+export function isSaturated({ throttle, measured }: LiveFlight): boolean {
+  if (throttle === null) return false;
+  return throttle >= FULL_THROTTLE || (throttle <= NO_THROTTLE && (measured.at(-1) ?? 0) > AIRBORNE_M);
 }
 
 /** Display of channels: title, unit and decimal places. */

@@ -153,9 +153,9 @@ export const EXPLANATIONS = explained({
     question: "What is the link age?",
     answer: ["Time since the last packet from the vehicle. Above 2 s the values are stale and turn grey."],
   },
-  thrust: {
+  throttle: {
     question: "What does saturated mean?",
-    answer: ["The control loop demands maximum or zero thrust. While it is saturated, the gains have no effect."],
+    answer: ["The control loop demands maximum or zero throttle. While it is saturated, the gains have no effect."],
   },
 });
 

@@ -24,6 +24,7 @@ from app.vehicles.mavlink.events import (
     Parameter,
     Position,
     Setting,
+    Throttle,
     Version,
 )
 from app.vehicles.mavlink.parameters import settings
@@ -146,9 +147,10 @@ def test_positions_are_turned_upside_down() -> None:
 
 
 def test_messages_that_mix_their_units_measure_nothing() -> None:
-    for kind in ("GLOBAL_POSITION_INT", "VFR_HUD", "BATTERY_STATUS", "ATTITUDE"):
+    for kind in ("GLOBAL_POSITION_INT", "BATTERY_STATUS", "ATTITUDE"):
         assert not measured(FLOWN[0], kind)
         assert messages(FLOWN[0], kind, from_vehicle=True)
+    assert {type(each) for each in measured(FLOWN[0], "VFR_HUD")} == {Throttle}
 
 
 def test_land_comes_with_the_acknowledgement_that_frees_the_blocks() -> None:
@@ -324,6 +326,7 @@ def test_every_message_that_a_trial_listens_to_is_asked_for(profile: Profile) ->
         (1, True),
         (245, False),
         (162, False),
+        (74, False),
     ]
     assert asked[0][0]["param2"] == 8000
 

@@ -52,7 +52,7 @@ def test_a_whole_trial_scores_as_the_same_body_does_without_a_link() -> None:
     assert 33.0 <= flight.time_s[-1] < 33.1
     assert 0.0 in flight.time_s
     assert np.diff(flight.time_s).max() < 0.03
-    assert set(flight.channels) == {"altitude_m", "climb_rate_m_s", "set_point_m", "battery_v"}
+    assert set(flight.channels) == {"altitude_m", "climb_rate_m_s", "set_point_m", "battery_v", "throttle"}
     assert len(watcher.samples) == pytest.approx(33 * 50, rel=0.05)
 
 

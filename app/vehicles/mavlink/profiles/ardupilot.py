@@ -18,9 +18,11 @@ _SET_MESSAGE_INTERVAL: Final = 511
 _REQUEST_MESSAGE: Final = 512
 _SYS_STATUS: Final = 1
 _LOCAL_POSITION_NED: Final = 32
+_VFR_HUD: Final = 74
 _FENCE_STATUS: Final = 162
 _EXTENDED_SYS_STATE: Final = 245
 _STATUS_HZ: Final = 4.0
+_THROTTLE_HZ: Final = 10.0
 _AUTOPILOT_VERSION: Final = 148
 _CUSTOM_MODE: Final = 1.0
 
@@ -137,12 +139,13 @@ class ArduPilot:
 
 
 def request_telemetry(target: Target, telemetry_hz: float) -> tuple[Step, ...]:
-    """Request all messages that a trial needs, positions at this rate. Not every autopilot has the last two."""
+    """Request all messages that a trial uses, positions at this rate. Not every autopilot sends the last three."""
     return (
         _request(target, _LOCAL_POSITION_NED, telemetry_hz),
         _request(target, _SYS_STATUS, _STATUS_HZ),
         _request(target, _EXTENDED_SYS_STATE, _STATUS_HZ, needed=False),
         _request(target, _FENCE_STATUS, _STATUS_HZ, needed=False),
+        _request(target, _VFR_HUD, _THROTTLE_HZ, needed=False),
     )
 
 

@@ -31,6 +31,7 @@ from app.vehicles.mavlink.events import (
     Position,
     Setting,
     StatusText,
+    Throttle,
     Version,
 )
 
@@ -50,6 +51,8 @@ _LANDED_STATES: Final = MappingProxyType({1: True, 2: False, 4: False})
 _PREARM_CHECK: Final = 1 << 28
 """MAV_SYS_STATUS_PREARM_CHECK, a bit of the sensors in SYS_STATUS."""
 _TEXT_LENGTH: Final = 50
+_THROTTLE_UNUSED: Final = 1 << 6
+"""ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE."""
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
 _RESULTS: Final = ("accepted", "temporarily rejected", "denied", "unsupported", "failed", "in progress", "cancelled")
@@ -382,6 +385,21 @@ def battery(message: Message) -> Battery:
     )
 
 
+def throttle(message: Message) -> Throttle | None:
+    """Read VFR_HUD, whose throttle is in percent; None if it is out of range."""
+    return _throttle(number(message, "throttle") / 100.0)
+
+
+def commanded_throttle(message: Message) -> Throttle | None:
+    """Read ATTITUDE_TARGET, whose thrust is a share of full; None if it is out of range or marked as unused."""
+    is_unused = int(number(message, "type_mask")) & _THROTTLE_UNUSED
+    return None if is_unused else _throttle(number(message, "thrust"))
+
+
+def _throttle(share: float) -> Throttle | None:
+    return Throttle(share) if 0.0 <= share <= 1.0 else None
+
+
 def parameter(message: Message) -> Parameter:
     count, place = int(number(message, "param_count")), int(number(message, "param_index"))
     in_list = place if 0 <= place < count else None
@@ -451,6 +469,7 @@ READERS: Final[Readers] = MappingProxyType(
     {
         "LOCAL_POSITION_NED": position,
         "SYS_STATUS": battery,
+        "VFR_HUD": throttle,
         "PARAM_VALUE": parameter,
         "COMMAND_ACK": answer,
         "STATUSTEXT": parse_status_text,

@@ -142,4 +142,5 @@ _READERS: Final[base.Readers] = {
     "HEARTBEAT": _heartbeat,
     "PARAM_VALUE": _parameter,
     "EVENT": _event,
+    "ATTITUDE_TARGET": base.commanded_throttle,
 }

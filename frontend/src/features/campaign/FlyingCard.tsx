@@ -2,8 +2,8 @@ import { Button, Stack } from "@mantine/core";
 import { Link } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
 import { useLiveFlight } from "../../live/store";
-import { type LiveFlight, readingOf } from "../../live/telemetry";
-import { NOTHING, withUnit } from "../../ui/format";
+import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
+import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
@@ -57,10 +57,10 @@ export function FlyingCard({ campaign, trial, step }: Props) {
             <dt>Time</dt>
             <dd>{withUnit(live?.timeS.at(-1), "s", 1)}</dd>
           </div>
-          {live?.thrust !== null && (
+          {live !== null && live.throttle !== null && (
             <div className={classes["reading"]}>
-              <dt>Thrust</dt>
-              <dd>{typeof live?.thrust === "number" ? percent(live.thrust) : NOTHING}</dd>
+              <dt>{isSaturated(live) ? "Throttle, saturated" : "Throttle"}</dt>
+              <dd>{percent(live.throttle)}</dd>
             </div>
           )}
         </dl>

@@ -1,14 +1,14 @@
 import { IconCircleCheckFilled, IconCircleDashed } from "@tabler/icons-react";
 import type { Trial } from "../../api/types";
 import { useIsCurrent } from "../../live/store";
-import { type LiveFlight, readingOf } from "../../live/telemetry";
+import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
 import { type Aged, ageText, linkText } from "../../live/vehicleStatus";
 import type { Topic } from "../../ui/explanations";
 import { gainText, withUnit } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import { percent } from "../../ui/uncertainty";
 import classes from "./Fly.module.css";
-import { type GainTick, gainTicks, isSaturated, secondsLeft } from "./flyScreen";
+import { type GainTick, gainTicks, secondsLeft } from "./flyScreen";
 
 interface Props {
   trial: Trial;
@@ -79,11 +79,12 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
         />
       </dl>
       <dl className={classes["row"]}>
-        {live !== null && live.thrust !== null && (
+        {live !== null && live.throttle !== null && (
           <Reading
-            title={isSaturated(live.thrust) ? "Thrust, saturated" : "Thrust"}
-            topic="thrust"
-            value={percent(live.thrust)}
+            title={isSaturated(live) ? "Throttle, saturated" : "Throttle"}
+            topic="throttle"
+            value={percent(live.throttle)}
+            bad={isSaturated(live)}
             stale={stale}
           />
         )}

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type { Trial } from "../../api/types";
 import type { Loss } from "../../live/readiness";
 import { aged, statusFrom } from "../../live/vehicleStatus";
-import { flyStateLabel, flyStep, gainTicks, isSaturated, secondsLeft } from "./flyScreen";
+import { flyStateLabel, flyStep, gainTicks, secondsLeft } from "./flyScreen";
 
 type Flight = NonNullable<Trial["flight"]>;
 
@@ -88,8 +88,4 @@ test("a gain is ticked only when the vehicle holds exactly what it was asked to"
 test("the countdown ends with the record", () => {
   expect([secondsLeft(12.5, 30), secondsLeft(31, 30), secondsLeft(undefined, 30)]).toEqual([17.5, 0, null]);
   expect(secondsLeft(1, null)).toBeNull();
-});
-
-test("all the thrust there is, is saturated", () => {
-  expect([isSaturated(0.62), isSaturated(1)]).toEqual([false, true]);
 });

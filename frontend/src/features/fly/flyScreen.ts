@@ -108,10 +108,3 @@ export function secondsLeft(lastS: number | undefined, endS: number | null): num
   if (lastS === undefined || endS === null) return null;
   return Math.max(0, endS - lastS);
 }
-
-const FULL_THRUST = 0.995;
-
-/** Whether the thrust is at its maximum. */
-export function isSaturated(thrust: number): boolean {
-  return thrust >= FULL_THRUST;
-}
