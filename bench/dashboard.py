@@ -164,7 +164,7 @@ def use(page: Page) -> None:
     boxes[0].scroll_into_view_if_needed()
     _zoom(page)
     for span in ("First 8 s", "Whole flight"):
-        page.get_by_role("radiogroup", name="Time shown").get_by_text(span, exact=True).click()
+        page.get_by_role("radiogroup", name="Time range").get_by_text(span, exact=True).click()
         page.wait_for_timeout(600)
     for title in CHARTS:
         for act in ("show the numbers as a table", "show the chart"):

@@ -119,7 +119,7 @@ class Dashboard:
         self.page.get_by_role("tab", name=title).click()
 
     def choose_speed(self, label: Literal["1×", "10×", "Max"]) -> None:
-        self.page.get_by_role("radiogroup", name="Simulated at").get_by_text(label, exact=True).click()
+        self.page.get_by_role("radiogroup", name="Simulation speed").get_by_text(label, exact=True).click()
 
     def fly(self) -> None:
         """Fly what is chosen, once the page shows what follows the last flight."""
@@ -132,7 +132,7 @@ class Dashboard:
         return self.page.get_by_role("button", name=re.compile(r"^Fly flight \d+$"))
 
     def choose(self, choice: str) -> None:
-        """Choose what to fly next: Step, Smaller step, Repeat, Baseline or Own gains."""
+        """Choose what to fly next: Step, Smaller step, Repeat, Baseline or Custom gains."""
         self.page.get_by_role("radiogroup", name="Gains to fly").get_by_text(re.compile(f"^{choice}")).click()
 
     def choose_proposed(self, campaign_id: int) -> None:

@@ -73,7 +73,7 @@ def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard, 
     assert (predicted["meta"]["trial"], predicted["dash"]) == (2, "dash")
     assert max(predicted["y"]) > 2.5
     proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
-    card = dashboard.panel("Next flight: 2")
+    card = dashboard.panel("Next: flight 2")
     interval = proposal["interval"]
     expect(card).to_contain_text(f"{proposal['predicted_error']:.3f} m")
     expect(card).to_contain_text(f"{interval['lower']:.3f} … {interval['upper']:.3f} m (90 %)")
@@ -82,11 +82,11 @@ def test_the_prediction_is_drawn_dashed_before_the_flight(dashboard: Dashboard, 
         expect(row).to_contain_text(str(round(change["next"])))
 
 
-def test_a_flight_of_ones_own_gains_goes_through_the_same_checks(dashboard: Dashboard, states: States) -> None:
+def test_a_flight_of_custom_gains_goes_through_the_same_checks(dashboard: Dashboard, states: States) -> None:
     campaign_id = states.campaign("jsbsim")
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("Max")
-    dashboard.choose("Own gains")
+    dashboard.choose("Custom gains")
     kp = dashboard.page.get_by_role("textbox", name="kp")
     kp.fill("-5")
     expect(dashboard.page.get_by_text(re.compile("must lie in 0 … 4000"))).to_be_visible()
@@ -162,7 +162,7 @@ def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard, states: 
     time_s, altitude_m = dashboard.record(trial["id"])
     np.testing.assert_allclose(drawn["y"], np.interp(drawn["x"], time_s, altitude_m), atol=2e-3)
     with dashboard.page.expect_download() as download:
-        dashboard.page.get_by_role("link", name="Record as CSV").click()
+        dashboard.page.get_by_role("link", name="Download record (CSV)").click()
     lines = download.value.path().read_text().splitlines()
     assert lines[0].startswith("time_s,")
     assert len(lines) == 1 + trial["record"]["samples"]
@@ -230,4 +230,4 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
     made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
     assert made["definition"]["bounds"] == {"kp": [0, 2000]}
-    expect(page.get_by_text("Scored window: 20 s from the take-off command")).to_be_visible(timeout=30_000)
+    expect(page.get_by_text("Scored window: 20 s from the takeoff command")).to_be_visible(timeout=30_000)

@@ -168,7 +168,7 @@ def test_the_chart_opens_at_the_first_8_s_and_shows_the_whole_flight_on_request(
     assert deviation is not None
     time_s, altitude_m = page_of_many.record(best["trial_id"])
     np.testing.assert_allclose(deviation["y"], np.interp(deviation["x"], time_s, altitude_m - 3.0), atol=5e-3)
-    spans = page_of_many.page.get_by_role("radiogroup", name="Time shown")
+    spans = page_of_many.page.get_by_role("radiogroup", name="Time range")
     spans.get_by_text("Whole flight").click()
     page_of_many.until(lambda: seconds() == WHOLE_FLIGHT_S)
     spans.get_by_text("First 8 s").click()

@@ -24,13 +24,13 @@ def gains_shown(dashboard: Dashboard) -> dict[str, float]:
 
 
 def card_of(dashboard: Dashboard, number: int) -> Locator:
-    return dashboard.panel(f"Next flight: {number}")
+    return dashboard.panel(f"Next: flight {number}")
 
 
 def fly_what_is_shown(dashboard: Dashboard, campaign_id: int, number: int, choice: str) -> None:
     expect(card_of(dashboard, number)).to_be_visible()
     dashboard.choose(choice)
-    if choice == "Own gains":
+    if choice == "Custom gains":
         for name, value in OWN.items():
             dashboard.page.get_by_role("textbox", name=name).fill(str(value))
         dashboard.page.get_by_role("slider", name="Slider for kd").press("ArrowRight")
@@ -60,7 +60,7 @@ def test_the_green_button_flies_the_gains_shown_whatever_is_chosen(dashboard: Da
     dashboard.choose_speed("Max")
     expect(dashboard.page.get_by_role("radio", name="Repeat (recommended)")).to_be_checked()
     assert gains_shown(dashboard) == proposal["advice"]["gains"]
-    for number, choice in enumerate(("Repeat", "Smaller step", "Step", "Baseline", "Own gains"), start=3):
+    for number, choice in enumerate(("Repeat", "Smaller step", "Step", "Baseline", "Custom gains"), start=3):
         fly_what_is_shown(dashboard, campaign_id, number, choice)
     kinds = [trial["kind"] for trial in dashboard.trials(campaign_id)]
     assert kinds[2:] == ["repeat", "shorter step", "step", "baseline", "manual"]
@@ -69,7 +69,7 @@ def test_the_green_button_flies_the_gains_shown_whatever_is_chosen(dashboard: Da
 def test_an_answer_about_earlier_gains_never_stands_beside_newer_ones(dashboard: Dashboard, states: States) -> None:
     campaign_id = states.campaign(strategy="calibrated", stop=PATIENT, flights=1)
     dashboard.open_campaign(campaign_id)
-    dashboard.choose("Own gains")
+    dashboard.choose("Custom gains")
     expect(dashboard.fly_button).to_be_enabled()
     held: list[Route] = []
 

@@ -62,7 +62,7 @@ def test_a_flight_that_came_to_nothing_is_flown_again_with_its_gains(
     best = by_error(dashboard, campaign_id)[0]
     states.classify(best["id"], "invalid", "Wind gust")
     verdict = open_flight(dashboard, best)
-    verdict.get_by_role("button", name="Retry these gains").click()
+    verdict.get_by_role("button", name="Fly these gains again").click()
     dashboard.until(lambda: len(dashboard.trials(campaign_id)) == 4)
     again = dashboard.trials(campaign_id)[-1]
     assert again["gains"] == best["gains"]
@@ -74,21 +74,21 @@ def test_one_tap_after_an_abort_says_whether_it_counts_against_the_gains(
 ) -> None:
     aborted = dashboard.get(f"/trials/{states.abort(campaign_id)}")
     verdict = open_flight(dashboard, aborted)
-    expect(verdict).to_contain_text("It counts against its gains only if the vehicle behaved badly.")
-    badly = verdict.get_by_role("button", name="The vehicle behaved badly")
+    expect(verdict).to_contain_text("It counts against its gains only if the cause was the vehicle's behaviour.")
+    badly = verdict.get_by_role("button", name="Vehicle behaviour")
     box = badly.bounding_box()
     assert box is not None
     assert min(box["width"], box["height"]) >= 24
     badly.click()
-    expect(verdict).to_contain_text("The vehicle behaved badly: the flight counts against its gains.")
+    expect(verdict).to_contain_text("Aborted because of the vehicle's behaviour: the flight counts against its gains.")
     assert dashboard.get(f"/trials/{aborted['id']}")["abort_cause"] == "behaved badly"
-    verdict.get_by_role("button", name="Something else").click()
+    verdict.get_by_role("button", name="Other cause").click()
     expect(verdict).to_contain_text("the flight does not count against its gains.")
     expect(badly).to_be_visible()
 
     dashboard.open(f"/fly/{aborted['id']}")
     why = dashboard.page.get_by_role("region", name="Abort cause")
-    why.get_by_role("button", name="The vehicle behaved badly").click()
+    why.get_by_role("button", name="Vehicle behaviour").click()
     expect(why).to_contain_text("the flight counts against its gains.")
 
 

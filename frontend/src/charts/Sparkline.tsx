@@ -1,4 +1,5 @@
 import type { SparkCurve } from "../api/types";
+import { count } from "../ui/format";
 import classes from "./Sparkline.module.css";
 
 const BOX = { width: 300, height: 84 };
@@ -23,7 +24,7 @@ export function Sparkline({ curves, setPoint }: { curves: readonly SparkCurve[];
       className={classes["spark"]}
       preserveAspectRatio="none"
       role="img"
-      aria-label={curves.length === 0 ? "No flight yet" : `Curves of ${curves.length} flights`}
+      aria-label={curves.length === 0 ? "No flights yet" : `Curves of ${count(curves.length, "flight")}`}
     >
       <line x1={0} x2={BOX.width} y1={target} y2={target} className={classes["target"]} />
       {ordered.map((curve) => (

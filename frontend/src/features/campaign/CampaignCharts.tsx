@@ -78,7 +78,7 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
       curveOf={curveOf}
       tools={
         <SegmentedControl
-          aria-label="Time shown"
+          aria-label="Time range"
           size="sm"
           value={picked}
           onChange={pick}

@@ -23,7 +23,7 @@ const CONFIRMATION = ["repeat", "baseline", "repeat"] as const;
 const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meaning: string }> = {
   candidate: { word: "Candidate", meaning: "not yet confirmed by repeat flights." },
   confirmed: { word: "Confirmed", meaning: "better than the first gains in repeat flights." },
-  "not confirmed": { word: "Not confirmed", meaning: "repeat flights show no improvement over the first gains." },
+  "not confirmed": { word: "Not confirmed", meaning: "no improvement over the first gains in repeat flights." },
 };
 
 /** The gains that were repeated, if they are others than those of the best flight. */
@@ -102,10 +102,7 @@ export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props)
           </Button>
         )}
         <PromoteGains campaign={campaign} />
-        <Note fz="body">
-          A clone is a new campaign with the same settings. With “Start from flight” on, it starts from the best gains
-          found here.
-        </Note>
+        <Note fz="body">A clone is a new campaign with the same settings.</Note>
         <CloneForm {...campaign} experiment={experiment} />
         {campaign.actions.includes("archive") && (
           <Button

@@ -55,7 +55,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   return (
     <>
       <Anchor component={Link} to={`/campaigns/${campaignId}`} display="inline-block" py={4} fz="small">
-        {campaign?.name ?? "The campaign"}
+        {campaign?.name ?? "Campaign"}
       </Anchor>
       <Title order={1} mb={12}>
         Flight {number}

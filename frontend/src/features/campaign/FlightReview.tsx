@@ -88,7 +88,7 @@ export function FlightReview({ trial, trials }: Props) {
     <>
       {suggestion !== null && (
         <Text w="100%" fz="body" lh={1.4}>
-          Suggested: <strong>{suggestion.outcome}</strong>, {suggestion.why}.
+          Suggested: <strong>{suggestion.outcome}</strong> ({suggestion.why}).
           {suggestion.outcome === "invalid" && ` ${consequenceOf(trial, trials, "invalid")}`}
         </Text>
       )}
@@ -116,7 +116,7 @@ function standsOut(outcome: Suggestion["outcome"], trial: Trial, suggestion: Sug
   return outcome !== "invalid" && trial.state !== "invalid";
 }
 
-const LABELS = { "behaved badly": "The vehicle behaved badly", "something else": "Something else" } as const;
+const LABELS = { "behaved badly": "Vehicle behaviour", "something else": "Other cause" } as const;
 
 /** Whether an aborted flight counts against its gains, with buttons for the cause. */
 export function AbortCause({ trial }: { trial: Trial }) {

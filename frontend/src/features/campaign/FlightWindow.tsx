@@ -8,7 +8,7 @@ export function FlightWindow({ definition }: { definition: Definition }) {
   const seconds = windowOf(definition, useCatalogue().data);
   return seconds === null ? null : (
     <Note fz="small" className="numbers">
-      Scored window: {seconds} s from the take-off command
+      Scored window: {seconds} s from the takeoff command
     </Note>
   );
 }

@@ -18,13 +18,13 @@ interface Props {
   step: { trialId: number; trialNumber: number };
 }
 
-const STAGED = "Gains set, waiting for take-off";
+const STAGED = "Staged, waiting for takeoff";
 
 function stageWord(trial: Trial | undefined, live: LiveFlight | null): string {
   const waits = trial?.state === "staged" && trial.flight?.mode === "stage" && trial.flight.take_off_at === null;
   if (waits && live?.phase !== "flying") return STAGED;
-  if (live !== null && live.timeS.length > 0) return "Flying";
-  return trial?.state === "planned" ? "Waiting for the worker" : "Setting the gains";
+  if (live !== null && live.timeS.length > 0) return "In flight";
+  return trial?.state === "planned" ? "Waiting for the worker" : "Staging";
 }
 
 /** Live values of the flight in progress. The ABORT button is in the header of every page. */

@@ -47,7 +47,7 @@ export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
           })}
         </ul>
         <Note fz="fine" mt={10}>
-          Checked before every flight, for proposed and own gains.
+          Checked before every flight, for proposed and custom gains.
           <HelpTip topic="gate" />
         </Note>
       </div>
@@ -119,10 +119,8 @@ export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
 
 /** Explains why the offered values can be below those that the refusal names: several limits apply at once. */
 function OfferNote({ several, above, besides }: { several: boolean; above: boolean; besides: readonly string[] }) {
-  const nearest = several
-    ? "These are the closest values to yours that satisfy"
-    : "This is the closest value to yours that satisfies";
-  const limits = above ? "the limit above and these limits:" : "these limits. The flights are simulated again:";
+  const nearest = several ? "The closest values to yours that satisfy" : "The closest value to yours that satisfies";
+  const limits = above ? "the limit above and these:" : "these limits (using them repeats the simulated flights):";
   return (
     <>
       <p className={classes["offerNote"]}>

@@ -27,8 +27,8 @@ export function ImportRecord({ upload, trialId, plan }: Props) {
     <Stack gap={14}>
       <Note fz="body">
         Set these gains on your vehicle, fly, and upload the log: MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi
-        .data (with its .log), or a CSV file with the columns <code>time_s</code> (seconds since the command) and{" "}
-        <code>altitude_m</code>.
+        .data (with its .log), or a CSV file with the columns <code>time_s</code> (seconds since the takeoff command)
+        and <code>altitude_m</code>.
       </Note>
       <FileButton
         multiple

@@ -64,10 +64,10 @@ function Step({ campaign, next, trials, onChoose, onPreview, isSecondary = false
       );
     case "judge":
       return (
-        <Panel title={`Review flight ${step.trial.number}`}>
+        <Panel title={`Flight ${step.trial.number} needs review`}>
           <Text lh={1.45} mb={14}>
             {step.trial.state === "lost"
-              ? "The end of this flight is unknown. The next gains are proposed after you review it."
+              ? "How this flight ended is unknown. The next gains are proposed after you review it."
               : "The next gains are proposed after you review this flight."}
           </Text>
           <Button fullWidth onClick={() => onChoose(step.trial.number)}>

@@ -59,7 +59,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
                 disabled={!trial.actions.includes("fly")}
                 onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
               >
-                Fly now
+                Fly flight {trial.number}
               </Button>
             )}
             {registered ? (
@@ -70,7 +70,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
                 variant={needs_staging ? "filled" : "default"}
                 leftSection={<IconPlaneDeparture size={22} aria-hidden />}
               >
-                Stage
+                Stage flight {trial.number}
               </Button>
             ) : (
               <SpeedSwitch value={speed} onChange={setSpeed} />

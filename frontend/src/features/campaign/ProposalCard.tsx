@@ -42,7 +42,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isEvaluated = chosen.gains !== null && chosen.error === null;
   const isRefused = chosen.isChecked && chosen.gate?.passed === false;
   return (
-    <Panel title={`Next flight: ${number}`}>
+    <Panel title={`Next: flight ${number}`}>
       <Stack gap={14}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />

@@ -18,8 +18,8 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
       <Stack gap={14}>
         <Note fz="body">
           {campaign.vehicle.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
-          simulation with the same strategy, bounds, stop rule and gains: three valid flights, or fewer if the stop rule
-          ends it, and none aborted or invalid.
+          simulation with the same strategy, bounds, stop rule and gains: three valid flights (fewer if the stop rule
+          ends it), none aborted or invalid.
         </Note>
         <p role="status">
           <strong>{STANDING[state]}</strong> {reason}.

@@ -15,7 +15,7 @@ export function useSpeed(): [string, (value: string) => void] {
 export function SpeedSwitch({ value, onChange }: { value: string; onChange: (value: string) => void }) {
   return (
     <Group justify="space-between" wrap="nowrap" gap={12} c="dimmed" fz="small">
-      <span id="speed-label">Simulated at</span>
+      <span id="speed-label">Simulation speed</span>
       <SegmentedControl
         aria-labelledby="speed-label"
         size="md"

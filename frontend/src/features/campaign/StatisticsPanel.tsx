@@ -92,8 +92,8 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
         {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>
-            {count(more, "more flight")} needed: {further?.best ?? 0} of the best, {further?.baseline ?? 0} of the first
-            gains
+            {count(more, "more flight")} needed: {further?.best ?? 0} with the best gains, {further?.baseline ?? 0} with
+            the first
           </strong>
         )}
       </p>
@@ -179,7 +179,7 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
             <th scope="row">{gainsInBrackets(group.gains)}</th>
             <td>{group.trial_numbers.join(", ")}</td>
             <td>{plusMinus(group.mean, group.standard_error, unit)}</td>
-            <td>{[group.is_best ? "best" : "", group.is_baseline ? "first" : ""].filter(Boolean).join(", ")}</td>
+            <td>{[group.is_best ? "best" : "", group.is_baseline ? "baseline" : ""].filter(Boolean).join(", ")}</td>
           </tr>
         ))}
       </tbody>

@@ -21,7 +21,7 @@ export function StopCampaign({ campaignId }: { campaignId: number }) {
       <Note fz="body">Stop this campaign? Its flights are kept, and it can be reopened.</Note>
       <div className={classes["row"]}>
         <Button variant="default" onClick={() => setAsking(false)}>
-          Keep flying
+          Continue campaign
         </Button>
         <Button color="red" loading={finish.isPending} onClick={() => finish.mutate()}>
           Stop campaign

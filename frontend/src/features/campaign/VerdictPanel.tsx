@@ -101,7 +101,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       <TrialComparisons trial={trial} unit={unit} />
       {trial.overrule_reason && (
         <Aside tone="warn" mt={6} fz="body">
-          <strong>The gate refused these gains and was overruled:</strong> {trial.overrule_reason}
+          <strong>Refused by the gate, overruled:</strong> {trial.overrule_reason}
         </Aside>
       )}
       <dl className={`${classes["figures"]} numbers`}>
@@ -154,7 +154,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
             variant="default"
             leftSection={<IconDownload size={18} aria-hidden />}
           >
-            Record as CSV
+            Download record (CSV)
           </Button>
         )}
         <Anchor
@@ -197,9 +197,9 @@ function TrialComparisons({ trial, unit }: { trial: Trial; unit: string }) {
           <li key={against} data-verdict={asked ? undefined : verdict} className="numbers">
             <Icon size={20} aria-hidden />
             <span>
-              {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>},{" "}
-              {confidence === null ? "" : `${confidenceText(confidence)} confidence, `}against{" "}
-              {against === "first" ? "the first" : "the previous best"}, flight {trial_number}:{" "}
+              {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>} vs.
+              flight {trial_number} ({against === "first" ? "first" : "previous best"})
+              {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
               {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
               <small>{standard_error === null ? "(no repeat flights yet)" : "(± standard error)"}</small>
             </span>
@@ -239,7 +239,7 @@ function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
       </ul>
       {trial.repaired_error !== null && trial.repaired_error !== undefined && (
         <p className="numbers">
-          Error as recorded {plusMinus(trial.error, null, unit)}, with the glitches bridged{" "}
+          Error as recorded {plusMinus(trial.error, null, unit)}, with the glitches interpolated{" "}
           {plusMinus(trial.repaired_error, null, unit)}.
         </p>
       )}
@@ -262,7 +262,7 @@ function RetryGains({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
         loading={create.isPending}
         onClick={() => create.mutate({ gains: trial.gains, ...order })}
       >
-        Retry these gains
+        Fly these gains again
       </Button>
       <ErrorNotice error={create.error} />
     </>

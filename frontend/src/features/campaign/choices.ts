@@ -1,4 +1,4 @@
-/** What may be flown next: the proposal, its variants, or gains of one's own. */
+/** What may be flown next: the proposal, its variants, or custom gains. */
 
 import type { GainSet } from "../../api/evaluation";
 import type { Problem } from "../../api/problems";
@@ -8,11 +8,11 @@ import { gainText, readNumber } from "../../ui/format";
 export type ChoiceName = FlightChoice["kind"] | "own";
 
 export const CHOICES: Record<ChoiceName, { label: string; hint: string }> = {
-  step: { label: "Step", hint: "The step proposed by the strategy." },
-  "smaller step": { label: "Smaller step", hint: "Halfway between the best gains and the full step." },
+  step: { label: "Step", hint: "The gains that the strategy proposes." },
+  "smaller step": { label: "Smaller step", hint: "Halfway from the best gains to the proposed ones." },
   repeat: { label: "Repeat", hint: "Flies the best gains again to see whether the result was luck." },
   baseline: { label: "Baseline", hint: "Flies the first gains again to check whether the vehicle has changed." },
-  own: { label: "Own gains", hint: "" },
+  own: { label: "Custom gains", hint: "" },
 };
 
 export const RECOMMENDED: Record<Proposal["recommended"], string> = {
@@ -27,7 +27,7 @@ export function preselected({ choices }: Proposal): ChoiceName {
   return (choices.find(({ recommended }) => recommended) ?? choices.find(({ proposed }) => proposed))?.kind ?? "own";
 }
 
-/** What to fly, without how: the proposal, a variant with the gains that are shown, or one's own gains. */
+/** What to fly, without how: the proposal, a variant with the gains that are shown, or custom gains. */
 export function trialOf(proposal: Proposal, choice: FlightChoice | undefined, gains: GainSet): NewTrial {
   if (choice === undefined) return { gains };
   if (choice.proposed) return { proposal_id: proposal.id };

@@ -37,11 +37,11 @@ test("every setting that a proposal depends on is said in words", () => {
     "Scaled gains": "no",
     Start: "[400 20 100]",
     "Bounds of kp": "0 … 2000 counts",
-    "Largest step": "25\u00a0% of each range until a flight is valid, then 100\u00a0%",
+    "Maximum step": "25\u00a0% of each gain's range until the first valid flight, then 100\u00a0%",
     Seed: "3",
     "Definition digest": "0123456789ab",
   });
-  expect(rows["Stop"]).toBe("Two consecutive flights less than 5\u00a0% better than the best, or 7 flights");
+  expect(rows["Stop rule"]).toBe("Two consecutive flights less than 5\u00a0% better than the best, or 7 flights");
 });
 
 test("a warm start and a stop on noise are said in words", () => {
@@ -56,8 +56,8 @@ test("a warm start and a stop on noise are said in words", () => {
   };
   expect(Object.fromEntries(settingsOf({ ...campaign, definition }, catalogue))).toMatchObject({
     Start: "[900 200 200], flight 2 of campaign 4",
-    Stop: "No resolvable improvement at 95\u00a0% confidence, or 12 flights",
-    Battery: "Stops below 10.8 V after a flight",
+    "Stop rule": "No resolvable improvement at 95\u00a0% confidence, or 12 flights",
+    "Minimum battery voltage": "10.8 V after a flight",
   });
 });
 

@@ -6,9 +6,9 @@ import { gainsInBrackets } from "../../ui/gains";
 
 const STARTS = {
   default: "The vehicle's default gains",
-  simplex: "Simplex on the model",
-  given: "Given gains",
-  campaign: "Best of another campaign",
+  simplex: "Best gains on the model (simplex)",
+  given: "Custom gains",
+  campaign: "Best gains of another campaign",
 } as const;
 
 const CLOSE_UNITS = ["°", "×"];
@@ -75,7 +75,7 @@ function experimentOptions(definition: Definition, catalogue?: Catalogue): Recor
   return { ...defaults, ...definition.experiment_options };
 }
 
-/** Scored time after the take-off command, s; null for an experiment without this setting, and until the catalogue is
+/** Scored time after the takeoff command, s; null for an experiment without this setting, and until the catalogue is
  * loaded. */
 export function windowOf(definition: Definition, catalogue?: Catalogue): number | null {
   const seconds = experimentOptions(definition, catalogue)["window_s"];
@@ -96,14 +96,14 @@ export function settingsOf({ definition, vehicle, definition_digest }: Campaign,
     ["Strategy", named(catalogue?.strategies, definition.strategy)],
     ...optionRows(definition.options ?? {}, strategy?.options),
     ["Start", startText(start)],
-    ["Stop", stopText(stop)],
-    ...(stop?.min_battery_v ? ([["Battery", `Stops below ${stop.min_battery_v} V after a flight`]] as Row[]) : []),
+    ["Stop rule", stopText(stop)],
+    ...(stop?.min_battery_v ? ([["Minimum battery voltage", `${stop.min_battery_v} V after a flight`]] as Row[]) : []),
     ...Object.entries(definition.bounds ?? {}).map(
       ([name, [low, high]]): Row => [`Bounds of ${name}`, valueText(`${low} … ${high}`, unitOf(name))],
     ),
     [
-      "Largest step",
-      `${percent(definition.first_step_fraction ?? 0)} of each range until a flight is valid, then ${percent(definition.step_fraction ?? 0)}`,
+      "Maximum step",
+      `${percent(definition.first_step_fraction ?? 0)} of each gain's range until the first valid flight, then ${percent(definition.step_fraction ?? 0)}`,
     ],
     ...(definition.ceiling_m && experiment?.output_unit === "m"
       ? ([["Gate ceiling", `${definition.ceiling_m} m`]] as Row[])

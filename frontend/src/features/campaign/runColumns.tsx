@@ -9,6 +9,7 @@ import { trialStateLabel } from "../../ui/states";
 import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
 import { rangeText } from "../../ui/uncertainty";
+import { CHOICES } from "./choices";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
 import classes from "./FlightsPanel.module.css";
 import type { Sortable } from "./runs";
@@ -39,6 +40,15 @@ function Predicted({ trial, unit }: { trial: Trial; unit: string }) {
     </>
   );
 }
+
+const KINDS: Record<Trial["kind"], string> = {
+  start: "Start",
+  step: CHOICES.step.label,
+  "shorter step": CHOICES["smaller step"].label,
+  repeat: CHOICES.repeat.label,
+  baseline: CHOICES.baseline.label,
+  manual: CHOICES.own.label,
+};
 
 function State({ trial }: { trial: Trial }) {
   return (
@@ -107,8 +117,8 @@ export function runColumns(
       title: "Kind",
       className: classes["text"],
       extra: true,
-      value: ({ kind }) => kind,
-      cell: ({ kind }) => kind,
+      value: ({ kind }) => KINDS[kind],
+      cell: ({ kind }) => KINDS[kind],
     },
     {
       id: "verdict",

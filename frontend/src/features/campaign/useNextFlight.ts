@@ -23,7 +23,7 @@ interface PredictedError {
 
 export interface ChosenFlight {
   name: ChoiceName;
-  /** Undefined for own gains. */
+  /** Undefined for custom gains. */
   choice: FlightChoice | undefined;
   choose: (name: ChoiceName) => void;
   rows: GainRow[];
@@ -36,7 +36,7 @@ export interface ChosenFlight {
   gate: Gate | null;
   isChecked: boolean;
   error: unknown;
-  /** Replaces some of one's own gains. */
+  /** Replaces some of the custom gains. */
   use: (gains: GainSet) => void;
 }
 
@@ -75,7 +75,7 @@ export function useNextFlight(
     name,
     choice,
     choose: (next) => {
-      // One's own gains start from those shown.
+      // Custom gains start from those shown.
       if (next === "own" && choice !== undefined) setTexts(typedGains(choice.gains));
       setName(next);
     },

@@ -68,7 +68,7 @@ test("an error lies inside of, above or below what was predicted", () => {
 test("an overruled flight and one with glitches are marked", () => {
   const gap = { kind: "gap" as const, start_s: 3, end_s: 3.4, sentence: "Nothing was recorded for 0.4 s." };
   expect(marksOf({ ...third, overrule_reason: "the paper flew it", glitches: [gap, gap] })).toEqual([
-    "Overruled",
+    "Gate overruled",
     "2 glitches",
   ]);
   expect(marksOf(third)).toEqual([]);
@@ -84,10 +84,10 @@ test("a flight that repeats gains on purpose is held against its own prediction"
 
 test("what a class would change is said before: which flight is the best then, and that the gains are found anew", () => {
   expect(consequenceOf(third, all, "invalid")).toBe(
-    "Flight 3 is the best. Without it, flight 1 is the best, and the next gains are recomputed.",
+    "Flight 3 is the best. Without it, flight 1 becomes the best, and the next gains are recomputed.",
   );
   expect(consequenceOf(first, all, "invalid")).toBe(
-    "Flight 3 stays the best. The next gains are recomputed without flight 1.",
+    "Flight 3 remains the best. The next gains are recomputed without flight 1.",
   );
   expect(consequenceOf(first, [first, glitch], "invalid")).toBe(
     "No other flight is valid. Without flight 1, the campaign restarts from its start gains.",
@@ -111,7 +111,7 @@ test("the best gains become the safe ones only once flights have shown that they
 test("after a change of the safe gains it is told what the vehicle holds until they are written to it", () => {
   const vehicle = { name: "Bee", state: "ready", held: { kd: 82, kp: 283 }, safe_gains: { kp: 400, kd: 100 } } as const;
   expect(heldGainsNotice(vehicle)).toBe(
-    "Bee still has [283 82]. The safe gains are written at the next check, restore or flight.",
+    "Bee still holds [283 82]. The safe gains are written at the next check, restore or flight.",
   );
   expect(heldGainsNotice({ ...vehicle, state: "disconnected" })).toContain("at the next connection");
   expect(heldGainsNotice({ ...vehicle, held: vehicle.safe_gains })).toBe("");
@@ -120,7 +120,7 @@ test("after a change of the safe gains it is told what the vehicle holds until t
 
 test("an operator's abort asks why, and counts against its gains only when they behaved badly", () => {
   const aborted = (abort_cause: Trial["abort_cause"]) => ({ ...trial(2, "aborted", null), abort_cause });
-  expect(abortSentence(aborted("operator"))).toContain("only if the vehicle behaved badly");
+  expect(abortSentence(aborted("operator"))).toContain("only if the cause was the vehicle's behaviour");
   expect(abortSentence(aborted("something else"))).toContain("does not count against its gains");
   expect(abortSentence(aborted("limit"))).toBe("A limit was exceeded: the flight counts against its gains.");
   expect(abortSentence(first)).toBe("");

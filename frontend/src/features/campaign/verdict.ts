@@ -42,7 +42,7 @@ export function repeatPurpose(trial: Trial): string {
 export function marksOf(trial: Trial): string[] {
   const glitches = trial.glitches?.length ?? 0;
   return [
-    trial.overrule_reason ? "Overruled" : "",
+    trial.overrule_reason ? "Gate overruled" : "",
     glitches > 0 ? `${glitches} glitch${glitches === 1 ? "" : "es"}` : "",
   ].filter((mark) => mark !== "");
 }
@@ -71,11 +71,11 @@ export function abortSentence({ state, abort_cause: cause }: Pick<Trial, "state"
     case "limit":
       return "A limit was exceeded: the flight counts against its gains.";
     case "operator":
-      return "Why was the flight aborted? It counts against its gains only if the vehicle behaved badly.";
+      return "Why was the flight aborted? It counts against its gains only if the cause was the vehicle's behaviour.";
     case "behaved badly":
-      return "The vehicle behaved badly: the flight counts against its gains.";
+      return "Aborted because of the vehicle's behaviour: the flight counts against its gains.";
     case "something else":
-      return "Something else: the flight does not count against its gains.";
+      return "Aborted for another cause: the flight does not count against its gains.";
     default:
       return "Abort cause not recorded: the flight counts against its gains.";
   }
@@ -113,8 +113,8 @@ export function consequenceOf(trial: Trial, trials: readonly Trial[], outcome: T
     return `No other flight is valid. Without flight ${trial.number}, the campaign restarts from its start gains.`;
   }
   if (best?.id === trial.id)
-    return `Flight ${trial.number} is the best. Without it, flight ${other.number} is the best, and the next gains are recomputed.`;
-  return `Flight ${other.number} stays the best. The next gains are recomputed without flight ${trial.number}.`;
+    return `Flight ${trial.number} is the best. Without it, flight ${other.number} becomes the best, and the next gains are recomputed.`;
+  return `Flight ${other.number} remains the best. The next gains are recomputed without flight ${trial.number}.`;
 }
 
 /** Standing of the campaign without an invalid flight; empty for other flights. */
@@ -152,8 +152,8 @@ export function heldGainsNotice({
   if (held === null || Object.keys(held).length === 0 || sameHeld(held, safe)) return "";
   const gains = gainsInBrackets(inOrder(held, Object.keys(safe)));
   return state === "disconnected"
-    ? `${name} had ${gains} at the last reading. The safe gains are written at the next connection.`
-    : `${name} still has ${gains}. The safe gains are written at the next check, restore or flight.`;
+    ? `${name} held ${gains} when last read. The safe gains are written at the next connection.`
+    : `${name} still holds ${gains}. The safe gains are written at the next check, restore or flight.`;
 }
 
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "Low battery", "Collision"];

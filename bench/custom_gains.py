@@ -1,6 +1,6 @@
-"""Time from a change of one's own gains to the redrawn prediction, in Chromium.
+"""Time from a change of custom gains to the redrawn prediction, in Chromium.
 
-    ./dev exec python -m bench.own_gains [--changes 100] [--flights 4]
+    ./dev exec python -m bench.custom_gains [--changes 100] [--flights 4]
 
 Runs a real server with a campaign on the twin, calibrated after some flights, and types gains into the card of the next
 flight, one change after another. The time runs from the input event until the chart's dashed curve has been painted.
@@ -51,7 +51,7 @@ def fly(address: str, flights: int) -> int:
     """A campaign on the twin after so many flights; its id."""
     definition = Definition(strategy="calibrated", stop=StopRule(kind="budget", max_flights=flights + 1))
     with Client(address) as client:
-        campaign = client.create_campaign("Own gains", vehicle="twin", definition=definition)
+        campaign = client.create_campaign("Custom gains", vehicle="twin", definition=definition)
         for _ in range(flights):
             client.wait(client.fly(campaign.id, client.ask(campaign.id)).id)
         client.ask(campaign.id)
@@ -60,7 +60,7 @@ def fly(address: str, flights: int) -> int:
 
 def change_gains(page: Page, changes: int) -> None:
     """Type one value of kp after another."""
-    page.get_by_role("radiogroup", name="Gains to fly").get_by_text("Own gains").click()
+    page.get_by_role("radiogroup", name="Gains to fly").get_by_text("Custom gains").click()
     kp = page.get_by_role("textbox", name="kp")
     values = np.random.default_rng(SEED).choice(np.arange(300, 2500), changes, replace=False)
     for value in values.tolist():
@@ -78,7 +78,7 @@ def percentiles(what: str, found_ms: Sequence[float]) -> float:
 
 
 def main() -> int:
-    asked = argparse.ArgumentParser(prog="bench.own_gains")
+    asked = argparse.ArgumentParser(prog="bench.custom_gains")
     asked.add_argument("--changes", type=int, default=100, help="number of changes of a gain")
     asked.add_argument("--flights", type=int, default=4, help="flights before")
     options = asked.parse_args()
