@@ -170,7 +170,7 @@ def test_screen_readers_always_get_announcements_and_speech_only_when_switched_o
 ASKED = {
     "What is the error?", "What is the predicted error?", "What is the interval?", "What is the overshoot?",
     "What is the rise time?", "What is the settling time?", "What is the steady-state error?",
-    "How do the flights correct the model?", "How are gains checked?", "How is the scatter estimated?",
+    "How do the flights correct the model?", "What does the gate check?", "What is the flight-to-flight scatter?",
     "What is the standard error?", "When is a difference significant?", "What do the lines mean?",
     "What does the next flight have to beat?", "What are the fitted parameters?",
 }  # fmt: skip

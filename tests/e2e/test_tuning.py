@@ -38,7 +38,7 @@ def test_fitted_parameters_are_shown_with_their_standard_errors(dashboard: Dashb
     campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
     dashboard.open_campaign(campaign_id)
     why = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["explanation"]
-    card = dashboard.panel("Next flight: 2")
+    card = dashboard.panel("Next: flight 2")
     card.get_by_text("Explanation").click()
     assert len(why["fitted"]) >= 4
     for one in why["fitted"]:
@@ -46,7 +46,7 @@ def test_fitted_parameters_are_shown_with_their_standard_errors(dashboard: Dashb
         expect(row).to_contain_text(printed(one["value"], one["standard_error"], "").strip())
     expect(card).to_contain_text(why["lesson"])
     card.get_by_role("button", name="What is the interval?").click()
-    expect(dashboard.page.get_by_text("Nine of ten flights should end inside it")).to_be_visible()
+    expect(dashboard.page.get_by_text("Nine out of ten flights should fall inside it")).to_be_visible()
 
 
 def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error(
@@ -83,7 +83,7 @@ def test_a_repeat_by_its_button_becomes_a_group_with_a_mean_and_a_standard_error
 
 
 def refuse(page: Page) -> None:
-    page.get_by_role("radiogroup", name="Gains to fly").get_by_text("Own gains").click()
+    page.get_by_role("radiogroup", name="Gains to fly").get_by_text("Custom gains").click()
     for name, value in WRAPPING.items():
         page.get_by_role("textbox", name=name).fill(str(value))
 
@@ -119,7 +119,7 @@ def test_a_refusal_is_overruled_on_a_simulation_only_with_a_reason_which_stays_w
     [trial] = dashboard.trials(campaign_id)
     assert (trial["gains"]["ki"], trial["overrule_reason"]) == (1356, "the paper flew these gains")
     verdict = dashboard.panel("Flight 1")
-    expect(verdict.get_by_text("Overruled", exact=True)).to_be_visible()
+    expect(verdict.get_by_text("Gate overruled", exact=True)).to_be_visible()
     expect(verdict).to_contain_text("the paper flew these gains")
 
 
@@ -155,7 +155,7 @@ def test_a_new_campaign_starts_from_the_best_of_another_one(dashboard: Dashboard
     dashboard.open("/new")
     recommended = dashboard.get("/catalogue")["strategies"][0]
     expect(page.get_by_role("combobox", name="Strategy")).to_have_value(recommended["name"])
-    page.get_by_role("combobox", name="Start from").select_option("Best of another campaign")
+    page.get_by_role("combobox", name="Start from").select_option("Best gains of another campaign")
     page.get_by_role("searchbox", name="Campaign").fill("Donor of the warm")
     page.get_by_role("button", name=re.compile("^Donor of the warm start")).click()
     best = dashboard.get(f"/campaigns/{donor}")["best"]

@@ -43,7 +43,7 @@ export function readOnlyReason(access: Access, vehicle: WatchedVehicle | null): 
   if (!access.may_link) {
     return sentences(
       watching,
-      "Other devices can reach this server. To fly a vehicle over a link, start the server with --host 127.0.0.1.",
+      "Other devices can reach this server. To fly this vehicle, restart Gainline with --host 127.0.0.1.",
     );
   }
   return sentences(watching, access.hint, STOPPING);

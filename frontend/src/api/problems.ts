@@ -29,7 +29,7 @@ const UNREACHABLE: Problem = {
   status: 0,
   title: "The server cannot be reached.",
   detail: "The request may or may not have been received.",
-  hint: "Check that Gainline is running and that the Wi-Fi is up. The page updates automatically: check it before you try again.",
+  hint: "Check that Gainline is running and that the network is up. The page updates automatically. Before you try again, see whether the request took effect.",
   problems: [],
 };
 

@@ -13,7 +13,7 @@ export const EXPLANATIONS = explained({
   error: {
     question: "What is the error?",
     answer: [
-      "The distance from the set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. F-16: the integral of |reference − pitch|.",
+      "How far the flight was from its set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. F-16: the integral of |reference − pitch|.",
       "Lower is better. Zero is impossible because climbing takes time: the reference trajectory itself scores 0.091 m.",
     ],
   },
@@ -32,14 +32,14 @@ export const EXPLANATIONS = explained({
   interval: {
     question: "What is the interval?",
     answer: [
-      "Nine of ten flights should end inside it. It includes the scatter between flights with the same gains and the uncertainty of the model.",
-      "A flight outside means that the model is off, or that something happened to the vehicle.",
+      "Nine out of ten flights should fall inside it. It covers the flight-to-flight scatter and the uncertainty of the model.",
+      "A flight outside it means that the model is off, or that the vehicle or the conditions have changed.",
     ],
   },
   bias: {
     question: "How do the flights correct the model?",
     answer: [
-      "By a bias correction. The difference between the best flight and the model with the same gains, sample by sample, is added to every prediction. The corrected model is exact at the gains flown in the best flight and accurate near them.",
+      "By a bias correction: the difference between the best flight and the model with the same gains, sample by sample, is added to every prediction. The corrected model is exact at the gains of the best flight and accurate near them.",
       "The strategy “calibrated” first fits the vehicle's parameters to the flights; the remaining difference is the bias.",
     ],
   },
@@ -58,11 +58,11 @@ export const EXPLANATIONS = explained({
   gradient: {
     question: "What is the gradient?",
     answer: [
-      "The change of the predicted error with each gain, computed by simulating the corrected model with slightly higher and lower values. Steps follow the negative gradient; the step with the lowest predicted error is flown.",
+      "The change of the predicted error per unit of each gain, computed by simulating the corrected model with slightly higher and lower values. Steps follow the negative gradient; the step with the lowest predicted error is flown.",
     ],
   },
   gate: {
-    question: "How are gains checked?",
+    question: "What does the gate check?",
     answer: [
       "Integer overflow in the autopilot's 32-bit arithmetic is checked exactly. Altitude, divergence, oscillation and aborts are checked in simulated flights that cover the uncertainty of the vehicle's parameters.",
     ],
@@ -77,20 +77,20 @@ export const EXPLANATIONS = explained({
     question: "What do the lines mean?",
     answer: [
       "Dotted: the set point. Dash-dotted: the reference trajectory, which the autopilot's filter generates and its control loop follows.",
-      "Thick: the best flight. Dark: the latest flight. Dashed, with its band: the prediction for the next gains. Nine of ten flights should stay inside the band.",
+      "Thick: the best flight. Dark: the latest flight. Dashed, with its band: the prediction for the next gains. Nine out of ten flights should stay inside the band.",
     ],
   },
   threshold: {
     question: "What does the next flight have to beat?",
     answer: [
-      "The threshold of the paper's stop rule: the best error minus the minimum improvement of this campaign (Settings, Stop). A flight above it counts as no improvement; two in a row end the campaign.",
+      "The threshold of the paper's stop rule: the best error minus the minimum improvement of this campaign (Settings, Stop rule). A flight above it counts as no improvement; two in a row end the campaign.",
       "The band shows how far the error of another flight with the best gains could vary by chance. A result inside it is not a resolvable change.",
     ],
   },
   scatter: {
-    question: "How is the scatter estimated?",
+    question: "What is the flight-to-flight scatter?",
     answer: [
-      "The standard deviation of the error between flights with the same gains. Without repeats it is a prior estimate; every repeat refines it.",
+      "The standard deviation of the error over flights with the same gains. Without repeats it is a prior estimate; every repeat refines it.",
     ],
   },
   standardError: {
@@ -130,7 +130,7 @@ export const EXPLANATIONS = explained({
   settlingTime: {
     question: "What is the settling time?",
     answer: [
-      "The time from the command until the altitude stays within ±5\u00a0% of the set point: 0.15 m for a takeoff to 3 m. A flight that is outside the band at the end did not settle.",
+      "The time from the command until the altitude stays within ±5\u00a0% of the set point: 0.15 m for a takeoff to 3 m. A flight outside the band at its end did not settle.",
     ],
   },
   steadyStateError: {
@@ -140,7 +140,7 @@ export const EXPLANATIONS = explained({
   warmStart: {
     question: "What is a warm start?",
     answer: [
-      "The first flight uses this campaign's best gains. If it shows that the two vehicles are similar, the new campaign builds on what was learned here, with a shorter first step; otherwise it starts from scratch.",
+      "The first flight uses this campaign's best gains. If it shows that the two vehicles are similar, the new campaign builds on the results of this one, with a shorter first step; otherwise it starts from scratch.",
     ],
   },
   safeGains: {

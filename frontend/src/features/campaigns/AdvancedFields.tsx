@@ -73,7 +73,7 @@ export function AdvancedFields(props: Props) {
 const STOPS: Record<StopKind, { label: string; line: string }> = {
   noise: {
     label: "No resolvable improvement",
-    line: "Ends when no further step would bring a resolvable improvement and the best and first gains have been repeated.",
+    line: "Ends when no further step promises a resolvable improvement, and the best and first gains have been flown again.",
   },
   paper: {
     label: "No improvement",
@@ -85,7 +85,7 @@ const STOPS: Record<StopKind, { label: string; line: string }> = {
 function StopFields({ form, reasons, set }: Props) {
   const narrow = useMediaQuery("(max-width: 620px)", false, { getInitialValueInEffect: false });
   return (
-    <Group title="Stop">
+    <Group title="Stop rule">
       <SegmentedControl
         aria-label="Stop rule"
         size="md"
@@ -179,7 +179,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
       })}
       <NumberField
         label="Maximum first step"
-        description="Of each range, until a flight is valid"
+        description="Fraction of each gain's range, until the first valid flight"
         suffix=" %"
         value={form.firstStepPercent}
         error={reasons["first_step_fraction"]}
@@ -187,7 +187,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
       />
       <NumberField
         label="Maximum later step"
-        description="Of each range"
+        description="Fraction of each gain's range, after that"
         suffix=" %"
         value={form.stepPercent}
         error={reasons["step_fraction"]}

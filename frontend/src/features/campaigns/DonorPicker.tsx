@@ -72,7 +72,7 @@ function Offers({ campaigns, onChoose }: OffersProps) {
           </UnstyledButton>
         </li>
       ))}
-      {campaigns.length > OFFERED && <li className={classes["rest"]}>Type more of the name to see other campaigns.</li>}
+      {campaigns.length > OFFERED && <li className={classes["rest"]}>Keep typing to narrow the list.</li>}
     </ul>
   );
 }
@@ -87,13 +87,13 @@ function Taken({ donor, best, experiment }: TakenProps) {
   const unit = useUnits(experiment).error;
   return (
     <Aside tone="good" fz="small" className="numbers">
-      Best flight: {best.trial_number} on {donor.vehicle.title}:{" "}
+      Best: flight {best.trial_number} on {donor.vehicle.title}:{" "}
       <strong>
         <GainList gains={best.gains} experiment={experiment} />
       </strong>
       , error {plusMinus(best.mean, best.standard_error, unit)}
       {best.standard_error === null ? "" : " (± standard error)"}. The first flight uses these gains and shows whether
-      the vehicles are similar enough to build on what was learned there.
+      the vehicles are similar enough to build on that campaign's results.
     </Aside>
   );
 }

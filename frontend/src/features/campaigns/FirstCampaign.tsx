@@ -28,7 +28,7 @@ export function FirstCampaign() {
         Tune a takeoff in a few flights
       </Title>
       <Note maw={560} fz="strong" lh={1.5}>
-        A campaign flies one vehicle repeatedly, each time with better gains, and stops when no further improvement is
+        A campaign flies one vehicle repeatedly, each time with new gains, and stops when no further improvement is
         found.
       </Note>
       <ol className={classes["steps"]}>

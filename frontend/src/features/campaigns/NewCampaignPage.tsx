@@ -61,7 +61,7 @@ export function NewCampaignPage() {
 const STARTS: Record<StartKind, string> = {
   default: "The vehicle's default gains",
   simplex: "Best gains on the model (simplex)",
-  campaign: "Best of another campaign",
+  campaign: "Best gains of another campaign",
   given: "Custom gains",
 };
 

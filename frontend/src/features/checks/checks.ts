@@ -37,7 +37,7 @@ export function signalsTable(signals: readonly CheckedSignal[]): FigureTable {
       column("difference", "Largest difference"),
       column("allowed", "Allowed"),
       column("verdict", "Result"),
-      column("where", "Differs in"),
+      column("where", "Differing samples"),
     ],
     rows: signals.map((one) => [
       `${one.name}, ${one.title.toLowerCase()}`,

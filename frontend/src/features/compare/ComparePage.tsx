@@ -102,9 +102,7 @@ function Introduction() {
         <strong>Compare flights</strong> of one or more campaigns: which gains are better, with what confidence, and
         which settings differ.
       </p>
-      <p>
-        Select two or more flights below. The first is the reference. Share the selection with the URL of this page.
-      </p>
+      <p>Select two or more flights. The first is the reference. To share the selection, copy the URL of this page.</p>
     </section>
   );
 }

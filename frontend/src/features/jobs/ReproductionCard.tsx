@@ -34,8 +34,8 @@ export function ReproductionCard({ reproduction }: { reproduction: ReproductionS
           <strong>In the paper:</strong> {paper}
         </Text>
         <Text maw="90ch" lh={1.45} mb={8}>
-          <strong>Here:</strong> {line}
-          {span !== null && <> Our results: {span}.</>}
+          <strong>In Gainline:</strong> {line}
+          {span !== null && <> Results: {span}.</>}
         </Text>
         <Standing reproduction={reproduction} />
         <ErrorNotice error={result.error} />
@@ -158,7 +158,7 @@ function ReproductionRows({ rows, title }: { rows: readonly ReproductionRow[]; t
       <thead>
         <tr>
           <td />
-          <th scope="col">Ours</th>
+          <th scope="col">Gainline</th>
           {columns.map(([key, heading]) => (
             <th key={key} scope="col">
               {heading}

@@ -121,10 +121,10 @@ function About({ system }: { system: System }) {
   return (
     <Panel title="This server">
       <dl className={fleet["facts"]}>
-        <LabelledValue title="Gainline" value={system.version} />
+        <LabelledValue title="Version" value={system.version} />
         <LabelledValue title="Worker" value={system.worker} bad={system.worker !== "running"} />
         <LabelledValue title="Database" value={`revision ${system.database_revision}`} />
-        <LabelledValue title="Data" value={bytesText(system.data_bytes)} />
+        <LabelledValue title="Data size" value={bytesText(system.data_bytes)} />
         <LabelledValue
           title={scarce ? "Free disk space, low" : "Free disk space"}
           value={bytesText(system.free_bytes)}
@@ -233,7 +233,7 @@ function LocalOnly({ system: { exposes, host, is_exposed } }: { system: System }
         same network, stop the server and start it with
       </Note>
       <code className={classes["command"]}>gainline serve --host 0.0.0.0</code>
-      <Note>(from a checkout: ./dev up --host 0.0.0.0). Its address then appears here.</Note>
+      <Note>or, in a checkout, with ./dev up --host 0.0.0.0. The address then appears here.</Note>
       <Aside tone="warn">
         <strong>Security:</strong> {exposes}
       </Aside>
