@@ -70,8 +70,8 @@ def take_control(dashboard: Dashboard) -> None:
 
 
 def stage(dashboard: Dashboard, gains: int) -> None:
-    """Have so many gains set, and see each one read back."""
-    dashboard.button("Stage").click()
+    """Have so many gains staged, and see each one read back."""
+    dashboard.button("Stage gains").click()
     expect(dashboard.page.get_by_label("read back")).to_have_count(gains)
     expect(hold_button(dashboard.page)).to_be_enabled()
 

@@ -126,7 +126,7 @@ def planned(dashboard: Dashboard, campaign_id: int, choose: Callable[[], None]) 
     dashboard.when_ready(campaign_id)
     choose()
     expect(dashboard.page).to_have_url(re.compile(r"/fly/\d+$"))
-    expect(dashboard.button("Stage")).to_be_visible()
+    expect(dashboard.button("Stage gains")).to_be_visible()
     trial: Json = dashboard.get(f"/trials/{dashboard.page.url.rsplit('/', 1)[1]}")
     return trial
 
@@ -189,7 +189,7 @@ def fly_the_first(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> Js
     picture(dashboard, "landed")
     flown = count_it(dashboard, trial["id"])
     dashboard.when_ready(campaign_id)
-    expect(dashboard.panel("Next flight: 2")).to_be_visible()
+    expect(dashboard.panel("Next: flight 2")).to_be_visible()
     picture(dashboard, "verdict")
     return flown
 
@@ -293,7 +293,7 @@ def promote(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> None:
     dashboard.page.get_by_label("Decided by, and why").fill(DECIDED)
     dashboard.button("Save safe gains").click()
     told = dashboard.page.get_by_text("The best gains are the safe gains of Number 1.")
-    expect(told).to_contain_text("Number 1 still has [283 13 82]")
+    expect(told).to_contain_text("Number 1 still holds [283 13 82]")
     assert dashboard.get(f"/vehicles/{vehicle_id}")["safe_gains"] == campaign["winner"]["gains"]
 
 

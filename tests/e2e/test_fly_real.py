@@ -148,7 +148,7 @@ def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: 
     assert asked.status == 403
     assert state_of(dashboard, trial_id) == "staged"
     dashboard.button("Unstage (restore safe gains)").click()
-    expect(dashboard.button("Stage")).to_be_enabled()
+    expect(dashboard.button("Stage gains")).to_be_enabled()
     assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
 
 
@@ -207,7 +207,7 @@ def test_it_all_fits_on_a_tablet_and_never_scrolls_sideways(
     for viewport in (TABLET, PHONE):
         tab = open_dashboard(dashboard.url, viewport=viewport)
         tab.open(f"/fly/{trial_id}")
-        expect(tab.button("Stage")).to_be_visible()
+        expect(tab.button("Stage gains")).to_be_visible()
         assert tab.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
         if viewport is TABLET:
             assert tab.page.evaluate("(m => m.scrollHeight <= m.clientHeight)(document.querySelector('main'))")

@@ -117,7 +117,7 @@ def test_a_reload_and_a_second_tab_show_the_same_flight(
     second = open_dashboard(shared_server.url)
     second.open("/")
     for tab in (dashboard, second):
-        expect(tab.page.get_by_role("region", name="Flying: On jsbsim")).to_be_visible()
+        expect(tab.page.get_by_role("region", name="Flight in progress: On jsbsim")).to_be_visible()
     wait_for_live(dashboard, 100)
     live = dashboard.trace("takeoffs", "live")
     assert live is not None

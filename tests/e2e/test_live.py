@@ -181,7 +181,7 @@ def test_a_line_that_only_looks_open_is_given_up_and_a_flight_on_it_is_not_shown
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("1×")
     dashboard.fly()
-    bar = dashboard.page.get_by_role("region", name=re.compile("^Flying: "))
+    bar = dashboard.page.get_by_role("region", name=re.compile("^Flight in progress: "))
     expect(bar).to_contain_text(re.compile(r"\d\.\d\d m"))
     expect(bar).not_to_contain_text("last known")
     with stopped(shared_server.pid):

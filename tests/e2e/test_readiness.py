@@ -40,7 +40,7 @@ SILENT_FOR = """seconds => new Promise(done => {
         done();
     });
 })"""
-READY, NOT_READY = "Gains set, ready to fly", "Not ready to fly"
+READY, NOT_READY = "Staged, ready to fly", "Not ready to fly"
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def losses(page: Page) -> Locator:
 def test_a_link_that_is_gone_for_a_minute_is_never_under_a_green_ready_to_fly(
     dashboard: Dashboard, drone: Drone, vehicle_id: int, trial_id: int
 ) -> None:
-    """Observed defect: “Gains set, ready to fly” was green and the hold button active."""
+    """Observed defect: “Staged, ready to fly” was green and the hold button active."""
     page = dashboard.page
     expect(word(dashboard)).to_have_text(READY)
     dashboard.until(partial(is_shown, page, ["done", "done", "open", "open", "open", "open"]))
@@ -133,7 +133,7 @@ def test_after_a_restart_of_the_drone_no_tick_stands_beside_gains_that_it_no_lon
     drone.switch_on()
     expect(page.get_by_text(re.compile("It restarted, so its gains are no longer those staged"))).to_be_visible()
     expect(page.get_by_label("read back")).to_have_count(0)
-    expect(dashboard.button("Stage")).to_be_enabled()
+    expect(dashboard.button("Stage gains")).to_be_enabled()
     expect(line_of(dashboard)).to_contain_text("[283 13 82]safe")
     assert state_of(dashboard, trial_id) == "planned"
     dashboard.open(f"/vehicles/{vehicle_id}")
@@ -170,7 +170,7 @@ def test_a_page_that_stood_still_takes_readiness_back_until_it_has_read_the_stat
 def test_a_server_that_does_not_answer_takes_readiness_back(dashboard: Dashboard, trial_id: int) -> None:
     page = dashboard.page
     page.route(re.compile("/readiness$"), lambda route: route.abort())
-    expect(losses(page)).to_contain_text(["The server does not answer."])
+    expect(losses(page)).to_contain_text(["The server is not responding."])
     expect(hold_button(page)).to_be_disabled()
     page.unroute(re.compile("/readiness$"))
     expect(hold_button(page)).to_be_enabled()

@@ -47,7 +47,7 @@ def test_every_page_of_a_real_vehicle_shows_that_a_locked_browser_may_only_watch
         notice(dashboard)
         picture(dashboard.page, f"watch-{path.split('/')[1]}-{theme}-{viewport['width']}")
         assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
-    for name in ("Stage", "Take control", "Connect"):
+    for name in ("Stage gains", "Take control", "Connect"):
         expect(dashboard.button(name)).to_have_count(0)
     expect(dashboard.page.get_by_role("button", name="Motors off – the drone falls")).to_be_disabled()
     dashboard.open("/campaigns")

@@ -60,7 +60,7 @@ def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dash
         expect(state_word(dashboard, "Ready")).to_be_visible()
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
         expect(fact(dashboard, "Connection", "Link age")).to_have_text(re.compile(r"^0\.\d s$"))
-        expect(fact(dashboard, "Battery", "Voltage now")).to_have_text(re.compile(r"^1\d\.\d V$"))
+        expect(fact(dashboard, "Battery", "Voltage")).to_have_text(re.compile(r"^1\d\.\d V$"))
         expect(dashboard.panel("Gains").get_by_text("Current gains are the safe gains")).to_be_visible()
 
         dashboard.button("Check now").click()
@@ -71,7 +71,7 @@ def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dash
         assert all(check["passed"] for check in checks)
 
         page.get_by_label("Battery label").fill("No. 3")
-        dashboard.button("Save").click()
+        dashboard.button("Save label").click()
         dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["battery"] == "No. 3")
 
         given = dashboard.panel("Gain history").get_by_role("row").nth(1)
@@ -148,7 +148,7 @@ def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
         slide_to_its_end(dashboard, page.get_by_role("button", name="Motors off – the drone falls"))
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
         page.get_by_label("Inspected by, and findings").fill("Ada: it stands, nothing is broken")
-        dashboard.button("Release").click()
+        dashboard.button("Release vehicle").click()
         expect(state_word(dashboard, "Ready")).to_be_visible()
         assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
         expect(dashboard.panel("Gain history")).to_contain_text("Safe gains at release")

@@ -63,7 +63,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
   const time = live?.timeS.at(-1);
   const reading = readingOf(live?.channel ?? "");
   return (
-    <section className={classes["flight"]} aria-label={`Flying: ${flying.name}`}>
+    <section className={classes["flight"]} aria-label={`Flight in progress: ${flying.name}`}>
       <span className={classes["flightName"]} title={flying.name}>
         {flying.name} · flight {flying.trialNumber}
       </span>
@@ -75,7 +75,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
         title="Open the fly screen"
       >
         {time === undefined ? (
-          <span>{live?.phase === "staging" ? "setting gains" : "flying"}</span>
+          <span>{live?.phase === "staging" || live?.phase === "staged" ? live.phase : "in flight"}</span>
         ) : (
           <>
             <span className={classes["big"]}>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</span>

@@ -55,9 +55,9 @@ function pageLoss({ answerAgeS, isServerAway, stalledS }: PageState, isInFlight:
   if (!isServerAway && answerAgeS <= ANSWER_S) return null;
   return {
     kind: "server away",
-    what: "The server does not answer. The data on this page is out of date.",
+    what: "The server is not responding. The data on this page is out of date.",
     way_on: isInFlight
-      ? "ABORT is re-sent until the server responds. If the vehicle does not descend, use its own remote control."
+      ? "ABORT is re-sent until the server responds. If the vehicle does not descend, use its remote control."
       : "No commands can be sent from here. Check the network and the computer that runs Gainline.",
   };
 }

@@ -29,8 +29,8 @@ function said(before: News, now: News): string[] {
 }
 
 test("a flight is announced from its gains to its take-off", () => {
-  expect(said(news(), flight("staging"))).toEqual(["Setting the gains."]);
-  expect(said(flight("staging"), flight("staged"))).toEqual(["Gains set, ready to fly."]);
+  expect(said(news(), flight("staging"))).toEqual(["Staging."]);
+  expect(said(flight("staging"), flight("staged"))).toEqual(["Staged, ready to fly."]);
   expect(said(flight("staged"), flight("flying"))).toEqual(["Taking off."]);
   expect(said(flight("flying"), flight("flying", [1, 2]))).toEqual([]);
 });

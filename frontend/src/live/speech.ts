@@ -26,8 +26,8 @@ const say = (text: string): Sentence => ({ text, urgent: false });
 const shout = (text: string): Sentence => ({ text, urgent: true });
 
 const PHASES: Readonly<Record<string, Sentence>> = {
-  staging: say("Setting the gains."),
-  staged: say("Gains set, ready to fly."),
+  staging: say("Staging."),
+  staged: say("Staged, ready to fly."),
   flying: say("Taking off."),
 };
 

@@ -12,7 +12,7 @@ export interface StateLabel {
 const CAMPAIGN: Record<CampaignState, StateLabel> = {
   draft: { word: "Preparing", tone: "busy" },
   ready: { word: "Ready to fly", tone: "quiet" },
-  flying: { word: "Flying", tone: "busy" },
+  flying: { word: "In flight", tone: "busy" },
   deciding: { word: "Between flights", tone: "quiet" },
   finished: { word: "Finished", tone: "good" },
   archived: { word: "Archived", tone: "quiet" },
@@ -45,8 +45,8 @@ export function campaignStateLabel(
 
 const TRIAL: Record<TrialState, StateLabel> = {
   planned: { word: "Planned", tone: "quiet" },
-  staged: { word: "Gains set", tone: "busy" },
-  flying: { word: "Flying", tone: "busy" },
+  staged: { word: "Staged", tone: "busy" },
+  flying: { word: "In flight", tone: "busy" },
   captured: { word: "Needs review", tone: "busy" },
   valid: { word: "Valid", tone: "good" },
   aborted: { word: "Aborted", tone: "bad" },

@@ -53,7 +53,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
               : "Connecting writes the safe gains and reads them back. The vehicle does not move."}
           </Note>
         )}
-        {status?.said && <Note>Message: {status.said}</Note>}
+        {status?.said && <Note>Vehicle message: {status.said}</Note>}
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
         <Note>
           {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
@@ -75,11 +75,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
     <Panel title="Battery">
       <Stack gap={14}>
         <dl className={`${classes["facts"]} numbers`}>
-          <LabelledValue
-            title="Voltage now"
-            value={withUnit(status?.status.batteryV, "V", 1)}
-            stale={!status?.isCurrent}
-          />
+          <LabelledValue title="Voltage" value={withUnit(status?.status.batteryV, "V", 1)} stale={!status?.isCurrent} />
           <LabelledValue title="Minimum to fly" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
         </dl>
         <form
@@ -98,7 +94,7 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
             onChange={(event) => setTyped(event.currentTarget.value)}
           />
           <Button type="submit" variant="default" disabled={label === vehicle.battery} loading={edit.isPending}>
-            Save
+            Save label
           </Button>
         </form>
         <ErrorNotice error={edit.error} />

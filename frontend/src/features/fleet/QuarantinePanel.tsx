@@ -55,7 +55,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
           onChange={(event) => setStatement(event.currentTarget.value)}
         />
         <Button type="submit" variant="default" disabled={statement.trim() === ""} loading={release.isPending}>
-          Release
+          Release vehicle
         </Button>
       </form>
       <ErrorNotice error={release.error} />

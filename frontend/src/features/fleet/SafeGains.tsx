@@ -60,7 +60,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
         {isKnown && sameHeld(held, safe) && (
           <span className={classes["good"]}>
             <IconCircleCheck size={18} aria-hidden />{" "}
-            {isCurrent ? "Current gains are the safe gains" : "At the last reading, it had its safe gains"}
+            {isCurrent ? "Current gains are the safe gains" : "Safe gains at the last reading"}
           </span>
         )}
         {isKnown && !sameHeld(held, safe) && (
@@ -68,7 +68,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
             <IconAlertTriangle size={18} aria-hidden />{" "}
             {isCurrent
               ? "Current gains differ from the safe gains"
-              : "At the last reading, its gains differed from the safe gains"}
+              : "Gains differed from the safe gains at the last reading"}
           </span>
         )}
         <Note>

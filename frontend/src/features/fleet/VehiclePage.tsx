@@ -108,7 +108,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
         <LinkPanel vehicle={vehicle} />
         <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
-        <Panel title="In control">
+        <Panel title="Operator">
           {watching === null ? (
             <OperatorControl vehicle={vehicle} />
           ) : (
@@ -117,7 +117,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
         </Panel>
         <BatteryPanel vehicle={vehicle} />
         <Panel
-          title="Preflight check"
+          title="Preflight checks"
           className={classes["wide"]}
           tools={
             <Button

@@ -83,7 +83,7 @@ export function ParameterPanel({ vehicleId, mayRead, reading, onRead }: Props) {
       className={classes["wide"]}
       tools={
         <Button variant="default" disabled={!mayRead || underWay} loading={reading || underWay} onClick={onRead}>
-          Read all
+          Read parameters
         </Button>
       }
     >

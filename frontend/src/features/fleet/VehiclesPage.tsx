@@ -40,7 +40,7 @@ export function VehiclesPage() {
         {shared.length > 0 && (
           <section>
             <Title order={2} c="dimmed" fz="body" mb={10}>
-              Shared simulations and flight records
+              Shared simulations and vehicles flown elsewhere
             </Title>
             <ul className={classes["list"]} aria-label="Shared simulations">
               {shared.map((vehicle) => (

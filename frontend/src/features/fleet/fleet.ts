@@ -7,8 +7,8 @@ import type { StateLabel } from "../../ui/states";
 const STATES: Record<VehicleState, StateLabel> = {
   disconnected: { word: "Not connected", tone: "quiet" },
   ready: { word: "Ready", tone: "good" },
-  staged: { word: "Gains set", tone: "busy" },
-  flying: { word: "Flying", tone: "busy" },
+  staged: { word: "Staged", tone: "busy" },
+  flying: { word: "In flight", tone: "busy" },
   quarantined: { word: "Quarantined", tone: "bad" },
 };
 
@@ -20,14 +20,14 @@ export function vehicleStateLabel({ state, registered }: Vehicle): StateLabel {
 export const ACTS: Record<ActKind, string> = {
   connect: "Connect",
   disconnect: "Disconnect",
-  check: "Preflight check",
+  check: "Run preflight checks",
   restore: "Restore safe gains",
   parameters: "Read parameters",
   release: "Release from quarantine",
   land: "Land",
   "motors off": "Motors off",
-  "safe gains": "Safe gains set",
-  control: "Control taken over",
+  "safe gains": "Change safe gains",
+  control: "Take over control",
 };
 
 export const PURPOSES: Record<GivenGains["purpose"], string> = {

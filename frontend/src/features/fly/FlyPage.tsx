@@ -31,7 +31,7 @@ export function FlyPage() {
 
 function FlyByTrial({ trialId }: { trialId: number }) {
   const trial = useTrial(trialId);
-  useTitle(trial.data ? `Fly ${trial.data.number}` : "Fly");
+  useTitle(trial.data ? `Fly flight ${trial.data.number}` : "Fly");
   if (trial.data) return <FlyOfCampaign trial={trial.data} />;
   return trial.error ? <NotFound error={trial.error} /> : <Skeleton height={480} radius="md" />;
 }

@@ -31,7 +31,7 @@ interface Props {
   isBlocked: boolean;
 }
 
-/** Actions of the current step for a vehicle with a link: control, staging, take-off, review. */
+/** Actions of the current step for a vehicle with a link: control, staging, takeoff, review. */
 export function LinkedSteps({
   campaign,
   trial,
@@ -55,7 +55,7 @@ export function LinkedSteps({
     case "staged":
       return <TakeOff trial={trial} vehicle={vehicle} isReady={isReady} />;
     case "unstaging":
-      return <Waiting text="Writing the safe gains and reading them back. The flight then returns to planned." />;
+      return <Waiting text="Writing the safe gains and reading them back. The flight is then planned again." />;
     case "flying":
       return <Abort trial={trial} abort={abort} />;
     case "judge":
@@ -101,7 +101,7 @@ export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
                 disabled={!trial.actions.includes("fly") || isBlocked}
                 onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
               >
-                Fly
+                Fly flight {trial.number}
               </Button>
               <SpeedSwitch value={speed} onChange={setSpeed} />
             </>
@@ -168,7 +168,7 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
         loading={stage.isPending}
         onClick={() => stage.mutate(trial)}
       >
-        Stage
+        Stage gains
       </Button>
       <p className={classes["quiet"]}>
         {wantsControl

@@ -53,7 +53,7 @@ test("the word in flight is the vehicle's own step, and a silent vehicle is neve
   expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: false, readiness: null }).word).toBe(
     "Starting",
   );
-  expect(flyStateLabel(trial, "flying", null, { quarantined: false, readiness: null }).word).toBe("Flying");
+  expect(flyStateLabel(trial, "flying", null, { quarantined: false, readiness: null }).word).toBe("In flight");
   expect(flyStateLabel(trial, "flying", statusAt("idle", 0.1), { quarantined: true, readiness: null }).word).toBe(
     "Quarantined",
   );
@@ -70,9 +70,9 @@ test("a staged vehicle is ready only while its readiness holds", () => {
     return flyStateLabel(staged, "staged", null, { quarantined: false, readiness }).word;
   };
   expect([label(), label("link silent"), label("control ended")]).toEqual([
-    "Gains set, ready to fly",
+    "Staged, ready to fly",
     "Not ready to fly",
-    "Gains set",
+    "Staged",
   ]);
   const unknown = flyStateLabel(staged, "staged", null, { quarantined: false, readiness: null });
   expect(unknown.word).toBe("Checking readiness");

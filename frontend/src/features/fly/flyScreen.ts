@@ -6,7 +6,7 @@ import { type Aged, stepWord } from "../../live/vehicleStatus";
 import { type StateLabel, trialStateLabel } from "../../ui/states";
 
 /**
- * plan: before staging. staged: gains are on the vehicle, before take-off. unstaging: safe gains are restored. judge: it
+ * plan: before staging. staged: gains are on the vehicle, before takeoff. unstaging: safe gains are restored. judge: it
  * landed and needs a review.
  */
 export type FlyStep = "plan" | "staging" | "staged" | "unstaging" | "flying" | "judge" | "over";
@@ -39,10 +39,10 @@ export function flyStep(trial: Standing, phase: string | null): FlyStep {
 
 const WORDS: Record<FlyStep, StateLabel> = {
   plan: { word: "Planned", tone: "quiet" },
-  staging: { word: "Setting the gains", tone: "busy" },
-  staged: { word: "Gains set, ready to fly", tone: "good" },
+  staging: { word: "Staging", tone: "busy" },
+  staged: { word: "Staged, ready to fly", tone: "good" },
   unstaging: { word: "Restoring safe gains", tone: "busy" },
-  flying: { word: "Flying", tone: "busy" },
+  flying: { word: "In flight", tone: "busy" },
   judge: { word: "Landed", tone: "busy" },
   over: { word: "Finished", tone: "quiet" },
 };
@@ -62,7 +62,7 @@ function stagedLabel(readiness: Readiness | null): StateLabel {
   if (readiness === null) return { word: "Checking readiness", tone: "busy" };
   if (readiness.is_ready) return WORDS.staged;
   const isOnlyControl = readiness.losses.every(({ kind }) => kind === "control ended");
-  return isOnlyControl ? { word: "Gains set", tone: "quiet" } : { word: "Not ready to fly", tone: "bad" };
+  return isOnlyControl ? { word: "Staged", tone: "quiet" } : { word: "Not ready to fly", tone: "bad" };
 }
 
 /** Main label. For a vehicle with a link, `status` has the step; a stale one is never "In flight". */
