@@ -49,7 +49,7 @@ class TrajectoriesFigure:
     Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, band,
     glitch, limit, live, pointed, off scale) and, for flights, `trial` and `standing` (best, latest, baseline, earlier,
     invalid, unjudged); a flight's `uid` is `flight-` and its number, that of its deviation `deviation-` and its number.
-    The traces `live` and `pointed` are empty: a page fills the first during a flight, the second with the flight under
+    The traces `live`, `live deviation` and `pointed` are empty: a page fills the first two during a flight, the last with the flight under
     the pointer if that one has no curve of its own. The altitude limit, `limit`, is hidden: the page on which a flight
     is observed shows it.
 
@@ -90,6 +90,8 @@ class TrajectoriesFigure:
             traces += glitch_traces(palette, flight.number, flight.curve, flight.glitches, history.output_unit)
         traces += [*self._legend(palette, drawn), *self._prediction(palette)]
         traces += [self._empty(palette, "live", "Flying now"), self._empty(palette, "pointed", "Pointed at")]
+        if is_step(history.set_point):
+            traces.append(self._empty(palette, "live deviation", "Flying now, deviation", yaxis="y2"))
         for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
             label, text = str(flight.number), f"Flight {flight.number}"
             traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.number, text=text))
@@ -284,7 +286,7 @@ class TrajectoriesFigure:
             )
         ]
 
-    def _empty(self, palette: Palette, role: str, name: str) -> Trace:
+    def _empty(self, palette: Palette, role: str, name: str, **style: Any) -> Trace:
         """An empty curve that the page fills."""
         return scatter(
             name,
@@ -296,6 +298,7 @@ class TrajectoriesFigure:
             legendrank=1,
             cliponaxis=True,
             hovertemplate=reading(name, self.history.output_unit),
+            **style,
         )
 
     def _trace(

@@ -111,7 +111,7 @@ class Standing:
 
     `has_link`: the vehicle is registered, with a process that keeps its link. `has_control`: the one who asks may
     command it. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe gains are being
-    restored instead.
+    restored instead. `abort_cause_open`: nobody has stated yet why the flight was aborted.
     """
 
     trial: TrialState
@@ -120,6 +120,7 @@ class Standing:
     has_control: bool
     take_off_requested: bool = False
     standing_down: bool = False
+    abort_cause_open: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,6 +153,8 @@ def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
         reached = "control"
     elif standing.trial is TrialState.STAGED and standing.take_off_requested:
         reached = "held"
+    elif standing.trial is TrialState.ABORTED and standing.abort_cause_open:
+        reached = "landed"
     steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
     if standing.trial is TrialState.LOST:  # whether it has landed is not known
         return Readiness(steps=steps[:-1], lost=steps[-1:], losses=())
@@ -176,9 +179,11 @@ def require_ready(readiness: Readiness) -> None:
 
 def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
     found: list[LossKind] = []
-    if (link := _link_loss(standing, report)) is not None:
+    is_quarantined = standing.vehicle is VehicleState.QUARANTINED
+    link = _link_loss(standing, report)
+    if link is not None and not (is_quarantined and link == "not connected"):  # its release asks for the connection
         found.append(link)
-    if standing.vehicle is VehicleState.QUARANTINED:
+    if is_quarantined:
         found.append("quarantined")
     if not standing.has_control and standing.trial is not TrialState.PLANNED:
         found.append("control ended")

@@ -140,6 +140,7 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         has_control=is_in_control(vehicle, context),
         take_off_requested=active is not None and active.take_off_at is not None,
         standing_down=active is not None and bool(active.stand_down),
+        abort_cause_open=row.abort_cause == "operator",
     )
     return readiness_of(standing, report_of(vehicle.id))
 

@@ -12,7 +12,7 @@ from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, la
 def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() -> None:
     card = TrajectoriesFigure(history(proposal=proposal(1))).compute()
     assert [one["meta"]["role"] for one in traces(card)] == [
-        "set point", "reference", "deviation", "prediction", "live", "pointed"]  # fmt: skip
+        "set point", "reference", "deviation", "prediction", "live", "pointed", "live deviation"]  # fmt: skip
     assert set(trace(card, "set point")["y"]) == {3.0}
     assert trace(card, "live")["x"] == []
 

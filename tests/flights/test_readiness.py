@@ -29,6 +29,7 @@ REACHED: dict[str, tuple[TrialState, dict[str, bool], ReadinessStep | None]] = {
     "captured": (TrialState.CAPTURED, {}, "landed"),
     "valid": (TrialState.VALID, {}, "reviewed"),
     "aborted": (TrialState.ABORTED, {}, "reviewed"),
+    "aborted, cause open": (TrialState.ABORTED, {"abort_cause_open": True}, "landed"),
     "invalid": (TrialState.INVALID, {}, "reviewed"),
     "cancelled": (TrialState.CANCELLED, {}, None),
 }
@@ -106,7 +107,7 @@ def test_in_flight_a_loss_takes_nothing_back_and_says_what_to_do_now(name: str, 
 
 
 @pytest.mark.parametrize("loss", REPORTS)
-@pytest.mark.parametrize("name", ["lost", "captured", "valid", "aborted", "invalid", "cancelled"])
+@pytest.mark.parametrize("name", ["lost", "captured", "valid", "aborted", "aborted, cause open", "invalid", "cancelled"])
 def test_once_the_flight_is_over_a_loss_changes_nothing(name: str, loss: str) -> None:
     state, flags, reached = REACHED[name]
     report, vehicle, _ = REPORTS[loss]
@@ -120,6 +121,11 @@ def test_control_that_ends_takes_everything_back(name: str) -> None:
     found = readiness_of(standing(state, flags, has_control=False), GOOD)
     assert (found.steps, found.lost) == ((), up_to(reached))
     assert [each.kind for each in found.losses] == ["control ended"]
+
+
+def test_a_quarantined_vehicle_without_a_connection_has_one_way_on() -> None:
+    found = readiness_of(standing(TrialState.PLANNED, {}, VehicleState.QUARANTINED), REPORTS["connecting"][0])
+    assert [each.kind for each in found.losses] == ["quarantined"]
 
 
 def test_control_that_was_never_taken_is_no_loss() -> None:

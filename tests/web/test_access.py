@@ -78,7 +78,7 @@ def test_a_link_is_exchanged_for_a_cookie_that_no_script_and_no_other_site_can_u
     client: TestClient, settings: Settings
 ) -> None:
     opened = client.get(new_link(settings.data_dir), follow_redirects=False)
-    assert (opened.status_code, opened.headers["location"]) == (303, "/")
+    assert (opened.status_code, opened.headers["location"]) == (303, "/?unlocked")
     cookie = opened.headers["set-cookie"].lower()
     assert {"httponly", "samesite=strict", "path=/"} <= set(re.split(r"; ?", cookie))
     assert opened.headers["referrer-policy"] == "no-referrer"

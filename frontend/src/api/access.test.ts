@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { readOnlyReason } from "./access";
+import { readOnlyReason, registrationRefusal } from "./access";
 import type { Access } from "./types";
 
 const HINT = "Open the link that the terminal printed.";
@@ -33,6 +33,13 @@ describe("a browser with read-only access", () => {
   it("is told on another device where the vehicle is commanded", () => {
     expect(readOnlyReason(REMOTE, real)).toContain("on the computer that runs Gainline");
     expect(readOnlyReason(REMOTE, null)).toBeNull();
+  });
+
+  it("is told before a vehicle is registered that this browser may not command", () => {
+    expect(registrationRefusal(LOCKED, true)).toBe(`This browser may not register a real vehicle. ${HINT}`);
+    expect(registrationRefusal(LOCKED, false)).toBeNull();
+    expect(registrationRefusal(EXPOSED, false)).toContain("--host 127.0.0.1");
+    expect(registrationRefusal(UNLOCKED, true)).toBeNull();
   });
 
   it("is told of everything on a device that has not opened a link", () => {

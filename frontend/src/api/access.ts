@@ -24,29 +24,54 @@ export function useReadOnlyReason(vehicle: WatchedVehicle | null): string | null
   return access === undefined ? null : readOnlyReason(access, vehicle);
 }
 
+/** What the unlock link that was opened permits; null before the answer. */
+export function useUnlocked(): string | null {
+  const access = useAccess();
+  if (access === undefined || !access.may_change) return null;
+  return access.may_command
+    ? "This browser may now command real vehicles."
+    : "This browser may now change campaigns and fly simulated vehicles.";
+}
+
+/** Why this browser may not register such a vehicle; null if it may. */
+export function useRegistrationRefusal(isReal: boolean): string | null {
+  const access = useAccess();
+  return access === undefined ? null : registrationRefusal(access, isReal);
+}
+
+export function registrationRefusal(access: Access, isReal: boolean): string | null {
+  const wayOn = access.may_change ? wayToCommand(access, isReal) : null;
+  return wayOn && sentences(`This browser may not register a ${isReal ? "real" : "simulated"} vehicle.`, wayOn);
+}
+
 export interface WatchedVehicle {
   name: string;
   is_real: boolean;
   registered: boolean;
 }
 
-const STOPPING = "Abort and Land still work from here.";
-
 /** Why a browser has read-only access to the vehicle, or to the server if null. Null if it may act. */
 export function readOnlyReason(access: Access, vehicle: WatchedVehicle | null): string | null {
   if (vehicle === null) {
     return access.may_change ? null : sentences("This device has read-only access.", access.hint);
   }
-  if (!vehicle.registered || (vehicle.is_real ? access.may_command : access.may_link)) return null;
-  const watching = `This browser has read-only access to ${vehicle.name}.`;
-  if (access.elsewhere) return sentences(watching, "Operate it on the computer that runs Gainline.");
-  if (!access.may_link) {
-    return sentences(
-      watching,
-      "Other devices can reach this server. To fly this vehicle, restart Gainline with --host 127.0.0.1.",
-    );
-  }
-  return sentences(watching, access.hint, STOPPING);
+  const wayOn = vehicle.registered ? wayToCommand(access, vehicle.is_real) : null;
+  if (wayOn === null) return null;
+  const isStopPossible = !access.elsewhere && access.may_link;
+  return sentences(
+    `This browser has read-only access to ${vehicle.name}.`,
+    wayOn,
+    isStopPossible ? "Abort and Land still work from here." : "",
+  );
+}
+
+/** How such a vehicle can be commanded; null if this browser may. */
+function wayToCommand(access: Access, isReal: boolean): string | null {
+  if (isReal ? access.may_command : access.may_link) return null;
+  if (access.elsewhere) return "Operate it on the computer that runs Gainline.";
+  return access.may_link
+    ? access.hint
+    : "Other devices can reach this server. To fly this vehicle, restart Gainline with --host 127.0.0.1.";
 }
 
 function sentences(...parts: string[]): string {

@@ -96,9 +96,9 @@ export function Chart({
 
   useEffect(() => {
     const target = element.current;
-    const trace = traceWithRole(figure.data, "live");
-    if (target === null || plotly === null || liveTrial === null || trace < 0) return;
-    return drawLive(plotly, target, trace, liveTrial);
+    if (target === null || plotly === null || liveTrial === null) return;
+    if (traceWithRole(figure.data, "live") < 0) return;
+    return drawLive(plotly, target, figure.data, liveTrial);
   }, [plotly, liveTrial, figure]);
 
   useEffect(() => {

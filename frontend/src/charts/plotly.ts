@@ -6,7 +6,7 @@ import { onLive } from "../live/store";
 import type { LiveFlight } from "../live/telemetry";
 import { throttled } from "../ui/throttle";
 import { onPointed, pointAt } from "./pointing";
-import { flightAt, marksOver, roomFor, type Trace, traceWithRole, windowFrom } from "./traces";
+import { flightAt, liveCurves, marksOver, roomFor, type Trace, traceWithRole, windowFrom } from "./traces";
 
 const BUILDS = {
   /** Lines and markers, enough for nearly every chart, and a fifth smaller than the full build. */
@@ -158,14 +158,25 @@ export function followPointing(
   };
 }
 
-/** Extend the live trace with the telemetry of a trial; returns the unsubscribe function. */
-export function drawLive(plotly: Plotly, chart: HTMLElement, trace: number, trialId: number): () => void {
+/** Extend the live traces with the telemetry of a trial; returns the unsubscribe function. */
+export function drawLive(plotly: Plotly, chart: HTMLElement, traces: readonly Trace[], trialId: number): () => void {
   let latest: LiveFlight | null = null;
   const drawing = throttled(async () => {
     if (latest === null || latest.timeS.length === 0) return;
-    const change = { x: [latest.timeS], y: [latest.measured], showlegend: true };
+    const curves = [...liveCurves(traces, latest)];
+    const shown = curves.map(([, curve]) => curve);
+    const change = {
+      x: shown.map(({ x }) => x),
+      y: shown.map(({ y }) => y),
+      showlegend: shown.map(({ showlegend }) => showlegend),
+    };
     const room = roomFor((chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity], latest.measured);
-    await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, [trace]);
+    await plotly.update(
+      chart,
+      change,
+      Number.isFinite(room[1]) ? { "yaxis.range": room } : {},
+      curves.map(([place]) => place),
+    );
   }, SHORTEST_REDRAW_MS);
   const unfollow = onLive(trialId, (flight) => {
     latest = flight;

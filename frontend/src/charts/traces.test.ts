@@ -30,6 +30,16 @@ test("the live trace takes what has been measured, and only that trace", () => {
   expect(withLive(traces, null)).toEqual(traces);
 });
 
+test("the live deviation is what has been measured less the set point, from the command on", () => {
+  const step: Trace = { meta: { role: "set point" }, x: [-0.3, 0, 0, 2, 4, 32], y: [0, 0, 3, 3, 5, 5] };
+  const drawn = withLive([step, { meta: { role: "live deviation" }, x: [], y: [] }], {
+    ...begun(1, 5),
+    timeS: [-0.1, 0, 1, 3, 33],
+    measured: [0, 0.1, 2.5, 4.5, 5.25],
+  });
+  expect(drawn[1]).toMatchObject({ x: [0, 1, 3, 33], y: [-2.9, -0.5, 0.5, 0.25], showlegend: false });
+});
+
 test("the altitude limit is shown within the axis, and nothing changes without one", () => {
   const limit: Trace = { meta: { role: "limit" }, x: [0, 32], y: [4.5, 4.5], visible: false };
   const drawn = withLimit({ data: [...traces, limit], layout: { yaxis: { range: [0, 3.5], nticks: 7 } } });

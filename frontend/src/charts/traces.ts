@@ -29,12 +29,46 @@ export function traceWithRole(traces: readonly Trace[], role: string): number {
   return traces.findIndex((trace) => trace.meta?.role === role);
 }
 
-/** The traces with the measured samples in the `live` trace; unchanged without a flight. */
+interface LiveCurve {
+  x: number[];
+  y: number[];
+  showlegend: boolean;
+}
+
+/** What has been measured, by the place of the trace that shows it: the output, and its deviation from the set point. */
+export function liveCurves(traces: readonly Trace[], { timeS, measured }: LiveFlight): Map<number, LiveCurve> {
+  const curves = new Map<number, LiveCurve>();
+  if (timeS.length === 0) return curves;
+  const live = traceWithRole(traces, "live");
+  const deviation = traceWithRole(traces, "live deviation");
+  const setPoint = traces[traceWithRole(traces, "set point")];
+  if (live >= 0) curves.set(live, { x: timeS, y: measured, showlegend: true });
+  if (deviation >= 0 && setPoint !== undefined) {
+    const first = timeS.findIndex((time) => time >= 0);
+    const x = first < 0 ? [] : timeS.slice(first);
+    const wanted = interpolated(x, setPoint.x as number[], setPoint.y as number[]);
+    const y = wanted.map((value, place) => (measured[timeS.length - x.length + place] ?? Number.NaN) - value);
+    curves.set(deviation, { x, y, showlegend: false });
+  }
+  return curves;
+}
+
+/** Values of a polyline at ascending places; constant beyond its ends. */
+function interpolated(at: readonly number[], xs: readonly number[], ys: readonly number[]): number[] {
+  let next = 0;
+  return at.map((x) => {
+    while (next < xs.length && (xs[next] as number) <= x) next += 1;
+    const [left, right] = [Math.max(next - 1, 0), Math.min(next, xs.length - 1)];
+    const [x0, x1, y0, y1] = [xs[left], xs[right], ys[left], ys[right]] as [number, number, number, number];
+    return x1 > x0 ? y0 + ((y1 - y0) * (x - x0)) / (x1 - x0) : y0;
+  });
+}
+
+/** The traces with what has been measured; unchanged without a flight. */
 export function withLive(traces: readonly Trace[], flight: LiveFlight | null): Trace[] {
-  if (flight === null || flight.timeS.length === 0) return [...traces];
-  return traces.map((trace) =>
-    trace.meta?.role === "live" ? { ...trace, x: flight.timeS, y: flight.measured, showlegend: true } : trace,
-  );
+  if (flight === null) return [...traces];
+  const curves = liveCurves(traces, flight);
+  return traces.map((trace, place) => ({ ...trace, ...curves.get(place) }));
 }
 
 type Points = { time_s: number[]; values: number[] } | null;

@@ -1,7 +1,7 @@
 import { useQueryClient } from "@tanstack/react-query";
 import { Suspense, useEffect, useLayoutEffect, useRef } from "react";
-import { Link, Outlet, useLocation, useMatch, useNavigationType } from "react-router";
-import { useReadOnlyReason } from "../api/access";
+import { Link, Outlet, useLocation, useMatch, useNavigationType, useSearchParams } from "react-router";
+import { useReadOnlyReason, useUnlocked } from "../api/access";
 import { useRenewedControl } from "../api/control";
 import { useCampaign } from "../api/queries";
 import { useVehicle } from "../api/vehicles";
@@ -9,7 +9,7 @@ import { followEvents } from "../live/events";
 import { useAbort, useFlying } from "../live/flights";
 import { liveFlightsNow, useConnection } from "../live/store";
 import { VehicleBadge } from "../ui/Badges";
-import { ReadOnlyNotice } from "../ui/Notices";
+import { ReadOnlyNotice, UnlockedNotice } from "../ui/Notices";
 import classes from "./Frame.module.css";
 import { ConnectionNotice, ConnectionState, FlyingBar, ThemeSwitch } from "./HeaderBar";
 import { KeyboardHelp } from "./KeyboardHelp";
@@ -88,6 +88,8 @@ export function AppFrame() {
   usePagesOpenAtTop();
   const { state } = useConnection();
   const watching = useReadOnlyReason(null);
+  const unlocked = useUnlocked();
+  const [parameters] = useSearchParams();
   useSpaceAborts(flying, campaignId, abort.press);
   return (
     <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
@@ -125,6 +127,7 @@ export function AppFrame() {
       <SpokenAnnouncements />
       <main id="main" className={classes["main"]} tabIndex={-1} data-stale={state === "away" || undefined}>
         <ReadOnlyNotice why={watching} />
+        <UnlockedNotice what={parameters.has("unlocked") ? unlocked : null} />
         <PageGuard path={pathname}>
           <Suspense fallback={<div aria-busy="true" />}>
             <Outlet context={abort} />

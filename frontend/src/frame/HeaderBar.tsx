@@ -47,8 +47,8 @@ export function ConnectionNotice() {
   if (state === "live" && !worker) {
     return (
       <p className={classes["notice"]} role="status">
-        <strong>No worker is running.</strong> Flights and computations are paused until it is back. Start it with{" "}
-        <code>gainline worker</code>.
+        <strong>No worker is running.</strong> Flights and computations are paused until it is back. The server restarts
+        its own worker within seconds; start a separate one with <code>gainline worker</code>.
       </p>
     );
   }

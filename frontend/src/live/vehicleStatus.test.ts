@@ -59,7 +59,8 @@ test("news that come while the vehicle itself is silent do not make it current",
 
 test("a vehicle that is gone or being sought is not current, however new the news", () => {
   expect(aged(heard({ state: "gone" }), after(0)).isCurrent).toBe(false);
-  expect(linkText(aged(heard({ state: "gone" }), after(0)))).toBe("link lost");
+  expect(linkText(aged(heard({ state: "gone", packet_age_s: 8.2 }), after(0)))).toBe("link lost for 8.2 s");
+  expect(linkText(aged(heard({ state: "gone", packet_age_s: null }), after(0)))).toBe("link lost");
   expect(linkText(aged(heard({ state: "connecting", packet_age_s: null }), after(0)))).toBe("connecting");
   const still = aged(heard({ state: "not answering" }), after(0));
   expect([still.isCurrent, linkText(still)]).toEqual([false, "process not responding"]);

@@ -84,7 +84,7 @@ export function linkText(one: Aged | null): string {
     case "connecting":
       return "connecting";
     case "gone":
-      return "link lost";
+      return one.linkAgeS === null ? "link lost" : `link lost for ${ageText(one.linkAgeS)}`;
     case "not answering":
       return "process not responding";
     case "connected":

@@ -1,5 +1,5 @@
-import { IconAlertTriangle, IconEye } from "@tabler/icons-react";
-import { otherProblems, problemOf } from "../api/problems";
+import { IconAlertTriangle, IconEye, IconLockOpen } from "@tabler/icons-react";
+import { otherProblems, type Problem, problemOf } from "../api/problems";
 import classes from "./Notices.module.css";
 
 interface Props {
@@ -11,7 +11,16 @@ interface Props {
 /** What happened, what it means, what to do. Renders nothing without an error. */
 export function ErrorNotice({ error, shown = [] }: Props) {
   const problem = problemOf(error);
-  if (problem === null) return null;
+  return problem === null ? null : <ProblemNotice problem={problem} shown={shown} />;
+}
+
+/** Why something failed earlier, as the server has stored it. Renders nothing without a reason. */
+export function FailureNotice({ reason }: { reason: string }) {
+  if (reason === "") return null;
+  return <ProblemNotice problem={{ status: 0, title: reason, detail: "", hint: "", problems: [] }} shown={[]} />;
+}
+
+function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly string[] }) {
   const others = otherProblems(problem, shown);
   return (
     <div className={classes["trouble"]} role="alert">
@@ -41,6 +50,17 @@ export function ReadOnlyNotice({ why }: { why: string | null }) {
     <p className={classes["watch"]} role="status">
       <IconEye size={20} aria-hidden />
       <span>{withCode(why)}</span>
+    </p>
+  );
+}
+
+/** Confirms what this browser may do now; renders nothing without it. */
+export function UnlockedNotice({ what }: { what: string | null }) {
+  if (what === null) return null;
+  return (
+    <p className={classes["watch"]} role="status">
+      <IconLockOpen size={20} aria-hidden />
+      <span>{what}</span>
     </p>
   );
 }

@@ -1,4 +1,4 @@
-import { Button, Chip, Group, Text, TextInput } from "@mantine/core";
+import { Button, Chip, Stack, Text, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useClassify, useJudgeAbort } from "../../api/mutations";
 import { problemOf, reasonsByField } from "../../api/problems";
@@ -128,11 +128,10 @@ export function AbortCause({ trial }: { trial: Trial }) {
     <section className={classes["abortCause"]} aria-label="Abort cause">
       <p role="status">{sentence}</p>
       {causes.length > 0 && (
-        <Group gap={8}>
+        <Stack gap={8}>
           {causes.map((cause) => (
             <Button
               key={cause}
-              px={12}
               variant="default"
               loading={judge.isPending}
               onClick={() => judge.mutate({ trial, cause })}
@@ -140,7 +139,7 @@ export function AbortCause({ trial }: { trial: Trial }) {
               {LABELS[cause]}
             </Button>
           ))}
-        </Group>
+        </Stack>
       )}
       <ErrorNotice error={judge.error} />
     </section>

@@ -4,7 +4,7 @@ import { Link } from "react-router";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
 import { gainText } from "../../ui/format";
-import { ErrorNotice } from "../../ui/Notices";
+import { ErrorNotice, FailureNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { predictedText } from "../../ui/uncertainty";
 import { useGainTitles, useUnits } from "../../ui/units";
@@ -48,7 +48,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           </div>
         </dl>
         <FlightWindow definition={campaign.definition} />
-        {trial.flight?.problem && <ErrorNotice error={new Error(trial.flight.problem)} />}
+        <FailureNotice reason={trial.flight?.problem ?? ""} />
         {can_fly ? (
           <>
             {!needs_staging && (

@@ -47,7 +47,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
           </dl>
         ) : (
           <Note>
-            Not connected.{" "}
+            {vehicle.actions.includes("disconnect") ? "Connecting: no vehicle has answered yet. " : "Not connected. "}
             {identity === null
               ? "Connecting compares the vehicle's gains with the safe gains and changes nothing."
               : "Connecting writes the safe gains and reads them back. The vehicle does not move."}

@@ -2,6 +2,7 @@ import { Button, Checkbox, Stack, Switch, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
+import { useRegistrationRefusal } from "../../api/access";
 import { useRegisterVehicle } from "../../api/fleet";
 import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
@@ -10,7 +11,7 @@ import { VehicleBadge } from "../../ui/Badges";
 import { OptionField, SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
 import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
-import { ErrorNotice } from "../../ui/Notices";
+import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import {
   AUTOPILOTS,
@@ -60,6 +61,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
 
   const unread = unreadGains(form);
   const simulated = isSimulated(form);
+  const refusal = useRegistrationRefusal(!simulated);
   return (
     <form
       noValidate
@@ -69,6 +71,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         register.mutate(vehicleRequest(form), { onSuccess: ({ id }) => void navigate(`/vehicles/${id}`) });
       }}
     >
+      <ReadOnlyNotice why={refusal} />
       <TextInput
         label="Name"
         description="Shown on every page, for example the number on the airframe"
@@ -124,6 +127,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           <Checkbox
             size="md"
             label="Verified safe on this vehicle"
+            description="Confirms exactly these gains: a change of one of them clears it."
             checked={form.confirmed}
             error={reasons["safe_gains_confirmed"]}
             onChange={(event) => set({ confirmed: event.currentTarget.checked })}

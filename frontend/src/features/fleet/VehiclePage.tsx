@@ -97,7 +97,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
               loading={asking === "disconnect"}
               onClick={() => ask.mutate("disconnect")}
             >
-              {vehicle.state === "disconnected" ? "Stop reconnecting" : "Disconnect"}
+              {vehicle.state === "disconnected" ? "Stop connecting" : "Disconnect"}
             </Button>
           )}
         </div>

@@ -14,7 +14,7 @@ const TITLES: Record<ReadinessStep, string> = {
 const STANDINGS = {
   done: { Icon: IconCircleCheckFilled, word: "done" },
   lost: { Icon: IconCircleXFilled, word: "lost" },
-  open: { Icon: IconCircle, word: "open" },
+  open: { Icon: IconCircle, word: "not reached" },
 } as const;
 
 function standingOf(step: ReadinessStep, { steps, lost }: Readiness): keyof typeof STANDINGS {

@@ -1,4 +1,5 @@
 import { IconCircleCheckFilled, IconCircleDashed } from "@tabler/icons-react";
+import { useRef } from "react";
 import type { Trial } from "../../api/types";
 import { useIsCurrent } from "../../live/store";
 import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
@@ -50,6 +51,13 @@ function LinkReading({ status }: { status: Aged | null }) {
   return <Reading title={title} topic="linkAge" value={ageText(status.linkAgeS)} bad={!status.isCurrent} />;
 }
 
+/** The value, or the last one that there was. */
+function useLastKnown(value: number | null | undefined): number | null | undefined {
+  const last = useRef(value);
+  if (value !== null && value !== undefined) last.current = value;
+  return last.current;
+}
+
 /** Large readings: altitude and error, then the rest. Stale readings are grey. */
 export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }: Props) {
   const reading = readingOf(live?.channel ?? "altitude_m");
@@ -58,6 +66,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
   const isCurrent = useIsCurrent(live);
   const stale = hasLink ? !(status?.isCurrent ?? false) : isFlying && !isCurrent;
   const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
+  const lastOutput = useLastKnown(output);
   const error = isFlying ? live?.errorSoFar : trial.error;
   const errorTitle = isFlying ? "Error so far" : "Error";
   const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
@@ -66,7 +75,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
       <dl className={classes["row"]}>
         <Reading
           title={stale ? `${reading.title}, last known` : reading.title}
-          value={withUnit(output, reading.unit, reading.digits)}
+          value={withUnit(stale ? lastOutput : output, reading.unit, reading.digits)}
           size="huge"
           stale={stale}
         />

@@ -9,7 +9,7 @@ import { useFlyActions } from "../../api/vehicleCommands";
 import type { AbortControl } from "../../live/flights";
 import { StateBadge } from "../../ui/Badges";
 import { HoldButton } from "../../ui/HoldButton";
-import { ErrorNotice } from "../../ui/Notices";
+import { ErrorNotice, FailureNotice } from "../../ui/Notices";
 import { trialStateLabel } from "../../ui/states";
 import { FlightMarkers, PredictionResult } from "../campaign/FlightMarkers";
 import { FlightNotes } from "../campaign/FlightNotes";
@@ -113,7 +113,7 @@ export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
               </Anchor>
             </p>
           )}
-          <Problem trial={trial} />
+          <FailureNotice reason={trial.flight?.problem ?? ""} />
           <ErrorNotice error={fly.error} />
         </Stack>
       );
@@ -159,7 +159,7 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
           </Anchor>
         </p>
       )}
-      <Problem trial={trial} />
+      <FailureNotice reason={trial.flight?.problem ?? ""} />
       <PreflightChecks checks={vehicle.checks ?? []} />
       <Button
         size="xl"
@@ -247,12 +247,6 @@ function Waiting({ text, children }: { text: string; children?: ReactNode }) {
       {children}
     </Stack>
   );
-}
-
-/** Why the last attempt did not fly. */
-function Problem({ trial }: { trial: Trial }) {
-  const problem = trial.flight?.problem ?? "";
-  return problem === "" ? null : <ErrorNotice error={new Error(problem)} />;
 }
 
 /** Failed preflight checks; renders nothing if all passed. */
