@@ -4,7 +4,7 @@
 
 Runs a real server, its worker and two simulated drones in separate processes. A tap between each vehicle and its link
 forwards every packet and records when the operating system received it. 20 clients follow the event stream. Flights are
-aborted over HTTP at random instants after the take-off; in between, vehicles on the ground are sent Land. With `--idle`
+aborted over HTTP at random instants after the takeoff; in between, vehicles on the ground are sent Land. With `--idle`
 a client keeps so many idle connections open and reopens those that the server closes, 200 a second; `--files` limits
 the files that the server may have open. Prints the figures. Exits with 1 if the 99th percentile of either latency is
 above 50 ms, a command was never sent, or a client received no telemetry.
@@ -229,7 +229,7 @@ class RequestTimes:
 
 
 class Operator:
-    """One operator with one vehicle: flights until the time is over, each aborted soon after its take-off."""
+    """One operator with one vehicle: flights until the time is over, each aborted soon after its takeoff."""
 
     def __init__(self, url: str, index: int, address: str, asked: RequestTimes) -> None:
         each_its_own = httpx2.Limits(max_keepalive_connections=0)
@@ -257,7 +257,7 @@ class Operator:
             trial = self._post(f"/campaigns/{self._campaign}/trials", {"gains": TRIED})["id"]
             self._post(f"/trials/{trial}/fly")
             self._until(f"/trials/{trial}", lambda found: found["state"] == "flying")
-            time.sleep(2.5 + self._randomness.uniform(0.0, 1.0))  # time for arming and the take-off command
+            time.sleep(2.5 + self._randomness.uniform(0.0, 1.0))  # time for arming and the takeoff command
             self._asked.aborts.append((self._index, time.time_ns()))
             assert self._post(f"/trials/{trial}/abort", {"reason": "bench"})["accepted"]
             self._until(f"/vehicles/{self._vehicle}", lambda vehicle: vehicle["state"] == "ready")

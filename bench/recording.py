@@ -5,7 +5,7 @@
 Another process runs a simulated drone in real time; this one flies a whole trial with a record of that length and a
 telemetry log. Positions are identified by the vehicle's own time stamps: each that was sent between the first and the
 last of the record must be exactly once in the record and once in the log. Processor time is that of this process from
-the take-off command to the end of the record. Prints the figures; exits with 1 if a sample is missing or recording
+the takeoff command to the end of the record. Prints the figures; exits with 1 if a sample is missing or recording
 takes more than a tenth of a core.
 """
 

@@ -42,7 +42,7 @@ class Permission(Enum):
     REAL = auto()
     """The same operations on a real vehicle."""
     TAKE_OFF = auto()
-    """The take-off of a real vehicle."""
+    """The takeoff of a real vehicle."""
     STOP = auto()
     """Stopping a real vehicle's motors, or closing its link; also permitted where no link may be opened."""
     REVIEW = auto()
@@ -149,7 +149,7 @@ def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
 def _locked(act: Permission, vehicle: str) -> NotAllowedError:
     if act is Permission.TAKE_OFF:
         return NotAllowedError(
-            f"{vehicle} is a real vehicle: only its operator can start the take-off, in an unlocked browser.",
+            f"{vehicle} is a real vehicle: only its operator can start the takeoff, in an unlocked browser.",
             hint=UNLOCK_HINT,
             script_hint=STAGED_BY_SCRIPT,
         )

@@ -263,8 +263,8 @@ def _chain(session: Session, row: CampaignRow) -> list[CampaignRow]:
         chain.insert(0, found)
     if len(chain) > MAX_CAMPAIGNS:
         raise ConflictError(
-            f"Campaign {row.id} has a chain of {len(chain) - 1} warm starts, and a bundle can hold {MAX_CAMPAIGNS} "
-            "campaigns. Without the first campaigns of the chain its gains could not be computed again.",
+            f"Campaign {row.id} follows a chain of {len(chain) - 1} warm starts; a bundle can hold {MAX_CAMPAIGNS} "
+            "campaigns, and without the first ones its gains could not be recomputed.",
             hint=f"Export the bundle of an earlier campaign of the chain (campaign {chain[MAX_CAMPAIGNS - 1].id} "
             "is the last that fits), or the report and the records of this one.",
         )

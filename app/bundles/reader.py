@@ -136,7 +136,7 @@ class Bundle:
                     used.add(_once(used, f"{field}.trials.{number}.telemetry", trial.telemetry))
                     self.part(trial.telemetry)
         if idle := sorted(self.manifest.parts.keys() - used):
-            _refuse(idle[0], "is not referred to in the contents")
+            _refuse(idle[0], "is not listed in the contents")
 
     def _listed(self, name: str, limit: int) -> bytes:
         if name not in self.manifest.parts:
@@ -223,7 +223,7 @@ def _output_of(field: str, campaign: Campaign) -> str:
 
 def _once(used: set[str], field: str, part: str) -> str:
     if part in used:
-        _refuse(field, f"{part} is used for something else already")
+        _refuse(field, f"{part} is already used for something else")
     return part
 
 

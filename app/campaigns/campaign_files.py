@@ -60,7 +60,7 @@ def read_campaign_file(path: Path) -> CampaignFile:
         raise _no_campaign(path, problems) from error
     if file.definition.start.kind == "campaign":
         reason = (
-            "'campaign' needs the database that contains the other campaign: create it over the API or in the dashboard"
+            "'campaign' needs the other campaign's database: create this campaign in the dashboard or through the API"
         )
         raise _no_campaign(path, (_located(document, ("definition", "start", "kind"), reason),))
     try:
@@ -94,7 +94,7 @@ def _no_campaign(path: Path, problems: tuple[Problem, ...]) -> InputError:
     return InputError(
         f"{path.name} is not a valid campaign file.",
         problems=problems,
-        hint="Correct the named lines; docs/campaign-files.md lists the fields.",
+        hint="Correct the lines listed; docs/campaign-files.md describes the fields.",
     )
 
 
@@ -105,7 +105,7 @@ def _load(path: Path) -> "CommentedMap":
 
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
-            raise InputError(f"{path.name} is larger than 1 MiB.", hint="Give a campaign file, not a flight record.")
+            raise InputError(f"{path.name} is larger than 1 MiB.", hint="Use a campaign file, not a flight record.")
         document = YAML(typ="rt").load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(
@@ -117,10 +117,10 @@ def _load(path: Path) -> "CommentedMap":
         raise InputError(
             f"{path.name} is not YAML.",
             problems=(Problem(f"line {line}", str(error.problem)),),
-            hint="Correct the named line.",
+            hint="Correct this line.",
         ) from error
     except (YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path.name} is not YAML: {error}.", hint="Give a UTF-8 YAML file.") from error
+        raise InputError(f"{path.name} is not YAML: {error}.", hint="Use a UTF-8 YAML file.") from error
     if not isinstance(document, CommentedMap):
         raise InputError(
             f"{path.name} is not a valid campaign file.",
@@ -173,7 +173,7 @@ def with_settings(file: CampaignFile, settings: Mapping[tuple[str, ...], object]
             for entry in error.errors()
         )
         raise InputError(
-            "These settings do not define a valid campaign.", problems=problems, hint="Correct the named settings."
+            "These settings do not define a valid campaign.", problems=problems, hint="Correct the settings listed."
         ) from error
 
 
@@ -262,7 +262,7 @@ def _assignments(file: CampaignFile, settings: Sequence[str]) -> dict[SettingPat
         raise InputError(
             "Invalid settings.",
             problems=tuple(problems),
-            hint="Settings belong to the chosen vehicle, experiment, strategy and stop rule.",
+            hint="--set takes settings of the chosen vehicle, experiment, strategy and stop rule.",
         )
     return chosen
 

@@ -96,7 +96,7 @@ def check_campaign(asked: DefinitionIn, vehicle: VehicleChoice) -> tuple[Definit
         raise InputError(
             "Invalid campaign.",
             problems=tuple(problems),
-            hint="Correct the named fields, then try again; nothing was changed.",
+            hint="Correct the fields listed, then try again; nothing was changed.",
         )
     return definition, options
 
@@ -119,9 +119,9 @@ def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionVal
     described = VEHICLE_KINDS[kind]
     if definition.experiment not in described.experiments:
         yield Problem("definition.experiment", f"{definition.experiment!r} cannot be flown by {kind}")
-        yield Problem("vehicle.kind", f"{kind!r} flies {', '.join(described.experiments)} only")
+        yield Problem("vehicle.kind", f"{kind!r} flies only {', '.join(described.experiments)}")
     elif options and definition.experiment not in (flies := described.experiments_with(options)):
-        reason = f"{definition.experiment!r} tunes other gains than this vehicle's, which flies {', '.join(flies)}"
+        reason = f"{definition.experiment!r} tunes gains that this vehicle does not have; it flies {', '.join(flies)}"
         yield Problem("definition.experiment", reason)
 
 
@@ -183,7 +183,7 @@ def _other_window(campaign: CampaignRow, asked: DefinitionIn) -> str | None:
     theirs_s, own_s = experiment_of_campaign(campaign).window_s, experiment.configured(chosen).window_s
     if theirs_s == own_s:
         return None
-    return f"campaign {campaign.id} scores {theirs_s:g} s of a flight, this one {own_s:g} s: different windows"
+    return f"campaign {campaign.id} has a scored window of {theirs_s:g} s, this one of {own_s:g} s"
 
 
 def _refused(field: str, reason: str) -> InputError:

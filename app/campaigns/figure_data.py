@@ -317,4 +317,4 @@ def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
             )
     if record.clock != "simulation" and len(record.time_s) > 1:
         interval = Curve(record.time_s[1:], np.diff(record.time_s))
-        yield ChannelPanel(title="Interval (s)", unit="s", curves={"Since the sample before": interval})
+        yield ChannelPanel(title="Interval (s)", unit="s", curves={"Since the previous sample": interval})

@@ -112,7 +112,7 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
     if job is not None and not wanted and job.state in {JobState.FAILED, JobState.CANCELLED}:
         problem = jobs.job_problem(job)
         why = "It was cancelled." if problem is None else f"{problem.title} {problem.hint}"
-        return _waiting(f"The landscape could not be computed. {why} Retry it on the page Jobs.")
+        return _waiting(f"The landscape could not be computed. {why} Retry it on the Jobs page.")
     reason = (
         "The model is being evaluated at several hundred gain sets around the flown and the proposed ones. This "
         "takes seconds, or half a minute with the calibrated model. The landscape appears here automatically."

@@ -123,11 +123,11 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
     """A proposal of this campaign that is not stale. Raises NotFoundError, or ConflictError when it is stale."""
     row = repository.get_proposal_or_none(session, proposal_id)
     if row is None or row.campaign_id != campaign.id:
-        raise NotFoundError("proposal", proposal_id, hint="Request the campaign's proposal and use its id.")
+        raise NotFoundError("proposal", proposal_id, hint="Get the campaign's proposal and use its id.")
     if is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
             f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
-            hint="Decide on the new proposal, which is shown once it is computed.",
+            hint="Wait for the new proposal, then decide again.",
         )
     return row
 
@@ -137,7 +137,7 @@ def require_fresh_proposal(session: Session, campaign: CampaignRow) -> ProposalR
     row = repository.latest_proposal(session, campaign.id)
     if row is None or is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
-            f"The next gains of campaign {campaign.id} are not computed yet.",
+            f"The next gains of campaign {campaign.id} have not been computed yet.",
             hint="Wait until they are computed, then try again.",
         )
     return row
@@ -172,8 +172,8 @@ def stored_start(session: Session, campaign: CampaignRow) -> Gains:
         or is_stale(session, campaign, latest, history.trials_of(session, campaign.id))
     ):
         raise ConflictError(
-            f"The start gains of campaign {campaign.id} are not computed yet; the step limits of your own gains are "
-            "measured from them.",
+            f"The start gains of campaign {campaign.id} have not been computed yet; the step limits of custom gains "
+            "are measured from them.",
             hint="Wait until they are computed, then try again.",
         )
     return latest.gains

@@ -221,7 +221,7 @@ def reopen_campaign(session: Session, campaign_id: int, flights: int, context: R
     check_action(CAMPAIGN_ACTIONS, "reopen", row.state, f"Campaign {row.id}")
     if (rehearsed := repository.rehearsed_id(session, row.id)) is not None:
         raise ConflictError(
-            f"Campaign {row.id} is the rehearsal of campaign {rehearsed}, which may fly because of its result.",
+            f"Campaign {row.id} is the rehearsal of campaign {rehearsed}, whose clearance to fly rests on its result.",
             hint="Clone it to fly more.",
         )
     reopen(row)

@@ -208,8 +208,8 @@ def _notes(
     notes = [verdict_sentence(experiment, now)]
     if expected > _NO_OPTIMISM * now.winner.standard_error(now.scatter):
         notes.append(
-            f"The best of {len(now.groups)} gain sets ({format_gains(now.winner.gains)}) looks better than it is, "
-            f"because it was selected as the lowest: by {short(expected)} {unit} on average. "
+            f"The best of {len(now.groups)} gain sets ({format_gains(now.winner.gains)}) looks better than it is "
+            f"by {short(expected)} {unit} on average, because the lowest was selected. "
             f"Its expected error is closer to {short(now.winner.mean + expected)} {unit}."
         )
     if drift is not None:

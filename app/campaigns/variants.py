@@ -37,7 +37,7 @@ def gains_of(session: Session, campaign: CampaignRow, variant: Variant) -> dict[
     found = _variants(campaign, trials, proposed)
     if not found:
         raise ConflictError(
-            f"Campaign {campaign.id} has no valid flight inside its bounds yet, which a {variant} needs.",
+            f"A {variant} needs a valid flight inside the bounds; campaign {campaign.id} has none yet.",
             hint="Fly the first proposal.",
         )
     if variant not in found:

@@ -56,7 +56,7 @@ GivenGains = Annotated[
         "--gains",
         metavar="NAME=NUMBER,…",
         show_default=False,
-        help="A gain set to fly with the strategy manual. Repeatable; the sets are flown in this order.",
+        help="A gain set to fly with the `manual` strategy. Repeatable; the sets are flown in this order.",
     ),
 ]
 Overrule = Annotated[
@@ -124,7 +124,7 @@ def serve(
 def unlock(
     script: Annotated[
         bool,
-        typer.Option("--script", help="Print the token of a script instead, to send as `Authorization: Bearer TOKEN`."),
+        typer.Option("--script", help="Print a script's token instead, to send as `Authorization: Bearer TOKEN`."),
     ] = False,
     data_dir: DataDir = None,
 ) -> None:
@@ -192,7 +192,9 @@ def reproduce(
     ] = False,
     trace: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", show_default=False, help="For controller: another recorded run, .csv or .csv.gz."),
+        typer.Option(
+            metavar="FILE", show_default=False, help="For `controller`: another recorded run, .csv or .csv.gz."
+        ),
     ] = None,
     json_out: JsonOut = None,
 ) -> None:
@@ -253,9 +255,7 @@ def sim_drone(
             "mavlink:ADDRESS.",
         ),
     ] = None,
-    any_network: Annotated[
-        bool, typer.Option("--any-network", help="Allow links that lead beyond this computer.")
-    ] = False,
+    any_network: Annotated[bool, typer.Option("--any-network", help="Allow links to other computers.")] = False,
 ) -> None:
     """Run a simulated MAVLink drone until stopped."""
     from app.cli.sim_drone import run_sim_drone

@@ -101,7 +101,7 @@ def run_campaign(
             )
     except BaseException as error:
         if display.trials or display.touched:
-            report(f"After an error: {str(error) or type(error).__name__}")
+            report(f"an error occurred: {str(error) or type(error).__name__}")
         raise
     report(stopped_because)
 
@@ -327,7 +327,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
     ]
     out.print(table(("run #", f"error ({unit})", f"predicted ({unit})", *names, "step", ""), rows, title=file.name))
     if overruled := [str(trial.number) for trial in display.trials if trial.overrule_reason]:
-        out.print(f"Refused by the gate and flown with a reason: flight {', '.join(overruled)}.")
+        out.print(f"Gate overruled: flight {', '.join(overruled)}.")
     out.print(f"Stopped: {stopped_because}")
     if best is not None:
         out.print(f"Best: {_error(best.error, unit)} with {format_gains(best.gains)}, flight {best.number}.")

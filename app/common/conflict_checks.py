@@ -21,7 +21,7 @@ def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, wha
     if state not in actions[action]:
         raise ConflictError(
             f"{what} is {state}; “{action}” is possible only while it is {_or(actions[action])}.",
-            hint="Load it again: its state has changed, or another step must come first.",
+            hint="Reload it: its state has changed, or another step must come first.",
         )
 
 
@@ -44,7 +44,7 @@ def check_version(sent: int, held: int, what: str, differences: Mapping[str, tup
     )
     raise ConflictError(
         f"{what} was changed by another client (current version {held}, you edited version {sent}).",
-        hint="Load it again, review the changes, and repeat your edit.",
+        hint="Reload it, review the changes, then repeat your edit.",
         problems=(Problem("version", f"is {held}, got {sent}"), *problems),
     )
 
@@ -60,4 +60,4 @@ def _or(states: frozenset[S]) -> str:
 
 
 def _look_again(possible: list[S]) -> str:
-    return f"Load it again; from here it can become {', '.join(possible)}." if possible else "This is its last state."
+    return f"Reload it; from here it can become {', '.join(possible)}." if possible else "This state is final."

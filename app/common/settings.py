@@ -80,7 +80,7 @@ def read_settings(given: Mapping[str, str | int | Path]) -> Settings:
         raise InputError(
             "Invalid settings.",
             problems=problems,
-            hint="Correct the named option or variable; docs/operations.md lists them all.",
+            hint="Correct the option or variable listed; docs/operations.md lists them all.",
         ) from error
 
 

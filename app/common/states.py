@@ -208,7 +208,7 @@ class TrialState(StrEnum):
             planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
                │  ↑───────┘ │        ├──→ aborted
                │            │        ├──→ lost ──→ captured (record recovered) | invalid
-               │            │        └──→ planned (no take-off command was sent)
+               │            │        └──→ planned (no takeoff command was sent)
                ├────────────┴──→ cancelled
                └──→ captured (flown elsewhere, imported)
 

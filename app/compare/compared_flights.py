@@ -116,7 +116,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
     if problems:
         raise InputError(
             "These flights cannot be compared.",
-            hint="Remove the named flights, or choose others.",
+            hint="Remove the flights listed, or choose others.",
             problems=tuple(problems),
         )
     rows = [found[trial_id] for trial_id in trial_ids]

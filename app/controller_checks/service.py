@@ -160,7 +160,7 @@ def _result(row: ControllerCheckRow) -> Result:
         return _RESULT.validate_python(row.result)
     except ValueError as error:
         raise StorageError(
-            f"Controller check {row.id} was made by another version of the program.", hint="Check the recording again."
+            f"Controller check {row.id} was made by another version of Gainline.", hint="Run the check again."
         ) from error
 
 

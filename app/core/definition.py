@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from app.core.errors import Problem
-from app.core.formatting import span
+from app.core.formatting import allowed_range
 from app.core.policy import Gains, is_finite, shortened
 from app.core.records.trajectory import Trajectory
 
@@ -152,7 +152,7 @@ class Option:
         if isinstance(self.default, int) and value != int(value):
             return f"must be a whole number, got {value:g}"
         if (self.lower is not None and value < self.lower) or (self.upper is not None and value > self.upper):
-            return f"must lie in {span(self.lower, self.upper)} {self.unit}".rstrip() + f", got {value:g}"
+            return f"must be {allowed_range(self.lower, self.upper)} {self.unit}".rstrip() + f", got {value:g}"
         return None
 
 

@@ -47,9 +47,11 @@ def short_percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
-def span(lower: float | None, upper: float | None) -> str:
-    """`0 … 409`; `any` where there is no limit."""
-    return " … ".join("any" if limit is None else f"{limit:g}" for limit in (lower, upper))
+def allowed_range(lower: float | None, upper: float | None) -> str:
+    """`between 0 and 409`; `at least 0` or `at most 409` where there is one limit, `any` where there is none."""
+    if lower is None:
+        return "any" if upper is None else f"at most {upper:g}"
+    return f"at least {lower:g}" if upper is None else f"between {lower:g} and {upper:g}"
 
 
 def count(amount: int, noun: str) -> str:

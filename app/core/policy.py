@@ -14,7 +14,7 @@ Vector = NDArray[np.float64]
 Gains = Mapping[str, float]
 
 _ROUNDING: Final = 1e-9  # a step of exactly the allowed fraction is allowed
-_HINT: Final = "Correct the named gains and send the set again; nothing was changed."
+_HINT: Final = "Correct the gains listed, then send the set again; nothing was changed."
 
 
 def is_finite(value: float) -> bool:
@@ -58,14 +58,14 @@ class Gain:
         if self.integer and value != int(value):
             return f"must be a whole number of counts, got {value:g}"
         if self.integer and not -(2**31) <= value < 2**31:
-            return f"must fit into 32 bits, got {shortened(value)}"
+            return f"must fit in 32 bits, got {shortened(value)}"
         return None
 
     def refusal_by_bounds(self, value: float) -> str | None:
         """Why the bounds refuse a number, or None if they do not."""
         if self.lower <= value <= self.upper:
             return None
-        return f"must lie in {self.lower:g} … {self.upper:g} {self.unit}, got {value:g}"
+        return f"must be between {self.lower:g} and {self.upper:g} {self.unit}, got {value:g}"
 
 
 @dataclass(frozen=True, slots=True)

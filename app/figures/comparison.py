@@ -106,7 +106,7 @@ class ComparisonFigure:
             ),
             yaxis2=theme.titled(
                 palette,
-                f"Less {first} ({data.output_unit})",
+                f"Minus {first} ({data.output_unit})",
                 domain=[0.0, 0.32],
                 nticks=5,
                 zeroline=True,
@@ -137,7 +137,7 @@ class ComparisonFigure:
         )
 
     def _difference(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
-        name = f"{flight.label} less {self.data.flights[0].label}"
+        name = f"{flight.label} minus {self.data.flights[0].label}"
         return scatter(
             name,
             thinned(curve.time_s, curve.values, POINTS),
@@ -159,7 +159,7 @@ class ComparisonFigure:
         )
         off = f" {outside} off scale, marked at the edge." if outside else ""
         return (
-            f"{data.output_title} of {len(data.flights)} flights over time, and below the difference of each from "
+            f"{data.output_title} of {len(data.flights)} flights over time, and below it the difference of each from "
             f"{data.flights[0].label}: {listed}.{off}"
         )
 
@@ -172,7 +172,7 @@ class ComparisonFigure:
         ]
         named += [
             (
-                Column(f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} less {first}",
+                Column(f"{flight.label.lower()}_less_{first.lower()}", f"{flight.label} minus {first}",
                        data.output_unit, 3),
                 curve,
             )

@@ -125,7 +125,7 @@ class ErrorsFigure:
         right = last + 0.95
         return [
             scatter(
-                "Noise of best",
+                "Scatter of the best",
                 ([0.5, right, right, 0.5, 0.5], [low, low, high, high, low]),
                 role="noise",
                 line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),
@@ -318,8 +318,8 @@ class ErrorsFigure:
                 Column("error", "Error", unit, 4),
                 Column("standard_error", "± scatter of one flight", unit, 4),
                 Column("predicted_error", "Predicted", unit, 4),
-                Column("predicted_low", "At least, 90 %", unit, 4),
-                Column("predicted_high", "At most, 90 %", unit, 4),
+                Column("predicted_low", "90 % interval, lower", unit, 4),
+                Column("predicted_high", "90 % interval, upper", unit, 4),
                 Column("best_so_far", "Best so far", unit, 4),
             ),
             tuple(rows),

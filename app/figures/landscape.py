@@ -261,7 +261,7 @@ class LandscapeFigure:
         ]
         if self.landscape.still:
             parts.append(
-                f"The gains with most of the gradient are varied; {', '.join(self.landscape.still)} are fixed."
+                f"The gains with the largest gradient are varied; {', '.join(self.landscape.still)} are fixed."
             )
         return " ".join(parts)
 

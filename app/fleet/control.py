@@ -100,7 +100,7 @@ def require_control(row: VehicleRow, context: RequestContext) -> str:
     require(Permission.TAKE_OFF, context.caller, row.name)
     if not context.from_our_page:
         raise NotAllowedError(
-            f"{row.name} is a real vehicle: only its operator can start the take-off, in the browser.",
+            f"{row.name} is a real vehicle: only its operator can start the takeoff, in the browser.",
             hint="Hold the button on the flight's fly page.",
             script_hint=STAGED_BY_SCRIPT,
         )

@@ -32,7 +32,7 @@ class CampaignVehicle(BaseModel):
     registered: bool
     can_fly: Annotated[bool, Field(description="false when flights are made elsewhere and uploaded")]
     needs_staging: Annotated[
-        bool, Field(description="true if a flight is staged first and its operator starts the take-off")
+        bool, Field(description="true if a flight is staged first and its operator starts the takeoff")
     ]
     state: VehicleState
     options: dict[str, OptionValue]

@@ -112,7 +112,7 @@ def _no_choice(field: str, reason: str) -> InputError:
     return InputError(
         "Invalid vehicle.",
         problems=(Problem(f"vehicle.{field}", reason),),
-        hint="Register the vehicle on the page Vehicles, then choose it for the campaign.",
+        hint="Register the vehicle on the Vehicles page, then choose it for the campaign.",
         script_hint="Register the vehicle with POST /api/vehicles and give its `id`.",
     )
 
@@ -139,7 +139,7 @@ def require_window_fits(row: VehicleRow, window_s: float) -> None:
     longest_s = get_kind(row.kind).longest_window_s(settings_of(row))
     if window_s > longest_s:
         raise ConflictError(
-            f"{row.name} flies for at most {longest_s:g} s of scored window, but the campaign's is {window_s:g} s: its "
+            f"{row.name} can fly a scored window of at most {longest_s:g} s; the campaign's is {window_s:g} s. Its "
             "flight plan would land it before the end.",
             hint="Raise the time limit of Takeoff in its flight plan, then plan_time_s; or choose a shorter window.",
         )

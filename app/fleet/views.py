@@ -44,7 +44,7 @@ def is_registered_one_by_one(kind: VehicleKind) -> bool:
 
 
 def needs_staging(row: VehicleRow) -> bool:
-    """Whether a person's own act is required between staging and take-off: the vehicle is real and registered."""
+    """Whether a person's own act is required between staging and takeoff: the vehicle is real and registered."""
     return row.is_real and row.registered
 
 

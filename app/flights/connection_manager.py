@@ -110,7 +110,7 @@ class VehicleConnectionManager:
     def order(self, vehicle_id: int, order: VehicleCommandKind, reason: str, by_s: float) -> Future[str]:
         """Send a command; the future holds why it was not forwarded to the vehicle, or "" once it was.
 
-        A flight that waits for its take-off stands down as well.
+        A flight that waits for its takeoff stands down as well.
         """
         slot = self._slots.get(vehicle_id)
         if slot is None or (session := slot.live) is None:

@@ -52,7 +52,7 @@ from app.vehicles.base import (
 from app.vehicles.registry import get_kind, restore_safe_gains
 
 Staging = Literal["none", "staged", "silent", "lost"]
-"""Of the flight that waits for its take-off: nothing staged, the staged gains read back, a silence since then, or the
+"""Of the flight that waits for its takeoff: nothing staged, the staged gains read back, a silence since then, or the
 gains no longer on the vehicle."""
 _NOT_READY: Final[Mapping[Staging, str]] = {
     "silent": "nothing was received from the vehicle for 2 s",
@@ -70,7 +70,7 @@ LOCK_TIMEOUT_S: Final = 120.0
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
 """How long the process repeats a command after its worker's end; shorter than the next connection's wait for the
 lock."""
-_EXPIRED: Final = "The command reached the vehicle's process too late and was not sent; the caller was informed."
+_EXPIRED: Final = "The command reached the vehicle's process too late and was not sent; the caller was notified."
 
 
 def run_connection_process(pipe: Connection, call: ConnectionRequest) -> None:
@@ -210,7 +210,7 @@ class VehicleProcess(FlightLoop):
     def _while_waiting(self) -> None:
         """Callback of slow operations on the ground: forwards a command at once, which interrupts the operation.
 
-        Raises InterruptedByOrderError for a forwarded command, VehicleError when the take-off is late.
+        Raises InterruptedByOrderError for a forwarded command, VehicleError when the takeoff is late.
         """
         if not self._is_open:
             return
@@ -221,7 +221,7 @@ class VehicleProcess(FlightLoop):
             self._end_interruptions()
             raise InterruptedByOrderError(
                 f"It was interrupted: {ordered.order} was commanded ({ordered.reason}).",
-                hint="Check what the vehicle does, then request it again.",
+                hint="Check what the vehicle is doing, then request it again.",
             )
 
     @contextmanager
@@ -339,7 +339,7 @@ class VehicleProcess(FlightLoop):
             self._vehicle.log_to(None)
 
     def _require_in_time(self) -> None:
-        """Check the take-off deadline until the vehicle arms. Every wait on the ground extends it, so that only a
+        """Check the takeoff deadline until the vehicle arms. Every wait on the ground extends it, so that only a
         process that was suspended misses it. Raises VehicleError then."""
         by_s, now_s = self._take_off_by_s, time.monotonic()
         if by_s is None:
@@ -347,7 +347,7 @@ class VehicleProcess(FlightLoop):
         self._take_off_by_s = now_s + TAKE_OFF_TIMEOUT_S if now_s <= by_s else None
         if now_s > by_s:
             raise _not_flown(
-                "It was not flown: the take-off was too late, because the vehicle's process had stalled.",
+                "It was not flown: the takeoff was too late, because the vehicle's process had stalled.",
                 "Check that this computer is not overloaded, then request the flight again.",
             )
 

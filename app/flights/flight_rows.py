@@ -3,7 +3,7 @@
     claim_flight → record_staged → record_lift_off → record_outcome
 
 A flight of mode `stage` waits between record_staged and record_lift_off, for what `clearance_of` says. `record_outcome`
-and `give_up_flight` may be called at any stage: a flight whose take-off was not commanded was not flown.
+and `give_up_flight` may be called at any stage: a flight whose takeoff was not commanded was not flown.
 
 What is sent to the vehicle is stored in the flight row before it is sent; what the vehicle answers, as soon as it is
 known. Each function is for a transaction of its own, and reads the flight's rows in one statement.
@@ -40,7 +40,7 @@ _NOT_VERIFIED: Final = "its process ended before the safe gains were read back; 
 class FlightOutcome:
     """Outcome of a flight, as far as the worker knows.
 
-    With a `record` the flight took place. Without one, `lifted_off` says whether a take-off command was sent, and
+    With a `record` the flight took place. Without one, `lifted_off` says whether a takeoff command was sent, and
     `withdrawn` whether the flight was ended before that. `concern`: the safe gains could not be verified afterwards.
     `unheard`: the flight's process ended without reporting whether they are restored. `restored`: they were read back.
     """
@@ -145,8 +145,8 @@ def record_staged(session: Session, flight_id: int, read_back: dict[str, float])
 def clearance_of(session: Session, flight_id: int) -> tuple[bool, str | None]:
     """Whether a staged flight may take off now, and why it must not take place at all; (False, None) while it waits.
 
-    It may once its operator has requested the take-off, for REQUEST_TIMEOUT (10 s): nothing takes off later than its
-    operator expects. It must not when it was unstaged, its trial was cancelled, or the take-off could not begin in
+    It may once its operator has requested the takeoff, for REQUEST_TIMEOUT (10 s): nothing takes off later than its
+    operator expects. It must not when it was unstaged, its trial was cancelled, or the takeoff could not begin in
     time; the worker then restores the safe gains and records the flight as withdrawn for this reason.
     """
     flight, _ = _read(session, flight_id)
@@ -167,7 +167,7 @@ def _stand_down_reason(flight: FlightRow) -> str | None:
     if flight.trial.state not in {TrialState.PLANNED, TrialState.STAGED}:
         return f"the trial is {flight.trial.state}"
     if flight.mode == "stage" and flight.take_off_at is not None and not _may_take_off(flight):
-        return f"the take-off did not start within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's request"
+        return f"the takeoff did not start within {REQUEST_TIMEOUT.total_seconds():g} s of the operator's request"
     return None
 
 
@@ -178,17 +178,17 @@ def _may_take_off(flight: FlightRow) -> bool:
 
 
 def record_lift_off(session: Session, flight_id: int) -> None:
-    """Record that the take-off command is about to be sent.
+    """Record that the takeoff command is about to be sent.
 
     After this the flight lands, is lost, or fails because the command was not sent after all. Raises ConflictError when
     the trial was cancelled or unstaged, when the gains read back are not the trial's, or when the operator of a staged
-    flight has not requested the take-off.
+    flight has not requested the takeoff.
     """
     flight, campaign = _read_running(session, flight_id)
     trial = flight.trial
     may_take_off, reason = _clearance(flight)
     if not may_take_off:
-        why = reason or "its take-off has not been requested"
+        why = reason or "its takeoff has not been requested"
         raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
     if mismatch := find_mismatch(trial.read_back or {}, trial.gains):
         raise ConflictError(

@@ -23,7 +23,7 @@ class FlightRequest:
     """One flight, from its row to the vehicle: all that a worker and the process that flies it need of the database.
 
     `speed`: how many times faster than real time a simulation flies, None for as fast as possible. A flight of mode
-    `stage` waits, once its gains are read back, for its operator's take-off request.
+    `stage` waits, once its gains are read back, for its operator's takeoff request.
     """
 
     flight_id: int
@@ -83,7 +83,7 @@ class CancelFlight:
 
 @dataclass(frozen=True, slots=True)
 class StagingLost:
-    """From the process, while it waits for the take-off: why the vehicle no longer holds the staged gains."""
+    """From the process, while it waits for the takeoff: why the vehicle no longer holds the staged gains."""
 
     why: str
 
@@ -106,7 +106,7 @@ class SafeGainsRestored:
 class FlightFailure:
     """From the process: what went wrong.
 
-    `unsafe`: the safe gains could not be verified afterwards. `not_flown`: no take-off command was sent to the vehicle.
+    `unsafe`: the safe gains could not be verified afterwards. `not_flown`: no takeoff command was sent to the vehicle.
     """
 
     what: str

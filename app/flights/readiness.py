@@ -2,7 +2,7 @@
 
     control → staged → held → in flight → landed → reviewed
 
-Before take-off a loss takes steps back: what was reached no longer holds, and the take-off is refused until its way on
+Before takeoff a loss takes steps back: what was reached no longer holds, and the takeoff is refused until its way on
 was taken. In flight a loss takes nothing back, but tells the operator what the vehicle does now.
 """
 
@@ -45,7 +45,7 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on="Gainline restarts its own worker within seconds. Start a separate one with gainline worker. Then "
             "stage the flight again.",
             what_in_flight="The worker does not answer.",
-            way_on_in_flight="If it has ended, the vehicle lands now; otherwise the flight goes on to its end. If in "
+            way_on_in_flight="If it has ended, the vehicle is landing now; otherwise the flight continues. If in "
             "doubt, use the vehicle's own remote control.",
         ),
         "not connected": LossText(
@@ -61,7 +61,7 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "link silent": LossText(
-            what="Nothing current has been received from the vehicle for 2 s.",
+            what="No current data has been received from the vehicle for 2 s.",
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
             what_in_flight="Nothing has been received from the vehicle for 2 s.",
             way_on_in_flight=f"Land is repeated until the vehicle confirms it. {_BY_HAND}",
@@ -142,7 +142,7 @@ class Readiness:
 
     @property
     def is_ready(self) -> bool:
-        """Whether the operator may start the take-off."""
+        """Whether the operator may start the takeoff."""
         return self.steps[-1:] == ("staged",)
 
 

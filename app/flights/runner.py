@@ -37,7 +37,7 @@ from app.vehicles.base import FlightRecord, VehicleError, find_mismatch
 from app.vehicles.registry import get_kind
 
 STAGED_FOR_S: Final = 600.0
-"""How long a vehicle with a trial's gains on it waits for its operator's take-off request."""
+"""How long a vehicle with a trial's gains on it waits for its operator's takeoff request."""
 POLL_INTERVAL_S: Final = 0.05
 
 _log = structlog.get_logger(__name__)
@@ -176,7 +176,7 @@ class FlightRunner:
     def _staged(
         self, request: FlightRequest, flag: AbortFlag, backend: FlightProcess, read_back: dict[str, float]
     ) -> FlightOutcome:
-        """Command the take-off if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
+        """Command the takeoff if the vehicle holds the trial's gains and the lift-off is recorded; else cancel it."""
         ended = FlightOutcome(lifted_off=True)
         try:
             self._store(lambda session: flight_rows.record_staged(session, request.flight_id, read_back))
@@ -214,10 +214,10 @@ class FlightRunner:
                 if may_take_off or reason is not None:
                     return reason
             except StorageError as error:
-                _log.error("the take-off request cannot be read", why=str(error))
+                _log.error("the takeoff request cannot be read", why=str(error))
                 self._clock.wait_s(RETRY_S)
             self._clock.wait_s(POLL_INTERVAL_S)
-        return f"its take-off was not requested within {STAGED_FOR_S / 60:g} minutes"
+        return f"its takeoff was not requested within {STAGED_FOR_S / 60:g} minutes"
 
     def _phase(self, request: FlightRequest, phase: Phase, note: str = "") -> None:
         self._publish(FlightPhase(campaign_id=request.campaign_id, trial_id=request.trial_id, phase=phase, note=note))
@@ -260,7 +260,7 @@ class FlightRunner:
 
         def refused(error: StorageError) -> None:
             _log.error("outcome not stored yet", why=str(error))
-            self._phase(request, "landed", f"The outcome is not stored yet; storing is retried: {error}")
+            self._phase(request, "landed", f"The outcome could not be stored yet; Gainline keeps trying: {error}")
 
         return retry_until_stored(store, refused, closing=self._closing, clock=self._clock) is not None
 

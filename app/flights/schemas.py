@@ -20,5 +20,5 @@ class TrialReadiness(BaseModel):
 
     steps: list[ReadinessStep]
     lost: list[ReadinessStep]
-    losses: Annotated[list[ReadinessLoss], Field(description="why; the take-off is refused while there is any")]
-    is_ready: Annotated[bool, Field(description="whether the take-off of the staged vehicle may be requested")]
+    losses: Annotated[list[ReadinessLoss], Field(description="why; the takeoff is refused while there is any")]
+    is_ready: Annotated[bool, Field(description="whether the takeoff of the staged vehicle may be requested")]

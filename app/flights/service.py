@@ -1,4 +1,4 @@
-"""Requests for flights, from the first to the operator's take-off request. The worker's side is in `flight_rows`."""
+"""Requests for flights, from the first to the operator's takeoff request. The worker's side is in `flight_rows`."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -58,7 +58,7 @@ def fly_trial(session: Session, trial_id: int, order: FlightOrder, context: Requ
 
 
 def stage_trial(session: Session, trial_id: int, context: RequestContext) -> Trial:
-    """Request that a registered vehicle takes the gains of a planned trial and waits for its operator's take-off
+    """Request that a registered vehicle takes the gains of a planned trial and waits for its operator's takeoff
     request.
 
     Raises as `fly_trial` does, and NotAllowedError when the client may not command the vehicle.
@@ -97,8 +97,8 @@ def request_flight(
     require_may_command(vehicle, context)
     if mode == "fly" and fleet.needs_staging(vehicle):
         raise NotAllowedError(
-            f"{vehicle.name} is a real vehicle: only its operator can start the take-off, in the browser.",
-            hint="Stage the trial; its operator then starts the take-off on the fly page.",
+            f"{vehicle.name} is a real vehicle: only its operator can start the takeoff, in the browser.",
+            hint="Stage the trial; its operator then starts the takeoff on the fly page.",
         )
     rehearsals.require_rehearsed(session, campaign)
     fleet.require_window_fits(vehicle, experiment_of_campaign(campaign).window_s)
@@ -146,10 +146,10 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
 
 
 def take_off_trial(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> Trial:
-    """Request the take-off of a staged vehicle: the operator's own act.
+    """Request the takeoff of a staged vehicle: the operator's own act.
 
     For a real vehicle the request has to come from Gainline's own page in an unlocked browser on this computer, with
-    the token of the operator in control. Raises ConflictError when nothing is staged, the take-off was requested
+    the token of the operator in control. Raises ConflictError when nothing is staged, the takeoff was requested
     already, another operator is in control, the rehearsal is no longer satisfied, or the vehicle is no longer ready;
     NotAllowedError otherwise.
     """
@@ -157,7 +157,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
     check_action(TRIAL_ACTIONS, "take-off", row.state, f"Trial {row.number}")
     campaign, flight = campaigns.get_row(session, row.campaign_id), _staged(session, row)
     if flight.take_off_at is not None:
-        raise ConflictError(f"The take-off of trial {row.number} has already been requested.", hint="Watch the flight.")
+        raise ConflictError(f"The takeoff of trial {row.number} has already been requested.", hint="Watch the flight.")
     vehicle = campaign.vehicle
     if fleet.needs_staging(vehicle):
         require_control(vehicle, context)
@@ -201,7 +201,7 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, problem=reason)
-        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started and is withdrawn.")
+        return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
         raise ConflictError(
             f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
@@ -211,5 +211,5 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight has already ended.")
     raise ConflictError(
         f"Trial {row.number} is {row.state}: there is no flight to abort.",
-        hint="Load the trial again.",
+        hint="Reload the trial.",
     )

@@ -50,7 +50,7 @@ MAX_UNANSWERED_ORDERS: Final = 50
 RECONNECT_INTERVAL_S: Final = 2.0
 """How often a vehicle that is wanted connected is looked for."""
 TAKE_OFF_TIMEOUT_S: Final = 2.0
-"""A take-off later than this after the operator's request would surprise the operator."""
+"""A takeoff later than this after the operator's request would surprise the operator."""
 
 
 MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]

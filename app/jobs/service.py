@@ -315,7 +315,7 @@ def _requeue(row: JobRow) -> int:
         _fail(
             row,
             f"The worker stopped {row.attempts} times during this job.",
-            "Read its log on the page Jobs, then retry it.",
+            "Read its log on the Jobs page, then retry it.",
             [],
         )
     else:

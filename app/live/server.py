@@ -42,7 +42,7 @@ STUCK_CLIENT_BYTES: Final = 4 * 1024 * 1024
 """A client with more unread bytes is disconnected; it reconnects and reads the database."""
 CONFIRMATION_S: Final = 0.25
 """How long after a command's deadline to wait for the answer that it was forwarded in time."""
-LATE: Final = "The command reached the worker too late and is not executed: use the vehicle's own remote control now."
+LATE: Final = "The command reached the worker too late and was not executed: use the vehicle's own remote control now."
 UNCONFIRMED: Final = (
     "The process that has the vehicle's link did not answer, and will not execute the command later: use the "
     "vehicle's own remote control now."

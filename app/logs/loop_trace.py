@@ -126,7 +126,7 @@ def _value(name: str, line: int, column: str, text: str) -> int:
     value = int(text)
     low, high = (0, 1) if column == "in_flight" else (INT32_MIN, INT32_MAX)
     if not low <= value <= high:
-        raise _malformed(name, line, column, f"must lie in {low} … {high}, got {value}")
+        raise _malformed(name, line, column, f"must be between {low} and {high}, got {value}")
     return value
 
 

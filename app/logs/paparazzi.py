@@ -225,7 +225,7 @@ class _Configuration:
         companion.seek(0)
         text = companion.read(MAX_COMPANION_BYTES + 1)
         if len(text) > MAX_COMPANION_BYTES:
-            raise refused("has a companion of more than 16 MiB", "Add the .log file that was written with it.")
+            raise refused("has a companion file of more than 16 MiB", "Add the .log file that was written with it.")
         parser = expat.ParserCreate()
         parser.StartElementHandler = self._element
         parser.EntityDeclHandler = _no_entities
@@ -233,7 +233,7 @@ class _Configuration:
             parser.Parse(text, True)
         except (expat.ExpatError, ValueError) as error:
             raise refused(
-                f"has a companion that is not XML: {error}", "Add the .log file that was written with it, or none."
+                f"has a companion file that is not XML: {error}", "Add the .log file that was written with it, or none."
             ) from error
 
     def settings(self, values: Sequence[tuple[float, int, float]]) -> list[Setting]:

@@ -60,7 +60,7 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
         raise TrajectoryError(
             f"{PurePath(name).name[:80]} contains no flight.",
             hint="A .log file goes with Paparazzi's .data file of the same name: choose both.",
-            problems=(Problem("file", "is a companion, not a record"),),
+            problems=(Problem("file", "is a companion file, not a record"),),
         )
     expected = next((reader for reader in READERS if reader.suffix == suffix), None)
     if expected is not None:

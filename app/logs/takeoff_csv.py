@@ -33,7 +33,7 @@ _FORMAT_HINT: Final = (
     "Save the flight as CSV in UTF-8 with the header time_s,altitude_m, commas between values and "
     "decimal points, time in seconds since the command, altitude in metres up."
 )
-_ROW_HINT: Final = "Correct or remove the named line and upload the file again; nothing was stored."
+_ROW_HINT: Final = "Correct or remove this line, then upload the file again; nothing was stored."
 
 
 def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:

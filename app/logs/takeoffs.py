@@ -159,8 +159,8 @@ def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
         return takeoffs[number - 1]
     happened = "The log contains one takeoff" if len(takeoffs) == 1 else f"The log contains {len(takeoffs)} takeoffs"
     raise TrajectoryError(
-        f"{happened}." if number is None else f"{happened}, and none with the number {number}.",
-        hint="Give the number of the takeoff; nothing was stored.",
+        f"{happened}." if number is None else f"{happened}; there is no takeoff {number}.",
+        hint="Specify the number of the takeoff; nothing was stored.",
         problems=tuple(Problem("takeoff", f"{each.number}: {each.summary}") for each in takeoffs[:_LISTED]),
     )
 
@@ -340,11 +340,11 @@ class _Record:
 
     def _notes(self, left_out: Sequence[str]) -> Iterator[str]:
         if not self.is_commanded:
-            yield "no command to take off in the log, so the delay before lift-off is not in the record"
+            yield "no takeoff command in the log, so the delay before lift-off is not in the record"
         if self.log.from_ground:
             yield f"altitude relative to the ground, which is at {self.ground_m:.2f} m in the log"
         if self.held.learned_late:
-            yield f"known only from after the takeoff: {', '.join(self.held.learned_late)}"
+            yield f"known only after the takeoff: {', '.join(self.held.learned_late)}"
         if left_out:
             yield f"left out because of missing values: {', '.join(left_out)}"
         if self.end.what:

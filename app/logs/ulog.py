@@ -64,7 +64,7 @@ def read_ulog(stream: BinaryIO) -> FlightLog:
 
     data = contents(stream)
     if not is_ulog(data[:_HEADER_BYTES]) or len(data) < _HEADER_BYTES:
-        raise refused("is no ULog", _HINT)
+        raise refused("is not a ULog file", _HINT)
     sieve = _LogFilter()
     sieve.filter(data)
     try:
@@ -304,7 +304,7 @@ def _missing(topics: Mapping[str, Table]) -> Iterator[str]:
         how = "while it was armed" if has_status else "armed or not"
         yield (
             f"no {_LANDED} in the log, so the takeoff is found from a rise of the altitude, {how}: check that "
-            "it is the flight"
+            "it is the right flight"
         )
     elif not has_status:
         yield (

@@ -133,7 +133,7 @@ def _showcase(shown: Showcase) -> Iterator[Row]:
     )
     yield Row(
         group=group,
-        label="gain of the first step, of the whole",
+        label="improvement of the first step, share of the total",
         unit="share",
         measured=float(steps[0] / (errors[0] - errors.min())),
         digits=2,

@@ -80,7 +80,7 @@ _ALL: Final = (
             "figure4": "Fig. 4",
         },
         run=_f16,
-        long_form="Methods compared over 50 models instead of 10, the model identified again also at ±20 and ±80 % "
+        long_form="Methods compared over 50 models instead of 10, the re-identified model also at ±20 and ±80 % "
         "and from noisy logs: takes ten times as long.",
     ),
     Reproduction(
@@ -106,7 +106,7 @@ _ALL: Final = (
         name="controller",
         title="Fig. 6: the replica of the controller",
         line="A takeoff recorded from the autopilot's own code, replayed step by step through the replica.",
-        paper="The copy of the vertical loop gives the autopilot's outputs up to small disagreements.",
+        paper="The copy of the vertical loop reproduces the autopilot's outputs except for small differences.",
         figures={"figure6-reference": "Fig. 6, above", "figure6-commands": "Fig. 6, below"},
         run=_controller,
     ),

@@ -128,7 +128,7 @@ def run_table(name: str, figure: str, on_progress: Progress) -> Result:
         },
         notes=(
             (
-                "Flown without noise. The reference is this program's target: within 1.5 % on jsbsim, within 1 % on "
+                "Flown without noise. The reference is Gainline's own target: within 1.5 % on jsbsim, within 1 % on "
                 "the twin."
             ),
             (

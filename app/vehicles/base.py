@@ -60,7 +60,7 @@ class FlightOptions:
 
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
     over the time of the `clock` (10.0: ten times real time); None runs as fast as possible. Real vehicles ignore both.
-    `window_s` is the scored time after the take-off command; a vehicle with one manoeuvre of fixed length ignores it.
+    `window_s` is the scored time after the takeoff command; a vehicle with one manoeuvre of fixed length ignores it.
     """
 
     seed: int
@@ -70,7 +70,7 @@ class FlightOptions:
 
     @property
     def record_s(self) -> float:
-        """Length of the record after the take-off command."""
+        """Length of the record after the takeoff command."""
         return self.window_s + RECORDED_BEYOND_S
 
 

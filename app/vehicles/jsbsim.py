@@ -55,12 +55,12 @@ def new_aircraft() -> "jsbsim.FGFDMExec":
     fdm = jsbsim.FGFDMExec(str(_ROOT))
     fdm.set_aircraft_path("aircraft")
     if not fdm.load_model(_AIRCRAFT):
-        raise VehicleError("JSBSim could not load the simulated vehicle.", hint="Install the program again.")
+        raise VehicleError("JSBSim could not load the simulated vehicle.", hint="Reinstall Gainline.")
     fdm.set_dt(STEP_S)
     fdm["ic/lat-geod-deg"] = _LATITUDE_DEG
     fdm["ic/h-agl-ft"] = _CENTRE_ABOVE_GROUND_M / _FOOT_M
     if not fdm.run_ic():
-        raise VehicleError("JSBSim could not place the vehicle on the ground.", hint="Install the program again.")
+        raise VehicleError("JSBSim could not place the vehicle on the ground.", hint="Reinstall Gainline.")
     return fdm
 
 
@@ -128,7 +128,7 @@ class JsbsimFlight:
         """Return a handle, which avoids the search for the name at every access."""
         node = self._fdm.get_property_manager().get_node(path)
         if node is None:
-            raise VehicleError(f"The simulated vehicle has no property {path}.", hint="Install the program again.")
+            raise VehicleError(f"The simulated vehicle has no property {path}.", hint="Reinstall Gainline.")
         return node
 
     def _configure(self, options: dict[str, float]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from app.core.errors import InputError, Problem
-from app.core.formatting import span
+from app.core.formatting import allowed_range
 from app.core.policy import Gains, is_finite, shortened
 from app.vehicles.base import ConnectedVehicle, Identity, OptionValue, Vehicle, VehicleOption
 
@@ -109,7 +109,7 @@ class VehicleKind:
             raise InputError(
                 f"These options do not suit the vehicle {self.name}.",
                 problems=tuple(problems),
-                hint="Correct the named options, or leave them out to get their defaults.",
+                hint="Correct the options listed, or omit them to use their defaults.",
             )
         return complete
 
@@ -126,9 +126,9 @@ def _accept(option: VehicleOption, value: object) -> tuple[OptionValue, str | No
         return default, f"must be a finite number, got {shortened(value)}"
     low, high = option.lower, option.upper
     if (low is not None and value < low) or (high is not None and value > high):
-        return default, f"must lie in {span(low, high)} {option.unit}, got {value:g}"
+        return default, f"must be {allowed_range(low, high)} {option.unit}, got {value:g}"
     return float(value), None
 
 
 def _expected(default: bool | str) -> str:
-    return "must be true or false" if isinstance(default, bool) else "must be a text"
+    return "must be true or false" if isinstance(default, bool) else "must be text"

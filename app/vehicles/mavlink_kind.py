@@ -172,14 +172,14 @@ MAVLINK: Final = VehicleKind(
         ),
         VehicleOption("telemetry_hz", "Requested rate of positions", "Hz", 50.0, 40.0, 200.0),
         VehicleOption(
-            "climb_waypoint", "Paparazzi: number of the waypoint that the take-off climbs to", "", 2.0, 1.0, 254.0
+            "climb_waypoint", "Paparazzi: number of the waypoint that the takeoff climbs to", "", 2.0, 1.0, 254.0
         ),
         VehicleOption("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
         VehicleOption("radius_m", "Maximum distance from the start", "m", 5.0, 0.5, 100.0),
         VehicleOption(
             "plan_radius_m", "Paparazzi: maximum distance from HOME in the flight plan", "m", 8.0, 0.5, 1000.0
         ),
-        VehicleOption("plan_time_s", "Paparazzi: time limit of the flight plan's take-off", "s", 45.0, 15.0, 600.0),
+        VehicleOption("plan_time_s", "Paparazzi: time limit of the flight plan's takeoff", "s", 45.0, 15.0, 600.0),
         VehicleOption("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
             "second_source",

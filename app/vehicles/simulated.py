@@ -88,7 +88,7 @@ class Pacer:
             raise InputError(
                 "This flight cannot be paced.",
                 problems=(Problem("speed", f"must be above 0 and finite, got {speed:g}"),),
-                hint="Give the ratio of simulated to wall time, such as 10, or nothing for as fast as possible.",
+                hint="Give the ratio of simulated to wall-clock time, such as 10; omit it to fly at full speed.",
             )
         self._speed = speed
         self._clock = clock
@@ -172,7 +172,7 @@ class GainHolder:
         if not self._staged:
             raise VehicleError(
                 "No gains were staged for this flight, so it was not started.",
-                hint="Stage the gains, compare what is read back, then fly.",
+                hint="Stage the gains, check the read-back, then fly.",
             )
 
     def _restore(self) -> None:
@@ -307,7 +307,7 @@ def _flown(simulation: Simulation, steps: int, command: Integers, set_point_m: f
     if not np.isfinite(rows).all():
         raise VehicleError(
             "The simulation diverged: the vehicle's state is no longer finite.",
-            hint="The vehicle is unstable with these gains or options. Choose milder ones.",
+            hint="The vehicle is unstable with these gains or options. Choose less aggressive ones.",
         )
     return rows
 
@@ -323,7 +323,7 @@ def _counts(gains: Gains) -> dict[str, float]:
 
 def _refusal(value: float) -> str | None:
     if not INT32_MIN <= value <= INT32_MAX:
-        return f"must fit into 32 bits, got {shortened(value)}"
+        return f"must fit in 32 bits, got {shortened(value)}"
     return None if value == int(value) else f"must be a whole number of counts, got {value:g}"
 
 

@@ -112,7 +112,7 @@ TWIN: Final = VehicleKind(
         VehicleOption("ground_effect", "Ground effect: extra thrust on the ground", "of thrust", 0.0, 0.0, 0.5),
         VehicleOption("ground_effect_height_m", "Height over which the ground effect fades", "m", 0.4, 0.1, 2.0),
         VehicleOption(
-            "measurement_delay_s", "Age of the altitude and climb rate that the loop senses", "s", 0.0, 0.0, 0.1
+            "measurement_delay_s", "Delay of the altitude and climb rate that the loop uses", "s", 0.0, 0.0, 0.1
         ),
         VehicleOption("battery_sag", "Share of the thrust lost evenly over 33 s", "of thrust", 0.0, 0.0, 0.1),
     ),

@@ -142,7 +142,7 @@ async def _invalid_request(_request: Request, error: Exception) -> Response:
     return _problem(
         HTTPStatus.UNPROCESSABLE_ENTITY,
         "The request has invalid fields; nothing was changed.",
-        "Correct the named fields, then try again.",
+        "Correct the fields listed, then try again.",
         problems,
         title="Unusable input",
     )

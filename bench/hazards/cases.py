@@ -93,7 +93,7 @@ class Case:
     """One trial and its faults; the first is the one under test.
 
     `powered_s` is how long the drone has been on before the connection, `staged_s` how long its gains are staged before
-    the take-off, `pinned` whether the connection names the drone's system id.
+    the takeoff, `pinned` whether the connection names the drone's system id.
     """
 
     seed: int

@@ -64,7 +64,7 @@ class _Checker:
         return [(each.begun_s, each.ended_s) for each in self.result.injected if each.kind in kinds]
 
     def of_flight(self, kind: str) -> list[Span]:
-        """Return the spans that begin after the take-off command; earlier ones may have no effect."""
+        """Return the spans that begin after the takeoff command; earlier ones may have no effect."""
         return [(each.begun_s, each.ended_s) for each in self._kinds(kind) if each.state in AIR]
 
     def within(self, spans: list[Span], *states: State) -> float:
@@ -139,7 +139,7 @@ class _Checker:
             yield Cause("F3", "refused", is_certain=all(refused))
 
     def _in_the_air(self) -> Iterator[Cause]:
-        """Yield the failures from the take-off command to the end of the record.
+        """Yield the failures from the takeoff command to the end of the record.
 
         A condition that lasts longer than its limit must be detected; one that is not detected leaves a complete
         record, which the outcome shows.
@@ -189,7 +189,7 @@ class _Checker:
             yield Cause("F6", "aborted", is_certain=True)
 
     def _may_have_stayed_down(self) -> bool:
-        """Whether the take-off command may not have arrived, or another command may have followed before the climb."""
+        """Whether the takeoff command may not have arrived, or another command may have followed before the climb."""
         unheard = any(covers(self.of(*DEAF), (at_s, at_s)) for at_s in self.states.times_of(Command.TAKE_OFF))
         return unheard or bool(self.of(OTHER_MODE, OTHER_LANDING))
 

@@ -76,7 +76,7 @@ class GroundTruth:
     armed: bool
     holds_safe: bool
     pilot_seen_s: Sequence[float] = ()
-    """Times of heartbeats that showed a pilot's mode, after the take-off."""
+    """Times of heartbeats that showed a pilot's mode, after the takeoff."""
     overruled_s: float = FOR_GOOD_S
     """When a command took the vehicle from that pilot."""
 
@@ -208,5 +208,5 @@ def _record(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
 
 
 def _took_off_s(truth: GroundTruth) -> float | None:
-    """Return when the take-off command reached the vehicle."""
+    """Return when the takeoff command reached the vehicle."""
     return next((at_s for at_s, command in truth.sent if command is Command.TAKE_OFF), None)

@@ -106,7 +106,7 @@ class HostileRig(Rig):
         return frames
 
     def _watch_pilot(self, frames: list[bytes], now_s: float) -> None:
-        """Record when heartbeats show a pilot after the take-off, and when the vehicle is taken from that pilot."""
+        """Record when heartbeats show a pilot after the takeoff, and when the vehicle is taken from that pilot."""
         flown = any(each.kind in PILOTS and each.begun_s < now_s < each.ended_s for each in self.injected)
         if not flown or self.states.first_s(State.TAKEOFF) is None:
             return

@@ -37,8 +37,8 @@ SEEN = [
     ("paparazzi", "disarmed once", State.RECORD, "completed", ""),
     ("ardupilot", "reboot once", State.RECORD, "completed", ""),
     ("paparazzi", "twin 0.4 s older", State.LAND, "invalid", "Two vehicles use the same system id"),
-    ("paparazzi", "pilot", State.RECORD, "invalid", "A pilot took over manual control"),
-    ("paparazzi", "carried away", State.RECORD, "aborted", "away from its start"),
+    ("paparazzi", "pilot", State.RECORD, "invalid", "A pilot took manual control"),
+    ("paparazzi", "carried away", State.RECORD, "aborted", "m from its start"),
 ]
 SEEN_ALIKE = [
     ("paparazzi", "vz nan", State.RECORD, "invalid", "froze while packets still arrived"),
@@ -116,7 +116,7 @@ UP = tuple(replace(each, height_m=3.0, armed=True) if each.time_s >= 10.0 else e
 DOWN = tuple(replace(each, height_m=0.0, armed=False) if each.time_s > 48.0 else each for each in UP)
 WHOLE = Trajectory(np.arange(0.0, 33.5, 0.5), {"altitude_m": np.full(67, 3.0)}, "mavlink", "vehicle")
 SAFE_AND_SOUND = ReportedOutcome("completed", "safe", "", record=WHOLE)
-QUARANTINED = ReportedOutcome("invalid", "quarantined", "A pilot took over manual control.", "It flies.", "It flies.")
+QUARANTINED = ReportedOutcome("invalid", "quarantined", "A pilot took manual control.", "It flies.", "It flies.")
 LANDED_ON = tuple((at_s, Command.LAND) for at_s in np.arange(45.0, 70.0, 6.0))
 
 

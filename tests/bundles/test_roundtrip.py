@@ -225,7 +225,7 @@ def test_a_longer_chain_of_warm_starts_than_a_bundle_holds_is_refused_in_words(
     assert client.get(f"/api/campaigns/{ids[19]}/bundle").status_code == 200
     refused = client.get(f"/api/campaigns/{ids[20]}/bundle")
     assert refused.status_code == 409, refused.text
-    assert "has a chain of 20 warm starts, and a bundle can hold 20 campaigns" in refused.json()["detail"]
+    assert "follows a chain of 20 warm starts; a bundle can hold 20 campaigns" in refused.json()["detail"]
     assert f"campaign {ids[19]} is the last that fits" in refused.json()["hint"]
 
 

@@ -214,7 +214,7 @@ def test_exactly_one_of_proposal_gains_and_variant_is_taken(client: TestClient, 
     path = f"/api/campaigns/{campaign['id']}/trials"
     for body in ({}, {"variant": "repeat", "proposal_id": 1}, {"gains": DEFAULT, "proposal_id": 1}):
         answer = client.post(path, json=body)
-        assert "exactly one of them is required" in problems_of(answer)["proposal_id"]
+        assert "exactly one is required" in problems_of(answer)["proposal_id"]
 
 
 def test_half_of_no_step_is_refused(client: TestClient, database: Database) -> None:
@@ -230,7 +230,7 @@ def test_a_smaller_step_waits_for_the_proposal_that_it_is_half_of(client: TestCl
     create_trial(client, campaign["id"], fly={"speed": None})
     land(database, lift_off(database), create_record(1.0))
     answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"variant": "smaller step"})
-    assert (answer.status_code, "not computed yet" in answer.json()["detail"]) == (409, True)
+    assert (answer.status_code, "have not been computed yet" in answer.json()["detail"]) == (409, True)
 
 
 @pytest.fixture
@@ -299,9 +299,9 @@ def test_a_donor_that_cannot_be_one_is_refused_by_name(client: TestClient, datab
     )
     assert "there is no campaign 99" in refusal({"campaign_id": 99})["definition.start.donor.campaign_id"]
     assert "leave it out" in refusal({"campaign_id": donor, "checksum": "0" * 64})["definition.start.donor.checksum"]
-    assert "must lie in" in refusal({"campaign_id": donor}, bounds={"kp": (0, 290)})["definition.start.gains.kp"]
+    assert "must be between" in refusal({"campaign_id": donor}, bounds={"kp": (0, 290)})["definition.start.gains.kp"]
     other = refusal({"campaign_id": donor}, experiment_options={"window_s": 20.0})["definition.start.donor.campaign_id"]
-    assert other == f"campaign {donor} scores 32.6 s of a flight, this one 20 s: different windows"
+    assert other == f"campaign {donor} has a scored window of 32.6 s, this one of 20 s"
     assert (
         "10 … 60 s"
         in refusal({"campaign_id": donor}, experiment_options={"window_s": 5.0})[

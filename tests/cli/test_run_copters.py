@@ -194,7 +194,7 @@ def test_gains_that_a_vehicle_is_never_given_are_refused_whoever_overrules(monke
     gains = "MPC_Z_P=9,MPC_Z_VEL_P_ACC=4,MPC_Z_VEL_I_ACC=2,MPC_Z_VEL_D_ACC=0"
     result = CliRunner().invoke(app, ["run", "px4-takeoff", "--gains", gains, "--overrule", "to see it"])
     assert result.exit_code == 1
-    assert "gains.MPC_Z_P: must lie in 0.1 … 1.5, got 9" in " ".join(result.stderr.split())
+    assert "gains.MPC_Z_P: must be between 0.1 and 1.5, got 9" in " ".join(result.stderr.split())
     assert len(rig.writes) == written
 
 
@@ -212,12 +212,12 @@ def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> No
     [
         (
             ("px4-takeoff", "--set", "autopilot=ardupilot"),
-            "definition.experiment: 'takeoff-px4' tunes other gains than",
+            "definition.experiment: 'takeoff-px4' tunes gains that this",
         ),
         (("px4-takeoff", "--strategy", "gradient"), "there is no model for the gains of 'takeoff-px4'"),
         (
             ("ardrone-takeoff", "--vehicle", "mavlink:udpin:127.0.0.1:14550", "--set", "autopilot=px4"),
-            "definition.experiment: 'takeoff' tunes other gains than this vehicle's, which flies takeoff-px4",
+            "definition.experiment: 'takeoff' tunes gains that this vehicle does not have; it flies takeoff-px4",
         ),
     ],
 )

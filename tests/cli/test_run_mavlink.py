@@ -82,11 +82,11 @@ def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains
     assert result.exit_code == 1
     printed = " ".join(result.output.split())
     assert "run 1" in printed
-    assert "Stopped: After an error: The battery is below 10.2 V." in printed
+    assert "Stopped: an error occurred: The battery is below 10.2 V." in printed
     assert "The safe gains are restored and read back: kp 283, ki 13, kd 82." in printed
     document = json.loads(out.read_text())
     assert [trial["outcome"] for trial in document["trials"]] == ["valid"]
-    assert document["stopped_because"].startswith("After an error")
+    assert document["stopped_because"].startswith("an error occurred")
 
 
 def test_when_the_safe_gains_could_not_be_verified_it_says_that_nobody_knows_what_the_vehicle_holds(

@@ -1,6 +1,7 @@
 import pytest
 
 from app.core.formatting import (
+    allowed_range,
     count,
     decimals,
     gain,
@@ -12,7 +13,6 @@ from app.core.formatting import (
     plus_minus,
     short,
     short_percent,
-    span,
 )
 
 
@@ -49,8 +49,9 @@ def test_a_share_may_have_three_significant_digits() -> None:
     assert [short_percent(0.125), short_percent(0.9)] == ["12.5 %", "90 %"]
 
 
-def test_a_range_names_the_side_without_a_limit() -> None:
-    assert [span(0.0, 409.0), span(None, 0.5)] == ["0 … 409", "any … 0.5"]
+def test_a_range_states_only_the_limits_that_exist() -> None:
+    limits = [(0.0, 409.0), (0.0, None), (None, 0.5), (None, None)]
+    assert [allowed_range(*pair) for pair in limits] == ["between 0 and 409", "at least 0", "at most 0.5", "any"]
 
 
 def test_amounts_have_their_nouns_and_groups_of_digits() -> None:

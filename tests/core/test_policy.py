@@ -16,7 +16,7 @@ GOOD = {"kp": 283, "ki": 13, "kd": 82}
 @pytest.mark.parametrize(
     ("gains", "problems"),
     [
-        ({"kp": -1, "ki": 13, "kd": 82}, {"gains.kp": "must lie in 0 … 4000 counts, got -1"}),
+        ({"kp": -1, "ki": 13, "kd": 82}, {"gains.kp": "must be between 0 and 4000 counts, got -1"}),
         ({"kp": 1, "ki": 13.5, "kd": 82}, {"gains.ki": "must be a whole number of counts, got 13.5"}),
         (
             {"kp": math.nan, "ki": math.inf, "kd": 82},

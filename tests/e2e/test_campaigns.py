@@ -89,7 +89,7 @@ def test_a_flight_of_custom_gains_goes_through_the_same_checks(dashboard: Dashbo
     dashboard.choose("Custom gains")
     kp = dashboard.page.get_by_role("textbox", name="kp")
     kp.fill("-5")
-    expect(dashboard.page.get_by_text(re.compile("must lie in 0 … 4000"))).to_be_visible()
+    expect(dashboard.page.get_by_text(re.compile("must be between 0 and 4000"))).to_be_visible()
     expect(dashboard.fly_button).to_be_disabled()
     kp.fill("400")
     dashboard.page.get_by_role("textbox", name="ki").fill("20")
@@ -222,7 +222,7 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     page.get_by_label("Maximum flights").fill("7")
     dashboard.button("Create campaign").click()
     expect(page.get_by_label("kp maximum")).to_have_attribute("aria-invalid", "true")
-    expect(page.get_by_text("must lie in 10 … 60 s, got 5")).to_be_visible()
+    expect(page.get_by_text("must be between 10 and 60 s, got 5")).to_be_visible()
     assert dashboard.get("/campaigns")["total"] == before
     page.get_by_label("kp minimum").fill("0")
     page.get_by_label("Scored window").fill("20")

@@ -186,7 +186,7 @@ def test_a_take_off_that_comes_too_late_does_not_take_place(rig: AnsweringRig, t
 def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
     rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In the last check, after its take-off command came in time."""
+    """In the last check, after its takeoff command came in time."""
     stood_still_s = 0.0
     line = RecordingPipe()
     process = started(rig, line, tmp_path)

@@ -344,5 +344,5 @@ def test_a_vehicle_that_is_staged_and_not_flown_within_ten_minutes_has_its_safe_
     field.fly_next()
     after = get(client, f"/api/trials/{trial_id}")
     assert (after["state"], after["flight"]["state"]) == ("planned", "cancelled")
-    assert after["flight"]["problem"] == "its take-off was not requested within 10 minutes"
+    assert after["flight"]["problem"] == "its takeoff was not requested within 10 minutes"
     assert vehicle_state(client) == "ready"

@@ -1,4 +1,4 @@
-"""What the process of a vehicle notices between the read-back of the staged gains and the take-off, in lock-step."""
+"""What the process of a vehicle notices between the read-back of the staged gains and the takeoff, in lock-step."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace

@@ -111,13 +111,13 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
 ) -> None:
     assert staged["actions"] == ["take-off", "unstage", "cancel", "abort", "note"]
     assert is_wanted(database, staged) == (False, None)
-    with pytest.raises(ConflictError, match="its take-off has not been requested"), database.write() as session:
+    with pytest.raises(ConflictError, match="its takeoff has not been requested"), database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
 
     status, sentence = take_off(client, staged, {})
     assert (status, sentence) == (
         403,
-        "Drone is a real vehicle: only its operator can start the take-off, in the browser.",
+        "Drone is a real vehicle: only its operator can start the takeoff, in the browser.",
     )
     script = control_header(client, real)
     assert take_off(client, staged, script)[0] == 403
@@ -130,7 +130,7 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
     assert is_wanted(database, staged) == (True, None)
     assert take_off(client, staged, {**OUR_PAGE, **script}) == (
         409,
-        f"The take-off of trial {staged['number']} has already been requested.",
+        f"The takeoff of trial {staged['number']} has already been requested.",
     )
     with database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
@@ -167,7 +167,7 @@ def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
     take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
     with database.write() as session:
         session.get_one(FlightRow, staged["flight"]["id"]).take_off_at = utc_now() - timedelta(seconds=11)
-    why = "the take-off did not start within 10 s of the operator's request"
+    why = "the takeoff did not start within 10 s of the operator's request"
     assert is_wanted(database, staged) == (False, why)
     with pytest.raises(ConflictError, match=why), database.write() as session:
         flight_rows.record_lift_off(session, staged["flight"]["id"])
@@ -414,7 +414,7 @@ def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json
     assert trial(client, planned)["flight"]["state"] == "cancelled"
 
 
-LOST = {"link silent": "Nothing current has been received from the vehicle for 2 s.", "gains unknown": "has restarted"}
+LOST = {"link silent": "No current data has been received from the vehicle for 2 s.", "gains unknown": "has restarted"}
 
 
 @pytest.mark.parametrize("unready", LOST)
@@ -457,5 +457,5 @@ def test_a_window_that_its_flight_plan_does_not_fit_is_refused_before_it_is_stag
     planned = create_trial(client, create_campaign_on(client, database, real, definition=definition)["id"])
     refused = client.post(f"/api/trials/{planned['id']}/stage")
     assert refused.status_code == 409
-    assert "at most 42.6 s of scored window, but the campaign's is 60 s" in refused.json()["detail"]
+    assert "a scored window of at most 42.6 s; the campaign's is 60 s" in refused.json()["detail"]
     assert "plan_time_s" in refused.json()["hint"]

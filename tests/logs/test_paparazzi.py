@@ -78,8 +78,8 @@ def test_other_aircraft_and_other_messages_are_left_out() -> None:
 @pytest.mark.parametrize(
     ("companion", "reason"),
     [
-        ("<configuration>", "companion that is not XML"),
-        ("not xml", "companion that is not XML"),
+        ("<configuration>", "companion file that is not XML"),
+        ("not xml", "companion file that is not XML"),
         ('<!DOCTYPE x [<!ENTITY a "b">]><x>&a;</x>', "it declares entities"),
     ],
 )

@@ -42,7 +42,7 @@ def test_two_flights_in_one_log_are_listed_to_choose_from() -> None:
     assert "1: 18.4 s into the log, from the block Takeoff" in refusal.value.problems[0].reason
     assert "kp 1624, ki 1356, kd 195" in refusal.value.problems[1].reason
     assert read_takeoff(io.BytesIO(both), number=2).gains["kp"] == 1624.0
-    with pytest.raises(TrajectoryError, match="none with the number 3"):
+    with pytest.raises(TrajectoryError, match="there is no takeoff 3"):
         read_takeoff(io.BytesIO(both), number=3)
 
 
@@ -94,7 +94,7 @@ def test_without_a_command_time_counts_from_lift_off_which_is_said() -> None:
     flown = read_takeoff(io.BytesIO(log.content))
     assert flown.begins_with == "lift-off"
     assert flown.gains == {}
-    assert any("no command to take off in the log" in note for note in flown.notes)
+    assert any("no takeoff command in the log" in note for note in flown.notes)
     assert abs(flown.trajectory["altitude_m"][flown.trajectory.time_s == 0.0][0]) <= 0.05
 
 

@@ -155,7 +155,7 @@ def test_without_the_land_detector_a_takeoff_is_a_rise_while_armed_and_a_note_sa
 def test_without_either_every_rise_is_offered_and_a_note_says_why() -> None:
     flown = read_takeoffs(io.BytesIO(log_from_boot(status=False, land_detector=False)))
     assert flown[0].start_s == pytest.approx(BOOT_JUMP_S, abs=0.05)
-    assert any("armed or not: check that it is the flight" in note for note in flown[0].notes)
+    assert any("armed or not: check that it is the right flight" in note for note in flown[0].notes)
 
 
 def test_a_takeoff_mode_that_was_chosen_before_arming_begins_the_flight_at_the_arming() -> None:

@@ -1,4 +1,4 @@
-"""The F-16 experiment's study on a few inaccurate models, and the model identified again over fifty."""
+"""The F-16 experiment's study on a few inaccurate models, and the re-identified model over fifty."""
 
 from itertools import pairwise
 

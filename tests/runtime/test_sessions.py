@@ -159,7 +159,7 @@ def test_a_vehicle_whose_process_stands_still_takes_no_order_and_does_not_fly_wh
             shown = vehicle.status(lambda status: status["state"] == "not answering")
             named = serving.get("/health")["vehicles_not_answering"]
             assert named == [{"vehicle_id": vehicle.id, "trouble": shown["trouble"]}]
-            for order in ("land", "motors-off"):  # which takes longer than a take-off is still in time
+            for order in ("land", "motors-off"):  # which takes longer than a takeoff is still in time
                 told = serving.post(f"/vehicles/{vehicle.id}/{order}", {"reason": "nobody answers"})
                 assert (told["accepted"], "remote control" in told["sentence"]) == (False, True)
         finally:

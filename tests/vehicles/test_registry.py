@@ -81,7 +81,7 @@ def test_options_are_completed_with_their_defaults() -> None:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"scatter": -0.1}, "must lie in 0 … 5 ×, got -0.1"),
+        ({"scatter": -0.1}, "must be between 0 and 5 ×, got -0.1"),
         ({"scatter": float("nan")}, "must be a finite number, got nan"),
         ({"scatter": "much"}, "must be a number, got 'much'"),
         ({"scatter": True}, "must be a number, got True"),

@@ -208,7 +208,7 @@ def test_a_scripts_token_stages_a_real_vehicle_and_does_not_take_it_off(
     for headers in (lease, {**lease, **OUR_PAGE}):
         refused = stranger.post(path, headers=headers)
         assert refused.status_code == 403
-        assert "only its operator can start the take-off, in an unlocked browser" in refused.json()["detail"]
+        assert "only its operator can start the takeoff, in an unlocked browser" in refused.json()["detail"]
     without_cookie = stranger.post(path, headers={**OUR_PAGE, **control_header(client, real)})
     assert without_cookie.status_code == 403
     refused = client.post(path, headers={**OUR_PAGE, **control_header(client, real)})

@@ -54,7 +54,7 @@ def add_photo(session: Session, trial_id: int, content: bytes) -> TrialPhoto:
             problems=(Problem("file", f"is larger than {size}"),),
         )
     if not content:
-        raise InputError("The photo is empty.", hint="Take it again.", problems=(Problem("file", "holds nothing"),))
+        raise InputError("The photo is empty.", hint="Take it again.", problems=(Problem("file", "is empty"),))
     if (media_type := media_type_of(content)) is None:
         raise MediaTypeError(
             "This is not a JPEG, PNG or WebP picture; nothing was stored.",

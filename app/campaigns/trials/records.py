@@ -265,7 +265,7 @@ def import_into_campaign(
     if len(chosen) > 1:
         raise InputError(
             f"{len(chosen)} trials of campaign {campaign_id} wait for a record.",
-            hint="Give the number of the trial: --trial.",
+            hint="Specify the trial with --trial.",
             problems=tuple(Problem("trial", f"{trial.number}: {trial.state}") for trial in chosen),
         )
     if chosen:

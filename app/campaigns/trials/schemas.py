@@ -112,12 +112,12 @@ class RecordBrief(BaseModel):
 
 class FlightBrief(BaseModel):
     """The last flight requested for this trial. `problem` says why it failed. A flight of mode `stage` waits with its
-    gains on the vehicle until its operator requests the take-off."""
+    gains on the vehicle until its operator requests the takeoff."""
 
     id: int
     state: FlightState
     mode: FlightMode
-    take_off_at: Annotated[datetime | None, Field(description="time of the take-off request")]
+    take_off_at: Annotated[datetime | None, Field(description="time of the takeoff request")]
     standing_down: Annotated[str, Field(description="why a staged flight was cancelled; empty otherwise")]
     problem: str
     battery: Annotated[str, Field(description="label of the battery used; empty if not given")]

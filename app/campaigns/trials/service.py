@@ -220,9 +220,9 @@ def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[Gat
     own = new.gains if new.variant is None else None
     if sum(given is not None for given in (new.proposal_id, own, new.variant)) != 1:
         raise InputError(
-            "A trial flies a proposal, gains of your own, or a variant.",
+            "A trial flies a proposal, custom gains or a variant.",
             hint="Send exactly one of them.",
-            problems=(Problem("proposal_id", "or gains or variant: exactly one of them is required"),),
+            problems=(Problem("proposal_id", "or gains or variant: exactly one is required"),),
         )
     if new.proposal_id is None:
         asked = own if new.variant is None else _of_variant(session, campaign, new.variant, new.gains)

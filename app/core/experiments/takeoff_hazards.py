@@ -157,7 +157,7 @@ def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: flo
         if not passed
         else f"{ceiling_m:g} m is allowed."
         if highest_m <= ceiling_m
-        else f"beyond {ceiling_m:g} m; these are the gains with which every flight is compared, so they are allowed."
+        else f"beyond {ceiling_m:g} m; every flight is compared with these gains, so they are allowed."
     )
     return Check("altitude", passed, sentence, worst=highest_m, limit=ceiling_m, case=case)
 

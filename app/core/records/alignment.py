@@ -130,5 +130,5 @@ def _unalignable(reason: str) -> TrajectoryError:
     return TrajectoryError(
         "The two sources of altitude cannot be aligned in time.",
         problems=(Problem("altitude_2_m", f"the two {reason}"),),
-        hint="Check that both measure the same vehicle, from before the take-off until after it.",
+        hint="Check that both measure the same vehicle, from before the takeoff until after it.",
     )

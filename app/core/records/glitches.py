@@ -151,7 +151,7 @@ def _held(time_s: Samples, values: Samples, physics: _Physics, mark: tuple[int, 
     first, last = mark
     sentence = (
         f"The same {values[first]:.2f} {physics.unit} for {time_s[last - 1] - time_s[first]:.2f} s from "
-        f"{time_s[first]:.2f} s on: a vehicle in the air is never so steady."
+        f"{time_s[first]:.2f} s on: no vehicle in the air is that steady."
     )
     return Glitch("frozen", float(time_s[first]), float(time_s[last]), sentence)
 
@@ -160,8 +160,8 @@ def _jumped(time_s: Samples, values: Samples, physics: _Physics, mark: tuple[int
     first, last = mark
     lasts = "" if last == first + 1 else f", and back {time_s[last] - time_s[first]:.2f} s later"
     sentence = (
-        f"A jump by {values[first + 1] - values[first]:+.2f} {physics.unit} at {time_s[first + 1]:.2f} s{lasts}: no "
-        "thrust can accelerate a vehicle so much."
+        f"A jump of {values[first + 1] - values[first]:+.2f} {physics.unit} at {time_s[first + 1]:.2f} s{lasts}: no "
+        "thrust can accelerate a vehicle that much."
     )
     return Glitch("acceleration", float(time_s[first]), float(time_s[last]), sentence)
 
@@ -228,8 +228,8 @@ def _disagreements(time_s: Samples, values: Samples, second: Samples, physics: _
         if time_s[after] - time_s[before] < _DISAGREEMENT_S:
             continue
         sentence = (
-            f"The difference of the two sources is up to {apart[before + 1 : last + 1].max():.2f} {physics.unit} "
-            f"larger than otherwise, {time_s[before]:.2f} … {time_s[after]:.2f} s."
+            f"The two sources differ by up to {apart[before + 1 : last + 1].max():.2f} {physics.unit} more than "
+            f"elsewhere, from {time_s[before]:.2f} to {time_s[after]:.2f} s."
         )
         yield Glitch("disagreement", float(time_s[before]), float(time_s[after]), sentence)
 

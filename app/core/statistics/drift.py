@@ -55,7 +55,7 @@ def drift(before: Mapping[str, Fitted], now: Mapping[str, Fitted]) -> Drift:
     allowed = {name: reach * hypot(before[name].standard_error, now[name].standard_error) for name in names}
     drifted = tuple(name for name in names if abs(moved[name]) > allowed[name])
     if not names:
-        sentence = "The newest calibration and the one from the last tuning have no common parameter to compare."
+        sentence = "The newest calibration and the one from the last tuning have no parameter in common."
         return Drift(due=False, drifted=(), sentence=sentence)
     if not drifted:
         titles = [now[name].title.lower() for name in names]

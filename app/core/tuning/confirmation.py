@@ -125,8 +125,8 @@ def _left_out(flights: Sequence[Flight], inside: Sequence[Flight]) -> str:
     out = [str(flight.number) for flight in flights if flight.number not in within]
     if not out:
         return ""
-    do = ("Flight", "lies", "takes") if len(out) == 1 else ("Flights", "lie", "take")
-    return f"{do[0]} {', '.join(out)} {do[1]} outside the bounds and {do[2]} no part."
+    do = ("Flight", "lies", "is") if len(out) == 1 else ("Flights", "lie", "are")
+    return f"{do[0]} {', '.join(out)} {do[1]} outside the bounds and {do[2]} not compared."
 
 
 def _next(

@@ -23,7 +23,7 @@ def check_definition(definition: Definition) -> None:
         raise InputError(
             "Invalid campaign definition.",
             problems=problems,
-            hint="Correct the named fields and try again; nothing was changed.",
+            hint="Correct the fields listed, then try again; nothing was changed.",
         )
 
 
@@ -65,7 +65,7 @@ def _fit(definition: Definition) -> Iterator[Problem]:
     if EXPERIMENTS[definition.experiment].modelled is None:
         yield from _without_model(definition)
     elif strategy.experiments and definition.experiment not in strategy.experiments:
-        yield Problem("strategy", f"{strategy.name!r} works with {', '.join(strategy.experiments)} only")
+        yield Problem("strategy", f"{strategy.name!r} works only with {', '.join(strategy.experiments)}")
 
 
 def _without_model(definition: Definition) -> Iterator[Problem]:
@@ -108,14 +108,16 @@ def _fractions(definition: Definition) -> Iterator[Problem]:
         if not 0.0 < value <= 1.0:
             yield Problem(name, f"must be above 0 and at most 1, got {value:g}")
     if not (math.isfinite(definition.ceiling_m) and MIN_CEILING_M <= definition.ceiling_m <= MAX_CEILING_M):
-        yield Problem("ceiling_m", f"must lie in {MIN_CEILING_M:g} … {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}")
+        yield Problem(
+            "ceiling_m", f"must be between {MIN_CEILING_M:g} and {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}"
+        )
 
 
 def _stop(rule: StopRule) -> Iterator[Problem]:
     if not 1 <= rule.max_flights <= MAX_FLIGHTS:
-        yield Problem("stop.max_flights", f"must lie in 1 … {MAX_FLIGHTS}, got {rule.max_flights}")
+        yield Problem("stop.max_flights", f"must be between 1 and {MAX_FLIGHTS}, got {rule.max_flights}")
     if not (math.isfinite(rule.improvement) and 0.0 <= rule.improvement <= MAX_IMPROVEMENT):
-        yield Problem("stop.improvement", f"must lie in 0 … {MAX_IMPROVEMENT:g}, got {rule.improvement:g}")
+        yield Problem("stop.improvement", f"must be between 0 and {MAX_IMPROVEMENT:g}, got {rule.improvement:g}")
     if not MIN_CONFIDENCE <= rule.confidence < 1.0:
         yield Problem("stop.confidence", f"must be at least {MIN_CONFIDENCE:g} and below 1, got {rule.confidence:g}")
     if rule.min_battery_v is not None and not (math.isfinite(rule.min_battery_v) and rule.min_battery_v > 0.0):

@@ -218,7 +218,11 @@ def _hint(gate: GateResult, is_real: bool) -> str:
     offered = ", ".join(f"{name} = {value:g}" for name, value in offers.items())
     nearest = f"The nearest gains that pass these checks: {offered}. " if offered else ""
     choose = "Choose less aggressive gains, or clone the campaign with wider limits."
-    may_overrule = "" if is_real or not gate.overrulable else " On a simulated vehicle you may overrule with a reason."
+    may_overrule = (
+        ""
+        if is_real or not gate.overrulable
+        else " On a simulated vehicle you may overrule the gate and give a reason."
+    )
     return f"{nearest}{choose}{may_overrule}"
 
 

@@ -59,7 +59,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "no heartbeat within 5 s", "none", "refused", "No heartbeat was received; nothing was sent."
         ),
         Failure.PARAMETER: Response(
-            "a gain unconfirmed after five attempts, 0.5 s apart, or read back unequal",
+            "a gain unconfirmed after five attempts, 0.5 s apart, or read back with another value",
             "restore gains",
             "refused",
             "The vehicle did not confirm its gains; it was not armed.",
@@ -68,7 +68,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "arming refused, or not armed 2 s after it", "disarm", "refused", "The vehicle did not arm."
         ),
         Failure.NO_LIFT_OFF: Response(
-            "take-off refused, or less than 0.15 m above the ground by the autopilot's time",
+            "takeoff refused, or still less than 0.15 m above the ground at the end of the autopilot's time",
             "disarm",
             "aborted",
             "The vehicle did not lift off.",
@@ -77,7 +77,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "no packet for 1 s, or three heartbeats missed",
             "repeat land",
             "invalid",
-            "The link was lost in flight. Land was repeated; the vehicle's own failsafe decides.",
+            "The link was lost in flight. Land was repeated; the vehicle's own failsafe takes over.",
         ),
         Failure.ENVELOPE: Response(
             "a limit of altitude, position, speed or oscillation, or the vehicle's own fence",
@@ -106,7 +106,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.LOST_POSITION: Response(
             "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
-            "an altitude that jumps by 0.5 m, or stays 0.5 m behind the climb rate during take-off",
+            "an altitude that jumps by 0.5 m, or stays 0.5 m behind the climb rate during takeoff",
             "land",
             "invalid",
             "The vehicle's position was lost.",
@@ -121,7 +121,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "a manual mode, in heartbeats that agree",
             "cease",
             "quarantine",
-            "A pilot took over manual control; no more commands were sent.",
+            "A pilot took manual control; no further commands were sent.",
         ),
         Failure.UNEXPECTED: Response(
             "another mode or block, a disarming or a reboot that was not commanded, in messages that agree",
@@ -146,7 +146,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "repeated sequence numbers with different contents, or two alternating clocks, under one system id",
             "land",
             "quarantine",
-            "Two vehicles use the same system id. Both were commanded to land; no motors were stopped.",
+            "Two vehicles use the same system id. Both were commanded to land; their motors were not stopped.",
         ),
         Failure.FALL: Response(
             "ground contact at more than 2 m/s",

@@ -30,7 +30,7 @@ _CLIMBED_WITHIN_M: Final = 1.0
 
 
 def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
-    """Return the most severe failure of a vehicle before the take-off command, if any."""
+    """Return the most severe failure of a vehicle before the takeoff command, if any."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
     return (
@@ -137,13 +137,13 @@ def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, s
     elif watch.last is not None and watch.origin is not None:
         last, away_m = watch.last, watch.last.away_m(watch.origin)
         if (height_m := last.altitude_m - ground_m) > limits.ceiling_m:
-            why = f"It flew at {height_m:.2f} m above the ground, over {limits.ceiling_m:g} m."
+            why = f"It was {height_m:.2f} m above the ground; the limit is {limits.ceiling_m:g} m."
         elif abs(last.climb_rate_m_s) > limits.climb_rate_m_s:
-            why = f"It flew at {last.climb_rate_m_s:+.1f} m/s, beyond {limits.climb_rate_m_s:g} m/s."
+            why = f"Its climb rate was {last.climb_rate_m_s:+.1f} m/s; the limit is ±{limits.climb_rate_m_s:g} m/s."
         elif away_m > limits.radius_m:
-            why = f"It flew {away_m:.1f} m away from its start, over {limits.radius_m:g} m."
+            why = f"It was {away_m:.1f} m from its start; the limit is {limits.radius_m:g} m."
         elif settling and watch.crossings >= limits.crossings:
-            why = f"It crossed its set point {watch.crossings} times, beyond ±{limits.crossing_m:g} m."
+            why = f"It crossed its set point {watch.crossings} times by more than ±{limits.crossing_m:g} m."
     return Finding(failure=Failure.ENVELOPE, why=why) if why else None
 
 
@@ -166,15 +166,15 @@ def _find_blind(second: SecondaryAltitude | None, now_s: float, *, stuck_s: floa
 def find_disagreement(second: SecondaryAltitude | None) -> Finding | None:
     if second is None or second.apart_since_s is None or second.received_s - second.apart_since_s <= _APART_S:
         return None
-    why = f"They were {second.apart_m:.2f} m apart, over {MAX_DIFFERENCE_M:g} m for {_APART_S:g} s."
+    why = f"They were {second.apart_m:.2f} m apart; more than {MAX_DIFFERENCE_M:g} m for {_APART_S:g} s is not allowed."
     return Finding(failure=Failure.DISAGREEMENT, why=why)
 
 
 def find_departure(watch: TrialObservation, ground_m: float) -> Finding | None:
-    """Find that a vehicle without a take-off command may have left the ground, by its altitude."""
+    """Find that a vehicle without a takeoff command may have left the ground, by its altitude."""
     if watch.last is None or abs(away_m := watch.last.altitude_m - ground_m) <= GROUND_M:
         return None
-    why = f"Its altitude changed by {away_m:+.2f} m before the take-off command, and it may have moved."
+    why = f"Its altitude changed by {away_m:+.2f} m before the takeoff command, and it may have moved."
     return Finding(failure=Failure.LOST_POSITION, why=why)
 
 
@@ -187,7 +187,7 @@ def find_disagreement_on_ground(watch: TrialObservation, ground_shift_m: float, 
     apart_m = abs(secondary_m + ground_shift_m - watch.last.altitude_m)
     if apart_m <= MAX_DIFFERENCE_M:
         return None
-    why = f"They were {apart_m:.2f} m apart before the take-off command."
+    why = f"They were {apart_m:.2f} m apart before the takeoff command."
     return Finding(failure=Failure.DISAGREEMENT, why=why)
 
 
@@ -214,7 +214,7 @@ def find_altitude_behind(watch: TrialObservation) -> Finding | None:
     """Find that a vehicle commanded to climb is on the ground by its altitude but climbs by its climb rate."""
     if not is_behind_climb_rate(watch):
         return None
-    why = f"By its climb rate it rose by {watch.behind_m:.1f} m more than by its altitude."
+    why = f"By its climb rate it rose {watch.behind_m:.1f} m more than its altitude shows."
     return Finding(failure=Failure.LOST_POSITION, why=why)
 
 

@@ -180,7 +180,7 @@ class Link:
         now_s = self._clock.now_s()
         with self._inbox_changed:
             if now_s - self._duplicate_s < DUPLICATE_TIMEOUT_S:
-                return "Another vehicle with its system id sends from another address."
+                return "Another vehicle with the same system id sends from another address."
             return self._duplicates.reason(now_s)
 
     @property

@@ -1,5 +1,5 @@
 """Gains and other parameters of the vehicle, written and read back with one request in flight and five attempts of
-0.5 s each; and the parameters that a trial changes for its take-off and restores afterwards.
+0.5 s each; and the parameters that a trial changes for its takeoff and restores afterwards.
 """
 
 import json
@@ -240,7 +240,7 @@ def written(gains: Gains) -> str:
     return ", ".join(f"{name} {value:g}" for name, value in gains.items()) or "nothing"
 
 
-# ---- parameters of the take-off
+# ---- parameters of the takeoff
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +281,7 @@ class TrialParameters:
         self._changed: dict[str, ChangedParameter] | None = None
 
     def set(self) -> None:
-        """Set the parameters for take-off. Raises VehicleError if the vehicle does not report the current values or
+        """Set the parameters for takeoff. Raises VehicleError if the vehicle does not report the current values or
         does not accept the new ones, or if the current values cannot be stored."""
         for setting in self._radio.profile.take_off_settings(self._radio.target):
             held = read_parameter(self._radio, setting.parameter)
@@ -368,13 +368,13 @@ class TrialParameters:
 def _unusable(file: Path, error: Exception) -> VehicleError:
     return VehicleError(
         f"The file {file}, which keeps parameters that a trial changed on the vehicle, cannot be used: {error}.",
-        hint="Check that the disk is not full. If the file is damaged, correct the vehicle's take-off parameters by "
+        hint="Check that the disk is not full. If the file is damaged, correct the vehicle's takeoff parameters by "
         "hand, then delete the file.",
     )
 
 
 def _unset(setting: Setting) -> VehicleError:
     return VehicleError(
-        f"The vehicle could not be set up: the take-off needs {setting.parameter} = {setting.value:g}.",
+        f"The vehicle could not be set up: the takeoff needs {setting.parameter} = {setting.value:g}.",
         hint="Check that the vehicle is connected and that no other program writes its parameters, then try again.",
     )

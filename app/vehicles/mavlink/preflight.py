@@ -23,7 +23,7 @@ HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
 POSITIONS_HZ: Final = 40.0
 SECONDARY_HZ: Final = 10.0
-ARMED: Final = "The vehicle is armed: somebody else armed it, or a flight of this program was interrupted."
+ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight was interrupted."
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
 _BATTERY_S: Final = 10.0
@@ -91,7 +91,8 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
     raise VehicleError(
         f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title} "
         f"(dialect {radio.profile.dialect.name}).{others}",
-        hint="Check that the vehicle is on, sends to this computer's port, and has the autopilot in its options.",
+        hint="Check that the vehicle is on, that it sends to this computer's port, and that its option `autopilot` is "
+        "correct.",
     )
 
 
@@ -499,7 +500,7 @@ def _flight_plan(problem: str) -> CheckItem:
         title="Flight plan",
         passed=not problem,
         found=problem or "has the blocks",
-        needed="the blocks for take-off and landing",
+        needed="the blocks for takeoff and landing",
         hint="Load a flight plan with these blocks (docs/real-flight.md), then connect again." if problem else "",
     )
 

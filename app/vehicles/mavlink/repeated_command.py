@@ -90,7 +90,7 @@ class RepeatedCommand:
             steps = self._radio.profile.steps(self._action, self._radio.target)
         except KeyError as error:
             raise VehicleError(
-                f"This program cannot command the vehicle to {self._action}: its flight plan listed no block {error}.",
+                f"Gainline cannot command the vehicle to {self._action}: its flight plan listed no block {error}.",
                 hint="Land it with the remote control or its own ground station.",
             ) from error
         for step in steps:

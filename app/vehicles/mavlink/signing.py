@@ -42,7 +42,7 @@ def read_key(file: Path) -> bytes:
         raise InputError(
             "The signing key cannot be read.",
             problems=(Problem("signing_key_file", f"names a file that cannot be read ({type(error).__name__})"),),
-            hint=f"Name a file with {2 * KEY_BYTES} hexadecimal digits that the program may read.",
+            hint=f"Name a file with {2 * KEY_BYTES} hexadecimal digits that this user can read.",
         ) from error
 
 
@@ -54,7 +54,7 @@ def check_key(key: bytes) -> None:
             problems=(
                 Problem("signing_key", f"must be {KEY_BYTES} bytes, written as {2 * KEY_BYTES} hexadecimal digits"),
             ),
-            hint="Make one with: openssl rand -hex 32",
+            hint="Create one with: openssl rand -hex 32",
         )
 
 

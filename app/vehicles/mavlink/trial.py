@@ -39,7 +39,7 @@ SINKS_M: Final = 0.3
 STALL_S: Final = 0.2
 """After a stall of this program of this length, pending packets are received before silence is evaluated."""
 LONGEST_STALL_S: Final = 1.0
-"""After a longer stall before the take-off command, the request to fly may be out of date, so the flight is refused."""
+"""After a longer stall before the takeoff command, the request to fly may be out of date, so the flight is refused."""
 _SAMPLE_EVERY_S: Final = 0.015
 """Minimum interval of live telemetry; records keep every sample."""
 
@@ -139,7 +139,7 @@ class TrialRunner:
             packets += self._radio.receive(LISTEN_S)
         self._listened_s = now_s
         if self._trial.state is State.ARM and stalled_s > LONGEST_STALL_S * self._radio.timeout_factor:
-            why = f"This program stalled for {stalled_s:.0f} s, so the take-off was not commanded."
+            why = f"Gainline stalled for {stalled_s:.0f} s, so the takeoff was not commanded."
             self._advance(ActionRefused(Action.ARM, why, now_s))
         for each in in_order(packets, self._look()):
             if isinstance(each, PacketReceived) and isinstance(each.measurement, Position):
@@ -229,7 +229,7 @@ class TrialRunner:
 def _describe_error(error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted from the keyboard"
-    return f"the program failed ({type(error).__name__}: {error})"
+    return f"internal error ({type(error).__name__}: {error})"
 
 
 def in_order(

@@ -63,7 +63,7 @@ DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
 _REPLY_S: Final = 0.5
-"""Interval at which a reply after the take-off command is requested."""
+"""Interval at which a reply after the takeoff command is requested."""
 _OTHER_M: Final = 1.0
 """After a greater jump of the altitude, another vehicle may be answering."""
 _ARMING_S: Final = 15.0
@@ -94,7 +94,7 @@ def advance(trial: Trial, event: Event) -> Step:
 
 
 def _confirm_take_off(trial: Trial, event: Event) -> Step:
-    """Note the first reply to a message sent after the take-off command, and request one until then."""
+    """Note the first reply to a message sent after the takeoff command, and request one until then."""
     last = trial.watch.last
     if not trial.may_take_off or last is None:
         return trial, ()
@@ -355,7 +355,7 @@ def _why_not_stopped(trial: Trial, now_s: float) -> str:
 
 def _answered(trial: Trial, event: Event) -> Trial:
     """Note a reply to the command to stop its motors, which together with one heartbeat confirms the stop. Before the
-    take-off command it may be the reply to arming, which some autopilots send for either."""
+    takeoff command it may be the reply to arming, which some autopilots send for either."""
     if trial.commanded_s is None:
         return trial
     measurement = event.measurement if isinstance(event, PacketReceived) else None

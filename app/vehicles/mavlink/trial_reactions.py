@@ -112,7 +112,7 @@ class Plan:
     """Plan of a trial.
 
     `safe_gains` are in the order in which an abort sends them; `ground_m` is the ground on the vehicle's datum;
-    `climbs_from_ground`: the commanded altitude counts from there; `record_s`: length of the record after the take-off
+    `climbs_from_ground`: the commanded altitude counts from there; `record_s`: length of the record after the takeoff
     command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again.
     """
 
@@ -147,11 +147,11 @@ class Plan:
 class Trial:
     """State of a trial.
 
-    `commanded_boot_s` is the vehicle's own time of the last sample before the take-off command, `commanded_in` its mode
+    `commanded_boot_s` is the vehicle's own time of the last sample before the takeoff command, `commanded_in` its mode
     then. `confirmed_boot_s` is its own time when it first replied to a message sent after that command; until then the
     command may still be under way to it. `failure` is the first failure. `stopped`: a person has requested motors off;
     `answered`: the vehicle has replied to the command to stop them. `ground_samples` are its positions between arming
-    and the take-off command, `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is
+    and the takeoff command, `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is
     the reason why it will be quarantined at the end, however it lands.
     """
 
@@ -186,7 +186,7 @@ class Trial:
 
     @property
     def may_take_off(self) -> bool:
-        """Whether the take-off command may yet reach the vehicle, which has not been seen in the air: its position may
+        """Whether the takeoff command may yet reach the vehicle, which has not been seen in the air: its position may
         be of the time before, and a command to stop its motors would arrive after it."""
         return self.commanded_s is not None and self.confirmed_boot_s is None and not self.watch.lifted
 
@@ -313,14 +313,14 @@ def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     off, or it was not observed climbing or descending and does not report the landing itself either."""
     watch, landed_blocks = trial.watch, trial.plan.limits.landed_blocks
     if trial.may_take_off:
-        return "it has not replied since the take-off command, which may still be under way"
+        return "it has not replied since the takeoff command, which may still be under way"
     is_unseen = trial.commanded_s is not None and (watch.unseen or not watch.lifted)
     may_fly = watch.block not in landed_blocks if landed_blocks else not watching.reports_landing(watch, now_s)
     return "its descent was not observed, and it has not reported a landing" if is_unseen and may_fly else ""
 
 
 def request_reply(trial: Trial, now_s: float) -> Step:
-    """Request a reply that confirms the take-off command."""
+    """Request a reply that confirms the takeoff command."""
     return replace(trial, requested_s=now_s), (RequestGain(trial.plan.safe_gains[0].parameter),)
 
 

@@ -458,7 +458,7 @@ class MavlinkVehicle:
         if self._gains.staged is None:
             raise VehicleError(
                 "No gains were staged, or the vehicle has restarted since: it was not flown.",
-                hint="Stage the gains, compare what is read back, then fly.",
+                hint="Stage the gains, check the read-back, then fly.",
             )
 
     def _observe_ground(self, watched_s: float, record_s: float) -> Ground:

@@ -103,7 +103,7 @@ def _whole(text: str, key: str, digits: str) -> int:
 def _port(text: str, key: str, digits: str) -> int:
     port = _whole(text, key, digits)
     if not 0 < port <= links.LARGEST_PORT:
-        raise _error(text, f"{key} must lie in 1 … {links.LARGEST_PORT}, got {port}")
+        raise _error(text, f"{key} must be between 1 and {links.LARGEST_PORT}, got {port}")
     return port
 
 

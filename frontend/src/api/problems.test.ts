@@ -14,22 +14,22 @@ import {
 const refused = problemFrom(422, {
   title: "These gains cannot be flown.",
   detail: "kp is out of bounds.",
-  hint: "Correct the named gains.",
+  hint: "Correct the gains listed.",
   problems: [
-    { field: "gains.kp", reason: "must lie in 0 … 4000 counts, got -1" },
+    { field: "gains.kp", reason: "must be between 0 and 4000 counts, got -1" },
     { field: "definition.stop.max_flights", reason: "must be 1 … 200" },
     { field: 7, reason: "not a problem at all" },
   ],
 });
 
 test("a refusal keeps its hint and its readable field problems", () => {
-  expect(refused.hint).toBe("Correct the named gains.");
+  expect(refused.hint).toBe("Correct the gains listed.");
   expect(refused.problems.map((one) => one.field)).toEqual(["gains.kp", "definition.stop.max_flights"]);
 });
 
 test("a reason finds the input it belongs to, the most precise one first", () => {
   expect(reasonsByField(refused, ["kp", "ki", "stop", "stop.max_flights"])).toEqual({
-    kp: "must lie in 0 … 4000 counts, got -1",
+    kp: "must be between 0 and 4000 counts, got -1",
     "stop.max_flights": "must be 1 … 200",
   });
 });

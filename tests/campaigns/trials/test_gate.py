@@ -92,7 +92,7 @@ def test_gains_that_the_vehicle_would_not_be_given_are_refused_whoever_overrules
     status, refused = ask(client, campaign, gains={"kp": 300, "ki": 13, "kd": 900}, overrule=REASON)
     assert (status, refused["detail"]) == (422, "These gains may not be written to the vehicle.")
     assert [(each["field"], each["reason"]) for each in refused["problems"]] == [
-        ("gains.kd", "must lie in 0 … 800, got 900")
+        ("gains.kd", "must be between 0 and 800, got 900")
     ]
 
 
@@ -106,7 +106,7 @@ def test_a_reason_that_nothing_needs_is_not_kept(client: TestClient, database: D
     ("gains", "field", "reason"),
     [
         (PAPERS | {"kd": 82.5}, "gains.kd", "must be a whole number of counts, got 82.5"),
-        (PAPERS | {"kp": 2**31}, "gains.kp", "must fit into 32 bits, got 2147483648"),
+        (PAPERS | {"kp": 2**31}, "gains.kp", "must fit in 32 bits, got 2147483648"),
     ],
 )
 def test_numbers_that_the_controller_cannot_hold_are_never_overruled(

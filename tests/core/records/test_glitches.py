@@ -72,10 +72,10 @@ def second_source(time_s: Samples, channels: Channels) -> None:
 @pytest.mark.parametrize(
     ("alter", "kind", "start_s", "end_s", "sentence"),
     [
-        (spike, "acceleration", 5.0, 5.1, "A jump by +0.40 m at 5.00 s, and back 0.1"),
+        (spike, "acceleration", 5.0, 5.1, "A jump of +0.40 m at 5.00 s, and back 0.1"),
         (hold, "frozen", 2.0, 3.0, "The same 1.91 m for 0.98 s from 2.00 s on"),
-        (hold_everything, "frozen", 20.0, 21.0, "a vehicle in the air is never so steady"),
-        (second_source, "disagreement", 7.0, 8.0, "The difference of the two sources is up to 0.50 m larger"),
+        (hold_everything, "frozen", 20.0, 21.0, "no vehicle in the air is that steady"),
+        (second_source, "disagreement", 7.0, 8.0, "The two sources differ by up to 0.50 m more than elsewhere"),
     ],
 )
 def test_what_no_vehicle_can_have_flown_is_found_where_it_is(
@@ -120,7 +120,7 @@ def test_a_datum_that_moves_is_named_and_cannot_be_repaired() -> None:
 
     bad = altered(model_run(), move)
     (found,) = find_glitches(TAKEOFF, bad)
-    assert found.sentence == "A jump by +0.30 m at 12.00 s: no thrust can accelerate a vehicle so much."
+    assert found.sentence == "A jump of +0.30 m at 12.00 s: no thrust can accelerate a vehicle that much."
     np.testing.assert_array_equal(repaired(TAKEOFF, bad, (found,))["altitude_m"], bad["altitude_m"])
 
 

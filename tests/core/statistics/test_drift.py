@@ -37,7 +37,7 @@ def test_of_two_parameters_each_is_allowed_more() -> None:
 def test_parameters_that_only_one_fit_has_are_not_compared() -> None:
     found = drift(hover(0.6, 0.001), lag(0.2, 0.001))
     assert not found.due
-    assert "no common parameter" in found.sentence
+    assert "no parameter in common" in found.sentence
 
 
 def test_what_is_known_exactly_is_told_without_an_uncertainty() -> None:

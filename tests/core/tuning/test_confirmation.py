@@ -100,9 +100,9 @@ def test_the_operators_own_gains_are_no_promise_and_need_none() -> None:
     ("bounds", "winner", "baseline", "left_out"),
     [
         ((0.0, 100.0), 3.0, 1.0, ""),
-        ((1.5, 100.0), 3.0, 2.0, "Flight 1 lies outside the bounds and takes no part."),
-        ((0.0, 2.5), 2.0, 1.0, "Flights 3, 4 lie outside the bounds and take no part."),
-        ((3.5, 100.0), 4.0, 4.0, "Flights 1, 2, 3 lie outside the bounds and take no part."),
+        ((1.5, 100.0), 3.0, 2.0, "Flight 1 lies outside the bounds and is not compared."),
+        ((0.0, 2.5), 2.0, 1.0, "Flights 3, 4 lie outside the bounds and are not compared."),
+        ((3.5, 100.0), 4.0, 4.0, "Flights 1, 2, 3 lie outside the bounds and are not compared."),
     ],
 )
 def test_only_gains_inside_the_bounds_are_confirmed(

@@ -32,7 +32,7 @@ def test_the_default_definition_has_no_problems() -> None:
             "start.donor",
             "is required with start.kind 'campaign', and not allowed with any other",
         ),
-        (replace(GOOD, ceiling_m=101.0), "ceiling_m", "must lie in 3.2 … 100 m, got 101"),
+        (replace(GOOD, ceiling_m=101.0), "ceiling_m", "must be between 3.2 and 100 m, got 101"),
         (replace(GOOD, stop=StopRule(confidence=1.0)), "stop.confidence", "must be at least 0.5 and below 1, got 1"),
         (replace(GOOD, stop=StopRule(min_battery_v=-1.0)), "stop.min_battery_v", "must be above 0 V, got -1"),
         (
@@ -45,7 +45,7 @@ def test_the_default_definition_has_no_problems() -> None:
             "strategy",
             "must be one of calibrated, gradient, identified, simplex, manual, got 'luck'",
         ),
-        (replace(GOOD, strategy="identified"), "strategy", "'identified' works with pitch-tracking only"),
+        (replace(GOOD, strategy="identified"), "strategy", "'identified' works only with pitch-tracking"),
         (replace(GOOD, options={"raw": True}), "options.raw", "is not an option of gradient (options: scaled, bias)"),
         (
             replace(GOOD, strategy="manual", options={"raw": 1}),
@@ -61,7 +61,7 @@ def test_the_default_definition_has_no_problems() -> None:
         ),
         (replace(GOOD, bounds={"kp": (0, math.nan)}), "bounds.kp", "must be whole numbers, got 0 … nan"),
         (replace(GOOD, bounds={"ki": (0.5, 99)}), "bounds.ki", "must be whole numbers, got 0.5 … 99"),
-        (replace(GOOD, bounds={"kp": (500, 600)}), "start.gains.kp", "must lie in 500 … 600 counts, got 283"),
+        (replace(GOOD, bounds={"kp": (500, 600)}), "start.gains.kp", "must be between 500 and 600 counts, got 283"),
         (replace(GOOD, start=Start(kind="given")), "start.gains", "are required with start.kind 'given'"),
         (replace(GOOD, start=Start(gains={"kp": 1})), "start.gains", "are not allowed with start.kind 'default'"),
         (
@@ -72,10 +72,10 @@ def test_the_default_definition_has_no_problems() -> None:
         (replace(GOOD, first_step_fraction=0.0), "first_step_fraction", "must be above 0 and at most 1, got 0"),
         (replace(GOOD, step_fraction=1.5), "step_fraction", "must be above 0 and at most 1, got 1.5"),
         (replace(GOOD, step_fraction=math.nan), "step_fraction", "must be above 0 and at most 1, got nan"),
-        (replace(GOOD, stop=StopRule(max_flights=0)), "stop.max_flights", "must lie in 1 … 200, got 0"),
-        (replace(GOOD, stop=StopRule(max_flights=201)), "stop.max_flights", "must lie in 1 … 200, got 201"),
-        (replace(GOOD, stop=StopRule(improvement=0.51)), "stop.improvement", "must lie in 0 … 0.5, got 0.51"),
-        (replace(GOOD, stop=StopRule(improvement=math.nan)), "stop.improvement", "must lie in 0 … 0.5, got nan"),
+        (replace(GOOD, stop=StopRule(max_flights=0)), "stop.max_flights", "must be between 1 and 200, got 0"),
+        (replace(GOOD, stop=StopRule(max_flights=201)), "stop.max_flights", "must be between 1 and 200, got 201"),
+        (replace(GOOD, stop=StopRule(improvement=0.51)), "stop.improvement", "must be between 0 and 0.5, got 0.51"),
+        (replace(GOOD, stop=StopRule(improvement=math.nan)), "stop.improvement", "must be between 0 and 0.5, got nan"),
         (replace(GOOD, seed=-1), "seed", "must not be negative, got -1"),
     ],
 )

@@ -25,8 +25,8 @@ def check(name: str, gains: dict[str, float], definition: Definition | None = No
 @pytest.mark.parametrize(
     ("gains", "sentence", "worst"),
     [
-        (DEFAULT | {"kp": -1}, "kp must lie in 0 … 4000 counts, got -1.", 1 / 4000),
-        (DEFAULT | {"ki": 1356}, "ki must lie in 0 … 1073 counts, got 1356.", 283 / 1073),
+        (DEFAULT | {"kp": -1}, "kp must be between 0 and 4000 counts, got -1.", 1 / 4000),
+        (DEFAULT | {"ki": 1356}, "ki must be between 0 and 1073 counts, got 1356.", 283 / 1073),
     ],
 )
 @compiled_only
@@ -41,7 +41,7 @@ def test_gains_out_of_their_bounds_are_refused_by_name(gains: dict[str, float], 
     [
         (DEFAULT | {"kd": 82.5}, "kd must be a whole number of counts, got 82.5.", 0.0),
         (DEFAULT | {"kd": math.nan}, "kd must be a finite number, got nan.", math.inf),
-        (DEFAULT | {"kp": 2**31}, "kp must fit into 32 bits, got 2147483648.", (2**31 - 4000) / 4000),
+        (DEFAULT | {"kp": 2**31}, "kp must fit in 32 bits, got 2147483648.", (2**31 - 4000) / 4000),
     ],
 )
 def test_numbers_that_no_controller_holds_are_refused_alone_and_for_good(

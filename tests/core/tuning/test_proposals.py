@@ -145,7 +145,7 @@ def test_under_the_rule_noise_gains_outside_the_bounds_are_not_flown_again(strat
         assert check_policy(definition, TAKEOFF, space, proposal.gains, flights, spread=proposal.spread).passed
         flights.append(fly(len(flights) + 1, proposal.gains))
     assert space.check(proposal.gains) == proposal.gains
-    assert "Flight 2 lies outside the bounds and takes no part." in proposal.explanation.summary
+    assert "Flight 2 lies outside the bounds and is not compared." in proposal.explanation.summary
     assert evaluate_stop_rule(definition, flights, proposal).reason == "told from noise"
 
 

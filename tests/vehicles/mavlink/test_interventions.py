@@ -155,7 +155,7 @@ def test_two_sources_that_disagree_for_a_third_of_a_second_land_the_vehicle() ->
     assert walk.state is State.RECORD
     watched(walk, 0.1, off_m=0.35)
     assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.DISAGREEMENT, "invalid")
-    assert walk.trial.why == "They were 0.35 m apart, over 0.3 m for 0.3 s."
+    assert walk.trial.why == "They were 0.35 m apart; more than 0.3 m for 0.3 s is not allowed."
     assert walk.gains_sent == []
 
 
@@ -300,7 +300,7 @@ def test_a_vehicle_whose_second_source_differs_before_the_command_gets_no_take_o
     while walk.state is State.ARM:
         watched(walk, STEP_S, off_m=1.0 if walk.trial.armed_s is not None else 0.0)
     assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.DISAGREEMENT)
-    assert walk.trial.why == "They were 1.00 m apart before the take-off command."
+    assert walk.trial.why == "They were 1.00 m apart before the takeoff command."
 
 
 PX4 = replace(

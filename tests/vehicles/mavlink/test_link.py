@@ -150,7 +150,7 @@ def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(
         assert link.duplicate_reason == ""
         other.send(heartbeat(other, autopilot=9))
         assert becomes(lambda: bool(link.duplicate_reason))
-    assert link.duplicate_reason == "Another vehicle with its system id sends from another address."
+    assert link.duplicate_reason == "Another vehicle with the same system id sends from another address."
 
 
 def test_another_vehicle_with_its_system_id_on_another_host_makes_the_link_doubtful(

@@ -203,7 +203,7 @@ def test_gains_are_clamped_here_because_no_autopilot_does() -> None:
         check_gains({"kp": -5, "ki": 300.7, "kd": 82, "nom_thr": 1}, gain_set)
     assert {(problem.field, problem.reason) for problem in refusal.value.problems} == {
         ("gains.nom_thr", "is not a gain of this vehicle"),
-        ("gains.kp", "must lie in 0 … 4000, got -5"),
+        ("gains.kp", "must be between 0 and 4000, got -5"),
         ("gains.ki", "must be a whole number of counts, got 300.7"),
     }
 

@@ -189,7 +189,7 @@ def test_a_program_that_stood_still_while_it_armed_commands_no_take_off() -> Non
     """Seen: it went through what had come meanwhile, took off five seconds late, and read the abort then."""
     with StallingRig() as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)
-        with pytest.raises(VehicleError, match="stalled for 5 s, so the take-off was not commanded") as failed:
+        with pytest.raises(VehicleError, match="stalled for 5 s, so the takeoff was not commanded") as failed:
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert failed.value.not_flown
         assert rig.stalled

@@ -94,7 +94,7 @@ COPTER = replace(PLAN, climbs_from_ground=True)
 
 
 def armed(plan: Plan = COPTER, for_s: float = 0.2) -> TrialDriver:
-    """For so long, before its take-off command."""
+    """For so long, before its takeoff command."""
     walk = TrialDriver(plan=plan)
     walk.give(ActionDone(Action.ARM, walk.now_s))
     walk.armed = True
@@ -110,7 +110,7 @@ def commanded(walk: TrialDriver) -> TrialDriver:
 
 
 def begun_anew(by_m: float = 0.5, plan: Plan = COPTER, after_s: float = 0.2) -> TrialDriver:
-    """To the take-off command of a vehicle whose altitude begins anew so long after it was armed."""
+    """To the takeoff command of a vehicle whose altitude begins anew so long after it was armed."""
     walk = armed(plan, after_s)
     walk.altitude_m += by_m
     return commanded(walk)
@@ -166,7 +166,7 @@ def test_a_vehicle_whose_altitude_rose_before_the_command_gets_no_take_off() -> 
     rise(walk)
     commanded(walk)
     assert walk.trial.failure is Failure.LOST_POSITION
-    assert walk.trial.why == "Its altitude changed by +0.40 m before the take-off command, and it may have moved."
+    assert walk.trial.why == "Its altitude changed by +0.40 m before the takeoff command, and it may have moved."
     walk.pass_s(0.5)
     assert Action.TAKE_OFF not in walk.actions
     assert walk.actions[-1] is Action.LAND, "it may be in the air"
@@ -542,7 +542,7 @@ def test_an_altitude_that_stays_behind_its_climb_rate_is_lost_and_stops_no_motor
         walk.pass_s(STEP_S)
     walk.altitude_m, walk.climb_rate_m_s = ground_m, 0.0
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
-    assert walk.trial.why == "By its climb rate it rose by 0.5 m more than by its altitude."
+    assert walk.trial.why == "By its climb rate it rose 0.5 m more than its altitude shows."
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)

@@ -144,7 +144,7 @@ class TrialDriver:
     # ---- as a flight goes
 
     def arm(self) -> "TrialDriver":
-        """To the take-off command."""
+        """To the takeoff command."""
         self.give(ActionDone(Action.ARM, self.now_s))
         self.armed = True
         while self.state is State.ARM:

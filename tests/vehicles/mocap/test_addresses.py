@@ -39,7 +39,7 @@ def test_a_source_is_written_as_one_text(text: str, address: SourceAddress) -> N
         ("natnet:10.0.0.2?body=1&local=eth0", "local must be an IPv4 address"),
         ("natnet:10.0.0.2?body=1&multicast=10.0.0.9", "multicast must be a group"),
         ("natnet:10.0.0.2?body=1&multicast=maybe", "multicast must be a group"),
-        ("natnet:10.0.0.2?body=1&data_port=0", "data_port must lie in 1"),
+        ("natnet:10.0.0.2?body=1&data_port=0", "data_port must be between 1"),
         ("mavlink:udpin:0.0.0.0", "must be udp:HOST:PORT"),
     ],
 )

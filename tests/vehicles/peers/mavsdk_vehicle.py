@@ -46,7 +46,7 @@ class MavsdkVehicle:
     def __init__(self, port: int, *, armable: bool = True) -> None:
         self.altitude_m = GROUND_M
         self.flew_with: list[dict[str, float]] = []
-        """The gains that it held at each take-off."""
+        """The gains that it held at each takeoff."""
         self._climb_rate_m_s = 0.0
         self._mode = FlightMode.UNKNOWN
         self._leaving = threading.Event()

@@ -13,7 +13,7 @@ NEAR_M = 6.0
 
 
 def built(body: Body, system: int) -> Paparazzi:
-    """With a plan that allows less than a real one, so that wind carries it there within its take-off."""
+    """With a plan that allows less than a real one, so that wind carries it there within its takeoff."""
     return Paparazzi(body, system=system, max_distance_m=NEAR_M)
 
 

@@ -51,7 +51,7 @@ def propose(
     Raises TypeError for experiments other than the takeoff.
     """
     if not isinstance(experiment, Takeoff):
-        raise TypeError(f"calibrated works with takeoff only, not with {experiment.name}")
+        raise TypeError(f"calibrated works only with takeoff, not with {experiment.name}")
     calibration, base = _calibrated(experiment, flights)
     models = calibration.plausible(runs=MODELS, width=ROBUSTNESS_SD)
     fraction = min(trust_fraction(flights), definition.step_fraction)

@@ -206,7 +206,7 @@ def _explanation(
 ) -> Explanation:
     numbers = ", ".join(str(number) for number in found.flights)
     plural = "s" if len(found.flights) > 1 else ""
-    fitted = f"A and B were identified again from flight{plural} {numbers}."
+    fitted = f"A and B were re-identified from flight{plural} {numbers}."
     gains = format_gains(space.mapping(optimum.gains))
     offer = (
         f"The identified model predicts no sufficient improvement over flight {base.number}, error "
@@ -230,7 +230,7 @@ _FITS: Final[dict[Fit, str]] = {
 
 IDENTIFIED: Final = Strategy(
     name="identified",
-    title="Model identified again",
+    title="Re-identified model",
     line="Identifies the aircraft's linear model from all flights, then flies the optimum of that model.",
     options=(
         Option(

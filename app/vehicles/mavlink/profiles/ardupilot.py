@@ -78,7 +78,7 @@ class ArduPilot:
         Requirement("FS_GCS_TIMEOUT", "land within 15 s of losing it", most=15.0),
         Requirement(
             "SYSID_MYGCS",
-            f"have this program as its ground station ({GROUND_STATION})",
+            f"have Gainline as its ground station ({GROUND_STATION})",
             frozenset({float(GROUND_STATION)}),
             newer_name="MAV_GCS_SYSID",
         ),

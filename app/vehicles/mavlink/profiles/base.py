@@ -89,7 +89,7 @@ class GainParameter:
     def refusal(self, value: float) -> str | None:
         """Return why this value may not be written, or None if it may."""
         if not self.lower <= value <= self.upper:
-            return f"must lie in {self.lower:g} … {self.upper:g}, got {shortened(value)}"
+            return f"must be between {self.lower:g} and {self.upper:g}, got {shortened(value)}"
         return f"must be a whole number of counts, got {value:g}" if self.whole and value != int(value) else None
 
 
@@ -200,7 +200,7 @@ class Profile(Protocol):
     def heartbeat_s(self) -> float: ...
     @property
     def lift_off_s(self) -> float:
-        """Time after the take-off command for which it may still stand on the ground."""
+        """Time after the takeoff command for which it may still stand on the ground."""
         ...
 
     @property
@@ -211,7 +211,7 @@ class Profile(Protocol):
 
     @property
     def climbs_from_ground(self) -> bool:
-        """Whether the altitude commanded is above the place of take-off, rather than above the autopilot's origin."""
+        """Whether the altitude commanded is above the place of takeoff, rather than above the autopilot's origin."""
         ...
 
     @property
@@ -240,7 +240,7 @@ class Profile(Protocol):
 
     @property
     def arming_blocks(self) -> frozenset[str]:
-        """Blocks of its flight plan, if it has one, in which it stands on the ground before the take-off."""
+        """Blocks of its flight plan, if it has one, in which it stands on the ground before the takeoff."""
         ...
 
     @property
@@ -282,7 +282,7 @@ class Profile(Protocol):
         ...
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
-        """Return the parameters required for a take-off to the altitude of `target`."""
+        """Return the parameters required for a takeoff to the altitude of `target`."""
         ...
 
     def version_request(self, target: Target) -> Outgoing | None:

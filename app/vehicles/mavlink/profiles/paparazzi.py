@@ -151,7 +151,7 @@ def _block(target: Target, name: str) -> tuple[Outgoing, ...]:
 
 
 def _climb_here(target: Target) -> Outgoing:
-    """Return the message that sets the waypoint of the take-off straight above the vehicle."""
+    """Return the message that sets the waypoint of the takeoff straight above the vehicle."""
     fields = {
         "seq": target.waypoint,
         "frame": _LOCAL_ENU,

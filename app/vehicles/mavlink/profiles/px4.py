@@ -1,4 +1,4 @@
-"""PX4: its take-off and landing modes, and the gains of its vertical controllers."""
+"""PX4: its takeoff and landing modes, and the gains of its vertical controllers."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -42,7 +42,7 @@ class Px4:
     landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
     mode_names: Final = MappingProxyType(
         {
-            "1.0": "Manual", "2.0": "Altitude", "3.0": "Position", "4.1": "Ready", "4.2": "Take-off", "4.3": "Hold",
+            "1.0": "Manual", "2.0": "Altitude", "3.0": "Position", "4.1": "Ready", "4.2": "Takeoff", "4.3": "Hold",
             "3.1": "Orbit", "3.2": "Position slow", "4.4": "Mission", "4.5": "Return", "4.6": "Land", "5.0": "Acro",
             "6.0": "Offboard", "7.0": "Stabilized", "8.0": "Rattitude", "10.0": "Termination",
             "11.0": "Altitude cruise",

@@ -425,7 +425,7 @@ export const takeOffTrial = <ThrowOnError extends boolean = false>(options: Opti
  * Get Readiness
  *
  * How far a flight has come, and what takes it back at this moment. It changes without an event: read it again
- * every second before a take-off.
+ * every second before a takeoff.
  */
 export const getReadiness = <ThrowOnError extends boolean = false>(options: Options<GetReadinessData, ThrowOnError>): RequestResult<GetReadinessResponses, GetReadinessErrors, ThrowOnError> => (options.client ?? client).get<GetReadinessResponses, GetReadinessErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/readiness', ...options });
 

@@ -452,7 +452,7 @@ export type CampaignVehicle = {
     /**
      * Needs Staging
      *
-     * true if a flight is staged first and its operator starts the take-off
+     * true if a flight is staged first and its operator starts the takeoff
      */
     needs_staging: boolean;
     state: VehicleState;
@@ -1368,7 +1368,7 @@ export type FittedParameter = {
  * FlightBrief
  *
  * The last flight requested for this trial. `problem` says why it failed. A flight of mode `stage` waits with its
- * gains on the vehicle until its operator requests the take-off.
+ * gains on the vehicle until its operator requests the takeoff.
  */
 export type FlightBrief = {
     /**
@@ -1383,7 +1383,7 @@ export type FlightBrief = {
     /**
      * Take Off At
      *
-     * time of the take-off request
+     * time of the takeoff request
      */
     take_off_at: string | null;
     /**
@@ -3585,13 +3585,13 @@ export type TrialReadiness = {
     /**
      * Losses
      *
-     * why; the take-off is refused while there is any
+     * why; the takeoff is refused while there is any
      */
     losses: Array<ReadinessLoss>;
     /**
      * Is Ready
      *
-     * whether the take-off of the staged vehicle may be requested
+     * whether the takeoff of the staged vehicle may be requested
      */
     is_ready: boolean;
 };
@@ -3604,7 +3604,7 @@ export type TrialReadiness = {
  * planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
  * │  ↑───────┘ │        ├──→ aborted
  * │            │        ├──→ lost ──→ captured (record recovered) | invalid
- * │            │        └──→ planned (no take-off command was sent)
+ * │            │        └──→ planned (no takeoff command was sent)
  * ├────────────┴──→ cancelled
  * └──→ captured (flown elsewhere, imported)
  *

@@ -117,12 +117,12 @@ describe("typed gains", () => {
 
 test("a refusal names the gains, the reasons, and what would pass", () => {
   const checks = [
-    { name: "bounds", passed: false, sentence: "kp must lie in 0 … 4000.", gain: "kp", offer: { kp: 4000 } },
+    { name: "bounds", passed: false, sentence: "kp must be between 0 and 4000.", gain: "kp", offer: { kp: 4000 } },
     { name: "altitude", passed: false, sentence: "It rises to 9 m." },
     { name: "wrapping", passed: true, sentence: "No product can wrap." },
   ];
   expect(refusalOf({ passed: false, checks } as Gate).problems).toEqual([
-    { field: "gains.kp", reason: "kp must lie in 0 … 4000.", offer: { kp: 4000 } },
+    { field: "gains.kp", reason: "kp must be between 0 and 4000.", offer: { kp: 4000 } },
     { field: "gains", reason: "It rises to 9 m." },
   ]);
 });

@@ -49,7 +49,7 @@ def test_the_second_flight_is_at_the_true_optimum_and_nothing_is_left_after_it()
     assert proposal.interval is not None
     assert second.error is not None
     assert second.error in proposal.interval
-    assert "identified again from flight 1." in proposal.explanation.summary
+    assert "re-identified from flight 1." in proposal.explanation.summary
     assert len(proposal.explanation.fitted) == 19
     assert proposal.explanation.fitted[-1].standard_error < 0.01
     last = next_proposal(campaign, [first, second])
