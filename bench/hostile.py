@@ -122,7 +122,7 @@ under each autopilot. As in [faults.md](faults.md) the trials run in lockstep, s
 The checks use the packets at the vehicle's antenna, its true height, and the hazard itself. These are violations:
 
 - motors off above 0.15 m; a height of more than a metre above the altitude limit;
-- a vehicle that is not on the ground a minute after its trial, while the program attends to it; one that is armed and
+- a vehicle that is not on the ground a minute after its trial, while Gainline attends to it; one that is armed and
   heard and stays up for eight seconds without Land; anything but Land sent to a vehicle in the air after its trial;
 - anything sent to a vehicle that a pilot flies, once two heartbeats must have shown it. From then on the pilot is
   responsible, also after switching back, so the landing is not checked;

@@ -112,12 +112,12 @@ one run and prints all details. `--out docs` writes this page.
 
 The seed of a run determines the autopilot, the gains, the faults, the state of the trial in which each begins, how long
 after the beginning of that state, and its duration (from a tenth of a second to permanent). Consecutive seeds cover
-every fault in every state. The vehicle is the simulated drone with the flight model `twin` and its scatter; the program
+every fault in every state. The vehicle is the simulated drone with the flight model `twin` and its scatter; Gainline
 flies it with `MavlinkVehicle`, as any vehicle over MAVLink. Both run in lockstep: the drone's time advances only while
-the program waits, so a repeated run gives the same result however busy the machine is. Real sockets and threads are
+Gainline waits, so a repeated run gives the same result however busy the machine is. Real sockets and threads are
 covered by the tests of the link.
 
-The checks (`bench/hazards/fault_checks.py`) were written from the table in real-flight.md and do not use the program's
+The checks (`bench/hazards/fault_checks.py`) were written from the table in real-flight.md and do not use Gainline's
 own account of the trial. A tap at the drone's antenna reads every packet that the ground sends, whether or not the
 drone receives it, together with the drone's true height. The states in the tables below are derived from these packets.
 The checks are:
@@ -136,7 +136,7 @@ The checks are:
 {right} of {runs} runs (seeds {seeds}; {autopilots}) passed.{wrong}
 
 - Trials: {outcomes}.
-- Vehicles afterwards: {vehicles} (an unopened vehicle could not be connected, so the program never controlled it).
+- Vehicles afterwards: {vehicles} (an unopened vehicle could not be connected, so Gainline never controlled it).
 - {stops} packets that stop motors were sent. Apart from the operator's own, none was sent with the drone more than
   {highest} m above the ground.
 
@@ -162,9 +162,9 @@ These were found by such runs and have been fixed. `tests/bench/test_faults.py` 
   staged ones.
 - With single position samples that jump, a vehicle on the ground was never at rest for two seconds and was quarantined
   after 40 s.
-- When gains overshot to the altitude limit of the vehicle's own flight plan, the program took the landing for one that
+- When gains overshot to the altitude limit of the vehicle's own flight plan, Gainline took the landing for one that
   the vehicle had begun for another reason. It landed with these gains, and the flight did not count against them.
-- When the link was lost during lift-off, the program took this for no lift-off and counted it against the gains.
+- When the link was lost during lift-off, Gainline took this for no lift-off and counted it against the gains.
 
 Not covered: sideways movement, radios that lose single packets, other autopilots, and hardware. Trials in which the
 link delivers false messages of a sound vehicle are in [hostile-links.md](hostile-links.md).

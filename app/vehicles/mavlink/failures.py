@@ -65,7 +65,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "The vehicle did not confirm its gains; it was not armed.",
         ),
         Failure.NOT_ARMED: Response(
-            "arming refused, or not armed 2 s after it", "disarm", "refused", "The vehicle did not arm."
+            "arming refused, or not armed within 2 s", "disarm", "refused", "The vehicle did not arm."
         ),
         Failure.NO_LIFT_OFF: Response(
             "takeoff refused, or still less than 0.15 m above the ground at the end of the autopilot's time",
