@@ -51,8 +51,8 @@ class Keyring:
         except OSError as error:
             raise StorageError(
                 f"The folder {folder}, which holds this server's secret, cannot be used: {error.strerror}.",
-                hint="Give this user read and write permission for it; or stop Gainline and delete it, after "
-                "which every browser must be unlocked again.",
+                hint="Give this user read and write permission for it. Or stop Gainline and delete it; every "
+                "browser must then be unlocked again.",
             ) from error
 
     def value(self, key: Key) -> str:

@@ -159,7 +159,7 @@ class Packer:
             raise StorageError(
                 f"The bundle was not created: the predicted flight of proposal {row.id} of campaign "
                 f"{row.campaign_id} is damaged.",
-                hint="Restore the database from an earlier backup. Flight records are checked separately.",
+                hint="Restore the database from an earlier backup.",
             )
         return Proposal(**kept, predicted=self._record(row.predicted))
 

@@ -129,7 +129,7 @@ async def get_health(live: Live) -> Health:
 
 @router.get("/catalogue")
 def get_catalogue() -> Catalogue:
-    """Everything that a campaign can be made of."""
+    """Everything that a campaign can consist of."""
     return Catalogue.model_validate(
         {
             "experiments": [

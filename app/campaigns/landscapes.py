@@ -115,7 +115,7 @@ def _not_yet(session: Session, campaign: CampaignRow, proposal: ProposalRow) -> 
         return _waiting(f"The landscape could not be computed. {why} Retry it on the Jobs page.")
     reason = (
         "The model is being evaluated at several hundred gain sets around the flown and the proposed ones. This "
-        "takes seconds, or half a minute with the calibrated model. The landscape appears here automatically."
+        "takes a few seconds, or half a minute with the calibrated model. The landscape appears here automatically."
     )
     if job is not None and job.state == JobState.RUNNING and job.done_share:
         reason = f"{percent(job.done_share)} done: {job.doing}. The landscape appears here automatically."

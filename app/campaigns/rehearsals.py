@@ -82,6 +82,6 @@ def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
         raise ConflictError(
             f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal: "
             f"{result.reason}.",
-            hint=f"Rehearse it {where} first: fly {FLIGHTS} valid flights, or the campaign until its stop rule "
-            "ends it, with no flight aborted or invalid.",
+            hint=f"Rehearse it {where} first: fly {FLIGHTS} valid flights, or fly it until its stop rule "
+            "ends it, with no aborted or invalid flight.",
         )

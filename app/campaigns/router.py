@@ -139,7 +139,7 @@ def get_statistics(session: Reader, campaign_id: Id) -> CampaignStatistics:
 
 @router.get("/{campaign_id}/proposal")
 def get_proposal(session: Reader, campaign_id: Id) -> NextFlight:
-    """State of the next proposal, and the proposal once it is there."""
+    """State of the next proposal, and the proposal once it is computed."""
     return service.next_flight(session, campaign_id)
 
 

@@ -293,7 +293,7 @@ class FlightChoice(BaseModel):
 
 class Proposal(BaseModel):
     """The next gain set, computed from one history; stale as soon as that history has changed. `recommended` is the
-    advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so. `choices` are the
+    advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` is true. `choices` are the
     proposal and its variants, no gain set twice; none is recommended when the advice is to stop."""
 
     id: int
@@ -416,7 +416,7 @@ class TrackRecord(BaseModel):
 class CampaignStatistics(BaseModel):
     """Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all repeats and the
     experiment's prior; null while unknown, that is before the first repeat under an autopilot whose scatter was never
-    measured, and zero if all repeats gave the same error. `scatter_source` says where it is from. `optimism` is how
+    measured, and zero if all repeats gave the same error. `scatter_source` states its source. `optimism` is how
     much the best is expected to look better than it is because it was chosen, and `shrunk_error` its error corrected
     for that."""
 

@@ -215,7 +215,7 @@ class Client:
     def fly(
         self, campaign_id: int, gains: Proposal | Mapping[str, float], *, speed: float | None = None, note: str = ""
     ) -> Trial:
-        """Request a flight of a simulated vehicle. `speed` is simulated time over wall time; None: as fast as
+        """Request a flight of a simulated vehicle. `speed` is simulated time over wall-clock time; None: as fast as
         possible."""
         return self._plan(campaign_id, gains, note=note, fly=FlightOrder(speed=speed))
 

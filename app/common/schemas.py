@@ -201,7 +201,7 @@ class FigureTable(BaseModel):
 
 
 class FigureCard(BaseModel):
-    """A figure, or why there is none: `waiting` for data, or `failed`. `summary` says in a sentence what it shows."""
+    """A figure, or why there is none: `waiting` for data, or `failed`. `summary` describes it in a sentence."""
 
     name: str
     title: str

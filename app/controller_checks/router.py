@@ -50,7 +50,7 @@ def check_controller(
 
 @router.post("/example", status_code=status.HTTP_201_CREATED)
 def check_example_controller(act: IdempotentPost) -> ControllerCheck:
-    """Check the example recording: a takeoff that comes with the program, recorded from the autopilot's own code."""
+    """Check the example recording: a takeoff that comes with Gainline, recorded from the autopilot's own code."""
     result = service.examine_example()
     return act(ControllerCheck, lambda session: service.store_example(session, result))
 
@@ -70,5 +70,5 @@ def get_controller_check_figure(
 
 @router.delete("/{check_id}", status_code=status.HTTP_204_NO_CONTENT)
 def delete_controller_check(session: Writer, check_id: Id) -> None:
-    """Delete a check; it can be made again from its recording."""
+    """Delete a check; it can be repeated from its recording."""
     service.delete_check(session, check_id)

@@ -46,7 +46,7 @@ def list_vehicles(session: Reader, limit: Limit = 50, cursor: CursorText = None)
 
 @router.post("", status_code=status.HTTP_201_CREATED)
 def register_vehicle(act: IdempotentPost, asking: RequestContextDep, body: NewVehicle) -> Vehicle:
-    """Register a vehicle that the program keeps a link to. Whether it is REAL follows from its settings."""
+    """Register a vehicle that Gainline keeps a link to. Whether it is REAL follows from its settings."""
     return act(Vehicle, lambda session: registration.register_vehicle(session, body, asking))
 
 

@@ -108,7 +108,7 @@ class LeaseRequest(Request):
 
 
 class Vehicle(BaseModel):
-    """Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it reported at
+    """Something that can fly a trial. `concern` states why it is quarantined; `held` are the gains that it reported at
     `held_at`. A simulation that is shared by campaigns is not `registered` and has no link."""
 
     id: int
@@ -183,7 +183,7 @@ class VehicleOrder(Request):
 
 class OrderAnswer(BaseModel):
     """`accepted` is true once the process that has the vehicle's link has forwarded the command; the effect appears in
-    the vehicle's status. When it is false, `sentence` says why, and the command is not carried out later."""
+    the vehicle's status. When it is false, `sentence` states why, and the command is not executed later."""
 
     accepted: bool
     sentence: str

@@ -14,7 +14,7 @@ router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_on
 
 @router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
 def create_trial(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: NewTrial) -> Trial:
-    """Plan a trial of the proposal or of your own gains and, with `fly`, request its flight at once."""
+    """Plan a trial of the proposal, a variant or custom gains and, with `fly`, request its flight at once."""
     return act(
         Trial,
         lambda session: service.plan_trial(session, campaign_id, body, asking),

@@ -8,7 +8,7 @@ from app.flights.readiness import LossKind, ReadinessStep
 
 
 class ReadinessLoss(BaseModel):
-    """Something that takes readiness back: what it means now, and the way on."""
+    """Something that takes readiness back: what it means now, and what to do."""
 
     kind: LossKind
     what: str
@@ -16,7 +16,7 @@ class ReadinessLoss(BaseModel):
 
 
 class TrialReadiness(BaseModel):
-    """How far a flight has come, for who asks: the steps that hold, in order, and those that were reached and lost."""
+    """How far a flight has come, for this client: steps that hold, in order, and steps that were reached and lost."""
 
     steps: list[ReadinessStep]
     lost: list[ReadinessStep]

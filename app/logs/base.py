@@ -29,8 +29,8 @@ def contents(stream: BinaryIO) -> Contents:
     stream.seek(0)
     if size > MAX_BYTES:
         raise TrajectoryError(
-            f"The log has {size / 2**20:.0f} MiB.",
-            hint=f"Cut it to the flight: at most {MAX_BYTES / 2**20:g} MiB are read.",
+            f"The log is too large: {size / 2**20:.0f} MiB.",
+            hint=f"Trim it to the flight: at most {MAX_BYTES / 2**20:g} MiB can be read.",
             problems=(Problem("file", f"is larger than {MAX_BYTES / 2**20:g} MiB"),),
         )
     if not size:

@@ -73,7 +73,7 @@ def _unpack(name: str, source: BinaryIO, plain: BinaryIO) -> None:
         if plain.tell() > MAX_BYTES:
             raise InputError(
                 f"{name} cannot be replayed.",
-                hint=f"Cut the run: at most {MAX_BYTES // 2**20} MiB of text and {MAX_ROWS} rows are read.",
+                hint=f"Trim the run: at most {MAX_BYTES // 2**20} MiB of text and {MAX_ROWS} rows can be read.",
                 problems=(Problem("file", f"contains more than {MAX_BYTES // 2**20} MiB of text"),),
             )
     plain.seek(0)

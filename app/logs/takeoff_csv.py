@@ -86,7 +86,7 @@ class _Lines:
             raise _refused(
                 f"line {self.number}",
                 f"is one too many: a flight may have at most {MAX_ROWS} rows",
-                "Cut the log to the takeoff, or keep every tenth row: 50 per second are enough.",
+                "Trim the log to the takeoff, or keep every tenth row: 50 rows per second are enough.",
             )
         if self.number == 1:
             if raw.startswith(_UTF_16):

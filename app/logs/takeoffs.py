@@ -133,7 +133,7 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
         if len(found) > MAX_TAKEOFFS:
             raise TrajectoryError(
                 f"The log contains more than {MAX_TAKEOFFS} takeoffs.",
-                hint="Cut it to the flights of one day, or choose the log of one flight.",
+                hint="Trim it to the flights of one day, or choose the log of one flight.",
                 problems=(Problem("file", "contains too many flights"),),
             )
     if not found:

@@ -47,7 +47,7 @@ def run_limited(limits: Limits, function: Callable[P, T], *args: P.args, **kwarg
     if not _places.acquire(timeout=WAITS_S):
         raise UnavailableError(
             f"{MAX_CONCURRENT} files are already being read.",
-            hint="Send this file again in a moment; nothing was stored.",
+            hint="Send this file again in a few seconds; nothing was stored.",
         )
     try:
         return _run(limits, partial(function, *args, **kwargs))

@@ -19,7 +19,7 @@ router = APIRouter(prefix="/api/campaigns", tags=["reports"])
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}},
 )
 def get_report(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> Response:
-    """The whole campaign as one page that can be saved and sent: it needs neither this program nor a network."""
+    """The whole campaign as one page that can be saved and sent: it needs neither Gainline nor a network."""
     document = _document(database, settings, campaign_id)
     return Response(
         document.html,

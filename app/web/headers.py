@@ -118,7 +118,7 @@ class BodyLimitMiddleware:
 
     def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
         self._app = app
-        record = "a flight record has at most 200 000 rows, so thin a longer one or cut it"
+        record = "a flight record has at most 200 000 rows, so downsample or trim a longer one"
         self._uploads = {
             "/trajectory": _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs"),
             "/controller-checks": _Limit("file", upload_bytes, "`gainline controller check` reads larger logs"),

@@ -172,7 +172,7 @@ def test_a_variant_is_computed_from_the_flights(client: TestClient, database: Da
     path = f"/api/campaigns/{campaign['id']}/trials"
     for variant in ("repeat", "baseline", "smaller step"):
         answer = client.post(path, json={"variant": variant})
-        assert (answer.status_code, "no valid flight inside its bounds" in answer.json()["detail"]) == (409, True)
+        assert (answer.status_code, "needs a valid flight inside the bounds" in answer.json()["detail"]) == (409, True)
     create_trial(client, campaign["id"], fly={"speed": None})
     land(database, lift_off(database), modelled(DEFAULT))
     run_jobs(database)
@@ -303,7 +303,7 @@ def test_a_donor_that_cannot_be_one_is_refused_by_name(client: TestClient, datab
     other = refusal({"campaign_id": donor}, experiment_options={"window_s": 20.0})["definition.start.donor.campaign_id"]
     assert other == f"campaign {donor} has a scored window of 32.6 s, this one of 20 s"
     assert (
-        "10 … 60 s"
+        "between 10 and 60 s"
         in refusal({"campaign_id": donor}, experiment_options={"window_s": 5.0})[
             "definition.experiment_options.window_s"
         ]

@@ -182,8 +182,8 @@ def test_the_gate_says_how_far_the_gains_may_go(client: TestClient, database: Da
     answer = client.post(f"{CAMPAIGN}/{campaign['id']}/trials", json={"gains": {"kp": 3000, "ki": 13, "kd": 82}})
     assert answer.json()["title"] == "Gains refused"
     assert problems_of(answer)["gains.kp"] == (
-        "The largest change, of kp, is 67.9\u00a0% of its range; only 25\u00a0% is allowed from the start gains "
-        "until a flight is valid."
+        "kp changes most, by 67.9\u00a0% of its range; only 25\u00a0% is allowed from the start gains "
+        "before the first valid flight."
     )
 
 

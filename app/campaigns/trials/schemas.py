@@ -14,14 +14,14 @@ Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=1000
 
 
 class FlightOrder(Request):
-    """Speed of a simulated flight: simulated time over wall time; null: as fast as possible."""
+    """Speed of a simulated flight: simulated time over wall-clock time; null: as fast as possible."""
 
     speed: Speed | None = 10.0
 
 
 class NewTrial(Request):
-    """A trial of a proposal, of your own gains, or of a variant: exactly one of the three. With `fly` it is flown at
-    once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
+    """A trial of a proposal, of custom gains, or of a variant: exactly one of the three. With `fly` it is flown at
+    once. Variants: `smaller step`, halfway from the best gains to the proposal; `repeat`, the best gains again;
     `baseline`, the first flight's gains again. A variant with `gains` is refused when these are not its gains: it then
     flies what its client has shown, or nothing."""
 
@@ -111,7 +111,7 @@ class RecordBrief(BaseModel):
 
 
 class FlightBrief(BaseModel):
-    """The last flight requested for this trial. `problem` says why it failed. A flight of mode `stage` waits with its
+    """The last flight requested for this trial. `problem` states why it failed. A flight of mode `stage` waits with its
     gains on the vehicle until its operator requests the takeoff."""
 
     id: int

@@ -48,7 +48,7 @@ class GateDecision:
 def check_own_gains(
     session: Session, campaign: CampaignRow, asked: Gains, *, overrule: str | None = None
 ) -> GateDecision:
-    """Check a person's own gains, given what was known of the vehicle when the latest proposal was computed.
+    """Check custom gains, given what was known of the vehicle when the latest proposal was computed.
 
     Takes about 0.1 s. Raises GainsError that names what is refused and what would pass.
     """

@@ -66,7 +66,7 @@ def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fr
     vector = space.vector(gains)
     passed = worst <= fraction or bool(((low <= vector) & (vector <= high)).all())
     sentence = (
-        f"The largest change, of {name}, is {percent(worst, 1)} of its range; "
+        f"{name} changes most, by {percent(worst, 1)} of its range; "
         f"{'at most' if passed else 'only'} {percent(fraction)} is allowed from {origin}."
     )
     beyond = {} if passed else space.mapping(space.nearest(vector.clip(low, high)))
@@ -176,10 +176,10 @@ def _step(
 ) -> Check:
     flown = [flight.gains for flight in flights if flight.outcome == "valid"]
     if flown:
-        return check_step(space, gains, flown, definition.step_fraction, "a flown set")
+        return check_step(space, gains, flown, definition.step_fraction, "the nearest flown set")
     origin = start_gains(definition, experiment, space) if start is None else start
     fraction = definition.first_step_fraction
-    return check_step(space, gains, [origin], fraction, "the start gains until a flight is valid")
+    return check_step(space, gains, [origin], fraction, "the start gains before the first valid flight")
 
 
 def space_of(definition: Definition) -> PolicySpace:

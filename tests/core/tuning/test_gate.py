@@ -63,8 +63,8 @@ def test_before_the_first_flight_a_quarter_of_each_range_around_the_start_is_all
     assert refused.worst == pytest.approx(103 / 409)
     assert refused.limit == 0.25
     assert refused.sentence == (
-        "The largest change, of kd, is 25.2\u00a0% of its range; only 25\u00a0% is allowed from the start gains "
-        "until a flight is valid."
+        "kd changes most, by 25.2\u00a0% of its range; only 25\u00a0% is allowed from the start gains "
+        "before the first valid flight."
     )
 
 

@@ -409,7 +409,7 @@ def test_a_vehicle_met_in_the_air_is_observed_landed_and_released_by_a_person() 
         with connected(rig, PINNED) as vehicle:
             assert rig.writes == []
             assert (vehicle.condition().step, vehicle.condition().armed) == ("observing", True)
-            assert "armed: somebody else armed it" in vehicle.concern
+            assert "armed: either somebody else armed it" in vehicle.concern
             for ask in (lambda: vehicle.stage(SAFE), vehicle.restore, vehicle.release):
                 with pytest.raises(SafeGainsError):
                     ask()

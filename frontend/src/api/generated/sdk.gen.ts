@@ -29,7 +29,7 @@ export const getHealth = <ThrowOnError extends boolean = false>(options?: Option
 /**
  * Get Catalogue
  *
- * Everything that a campaign can be made of.
+ * Everything that a campaign can consist of.
  */
 export const getCatalogue = <ThrowOnError extends boolean = false>(options?: Options<GetCatalogueData, ThrowOnError>): RequestResult<GetCatalogueResponses, GetCatalogueErrors, ThrowOnError> => (options?.client ?? client).get<GetCatalogueResponses, GetCatalogueErrors, ThrowOnError>({ url: '/api/catalogue', ...options });
 
@@ -179,7 +179,7 @@ export const getStatistics = <ThrowOnError extends boolean = false>(options: Opt
 /**
  * Get Proposal
  *
- * State of the next proposal, and the proposal once it is there.
+ * State of the next proposal, and the proposal once it is computed.
  */
 export const getProposal = <ThrowOnError extends boolean = false>(options: Options<GetProposalData, ThrowOnError>): RequestResult<GetProposalResponses, GetProposalErrors, ThrowOnError> => (options.client ?? client).get<GetProposalResponses, GetProposalErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/proposal', ...options });
 
@@ -214,7 +214,7 @@ export const listTrials = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Create Trial
  *
- * Plan a trial of the proposal or of your own gains and, with `fly`, request its flight at once.
+ * Plan a trial of the proposal, a variant or custom gains and, with `fly`, request its flight at once.
  */
 export const createTrial = <ThrowOnError extends boolean = false>(options: Options<CreateTrialData, ThrowOnError>): RequestResult<CreateTrialResponses, CreateTrialErrors, ThrowOnError> => (options.client ?? client).post<CreateTrialResponses, CreateTrialErrors, ThrowOnError>({
     url: '/api/campaigns/{campaign_id}/trials',
@@ -453,7 +453,7 @@ export const listVehicles = <ThrowOnError extends boolean = false>(options?: Opt
 /**
  * Register Vehicle
  *
- * Register a vehicle that the program keeps a link to. Whether it is REAL follows from its settings.
+ * Register a vehicle that Gainline keeps a link to. Whether it is REAL follows from its settings.
  */
 export const registerVehicle = <ThrowOnError extends boolean = false>(options: Options<RegisterVehicleData, ThrowOnError>): RequestResult<RegisterVehicleResponses, RegisterVehicleErrors, ThrowOnError> => (options.client ?? client).post<RegisterVehicleResponses, RegisterVehicleErrors, ThrowOnError>({
     url: '/api/vehicles',
@@ -692,14 +692,14 @@ export const checkController = <ThrowOnError extends boolean = false>(options: O
 /**
  * Check Example Controller
  *
- * Check the example recording: a takeoff that comes with the program, recorded from the autopilot's own code.
+ * Check the example recording: a takeoff that comes with Gainline, recorded from the autopilot's own code.
  */
 export const checkExampleController = <ThrowOnError extends boolean = false>(options?: Options<CheckExampleControllerData, ThrowOnError>): RequestResult<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError> => (options?.client ?? client).post<CheckExampleControllerResponses, CheckExampleControllerErrors, ThrowOnError>({ url: '/api/controller-checks/example', ...options });
 
 /**
  * Delete Controller Check
  *
- * Delete a check; it can be made again from its recording.
+ * Delete a check; it can be repeated from its recording.
  */
 export const deleteControllerCheck = <ThrowOnError extends boolean = false>(options: Options<DeleteControllerCheckData, ThrowOnError>): RequestResult<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError> => (options.client ?? client).delete<DeleteControllerCheckResponses, DeleteControllerCheckErrors, ThrowOnError>({ url: '/api/controller-checks/{check_id}', ...options });
 
@@ -741,7 +741,7 @@ export const getComparisonCsv = <ThrowOnError extends boolean = false>(options: 
 /**
  * Get Report
  *
- * The whole campaign as one page that can be saved and sent: it needs neither this program nor a network.
+ * The whole campaign as one page that can be saved and sent: it needs neither Gainline nor a network.
  */
 export const getReport = <ThrowOnError extends boolean = false>(options: Options<GetReportData, ThrowOnError>): RequestResult<GetReportResponses, GetReportErrors, ThrowOnError> => (options.client ?? client).get<GetReportResponses, GetReportErrors, ThrowOnError>({ url: '/api/campaigns/{campaign_id}/report.html', ...options });
 

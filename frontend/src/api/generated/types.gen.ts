@@ -305,7 +305,7 @@ export type CampaignState = 'draft' | 'ready' | 'flying' | 'deciding' | 'finishe
  *
  * Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all repeats and the
  * experiment's prior; null while unknown, that is before the first repeat under an autopilot whose scatter was never
- * measured, and zero if all repeats gave the same error. `scatter_source` says where it is from. `optimism` is how
+ * measured, and zero if all repeats gave the same error. `scatter_source` states its source. `optimism` is how
  * much the best is expected to look better than it is because it was chosen, and `shrunk_error` its error corrected
  * for that.
  */
@@ -1214,7 +1214,7 @@ export type Explanation = {
 /**
  * FigureCard
  *
- * A figure, or why there is none: `waiting` for data, or `failed`. `summary` says in a sentence what it shows.
+ * A figure, or why there is none: `waiting` for data, or `failed`. `summary` describes it in a sentence.
  */
 export type FigureCard = {
     /**
@@ -1367,7 +1367,7 @@ export type FittedParameter = {
 /**
  * FlightBrief
  *
- * The last flight requested for this trial. `problem` says why it failed. A flight of mode `stage` waits with its
+ * The last flight requested for this trial. `problem` states why it failed. A flight of mode `stage` waits with its
  * gains on the vehicle until its operator requests the takeoff.
  */
 export type FlightBrief = {
@@ -1524,7 +1524,7 @@ export type FlightDifference = {
 /**
  * FlightOrder
  *
- * Speed of a simulated flight: simulated time over wall time; null: as fast as possible.
+ * Speed of a simulated flight: simulated time over wall-clock time; null: as fast as possible.
  */
 export type FlightOrder = {
     /**
@@ -2175,8 +2175,8 @@ export type NewCampaignOutput = {
 /**
  * NewTrial
  *
- * A trial of a proposal, of your own gains, or of a variant: exactly one of the three. With `fly` it is flown at
- * once. Variants: `smaller step`, half way from the best gains to the proposal; `repeat`, the best gains again;
+ * A trial of a proposal, of custom gains, or of a variant: exactly one of the three. With `fly` it is flown at
+ * once. Variants: `smaller step`, halfway from the best gains to the proposal; `repeat`, the best gains again;
  * `baseline`, the first flight's gains again. A variant with `gains` is refused when these are not its gains: it then
  * flies what its client has shown, or nothing.
  */
@@ -2300,7 +2300,7 @@ export type OptionInfo = {
  * OrderAnswer
  *
  * `accepted` is true once the process that has the vehicle's link has forwarded the command; the effect appears in
- * the vehicle's status. When it is false, `sentence` says why, and the command is not carried out later.
+ * the vehicle's status. When it is false, `sentence` states why, and the command is not executed later.
  */
 export type OrderAnswer = {
     /**
@@ -2523,7 +2523,7 @@ export type Promotion = {
  * Proposal
  *
  * The next gain set, computed from one history; stale as soon as that history has changed. `recommended` is the
- * advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` says so. `choices` are the
+ * advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` is true. `choices` are the
  * proposal and its variants, no gain set twice; none is recommended when the advice is to stop.
  */
 export type Proposal = {
@@ -2585,7 +2585,7 @@ export type Proposal = {
 /**
  * ReadinessLoss
  *
- * Something that takes readiness back: what it means now, and the way on.
+ * Something that takes readiness back: what it means now, and what to do.
  */
 export type ReadinessLoss = {
     /**
@@ -3571,7 +3571,7 @@ export type TrialPhoto = {
 /**
  * TrialReadiness
  *
- * How far a flight has come, for who asks: the steps that hold, in order, and those that were reached and lost.
+ * How far a flight has come, for this client: steps that hold, in order, and steps that were reached and lost.
  */
 export type TrialReadiness = {
     /**
@@ -3637,7 +3637,7 @@ export type Trouble = {
 /**
  * Vehicle
  *
- * Something that can fly a trial. `concern` says why it is quarantined; `held` are the gains that it reported at
+ * Something that can fly a trial. `concern` states why it is quarantined; `held` are the gains that it reported at
  * `held_at`. A simulation that is shared by campaigns is not `registered` and has no link.
  */
 export type Vehicle = {
