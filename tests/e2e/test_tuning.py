@@ -139,7 +139,7 @@ def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(
     [trial] = dashboard.trials(campaign_id)
     assert trial["glitches"]
     assert trial["repaired_error"] < trial["error"]
-    told = dashboard.page.get_by_text(f"with the glitches bridged {trial['repaired_error']:.3f} m")
+    told = dashboard.page.get_by_text(f"with the glitches interpolated {trial['repaired_error']:.3f} m")
     expect(told).to_be_visible()
     dashboard.until(lambda: dashboard.trace("takeoffs", "glitch", trial=1) is not None)
     drawn = dashboard.trace("takeoffs", "glitch", trial=1)

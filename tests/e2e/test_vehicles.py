@@ -41,11 +41,11 @@ def register_by_hand(dashboard: Dashboard, name: str, drone: Drone) -> int:
     page.get_by_label("Name").fill(name)
     page.get_by_role("switch", name="Simulation on this computer").check()
     address.fill("udp:nowhere")
-    dashboard.button("Register").click()
+    dashboard.button("Register vehicle").click()
     expect(address).to_have_attribute("aria-invalid", "true")
     expect(page.get_by_text(re.compile("^must be udp:HOST:PORT"))).to_be_visible()
     address.fill(drone.address)
-    dashboard.button("Register").click()
+    dashboard.button("Register vehicle").click()
     page.wait_for_url(re.compile(r"/vehicles/\d+$"))
     return int(page.url.rsplit("/", 1)[1])
 

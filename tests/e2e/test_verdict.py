@@ -38,7 +38,7 @@ def test_marking_the_best_invalid_says_what_it_changes_before_and_after_and_is_u
     verdict = open_flight(dashboard, best)
     verdict.get_by_role("button", name="Mark invalid").click()
     expect(verdict).to_contain_text(
-        f"Flight {best['number']} is the best. Without it, flight {second['number']} is the best, "
+        f"Flight {best['number']} is the best. Without it, flight {second['number']} becomes the best, "
         "and the next gains are recomputed."
     )
     verdict.get_by_text("Wind gust").click()

@@ -12,7 +12,7 @@ import { Panel } from "../../ui/Panel";
 import { useLastRows } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
 import table from "../../ui/ScrollTable.module.css";
-import { confidenceText, percent, plusMinus } from "../../ui/uncertainty";
+import { confidenceText, plusMinus } from "../../ui/uncertainty";
 import classes from "./Statistics.module.css";
 import { VERDICTS } from "./verdict";
 
@@ -136,6 +136,7 @@ function Scatter({
 }
 
 function Predictions({ record }: { record: CampaignStatistics["track_record"] }) {
+  const steps = record.agreeing + record.disagreeing;
   return (
     <Aside tone={record.trustworthy ? undefined : "bad"} className={classes["fact"] ?? ""}>
       <h3>
@@ -144,14 +145,18 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
       </h3>
       <p className={`${classes["big"]} numbers`}>
         {record.of === 0 ? "None yet" : `${record.inside} of ${record.of}`}
-        {record.of > 0 && record.share !== null && <small>{percent(record.share)} inside the 90&nbsp;% interval</small>}
+        {record.of > 0 && <small>90&nbsp;% expected</small>}
       </p>
       {!record.trustworthy && (
         <p className={classes["warning"]}>
           <IconAlertTriangle size={18} aria-hidden /> Gradient unreliable
         </p>
       )}
-      <p className={classes["fine"]}>{record.sentence}</p>
+      {steps > 0 && (
+        <p className={classes["fine"]}>
+          {record.agreeing} of {count(steps, "step")} changed the error in the predicted direction.
+        </p>
+      )}
     </Aside>
   );
 }

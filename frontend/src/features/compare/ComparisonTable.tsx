@@ -169,7 +169,7 @@ function Against({ pair, first, unit }: { pair: FlightPair | null; first: string
       )}
       {further && (
         <small className={classes["small"]}>
-          needs {further.trial} more with its gains and {further.against} with those of {first}
+          needs {count(further.trial, "more flight")} with its gains and {further.against} with those of {first}
         </small>
       )}
     </>

@@ -165,7 +165,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         leftSection={<IconPlus size={22} aria-hidden />}
         className={classes["submit"]}
       >
-        Register
+        Register vehicle
       </Button>
     </form>
   );

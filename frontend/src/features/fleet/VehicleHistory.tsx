@@ -89,7 +89,7 @@ export function RequestList({ vehicleId }: { vehicleId: number }) {
       <ScrollTable label="Command log" className={classes["table"]}>
         <thead>
           <tr>
-            <th scope="col">Request</th>
+            <th scope="col">Command</th>
             <th scope="col">Time</th>
             <th scope="col">Outcome</th>
           </tr>
