@@ -36,7 +36,7 @@ from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
-from app.core.formatting import format_gains, percent
+from app.core.formatting import format_gains, named_flights, percent
 from app.core.tuning.confirmation import ComparisonState
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.fleet import service as fleet
@@ -314,9 +314,8 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
 def _because(row: CampaignRow, now: ComparisonState, asked: Promotion) -> str:
     assert now.comparison is not None
     assert now.comparison.confidence is not None
-    flights = ", ".join(map(str, now.winner.numbers))
     sure = percent(now.comparison.confidence)
-    return f"{asked.statement} (campaign {row.id}, flights {flights}: better, {sure} confidence)"
+    return f"{asked.statement} (campaign {row.id}, {named_flights(now.winner.numbers)}: better, {sure} confidence)"
 
 
 def _not_shown(row: CampaignRow, why: str) -> ConflictError:

@@ -3,13 +3,14 @@ shares and amounts. Sentences have a hyphen for a minus, tables and figures a tr
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 NOTHING: Final = "–"
 
 _MAX_DIGITS: Final = 6
 _SHORT_DIGITS: Final = 4
+_LISTED_RUNS: Final = 5
 _TWO_DIGITS_BELOW: Final = 3.55
 """An uncertainty with leading digits below this is given a second digit: 0.012 as 0.01 would lose too much."""
 
@@ -57,6 +58,22 @@ def allowed_range(lower: float | None, upper: float | None) -> str:
 def count(amount: int, noun: str) -> str:
     """`1 flight`, `2 flights`."""
     return f"{amount} {noun}{'' if amount == 1 else 's'}"
+
+
+def named_flights(numbers: Sequence[int]) -> str:
+    """`flight 3`, `flights 1–3, 7`; if that were a long list, `153 flights from 42 to 498`. Ascending numbers."""
+    runs: list[tuple[int, int]] = []
+    for each in numbers:
+        if runs and each == runs[-1][1] + 1:
+            runs[-1] = runs[-1][0], each
+        else:
+            runs.append((each, each))
+    if len(runs) > _LISTED_RUNS:
+        return f"{len(numbers)} flights from {numbers[0]} to {numbers[-1]}"
+    listed = (
+        str(first) if first == last else f"{first}{'–' if last - first > 1 else ', '}{last}" for first, last in runs
+    )
+    return f"flight{'' if len(numbers) == 1 else 's'} {', '.join(listed)}"
 
 
 def grouped(amount: int, separator: str = " ") -> str:

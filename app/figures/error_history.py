@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
+from app.core import formatting
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.data import History, Range, last_number
@@ -47,7 +48,7 @@ class ErrorsFigure:
             self._best_so_far(palette),
             *self._threshold(palette, last),
             *self._intervals(palette, span.high),
-            *self._predicted(palette),
+            *self._predicted(palette, 1.08 * span.high),
             *self._repeats(palette),
             *self._measured(palette),
             *self._without_error(palette, FOOT * span.high),
@@ -57,9 +58,7 @@ class ErrorsFigure:
         traces += off_scale_traces(palette, outside, span.high, history.error_unit, last=last, crowded=self._is_crowded)
         layout = theme.layout(
             palette,
-            xaxis=theme.titled(
-                palette, "Flight", range=[0.5, last + 0.95], dtick=max(1, -(-last // 12)), showgrid=False
-            ),
+            xaxis=theme.titled(palette, "Flight", **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]}),
             yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, 1.08 * span.high], nticks=6),
             margin={**theme.MARGIN_PX, "l": 60},
             annotations=self._labels(palette, span.high),
@@ -147,7 +146,7 @@ class ErrorsFigure:
                 role="repeats",
                 mode="markers",
                 text=[
-                    f"Flights {', '.join(map(str, group.numbers))}<br>"
+                    f"{formatting.named_flights(group.numbers).capitalize()}<br>"
                     f"mean {group.mean:.4f} ± {group.standard_error:.4f} {unit} (standard error)"
                     for group in repeats
                 ],
@@ -209,6 +208,7 @@ class ErrorsFigure:
                 "xshift": 6,
                 "yshift": 13,
                 "font": {"size": 12, "color": palette.best if flight is best else palette.ink},
+                **({"bgcolor": palette.surface, "borderpad": 1} if self._is_crowded else {}),
             }
             for flight in flights
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
@@ -263,7 +263,8 @@ class ErrorsFigure:
             )
         ]
 
-    def _predicted(self, palette: Palette) -> list[Trace]:
+    def _predicted(self, palette: Palette, top: float) -> list[Trace]:
+        """The predicted error of each flight, or only the next one's if there are many; at the edge if it is higher."""
         flights = () if self._is_crowded else self.history.flights
         pairs = [(flight.number, flight.predicted_error) for flight in flights]
         if self.history.proposal is not None:
@@ -274,12 +275,13 @@ class ErrorsFigure:
         return [
             scatter(
                 "Predicted",
-                ([number for number, _ in known], [value for _, value in known]),
+                ([number for number, _ in known], [min(value, round(top, 6)) for _, value in known]),
                 role="predicted",
                 mode="markers",
+                text=[f"{value:.4f} {self.history.error_unit}" for _, value in known],
                 marker={"size": 13, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
                 cliponaxis=False,
-                hovertemplate=f"<b>Flight %{{x}}, predicted</b><br>{self._reading}<extra></extra>",
+                hovertemplate="<b>Flight %{x}, predicted</b><br>%{text}<extra></extra>",
             )
         ]
 

@@ -6,6 +6,8 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 ThemeName = Literal["light", "dark"]
+MOST_TICKS: Final = 12
+"""On an axis of flight numbers."""
 FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', 'DejaVu Sans', sans-serif"
 
 
@@ -153,8 +155,14 @@ def shared_axis(palette: Palette, title: str, index: int, count: int, **more: ob
 
 
 def flight_ticks(last: int) -> dict[str, object]:
-    """An axis of flight numbers up to `last`: a dozen ticks at most, no grid."""
-    return {"range": [0.5, last + 0.6], "dtick": max(1, -(-last // 12)), "showgrid": False}
+    """An axis of flight numbers up to `last`: a dozen ticks at most, at round numbers; no grid."""
+    steps = (digit * 10**power for power in range(7) for digit in (1, 2, 5))
+    return {
+        "range": [0.5, last + 0.6],
+        "tick0": 0,
+        "dtick": next(step for step in steps if last <= MOST_TICKS * step),
+        "showgrid": False,
+    }
 
 
 def note(palette: Palette, text: str, **more: object) -> dict[str, object]:

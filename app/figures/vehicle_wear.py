@@ -181,9 +181,7 @@ class BatteriesFigure:
             xaxis=theme.titled(
                 palette,
                 "Flight of this vehicle",
-                showgrid=False,
-                range=[0.5, len(self.flights) + 0.5],
-                dtick=max(1, len(self.flights) // 12),
+                **theme.flight_ticks(len(self.flights)),
             ),
             yaxis=theme.titled(palette, "Voltage (V)"),
         )

@@ -8,6 +8,7 @@ from app.core.formatting import (
     gains,
     grouped,
     measured,
+    named_flights,
     number,
     percent,
     plus_minus,
@@ -56,6 +57,13 @@ def test_a_range_states_only_the_limits_that_exist() -> None:
 
 def test_amounts_have_their_nouns_and_groups_of_digits() -> None:
     assert [count(1, "flight"), count(0, "flight"), grouped(2147483647)] == ["1 flight", "0 flights", "2 147 483 647"]
+
+
+def test_flights_are_listed_in_runs_and_counted_where_there_are_many() -> None:
+    assert [named_flights(numbers) for numbers in ([3], [3, 4], [1, 2, 3, 7])] == [
+        "flight 3", "flights 3, 4", "flights 1–3, 7"]  # fmt: skip
+    assert named_flights(range(1, 501)) == "flights 1–500"
+    assert named_flights([2, 4, 6, 8, 10, 12]) == "6 flights from 2 to 12"
 
 
 def test_a_table_has_true_minus_signs_and_dashes() -> None:

@@ -39,6 +39,20 @@ def test_predictions_of_flown_and_of_the_next_flight_are_open_diamonds() -> None
     assert drawn["marker"]["symbol"] == "diamond-open"
 
 
+def test_a_prediction_far_above_all_flights_is_drawn_at_the_edge_with_its_value() -> None:
+    card = ErrorsFigure(history(flight(1, 0.3, predicted_error=2.0), flight(2, 0.2))).compute()
+    drawn = trace(card, "predicted")
+    assert drawn["y"] == pytest.approx([layout(card)["yaxis"]["range"][1]], abs=1e-6)
+    assert drawn["text"] == ["2.0000 m"]
+
+
+@pytest.mark.parametrize(("flights", "step"), [(1, 1), (12, 1), (13, 2), (60, 5), (119, 10), (500, 50), (1000, 100)])
+def test_flight_numbers_on_an_axis_are_round_and_a_dozen_at_most(flights: int, step: int) -> None:
+    axis = layout(ErrorsFigure(history(flight(1, 0.3), flight(flights, 0.2))).compute())["xaxis"]
+    assert (axis["tick0"], axis["dtick"]) == (0, step)
+    assert flights // step <= 12
+
+
 def test_an_invalid_flight_is_a_cross_and_never_the_best() -> None:
     card = ErrorsFigure(history(flight(1, 0.3), flight(2, None, outcome="invalid"), flight(3, 0.2))).compute()
     assert trace(card, "measured")["x"] == [1, 3]

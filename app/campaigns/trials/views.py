@@ -20,7 +20,7 @@ from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTI
 from app.core.definition import Flight
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Scatter
-from app.core.formatting import percent
+from app.core.formatting import named_flights, percent
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
@@ -238,7 +238,7 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
 
 
 def _once_more(again: Sequence[int]) -> str:
-    return f"with the gains of flight{'s' if len(again) > 1 else ''} {', '.join(map(str, again))} again"
+    return f"with the gains of {named_flights(again)} again"
 
 
 def _glitches(row: TrialRow) -> str:

@@ -3,6 +3,8 @@ import {
   against,
   bytesText,
   count,
+  flightNumbers,
+  flightsText,
   gainText,
   grouped,
   localTime,
@@ -61,6 +63,18 @@ test("sizes are told in the digits that matter", () => {
     "88 MB",
     "1.4 TB",
   ]);
+});
+
+test("flight numbers are listed in runs, and counted where there are many", () => {
+  const scattered = [2, 4, 6, 8, 10, 12];
+  expect([flightsText([3]), flightsText([3, 4]), flightsText([1, 2, 3, 7])]).toEqual([
+    "flight 3",
+    "flights 3, 4",
+    "flights 1–3, 7",
+  ]);
+  expect(flightsText(Array.from({ length: 500 }, (_, index) => index + 1))).toBe("flights 1–500");
+  expect(flightsText(scattered)).toBe("6 flights from 2 to 12");
+  expect([flightNumbers([1, 2, 3]), flightNumbers(scattered)]).toEqual(["1–3", "6, from 2 to 12"]);
 });
 
 test("large counts come in groups of three", () => {

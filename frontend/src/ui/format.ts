@@ -48,6 +48,33 @@ export function count(number: number, noun: string): string {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
+/** More runs of flight numbers than this are counted instead of listed. */
+const LISTED = 5;
+
+/** Ascending flight numbers as runs: `["3", "7, 8", "10–15"]`. */
+function runsOf(numbers: readonly number[]): string[] {
+  const runs: [from: number, to: number][] = [];
+  for (const number of numbers) {
+    const last = runs.at(-1);
+    if (last !== undefined && number === last[1] + 1) last[1] = number;
+    else runs.push([number, number]);
+  }
+  return runs.map(([from, to]) => (from === to ? `${from}` : `${from}${to - from > 1 ? "–" : ", "}${to}`));
+}
+
+/** `1–3, 7`, or `153, from 42 to 498`. */
+export function flightNumbers(numbers: readonly number[]): string {
+  const runs = runsOf(numbers);
+  return runs.length > LISTED ? `${numbers.length}, from ${numbers[0]} to ${numbers.at(-1)}` : runs.join(", ");
+}
+
+/** `flight 3`, `flights 1–3, 7`, or `153 flights from 42 to 498`. */
+export function flightsText(numbers: readonly number[]): string {
+  const runs = runsOf(numbers);
+  if (runs.length > LISTED) return `${numbers.length} flights from ${numbers[0]} to ${numbers.at(-1)}`;
+  return `flight${numbers.length === 1 ? "" : "s"} ${runs.join(", ")}`;
+}
+
 /** A large count in groups of three digits, separated by thin spaces. */
 export function grouped(number: number): string {
   return String(number).replace(/\B(?=(\d{3})+$)/g, "\u2009");

@@ -10,7 +10,7 @@ import numpy as np
 from app.core.definition import Definition, Flight, Option, best_flight, was_flown
 from app.core.experiments.base import Matrix, ModelledExperiment, ParameterDistribution, fitted_parameters, halton
 from app.core.experiments.pitch_tracking import PitchTracking
-from app.core.formatting import format_gains, short
+from app.core.formatting import format_gains, named_flights, short
 from app.core.models.f16 import STEP_S
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -204,9 +204,7 @@ def _explanation(
     *,
     stays: bool,
 ) -> Explanation:
-    numbers = ", ".join(str(number) for number in found.flights)
-    plural = "s" if len(found.flights) > 1 else ""
-    fitted = f"A and B were re-identified from flight{plural} {numbers}."
+    fitted = f"A and B were re-identified from {named_flights(found.flights)}."
     gains = format_gains(space.mapping(optimum.gains))
     offer = (
         f"The identified model predicts no sufficient improvement over flight {base.number}, error "

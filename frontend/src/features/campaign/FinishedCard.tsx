@@ -3,7 +3,7 @@ import { IconArchive, IconRepeat } from "@tabler/icons-react";
 import { useArchive, useReopen } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
-import { against, percentChange, withUnit } from "../../ui/format";
+import { against, flightsText, percentChange, withUnit } from "../../ui/format";
 import { GainList, gainsInBrackets, sameHeld } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
@@ -29,8 +29,7 @@ const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meani
 /** The gains that were repeated, if they are others than those of the best flight. */
 function otherWinner({ winner }: Campaign, best: Trial): string {
   if (winner === null || sameHeld(winner.gains, best.gains)) return "";
-  const flights = winner.trial_numbers;
-  return `${gainsInBrackets(winner.gains)} of flight${flights.length > 1 ? "s" : ""} ${flights.join(", ")}, `;
+  return `${gainsInBrackets(winner.gains)} of ${flightsText(winner.trial_numbers)}, `;
 }
 
 interface Props {

@@ -3,7 +3,7 @@ import { IconAlertTriangle } from "@tabler/icons-react";
 import { useStatistics } from "../../api/queries";
 import type { CampaignStatistics } from "../../api/types";
 import { Aside, toneOf } from "../../ui/Aside";
-import { count } from "../../ui/format";
+import { count, flightNumbers } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
@@ -182,7 +182,7 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
         {listed.map((group) => (
           <tr key={group.trial_numbers[0]} data-best={group.is_best || undefined}>
             <th scope="row">{gainsInBrackets(group.gains)}</th>
-            <td>{group.trial_numbers.join(", ")}</td>
+            <td>{flightNumbers(group.trial_numbers)}</td>
             <td>{plusMinus(group.mean, group.standard_error, unit)}</td>
             <td>{[group.is_best ? "best" : "", group.is_baseline ? "baseline" : ""].filter(Boolean).join(", ")}</td>
           </tr>
