@@ -180,12 +180,10 @@ def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
     if now.looks and comparison.verdict != "unresolved":
         return Confirmation(phase="decided", why=sentence)
     if now.winner.size <= now.baseline.size:
-        why = f"The winner, {format_gains(now.winner.gains)}, is flown again, to confirm that it is better."
-        return Confirmation(phase="repeat", why=f"{why} {sentence}")
-    why = (
-        f"The first flight's gains, {format_gains(now.baseline.gains)}, are flown again under the winner's conditions."
-    )
-    return Confirmation(phase="baseline", why=f"{why} {sentence}")
+        why = "The winner is flown again, to confirm that it is better."
+        return Confirmation(phase="repeat", why=f"{why}{_missing(comparison)}")
+    why = "The first flight's gains are flown again under the winner's conditions."
+    return Confirmation(phase="baseline", why=f"{why}{_missing(comparison)}")
 
 
 def _is_worth_a_step(definition: Definition, now: ComparisonState, left: int, proposal: Proposal) -> bool:
@@ -226,6 +224,13 @@ def _direction(comparison: Comparison) -> str:
 
 def _percent(confidence: float) -> str:
     return f"more than {percent(0.999, 1)}" if confidence > 0.999 else percent(confidence, 1)
+
+
+def _missing(comparison: Comparison) -> str:
+    """What a comparison without a result still needs, as a further sentence."""
+    if comparison.confidence is None:
+        return f" {SCATTER_NOT_KNOWN}"
+    return f" Unresolved so far. {_deciding(comparison)}" if comparison.verdict == "unresolved" else ""
 
 
 def _deciding(comparison: Comparison) -> str:

@@ -70,7 +70,7 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
       height={440}
       topic="curves"
       dressed={useDressed(chosen, span, preview?.prediction ?? null)}
-      className={preview?.isCurrent === false ? classes["outdated"] : undefined}
+      className={`${classes["curves"]} ${preview?.isCurrent === false ? classes["outdated"] : ""}`}
       liveTrial={campaign.flying?.trial_id ?? null}
       onChoose={onChoose}
       onWindow={setZoom}

@@ -20,21 +20,23 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const catalogue = useCatalogue().data;
   return (
     <header className={classes["header"]}>
-      <Anchor component={Link} to="/" display="inline-block" py={4} fz="small">
-        All campaigns
-      </Anchor>
-      {renaming ? (
-        <Rename campaign={campaign} onClose={() => setRenaming(false)} />
-      ) : (
-        <Group gap={4} wrap="nowrap">
-          <Title order={1} lh={1.2} style={{ overflowWrap: "anywhere" }}>
-            {campaign.name}
-          </Title>
-          <ActionIcon color="gray" aria-label="Rename campaign" title="Rename" onClick={() => setRenaming(true)}>
-            <IconPencil size={18} color="var(--dim)" />
-          </ActionIcon>
-        </Group>
-      )}
+      <Group gap="0 16px" align="center">
+        {renaming ? (
+          <Rename campaign={campaign} onClose={() => setRenaming(false)} />
+        ) : (
+          <Group gap={4} wrap="nowrap">
+            <Title order={1} lh={1.2} style={{ overflowWrap: "anywhere" }}>
+              {campaign.name}
+            </Title>
+            <ActionIcon color="gray" aria-label="Rename campaign" title="Rename" onClick={() => setRenaming(true)}>
+              <IconPencil size={18} color="var(--dim)" />
+            </ActionIcon>
+          </Group>
+        )}
+        <Anchor component={Link} to="/" py={4} fz="small" ms="auto">
+          All campaigns
+        </Anchor>
+      </Group>
       <div className={classes["facts"]}>
         <StateBadge words={campaignStateLabel(campaign.state, campaign.outcome, campaign.rehearsal.state)} />
         <span>{count(campaign.trials.flown, "flight")}</span>

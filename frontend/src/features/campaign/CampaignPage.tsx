@@ -1,4 +1,4 @@
-import { SimpleGrid, Skeleton, Stack, Tabs, useComputedColorScheme } from "@mantine/core";
+import { SimpleGrid, Skeleton, Tabs, useComputedColorScheme } from "@mantine/core";
 import { memo, startTransition, useCallback, useEffect, useState } from "react";
 import { useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
@@ -77,7 +77,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
   const unproposed = useProposal(campaign.id).error;
   const experiment = campaign.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
-  const shown = selectedTrial(trials, chosen);
+  const shown = selectedTrial(trials, chosen, standing?.campaign ?? campaign);
   const watching = useReadOnlyReason(campaign.vehicle);
   const choose = useCallback(
     (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),
@@ -93,7 +93,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <CampaignHeader campaign={campaign} />
       <ReadOnlyNotice why={watching} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
-        <Stack gap="var(--gap)" miw={0}>
+        <div className={classes["column"]}>
           <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} preview={preview} onChoose={choose} />
           {shown !== null && (
             <Verdict
@@ -104,8 +104,8 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
               experiment={experiment}
             />
           )}
-        </Stack>
-        <div className={classes["next"]}>
+        </div>
+        <div className={`${classes["column"]} ${classes["next"]}`}>
           {standing !== null && <Next {...standing} onChoose={setChosen} onPreview={setPreview} />}
           {standing === null &&
             (unproposed || trouble ? (

@@ -29,10 +29,10 @@ export function NextFlightCard(props: Props) {
 function RehearsalStep({ rehearses, ...props }: Props & { rehearses: number }) {
   const real = useCampaign(rehearses).data;
   return (
-    <Stack gap="var(--gap)">
+    <>
       {real !== undefined && <RehearsalNote real={real} />}
       <Step {...props} isSecondary={real?.rehearsal.state === "passed"} />
-    </Stack>
+    </>
   );
 }
 

@@ -42,10 +42,12 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
               <dd title={String(value)}>{gainText(value)}</dd>
             </div>
           ))}
-          <div className={classes["reading"]} data-row>
-            <dt>Predicted error</dt>
-            <dd>{predictedText(trial.predicted_error, trial.predicted_interval, unit)}</dd>
-          </div>
+          {trial.predicted_error !== null && (
+            <div className={classes["reading"]} data-row>
+              <dt>Predicted error</dt>
+              <dd>{predictedText(trial.predicted_error, trial.predicted_interval, unit)}</dd>
+            </div>
+          )}
         </dl>
         <FlightWindow definition={campaign.definition} />
         <FailureNotice reason={trial.flight?.problem ?? ""} />

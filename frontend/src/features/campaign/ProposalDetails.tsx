@@ -7,7 +7,7 @@ import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import { intervalText, percent, plusMinus } from "../../ui/uncertainty";
-import { CHOICES, type ChoiceName, RECOMMENDED } from "./choices";
+import { CHOICES, type ChoiceName } from "./choices";
 import classes from "./NextFlight.module.css";
 
 interface PredictedErrorProps {
@@ -65,8 +65,8 @@ export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
     <Aside tone="good" className={classes["advice"] ?? ""} data-kind={kind}>
       <Icon size={22} color="var(--best)" aria-hidden />
       <p>
-        <strong>Recommended: {RECOMMENDED[kind].toLowerCase()}</strong>
-        {why && <span>{why}</span>}
+        {kind === "stop" && <strong>Recommended: stop the campaign</strong>}
+        <span>{why || CHOICES[chosen].hint}</span>
       </p>
     </Aside>
   );

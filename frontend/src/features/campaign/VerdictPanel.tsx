@@ -8,7 +8,7 @@ import type { Campaign, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import type { Topic } from "../../ui/explanations";
-import { percentChange, percentText, withUnit } from "../../ui/format";
+import { flightsText, percentChange, percentText, withUnit } from "../../ui/format";
 import { GainList } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
@@ -24,7 +24,7 @@ import { speedOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
 import { useSpeed } from "./SpeedSwitch";
 import classes from "./Verdict.module.css";
-import { bestBeforeOf, repeatPurpose, sentenceOf, standingWithout, VERDICTS } from "./verdict";
+import { bestBeforeOf, isScored, repeatPurpose, sentenceOf, standingWithout, VERDICTS } from "./verdict";
 
 interface Props {
   trial: Trial;
@@ -77,6 +77,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
   const asked = repeatPurpose(trial);
   const without = standingWithout(trial, trials);
   const scatter = trial.state === "valid" ? statistics?.sigma : null;
+  const isCompared = trial.comparisons.some(({ against }) => against === "best before");
   return (
     <Panel
       title={`Flight ${trial.number}${isBest && trial.state === "valid" ? " · best so far" : ""}`}
@@ -93,7 +94,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {asked}
         </Text>
       )}
-      <p className={asked ? classes["reason"] : classes["sentence"]}>{sentenceOf(trial)}</p>
+      {!isScored(trial) && <p className={classes["sentence"]}>{sentenceOf(trial)}</p>}
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
         <p className={classes["reason"]}>{trial.reason}</p>
       )}
@@ -115,12 +116,14 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <PredictionResult trial={trial} />
         </Fact>
-        <Fact title={bestBefore ? `Previous best, flight ${bestBefore.number}` : "Previous best"}>
-          {withUnit(bestBefore?.error, unit)}{" "}
-          {!asked && <Change error={trial.error} other={bestBefore?.error} unit={unit} />}
-        </Fact>
+        {bestBefore && (
+          <Fact title={`Previous best, flight ${bestBefore.number}`}>
+            {withUnit(bestBefore.error, unit)}{" "}
+            {!asked && !isCompared && <Change error={trial.error} other={bestBefore.error} unit={unit} />}
+          </Fact>
+        )}
         {group !== undefined && group.errors.length > 1 && (
-          <Fact title={`Mean of flights ${group.trial_numbers.join(", ")}`} topic="standardError">
+          <Fact title={`Mean of ${flightsText(group.trial_numbers)}`} topic="standardError">
             {plusMinus(group.mean, group.standard_error, unit)}{" "}
             {group.standard_error !== null && <small>(± standard error)</small>}
           </Fact>

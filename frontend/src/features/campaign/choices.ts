@@ -15,13 +15,6 @@ export const CHOICES: Record<ChoiceName, { label: string; hint: string }> = {
   own: { label: "Custom gains", hint: "" },
 };
 
-export const RECOMMENDED: Record<Proposal["recommended"], string> = {
-  step: "Fly the proposed step",
-  repeat: "Repeat the best gains",
-  baseline: "Fly the baseline",
-  stop: "Stop the campaign",
-};
-
 /** The recommended choice; without one the proposal's own. */
 export function preselected({ choices }: Proposal): ChoiceName {
   return (choices.find(({ recommended }) => recommended) ?? choices.find(({ proposed }) => proposed))?.kind ?? "own";

@@ -41,10 +41,17 @@ test("an aborted flight says why, and not twice that it was aborted", () => {
 });
 
 test("the latest flight is shown until another is chosen; a plan is no flight", () => {
-  expect(selectedTrial(all, null)?.number).toBe(3);
-  expect(selectedTrial(all, 2)?.number).toBe(2);
-  expect(selectedTrial(all, 4)?.number).toBe(3);
-  expect(selectedTrial([], null)).toBeNull();
+  expect(selectedTrial(all, null, { state: "deciding" })?.number).toBe(3);
+  expect(selectedTrial(all, 2, { state: "deciding" })?.number).toBe(2);
+  expect(selectedTrial(all, 4, { state: "deciding" })?.number).toBe(3);
+  expect(selectedTrial([], null, { state: "deciding" })).toBeNull();
+});
+
+test("a finished campaign shows its result, and a flight only when it is selected", () => {
+  expect(selectedTrial(all, null, { state: "finished" })).toBeNull();
+  expect(selectedTrial(all, 2, { state: "finished" })?.number).toBe(2);
+  expect(selectedTrial(all, 4, { state: "finished" })).toBeNull();
+  expect(selectedTrial(all, null, { state: "archived" })).toBeNull();
 });
 
 test("what a flight may be classed as follows from what it is", () => {

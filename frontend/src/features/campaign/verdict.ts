@@ -56,6 +56,11 @@ export function bestBeforeOf(trial: Pick<Trial, "number">, trials: readonly Tria
   );
 }
 
+/** Whether the flight has an error, which its panel shows with all that the verdict sentence says. */
+export function isScored({ state, error }: Pick<Trial, "state" | "error">): boolean {
+  return state === "valid" && error !== null;
+}
+
 /** The verdict sentence, otherwise the reason. Without "Aborted" or "Lost", which the state badge shows. */
 export function sentenceOf(trial: Trial): string {
   if (!["aborted", "lost"].includes(trial.state) || trial.reason === "") return trial.verdict || trial.reason;
@@ -90,10 +95,16 @@ export function abortWords({
   return (["behaved badly", "something else"] as const).filter((word) => word !== cause);
 }
 
-/** The shown flight: the selected one, otherwise the latest. */
-export function selectedTrial(trials: readonly Trial[], chosen: number | null): Trial | null {
+/** The shown flight: the selected one, otherwise the latest. A finished campaign shows its result, and a flight only
+ * once it is selected. */
+export function selectedTrial(
+  trials: readonly Trial[],
+  chosen: number | null,
+  { state }: Pick<Campaign, "state">,
+): Trial | null {
   const flown = trials.filter((trial) => wasFlown(trial.state));
-  return flown.find((trial) => trial.number === chosen) ?? flown.at(-1) ?? null;
+  const isFinished = state === "finished" || state === "archived";
+  return flown.find((trial) => trial.number === chosen) ?? (isFinished ? null : (flown.at(-1) ?? null));
 }
 
 /** The best valid flight: the lowest error, the earliest of equal ones. */
