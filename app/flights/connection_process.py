@@ -37,7 +37,7 @@ from app.flights.process_messages import (
     VehicleResponse,
 )
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, TAKE_OFF_TIMEOUT_S, status_time
-from app.live.messages import FlightPhase, Telemetry, UnreadyReason, VehicleStatus
+from app.live.messages import SILENT_AFTER_S, FlightPhase, Telemetry, UnreadyReason, VehicleStatus
 from app.processes import ignore_stop_signals
 from app.vehicles.base import (
     Condition,
@@ -55,14 +55,12 @@ Staging = Literal["none", "staged", "silent", "lost"]
 """Of the flight that waits for its takeoff: nothing staged, the staged gains read back, a silence since then, or the
 gains no longer on the vehicle."""
 _NOT_READY: Final[Mapping[Staging, str]] = {
-    "silent": "nothing was received from the vehicle for 2 s",
+    "silent": f"nothing was received from the vehicle for {SILENT_AFTER_S:g} s",
     "lost": "the staged gains are no longer on the vehicle",
 }
 
 POLL_INTERVAL_S: Final = 0.005
 STATUS_INTERVAL_S: Final = 0.2
-SILENT_AFTER_S: Final = 2.0
-"""A vehicle that has sent nothing for this long is not ready to fly."""
 LOST_AFTER_S: Final = 3.0
 """A vehicle without a heartbeat for this long is shown as gone."""
 LOCK_TIMEOUT_S: Final = 120.0

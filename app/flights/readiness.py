@@ -14,6 +14,7 @@ from typing import Final, Literal
 from app.common.errors import ConflictError
 from app.common.states import TrialState, VehicleState
 from app.live.hub import VehicleReport
+from app.live.messages import SILENT_AFTER_S
 
 ReadinessStep = Literal["control", "staged", "held", "in flight", "landed", "reviewed"]
 STEPS: Final[tuple[ReadinessStep, ...]] = ("control", "staged", "held", "in flight", "landed", "reviewed")
@@ -21,8 +22,6 @@ STEPS: Final[tuple[ReadinessStep, ...]] = ("control", "staged", "held", "in flig
 LossKind = Literal[
     "worker away", "not connected", "process silent", "link silent", "gains unknown", "quarantined", "control ended"
 ]
-STATUS_TIMEOUT_S: Final = 2.0
-"""The process of a vehicle reports its status five times a second."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,9 +60,9 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "link silent": LossText(
-            what="No current data has been received from the vehicle for 2 s.",
+            what=f"No current data has been received from the vehicle for {SILENT_AFTER_S:g} s.",
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
-            what_in_flight="Nothing has been received from the vehicle for 2 s.",
+            what_in_flight=f"Nothing has been received from the vehicle for {SILENT_AFTER_S:g} s.",
             way_on_in_flight=f"Land is repeated until the vehicle confirms it. {_BY_HAND}",
         ),
         "gains unknown": LossText(
@@ -199,7 +198,7 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     status = report.status
     if standing.vehicle is VehicleState.DISCONNECTED or status is None or status.state == "connecting":
         return "not connected"
-    if status.state == "not answering" or status.age_s > STATUS_TIMEOUT_S:
+    if status.state == "not answering" or status.age_s > SILENT_AFTER_S:
         return "process silent"
     if status.state == "gone":
         return "link silent"

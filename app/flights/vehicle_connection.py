@@ -32,15 +32,13 @@ from app.flights.process_messages import (
     VehicleRequest,
     VehicleResponse,
 )
-from app.live.messages import NO_LINK, VehicleCommandKind, VehicleStatus
+from app.live.messages import NO_LINK, SILENT_AFTER_S, VehicleCommandKind, VehicleStatus
 from app.vehicles.base import SafeGainsError, VehicleError
 
 _ENDED: Final = (
     "The process that had the vehicle's link ended; it is unknown whether the command was sent. Use the vehicle's "
     "own remote control now."
 )
-SILENT_AFTER_S: Final = 2.0
-"""A process with an open link sends a status five times a second."""
 NOT_ANSWERING: Final = (
     "The process that has its link does not answer: commands do not reach the vehicle. If it flies, use its own "
     "remote control now."

@@ -22,6 +22,9 @@ MAX_LINE_BYTES: Final = 256 * 1024
 NO_LINK: Final = "No worker has a link to this vehicle, so nothing was sent: use its own remote control now."
 
 Phase = Literal["staging", "staged", "flying", "landed", "ended"]
+SILENT_AFTER_S: Final = 2.0
+"""A vehicle that has sent nothing for this long is not ready to fly, nor is one whose process, which reports its status
+five times a second, has not reported it for this long."""
 VehicleLinkState = Literal["connecting", "connected", "gone", "not answering"]
 VehicleCommandKind = Literal["land", "motors off"]
 UnreadyReason = Literal["", "link silent", "gains unknown"]
