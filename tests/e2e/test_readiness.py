@@ -168,6 +168,39 @@ def test_a_page_that_stood_still_takes_readiness_back_until_it_has_read_the_stat
     expect(word(dashboard)).to_have_text(READY)
 
 
+def show(page: Page, visibility: str) -> None:
+    """Put the tab into the background, or bring it back."""
+    page.evaluate(
+        """visibility => {
+            Object.defineProperty(document, "visibilityState", { configurable: true, get: () => visibility });
+            document.dispatchEvent(new Event("visibilitychange", { bubbles: true }));
+        }""",
+        visibility,
+    )
+
+
+def test_a_tab_in_the_background_asks_nothing_and_reads_the_state_again_before_it_is_green(
+    dashboard: Dashboard, trial_id: int
+) -> None:
+    page, readiness = dashboard.page, re.compile("/readiness$")
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url) if readiness.search(request.url) else None)
+    show(page, "hidden")
+    page.clock.run_for(2_000)
+    expect(word(dashboard)).to_have_text(READY)
+    before = len(asked)
+    page.clock.run_for(10_000)
+    assert len(asked) == before
+    page.route(readiness, lambda route: route.abort())
+    show(page, "visible")
+    expect(losses(page).first).to_contain_text(re.compile(r"This page was frozen for 1\d s"))
+    expect(word(dashboard)).to_have_text(NOT_READY)
+    expect(hold_button(page)).to_be_disabled()
+    page.unroute(readiness)
+    expect(word(dashboard)).to_have_text(READY)
+    expect(hold_button(page)).to_be_enabled()
+
+
 def test_a_server_that_does_not_answer_takes_readiness_back(dashboard: Dashboard, trial_id: int) -> None:
     page = dashboard.page
     page.route(re.compile("/readiness$"), lambda route: route.abort())

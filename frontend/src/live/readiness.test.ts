@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { TrialReadiness } from "../api/types";
-import { READINESS_STEPS, readinessNow } from "./readiness";
+import { type ReadinessStep, readinessNow } from "./readiness";
 
 const CURRENT = { answerAgeS: 0.3, isServerAway: false, stalledS: 0 };
 const AWAY = { ...CURRENT, isServerAway: true };
@@ -9,8 +9,9 @@ const STALLED = { ...CURRENT, stalledS: 12.4 };
 const READY: TrialReadiness = { steps: ["control", "staged"], lost: [], losses: [], is_ready: true };
 
 /** Every step that a flight can have reached, with a vehicle that answers. */
-const REACHED: TrialReadiness[] = READINESS_STEPS.map((_, index) => ({
-  steps: READINESS_STEPS.slice(0, index + 1),
+const STEPS: ReadinessStep[] = ["control", "staged", "held", "in flight", "landed", "reviewed"];
+const REACHED: TrialReadiness[] = STEPS.map((_, index) => ({
+  steps: STEPS.slice(0, index + 1),
   lost: [],
   losses: [],
   is_ready: index === 1,

@@ -11,15 +11,6 @@ import { type Moment, secondsBetween } from "./vehicleStatus";
 
 export type ReadinessStep = TrialReadiness["steps"][number];
 
-export const READINESS_STEPS: readonly ReadinessStep[] = [
-  "control",
-  "staged",
-  "held",
-  "in flight",
-  "landed",
-  "reviewed",
-];
-
 const ASK_MS = 1000;
 /** An older answer says nothing about now. Longer than a hold, so that a slow answer does not break it. */
 const ANSWER_S = 4;
@@ -76,10 +67,15 @@ export function readinessNow(answered: TrialReadiness, page: PageState): Readine
   const losses = [loss, ...answered.losses];
   if (isInFlight) return { ...answered, losses, is_ready: false };
   const kept: ReadinessStep[] = answered.steps.includes("control") ? ["control"] : [];
-  const lost = READINESS_STEPS.filter(
-    (step) => !kept.includes(step) && [...answered.steps, ...answered.lost].includes(step),
-  );
+  const lost = [...answered.steps, ...answered.lost].filter((step) => !kept.includes(step));
   return { steps: kept, lost, losses, is_ready: false };
+}
+
+/** Interval until the server is asked again. A tab in the background asks only from the hold to the landing. */
+function askAgainMs(answered: TrialReadiness | undefined): number | false {
+  if (answered === undefined) return ASK_MS;
+  const isWatched = document.visibilityState !== "hidden" || answered.steps.includes("held");
+  return isWatched && !isDown(answered) ? ASK_MS : false;
 }
 
 /** Readiness at this moment; null until the first answer. */
@@ -87,6 +83,7 @@ export function useReadiness(trialId: number, vehicleId: number | null): Readine
   const token = useOwnLease(vehicleId)?.token ?? "";
   const { state } = useConnection();
   const stall = useStall();
+  const returnedAt = useReturn();
   const asked = useQuery({
     queryKey: ["trial", trialId, "readiness", token],
     queryFn: async () => {
@@ -94,8 +91,9 @@ export function useReadiness(trialId: number, vehicleId: number | null): Readine
       const headers = vehicleId === null ? {} : controlHeader(vehicleId);
       return { readiness: await answer(getReadiness({ path: { trial_id: trialId }, headers })), at };
     },
-    refetchInterval: ({ state }) => (state.data !== undefined && isDown(state.data.readiness) ? false : ASK_MS),
+    refetchInterval: ({ state }) => askAgainMs(state.data?.readiness),
     refetchIntervalInBackground: true,
+    refetchOnWindowFocus: "always",
     retry: false,
   });
   const now = useMoment();
@@ -104,13 +102,34 @@ export function useReadiness(trialId: number, vehicleId: number | null): Readine
   return readinessNow(readiness, {
     answerAgeS: secondsBetween(at, now),
     isServerAway: state === "away",
-    stalledS: stall !== null && stall.endedAt.wallMs > at.wallMs ? stall.seconds : 0,
+    stalledS: stallAfter(at, stall, returnedAt),
   });
 }
 
 interface Stall {
   seconds: number;
   endedAt: Moment;
+}
+
+/** How long the page stood still after `at`, in seconds, by itself or in the background; 0 if it did not. */
+function stallAfter(at: Moment, stall: Stall | null, returnedAt: Moment | null): number {
+  if (stall !== null && stall.endedAt.wallMs > at.wallMs) return stall.seconds;
+  if (returnedAt === null || returnedAt.wallMs <= at.wallMs) return 0;
+  const unreadS = secondsBetween(at, returnedAt);
+  return unreadS > STALL_S ? unreadS : 0;
+}
+
+/** When this tab last came back from the background. */
+function useReturn(): Moment | null {
+  const [returnedAt, setReturnedAt] = useState<Moment | null>(null);
+  useEffect(() => {
+    const onVisibility = (): void => {
+      if (document.visibilityState !== "hidden") setReturnedAt(momentNow());
+    };
+    document.addEventListener("visibilitychange", onVisibility);
+    return () => document.removeEventListener("visibilitychange", onVisibility);
+  }, []);
+  return returnedAt;
 }
 
 /** The last time that this page stood still. */

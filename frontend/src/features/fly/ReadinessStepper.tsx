@@ -1,7 +1,8 @@
 import { IconAlertTriangleFilled, IconCircle, IconCircleCheckFilled, IconCircleXFilled } from "@tabler/icons-react";
-import { READINESS_STEPS, type Readiness, type ReadinessStep } from "../../live/readiness";
+import type { Readiness, ReadinessStep } from "../../live/readiness";
 import classes from "./ReadinessStepper.module.css";
 
+/** Every step, in order. */
 const TITLES: Record<ReadinessStep, string> = {
   control: "Control",
   staged: "Staged",
@@ -10,6 +11,7 @@ const TITLES: Record<ReadinessStep, string> = {
   landed: "Landed",
   reviewed: "Reviewed",
 };
+const STEPS = Object.keys(TITLES) as ReadinessStep[];
 
 const STANDINGS = {
   done: { Icon: IconCircleCheckFilled, word: "done" },
@@ -26,7 +28,7 @@ function standingOf(step: ReadinessStep, { steps, lost }: Readiness): keyof type
 export function ReadinessStepper({ readiness }: { readiness: Readiness }) {
   return (
     <ol className={classes["stepper"]} aria-label="Readiness">
-      {READINESS_STEPS.map((step) => {
+      {STEPS.map((step) => {
         const standing = standingOf(step, readiness);
         const { Icon, word } = STANDINGS[standing];
         return (
