@@ -3,6 +3,7 @@
 import math
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Lock
 from typing import Final
 
@@ -26,21 +27,29 @@ CURVE_POINTS: Final = 500
 KEPT: Final = 4
 
 
+@dataclass(frozen=True, slots=True)
+class FittedModel:
+    """What predicts the flights of one history; None for a history without a model."""
+
+    predictor: FlightPredictor | None
+
+
 class PredictorCache:
-    """The predictors of the histories asked for last, by digest; None for a history without a model."""
+    """The models of the histories asked for last, by digest."""
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._kept: OrderedDict[str, FlightPredictor | None] = OrderedDict()
+        self._kept: OrderedDict[str, FittedModel] = OrderedDict()
 
-    def __contains__(self, digest: str) -> bool:
-        return digest in self._kept
+    def find(self, digest: str) -> FittedModel | None:
+        """The model of that history, if it is kept. Hold it: other histories may replace it at any time."""
+        return self._kept.get(digest)
 
-    def get(self, digest: str, build: Callable[[], FlightPredictor | None]) -> FlightPredictor | None:
-        """The predictor of that history, built at the first request; concurrent requests wait for it."""
+    def get(self, digest: str, build: Callable[[], FlightPredictor | None]) -> FittedModel:
+        """The model of that history, fitted at the first request; concurrent requests wait for it."""
         with self._lock:
             if digest not in self._kept:
-                self._kept[digest] = build()
+                self._kept[digest] = FittedModel(build())
                 while len(self._kept) > KEPT:
                     self._kept.popitem(last=False)
             self._kept.move_to_end(digest)
@@ -59,17 +68,19 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
         gains = space_of(definition).complete(asked)
         digest = history.history_digest(session, campaign, definition, trials)
         recorded = {row.number for row in trials if row.state == TrialState.VALID and row.gains == gains}
-        is_new = not recorded and digest not in cache
+        kept = cache.find(digest)
+        is_new = not recorded and kept is None
         if is_new:
             recorded |= modelled_flights(definition, history.flown_gains(trials))
         flights = history.flights_of(session, campaign_id, recorded=recorded)
         donor = read_donor(session, definition) if is_new else None
     predicted = predict_repeat(definition, flights, gains)
     if predicted is None:
-        predictor = cache.get(digest, lambda: flight_predictor(definition, flights, donor))
-        predicted = None if predictor is None else predictor.predict(gains)
-    corrected = any(row.state == TrialState.VALID for row in trials)
-    return _view(gains, predicted, experiment_of(definition).output, corrected=corrected)
+        fitted = cache.get(
+            digest, lambda: flight_predictor(definition, flights, donor) if kept is None else kept.predictor
+        )
+        predicted = None if fitted.predictor is None else fitted.predictor.predict(gains)
+    return _view(gains, predicted, experiment_of(definition).output, corrected=history.is_corrected(trials))
 
 
 def _view(gains: Gains, predicted: Proposal | None, output: str, *, corrected: bool) -> GainsPrediction:

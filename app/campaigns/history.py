@@ -4,6 +4,7 @@ records; and the state changes of campaigns, trials and flights, only those in t
 
 import hashlib
 import json
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final, Literal
 
@@ -152,6 +153,11 @@ def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:
     """The valid trial with the lowest error; the earliest one of equal errors."""
     valid = [(row.error, row.number, row) for row in trials if row.state == TrialState.VALID and row.error is not None]
     return min(valid, key=lambda found: found[:2])[2] if valid else None
+
+
+def is_corrected(trials: Sequence[TrialRow], number: float = math.inf) -> bool:
+    """Whether a flight had corrected the model before this flight; by default, before the next one."""
+    return any(row.state == TrialState.VALID and row.number < number for row in trials)
 
 
 def find_unreviewed(trials: Sequence[TrialRow]) -> TrialRow | None:

@@ -169,7 +169,7 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
     advice = _advice(row, verdict)
     interval = None if row.interval is None else Interval.model_validate(row.interval)
     lower = None if interval is None else interval.lower
-    predicts = is_informative(lower, corrected=best is not None)
+    predicts = is_informative(lower, corrected=history.is_corrected(trials))
     return Proposal(
         id=row.id,
         campaign_id=row.campaign_id,

@@ -1,8 +1,12 @@
 """What may be flown next, over HTTP: the choices of a proposal, and the prediction and gate result of any gains."""
 
+from typing import Any
+
 import pytest
 from fastapi.testclient import TestClient
 
+from app.campaigns import history
+from app.campaigns.flight_predictions import KEPT, PredictorCache, predict_gains
 from app.db.session import Database
 from tests.builders import (
     Json,
@@ -157,3 +161,21 @@ def test_incomplete_gains_and_half_counts_are_refused_with_the_field(
     status, problem = consider(client, campaign_id, what, {"kp": 400.5, "ki": 20})
     assert status == 422
     assert [one["field"] for one in problem["problems"]] == ["gains.kd", "gains.kp"]
+
+
+def test_a_prediction_keeps_its_model_though_other_histories_replace_it_meanwhile(
+    client: TestClient, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    campaign_id = create_ready_campaign(client, database, definition=PATIENT)["id"]
+    create_flown_trial(client, database, campaign_id, 6.0)
+    cache, read = PredictorCache(), history.flights_of
+    first = predict_gains(database, cache, campaign_id, OWN)
+    assert first.predicted_error is not None
+
+    def replaced(*args: Any, **options: Any) -> Any:
+        for other in range(2 * KEPT):
+            cache.get(f"history {other}", lambda: None)
+        return read(*args, **options)
+
+    monkeypatch.setattr(history, "flights_of", replaced)
+    assert predict_gains(database, cache, campaign_id, OWN) == first
