@@ -1,6 +1,5 @@
 """Input data of the figures, loaded from the database as plain data."""
 
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,10 +13,9 @@ from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.proposals import is_stale
 from app.campaigns.trials import service as trials_service
-from app.common.schemas import OptionValue
 from app.common.states import TrialState
-from app.core.experiments import experiment_of, get_experiment
-from app.core.experiments.base import Scatter
+from app.core.experiments import experiment_of
+from app.core.experiments.base import Experiment, Scatter
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
@@ -106,8 +104,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
     experiment = experiment_of(definition)
     rows = history.trials_of(session, campaign_id)
     flown = [row for row in rows if row.state in history.FLOWN]
-    set_point, reference = _goal(campaign)
-    first_valid = min((row.number for row in rows if row.state == TrialState.VALID), default=math.inf)
+    set_point, reference = _goal(experiment)
     bare = History(
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
@@ -115,7 +112,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         gains=experiment.space.gains,
         set_point=set_point,
         reference=reference,
-        flights=tuple(_flight(row, corrected=row.number > first_valid) for row in flown),
+        flights=tuple(_flight(row, corrected=history.is_corrected(rows, row.number)) for row in flown),
         proposal=_next_flight(session, campaign, rows, experiment.output),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
@@ -201,14 +198,9 @@ def _coarse(curves: Mapping[int, list[list[float]]], row: TrialRow) -> Curve:
     return Curve(points[:, 0], points[:, 1])
 
 
-def _goal(campaign: CampaignRow) -> tuple[Curve, Curve | None]:
-    """Set point over the window, and the reference if the model has one; neither depends on the gains."""
-    return _cached_goal(campaign.experiment, tuple(campaign.definition["experiment_options"].items()))
-
-
 @lru_cache
-def _cached_goal(experiment_name: str, options: tuple[tuple[str, OptionValue], ...]) -> tuple[Curve, Curve | None]:
-    experiment = get_experiment(experiment_name, dict(options))
+def _goal(experiment: Experiment) -> tuple[Curve, Curve | None]:
+    """Set point over the window, and the reference if the model has one; neither depends on the gains."""
     grid = experiment.grid_s
     set_point = Curve(grid, experiment.set_point(grid))
     modelled = experiment.modelled
@@ -250,8 +242,7 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
 
 def _next(flight: NextFlight, rows: Sequence[TrialRow]) -> NextFlight:
     """The flight without an error, interval and band that say nothing; the model's curve stays."""
-    corrected = any(row.state == TrialState.VALID for row in rows)
-    if is_informative(None if flight.interval is None else flight.interval.low, corrected=corrected):
+    if is_informative(None if flight.interval is None else flight.interval.low, corrected=history.is_corrected(rows)):
         return flight
     return replace(flight, predicted_error=None, interval=None, band=None)
 
@@ -281,9 +272,11 @@ def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _
 def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
     campaign = repository.get_campaign(session, row.campaign_id)
     experiment = experiment_of_campaign(campaign)
-    set_point, reference = _goal(campaign)
+    set_point, modelled = _goal(experiment)
     record = None if row.trajectory_id is None else trajectories.trajectory_of(session, row.trajectory_id)
     best = history.best_of(trials)
+    glitches = _glitches(row)
+    glitches_s = [glitch.low for glitch in glitches]
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
     predicted = _predicted(session, _proposal_of(session, row), experiment.output)
     return FlightRecordData(
@@ -291,17 +284,22 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         output_title=_TITLES.get(experiment.output, experiment.output),
         output_unit=CHANNEL_UNITS[experiment.output],
         set_point=set_point,
-        reference=reference,
+        reference=modelled if record is None else _recorded_reference(record) or modelled,
         curve=None if record is None else _curve(record, experiment.output),
         predicted=predicted["curve"],
         band=predicted["band"],
-        glitches=_glitches(row),
+        glitches=glitches,
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,
         panels=() if record is None else tuple(_panels(record)),
-        events=() if record is None or experiment.output != "altitude_m" else flight_events(record),
+        events=() if record is None or experiment.output != "altitude_m" else flight_events(record, glitches_s),
         notes=pinned_notes(row.note),
     )
+
+
+def _recorded_reference(record: Trajectory) -> Curve | None:
+    """The autopilot's own reference, where it was recorded."""
+    return _curve(record, "reference_m") if "reference_m" in record.channels else None
 
 
 def _panels(record: Trajectory) -> Iterator[ChannelPanel]:

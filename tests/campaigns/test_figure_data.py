@@ -10,7 +10,9 @@ from app.db.session import Database
 from tests.builders import (
     create_climb,
     create_flown_trial,
+    create_imported_trial,
     create_ready_campaign,
+    csv_of,
     get,
     run_jobs,
 )
@@ -71,6 +73,28 @@ def test_a_flight_by_itself_is_drawn_over_the_best(client: TestClient, campaign_
     drawn = traces(client, f"/api/trials/{first['id']}/figure?theme=dark")
     assert trace(drawn, "best")["name"] == "Flight 2 · best"
     assert max(trace(drawn, "flight")["y"]) == pytest.approx(create_climb(2.0)["altitude_m"].max(), abs=1e-3)
+
+
+def test_an_imported_flight_shows_its_own_reference_reported_throttle_and_glitches(
+    client: TestClient, database: Database
+) -> None:
+    """What an autopilot's log contains beside the altitude."""
+    campaign = create_ready_campaign(client, database, vehicle="import")
+    climb = create_climb()
+    altitude_m = climb["altitude_m"].copy()
+    altitude_m[500:510] += 1.0
+    full = np.where((climb.time_s > 1.0) & (climb.time_s < 2.0), 1.0, 0.62)
+    channels = {"altitude_m": altitude_m, "reference_m": np.minimum(climb.time_s, 3.0), "throttle": full}
+    trial = create_imported_trial(client, campaign["id"], csv_of({"time_s": climb.time_s, **channels}))
+    card = get(client, f"/api/trials/{trial['id']}/figure")
+    drawn, layout = card["figure"]["data"], card["figure"]["layout"]
+    assert trace(drawn, "reference")["y"][-1] == 3.0
+    assert trace(drawn, "reference")["x"][0] == 0.0
+    assert "Reported throttle" in [one["name"] for one in drawn if one["meta"]["role"] == "input"]
+    saturated = trace(drawn, "saturated")["x"]
+    assert (saturated[0], saturated[-1]) == (pytest.approx(1.0, abs=0.03), pytest.approx(2.0, abs=0.03))
+    assert [one["text"] for one in layout["annotations"]] == ["Command", "Lift-off", "Glitch"]
+    assert layout["annotations"][2]["x"] == pytest.approx(10.0, abs=0.05)
 
 
 def test_a_campaign_without_flights_shows_what_is_missing(client: TestClient, database: Database) -> None:

@@ -1,6 +1,7 @@
 """Registry of experiments."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -16,14 +17,22 @@ EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType({experiment.name
 
 
 def get_experiment(name: str, options: Mapping[str, OptionValue] | None = None) -> Experiment:
-    """Return an experiment with its settings, which must be free of problems. Raises InputError for an unknown name."""
+    """Return an experiment with its settings, which must be free of problems; the same object for the same settings.
+
+    Raises InputError for an unknown name.
+    """
     if name not in EXPERIMENTS:
         raise InputError(
             "Unknown experiment.",
             hint=f"Choose one of: {', '.join(EXPERIMENTS)}.",
             problems=(Problem("experiment", f"unknown name {name!r}"),),
         )
-    return EXPERIMENTS[name].configured(options) if options else EXPERIMENTS[name]
+    return _configured(name, tuple(sorted(options.items()))) if options else EXPERIMENTS[name]
+
+
+@lru_cache
+def _configured(name: str, options: tuple[tuple[str, OptionValue], ...]) -> Experiment:
+    return EXPERIMENTS[name].configured(dict(options))
 
 
 def experiment_of(definition: Definition) -> Experiment:

@@ -1,6 +1,7 @@
-"""Events on the time line of a recorded takeoff: command, lift-off, abort, landing, and pinned notes."""
+"""Events on the time line of a recorded takeoff: command, lift-off, glitch, abort, landing, and pinned notes."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,6 +11,7 @@ from app.core.records.trajectory import Trajectory
 
 AIRBORNE_M: Final = 0.1
 """Altitude above which the vehicle has left the ground."""
+_NAMED_GLITCHES: Final = 3
 _PINNED: Final = re.compile(r"\s*(-?\d{1,4}(?:\.\d{1,6})?)\s?s\s?[:–-]\s?(\S.*)")
 
 
@@ -21,16 +23,17 @@ class FlightEvent:
     name: str
 
 
-def flight_events(trajectory: Trajectory) -> tuple[FlightEvent, ...]:
-    """The events that the record shows, in order.
+def flight_events(trajectory: Trajectory, glitches_s: Sequence[float] = ()) -> tuple[FlightEvent, ...]:
+    """The events that the record shows, in order, with its glitches, which begin at `glitches_s`.
 
     Lift-off: the first sample above 0.1 m. Abort: the set point, where it was recorded, returns to the ground. Landing:
-    the first sample at or below 0.1 m after the last one above. Only the command, if there is no altitude.
+    the first sample at or below 0.1 m after the last one above. Only the command and the glitches, if there is no
+    altitude. More than three glitches are one event, at the first.
     """
     time_s, channels = trajectory.time_s, trajectory.channels
-    found = [FlightEvent(0.0, "Command")]
+    found = [FlightEvent(0.0, "Command"), *_glitches(glitches_s)]
     if "altitude_m" not in channels or not len(time_s):
-        return tuple(found)
+        return tuple(sorted(found, key=_time))
     airborne = np.flatnonzero((time_s >= 0.0) & (channels["altitude_m"] > AIRBORNE_M))
     if airborne.size:
         found.append(FlightEvent(float(time_s[airborne[0]]), "Lift-off"))
@@ -49,6 +52,12 @@ def pinned_notes(note: str) -> tuple[FlightEvent, ...]:
 
 def _time(event: FlightEvent) -> float:
     return event.time_s
+
+
+def _glitches(begin_s: Sequence[float]) -> list[FlightEvent]:
+    if len(begin_s) > _NAMED_GLITCHES:
+        return [FlightEvent(min(begin_s), f"{len(begin_s)} glitches")]
+    return [FlightEvent(time_s, "Glitch") for time_s in begin_s]
 
 
 def _abort(trajectory: Trajectory) -> int | None:

@@ -42,3 +42,12 @@ def test_the_lines_of_a_note_that_begin_with_a_time_are_pinned_to_it() -> None:
         (2.0, "first wobble"),
         (12.5, "gust from the door"),
     ]
+
+
+def test_glitches_are_events_and_many_of_them_are_one() -> None:
+    def named(*begin_s: float) -> list[tuple[float, str]]:
+        record = Trajectory(TIME_S, {"altitude_m": np.zeros_like(TIME_S)}, "mavlink", "vehicle")
+        return [(event.time_s, event.name) for event in flight_events(record, begin_s)]
+
+    assert named(5.0, 2.5) == [(0.0, "Command"), (2.5, "Glitch"), (5.0, "Glitch")]
+    assert named(5.0, 6.0, 4.0, 7.0) == [(0.0, "Command"), (4.0, "4 glitches")]
