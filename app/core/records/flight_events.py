@@ -10,7 +10,7 @@ import numpy as np
 from app.core.records.trajectory import Trajectory
 
 AIRBORNE_M: Final = 0.1
-"""Altitude above which the vehicle has left the ground."""
+"""Height above which the vehicle has left the ground."""
 _NAMED_GLITCHES: Final = 3
 _PINNED: Final = re.compile(r"\s*(-?\d{1,4}(?:\.\d{1,6})?)\s?s\s?[:–-]\s?(\S.*)")
 
@@ -26,15 +26,17 @@ class FlightEvent:
 def flight_events(trajectory: Trajectory, glitches_s: Sequence[float] = ()) -> tuple[FlightEvent, ...]:
     """The events that the record shows, in order, with its glitches, which begin at `glitches_s`.
 
-    Lift-off: the first sample above 0.1 m. Abort: the set point, where it was recorded, returns to the ground. Landing:
-    the first sample at or below 0.1 m after the last one above. Only the command and the glitches, if there is no
-    altitude. More than three glitches are one event, at the first.
+    Lift-off: the first sample more than 0.1 m above the last one before the command. Landing: the first sample at most
+    that high after the last one higher. Abort: the set point, where it was recorded, returns to the ground. Only the
+    command and the glitches, if there is no altitude. More than three glitches are one event, at the first.
     """
     time_s, channels = trajectory.time_s, trajectory.channels
     found = [FlightEvent(0.0, "Command"), *_glitches(glitches_s)]
     if "altitude_m" not in channels or not len(time_s):
         return tuple(sorted(found, key=_time))
-    airborne = np.flatnonzero((time_s >= 0.0) & (channels["altitude_m"] > AIRBORNE_M))
+    is_commanded = time_s >= 0.0
+    ground_m = channels["altitude_m"][max(0, int(np.argmax(is_commanded)) - 1)]
+    airborne = np.flatnonzero(is_commanded & (channels["altitude_m"] - ground_m > AIRBORNE_M))
     if airborne.size:
         found.append(FlightEvent(float(time_s[airborne[0]]), "Lift-off"))
     if (abort := _abort(trajectory)) is not None:

@@ -1,7 +1,12 @@
+import io
+
 import numpy as np
+import pytest
 
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import Samples, Trajectory
+from app.logs.readers import read_takeoff
+from tests.logs.recorded import TLOGS, recorded
 
 TIME_S = np.arange(-1.0, 11.0)
 
@@ -17,6 +22,19 @@ def test_a_completed_takeoff_has_its_command_and_its_lift_off() -> None:
         (0.0, "Command"),
         (2.0, "Lift-off"),
     ]
+
+
+def test_lift_off_and_landing_count_from_where_it_stood_at_the_command() -> None:
+    """Paparazzi stands at 0.09 … 0.11 m above its origin."""
+    altitude_m = 0.11 + np.interp(TIME_S, [2, 4, 6, 8], [0.0, 3.0, 3.0, 0.0])
+    assert events_of(altitude_m=altitude_m) == [(0.0, "Command"), (3.0, "Lift-off"), (8.0, "Landing")]
+
+
+@pytest.mark.parametrize("name", TLOGS)
+def test_the_recorded_paparazzi_lifts_off_after_its_command(name: str) -> None:
+    flown = read_takeoff(io.BytesIO(recorded(f"{name}.tlog"))).trajectory
+    [lift_off] = [event.time_s for event in flight_events(flown) if event.name == "Lift-off"]
+    assert 0.2 < lift_off < 0.8
 
 
 def test_an_aborted_flight_shows_when_its_set_point_returned_to_the_ground_and_when_it_landed() -> None:
