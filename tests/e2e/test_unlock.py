@@ -1,7 +1,6 @@
 """A browser that has opened no link: it may only watch a REAL vehicle, and the terminal's link unlocks it."""
 
 import os
-import re
 from pathlib import Path
 
 import pytest
