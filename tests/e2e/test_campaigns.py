@@ -168,6 +168,13 @@ def test_the_record_of_a_flight_can_be_downloaded(dashboard: Dashboard, states: 
     assert len(lines) == 1 + trial["record"]["samples"]
 
 
+def test_a_flight_at_the_address_of_another_campaign_is_shown_in_its_own(dashboard: Dashboard, states: States) -> None:
+    campaign_id, other = states.campaign(flights=1), states.campaign(flights=0)
+    [trial] = dashboard.trials(campaign_id)
+    dashboard.open(f"/campaigns/{other}/flights/{trial['id']}")
+    expect(dashboard.page).to_have_url(re.compile(rf"/campaigns/{campaign_id}/flights/{trial['id']}$"))
+
+
 def test_a_page_opens_at_its_top_wherever_the_one_before_was_scrolled_to(dashboard: Dashboard, states: States) -> None:
     dashboard.open(f"/campaigns/{states.campaign(flights=1)}")
     page = dashboard.page

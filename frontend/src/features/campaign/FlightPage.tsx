@@ -1,7 +1,7 @@
 import { Anchor, Box, Button, Skeleton, Title, useComputedColorScheme } from "@mantine/core";
 import { IconPin } from "@tabler/icons-react";
 import { useCallback, useState } from "react";
-import { Link, useNavigate, useParams } from "react-router";
+import { Link, Navigate, useNavigate, useParams } from "react-router";
 import { useCampaign, useFlightFigure, useTrial, useTrials } from "../../api/queries";
 import type { FigureCard } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
@@ -51,7 +51,8 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   useTitle(trial.data ? `Flight ${trial.data.number}` : "Flight");
   if (trial.error) return <NotFound error={trial.error} />;
   if (trial.data === undefined) return <Skeleton height={480} radius="md" />;
-  const { number, record, gate } = trial.data;
+  const { campaign_id: own, number, record, gate } = trial.data;
+  if (own !== campaignId) return <Navigate replace to={`/campaigns/${own}/flights/${trialId}`} />;
   return (
     <>
       <Anchor component={Link} to={`/campaigns/${campaignId}`} display="inline-block" py={4} fz="small">
