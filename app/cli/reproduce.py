@@ -15,11 +15,11 @@ from rich.table import Table
 
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
-from app.controller_checks.check import LogCheck, check_log, check_trace, parse_gains
+from app.controller_checks.check import AUTOPILOTS, examine_file
+from app.controller_checks.paparazzi import LogCheck, check_log, parse_gains
+from app.controller_checks.results import Result as CheckResult
 from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
-from app.core.control.paparazzi import OUTPUTS, Replay
 from app.core.formatting import format_gains
-from app.logs.loop_trace import read_loop_trace
 from app.reproductions.controller import run_controller
 from app.reproductions.registry import REPRODUCTIONS, Reproduction, get_reproduction
 from app.reproductions.results import Result, Row
@@ -89,38 +89,60 @@ _UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err":
 
 
 def replay_files(files: Sequence[Path], json_out: Path | None) -> bool:
-    """Replay every file and print rows and the largest difference of each column; returns whether all are readable and
-    exact."""
-    replays: dict[Path, Replay] = {}
+    """Replay every file and print rows and the largest difference of each signal, a table for each autopilot; returns
+    whether all are readable and agree."""
+    checked: dict[Path, CheckResult] = {}
     for file in files:
         try:
-            replays[file] = check_trace(read_loop_trace(file)).replay
+            checked[file] = examine_file(file)
         except InputError as error:
             show_error(error)
+    for name, autopilot in AUTOPILOTS.items():
+        if own := {file: each for file, each in checked.items() if each.autopilot == name}:
+            console(json_out).print(_replays_table(autopilot.title, own))
+    write_json(json_out, {"files": [_replay_document(file, each) for file, each in checked.items()]})
+    return len(checked) == len(files) and all(each.passed for each in checked.values())
+
+
+def _replays_table(title: str, checked: Mapping[Path, CheckResult]) -> Table:
+    names = list(dict.fromkeys(signal.name for each in checked.values() for signal in each.signals))
     rows = [
         (
             file.name,
-            str(replay.rows),
-            *(str(replay.largest_difference[column]) for column in OUTPUTS),
-            "exact" if replay.exact else f"differs from row {replay.first_different_row} on",
+            str(each.rows),
+            *(f"{_largest_differences(each)[name]:.3g}" for name in names),
+            _verdict(each),
         )
-        for file, replay in replays.items()
+        for file, each in checked.items()
     ]
-    if rows:
-        console(json_out).print(
-            table(("file", "rows", *OUTPUTS, ""), rows, title="Largest difference between recording and replica")
-        )
-    write_json(json_out, {"files": [_recordings_document(file, replay) for file, replay in replays.items()]})
-    return len(replays) == len(files) and all(replay.exact for replay in replays.values())
+    return table(("file", "rows", *names, ""), rows, title=f"{title}: largest difference between recording and replica")
 
 
-def _recordings_document(file: Path, replay: Replay) -> dict[str, object]:
+def _largest_differences(checked: CheckResult) -> dict[str, float]:
+    return {signal.name: signal.largest_difference for signal in checked.signals}
+
+
+def _verdict(checked: CheckResult) -> str:
+    if not checked.passed:
+        return f"differs from row {checked.first_different_row} on"
+    return "exact" if _exact(checked) else "agrees"
+
+
+def _exact(checked: CheckResult) -> bool:
+    return all(signal.verdict == "exact" for signal in checked.signals)
+
+
+def _replay_document(file: Path, checked: CheckResult) -> dict[str, object]:
     return {
         "file": str(file),
-        "rows": replay.rows,
-        "exact": replay.exact,
-        "largest_difference": dict(replay.largest_difference),
-        "first_different_row": replay.first_different_row,
+        "autopilot": checked.autopilot,
+        "rows": checked.rows,
+        "passed": checked.passed,
+        "exact": _exact(checked),
+        "largest_difference": _largest_differences(checked),
+        "tolerance": {signal.name: signal.tolerance for signal in checked.signals},
+        "first_different_row": checked.first_different_row,
+        "notes": list(checked.notes),
     }
 
 

@@ -1,62 +1,44 @@
 """Result of a check as plain data for storage: sentences, one line for each signal, and curves."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from io import BytesIO
-from types import MappingProxyType
+from dataclasses import asdict, dataclass, field
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.controller_checks.check import LogCheck, TraceCheck, check_recording
-from app.core.control.loop_log import COMMANDS, GAINS, SIMULATED, TIME_TOLERANCE_S, TOLERANCES, CommandCheck, Overlay
-from app.core.control.loop_log import UNITS as REFERENCE_UNITS
-from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ
-from app.core.formatting import format_gains
+from app.core.control.loop_log import Overlay
 from app.core.records.trajectory import Samples
 from app.figures.panels import Overlaid
 from app.figures.scale import thinned
 
 Kind = Literal["log", "trace"]
 Verdict = Literal["exact", "agrees", "differs"]
+FigureName = Literal["reference", "commands"]
 Values = NDArray[np.int64] | Samples
 
 CURVE_POINTS: Final = 1000
 MARKS: Final = 200
 
 
-@dataclass(frozen=True, slots=True)
-class _Shown:
-    """Title and scale of a signal: `scale` converts its counts to `unit`."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signal:
+    """A signal of a loop. `scale` converts its recorded values to `unit`, in which it is drawn with `digits` decimals.
+
+    Differences are in `difference_unit`, as recorded; in a trace they may be at most `tolerance`, which `allowance`
+    describes.
+    """
 
     title: str
     unit: str
-    scale: float
     digits: int
+    difference_unit: str
+    scale: float = 1.0
+    tolerance: float = 0.0
+    allowance: str = "compared bit for bit"
 
 
-_SHOWN: Final[Mapping[str, _Shown]] = MappingProxyType(
-    {
-        "z_ref": _Shown("Reference altitude", "m", REFERENCE_UNITS["z_ref"], 3),
-        "zd_ref": _Shown("Reference speed", "m/s", REFERENCE_UNITS["zd_ref"], 3),
-        "zdd_ref": _Shown("Reference acceleration", "m/s²", REFERENCE_UNITS["zdd_ref"], 2),
-        "z_sum_err": _Shown("Summed error", "m·s", REFERENCE_UNITS["z_ref"] / RATE_HZ, 3),
-        "ff_cmd": _Shown("Feed-forward", "of 9600", 1.0, 0),
-        "fb_cmd": _Shown("Feedback", "of 9600", 1.0, 0),
-        "thrust": _Shown("Commanded thrust", "of 9600", 1.0, 0),
-    }
-)
-_TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
-_BEYOND: Final = f"beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty"
-_TO_THE_BIT: Final = "compared bit for bit"
-_COUNTED: Final = f"only differences beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty count"
-_DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 m."
-
-FIGURES: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
-    {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
-)
-"""The figures: title, and the signals one below another."""
+Signals = Mapping[str, Signal]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +59,11 @@ class SignalResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """Everything that a page shows of one check. `better_gains` are other gains from which more of the commands
-    follow."""
+    """Everything that a page shows of one check.
+
+    `better_gains` are other gains from which more of the commands follow; `first_different_row` counts the rows of a
+    trace from 0; `autopilot` is the name of an entry of the registry.
+    """
 
     kind: Kind
     passed: bool
@@ -90,164 +75,128 @@ class Result:
     notes: tuple[str, ...]
     signals: tuple[SignalResult, ...]
     curves: Mapping[str, Overlaid]
+    autopilot: str = "paparazzi"
+    first_different_row: int | None = None
 
     def as_json(self) -> dict[str, object]:
         return asdict(self)
 
 
-def examine_content(content: bytes, *, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
-    """Check a recording that is in memory, for a process of its own. Raises InputError as `check_recording` does."""
-    beside = None if companion is None else BytesIO(companion)
-    return result_of(check_recording(BytesIO(content), name=name, companion=beside, given=given))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TraceReplay:
+    """A trace and what the replica computed from the same inputs.
+
+    `time_s` has shape (n,), n ≥ 1; `recorded` and `replica` hold each signal by name, shape (n,). `gains` is None if
+    they change within the trace.
+    """
+
+    time_s: Samples
+    recorded: Mapping[str, Values]
+    replica: Mapping[str, Values]
+    gains: Mapping[str, float] | None
+    notes: tuple[str, ...] = field(default=())
 
 
-def result_of(checked: LogCheck | TraceCheck) -> Result:
-    return _result_of_log(checked) if isinstance(checked, LogCheck) else _result_of_trace(checked)
-
-
-def _result_of_trace(checked: TraceCheck) -> Result:
-    trace, replay = checked.trace, checked.replay
-    recorded = dict(zip(OUTPUTS, trace.outputs.T, strict=True))
-    replica = dict(zip(OUTPUTS, checked.computed.T, strict=True))
-    differs = {name: recorded[name] != replica[name] for name in OUTPUTS}
-    time_s = np.arange(replay.rows) / RATE_HZ
-    overlay = Overlay(time_s, recorded, replica, differs)
-    constant = {name: np.unique(trace.inputs[:, INPUTS.index(name)]) for name in GAINS}
-    is_constant = all(len(values) == 1 for values in constant.values())
+def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay) -> Result:
+    """Compare every signal of every row with the replica, within the tolerance of each signal; NaN equals NaN."""
+    apart = {name: _apart(replay.recorded[name], replay.replica[name]) for name in replay.recorded}
+    differs = {name: ~(values <= signals[name].tolerance) for name, values in apart.items()}
+    overlay = Overlay(replay.time_s, replay.recorded, replay.replica, differs)
+    rows = np.flatnonzero(np.logical_or.reduce(list(differs.values())))
+    results = tuple(
+        signal_result(name, signals[name], overlay, largest_difference=float(values.max()))
+        for name, values in apart.items()
+    )
     return Result(
         kind="trace",
-        passed=replay.exact,
-        sentence=_trace_sentence(checked, differs),
-        rows=replay.rows,
-        gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
-        gains_from="of the recording" if is_constant else "not constant",
+        passed=rows.size == 0,
+        sentence=_trace_sentence(results, overlay, rows),
+        rows=len(replay.time_s),
+        gains=replay.gains,
+        gains_from="not constant" if replay.gains is None else "of the recording",
         better_gains=None,
-        notes=(_DOWN,),
-        signals=tuple(
-            _signal(name, float(replay.largest_difference[name]), "counts", 0.0, _TO_THE_BIT, overlay)
-            for name in OUTPUTS
-        ),
-        curves=_curves((overlay,)),
+        notes=replay.notes,
+        signals=results,
+        curves=curves(signals, (overlay,)),
+        autopilot=autopilot,
+        first_different_row=int(rows[0]) if rows.size else None,
     )
 
 
-def _result_of_log(checked: LogCheck) -> Result:
-    commands, simulation = checked.commands, checked.simulation
-    *simulated, drawn = checked.overlays
-    apart = {name: float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0)) for name in COMMANDS}
-    signals = [
-        _signal(name, difference, "counts", 0.0, f"{_TO_THE_BIT}; fields may be one step of 1/512 s apart", drawn)
-        for name, difference in apart.items()
-    ]
-    if simulation is not None:
-        signals[:0] = [
-            _signal(name, difference, _TOLERANCE_UNITS[name], TOLERANCES[name], _COUNTED, simulated[0])
-            for name, difference in simulation.largest_difference.items()
-        ]
-    return Result(
-        kind="log",
-        passed=checked.passed,
-        sentence=_log_sentence(checked),
-        rows=commands.rows,
-        gains=dict(checked.gains),
-        gains_from=checked.gains_from,
-        better_gains=checked.better_gains,
-        notes=(*_notes(checked), _DOWN),
-        signals=tuple(signals),
-        curves=_curves(checked.overlays),
-    )
-
-
-def _signal(
-    name: str, difference: float, unit: str, tolerance: float, allowance: str, overlay: Overlay
+def signal_result(
+    name: str,
+    signal: Signal,
+    overlay: Overlay,
+    *,
+    largest_difference: float,
+    tolerance: float | None = None,
+    difference_unit: str | None = None,
+    allowance: str | None = None,
 ) -> SignalResult:
+    """Result of one signal; the last three replace those of `signal`."""
     wrong = np.flatnonzero(overlay.differs[name])
-    verdict: Verdict = "differs" if wrong.size else "exact" if difference == 0.0 else "agrees"
+    verdict: Verdict = "differs" if wrong.size else "exact" if largest_difference == 0.0 else "agrees"
     return SignalResult(
         name=name,
-        title=_SHOWN[name].title,
-        largest_difference=difference,
-        difference_unit=unit,
-        tolerance=tolerance,
-        allowance=allowance,
+        title=signal.title,
+        largest_difference=largest_difference,
+        difference_unit=difference_unit or signal.difference_unit,
+        tolerance=signal.tolerance if tolerance is None else tolerance,
+        allowance=allowance or signal.allowance,
         verdict=verdict,
         different=int(wrong.size),
         first_different_s=round(float(overlay.time_s[wrong[0]]), 6) if wrong.size else None,
     )
 
 
-def _trace_sentence(checked: TraceCheck, differs: Mapping[str, NDArray[np.bool_]]) -> str:
-    replay = checked.replay
-    if replay.first_different_row is None:
-        return f"The replica agrees: all {_grouped(replay.rows)} steps are exact in all {len(OUTPUTS)} signals."
-    row = replay.first_different_row
-    names = ", ".join(name for name in OUTPUTS if differs[name][row])
-    steps = int(np.logical_or.reduce(list(differs.values())).sum())
+def curves(signals: Signals, overlays: Iterable[Overlay]) -> dict[str, Overlaid]:
+    return {
+        name: _curve(name, signals[name], overlay)
+        for overlay in overlays
+        for name in overlay.recorded
+        if len(overlay.time_s)
+    }
+
+
+def grouped(count: int) -> str:
+    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
+def _apart(recorded: Values, replica: Values) -> Samples:
+    """|recorded − replica|, shape (n,); infinite where only one of them is NaN."""
+    apart: Samples = np.abs(np.asarray(recorded - replica, dtype=np.float64))
+    apart[np.isnan(recorded) & np.isnan(replica)] = 0.0
+    apart[np.isnan(apart)] = np.inf
+    return apart
+
+
+def _trace_sentence(results: tuple[SignalResult, ...], overlay: Overlay, rows: NDArray[np.int64]) -> str:
+    total = grouped(len(overlay.time_s))
+    exact = all(signal.tolerance == 0.0 for signal in results)
+    met = "exact" if exact else "within the tolerances"
+    if not rows.size:
+        return f"The replica agrees: all {total} steps are {met} in all {len(results)} signals."
+    names = ", ".join(name for name, wrong in overlay.differs.items() if wrong[rows[0]])
     return (
-        f"The replica differs: {_grouped(steps)} of {_grouped(replay.rows)} steps are not exact, the first at "
-        f"{row / RATE_HZ:.3f} s in {names}."
+        f"The replica differs: {grouped(len(rows))} of {total} steps are not {met}, the first at "
+        f"{overlay.time_s[rows[0]]:.3f} s in {names}."
     )
 
 
-def _log_sentence(checked: LogCheck) -> str:
-    commands, simulation = checked.commands, checked.simulation
-    if not commands.rows:
-        return "Nothing could be compared: the loop was not in control in this log."
-    if not commands.passed:
-        return (
-            f"The replica differs: {_grouped(commands.different)} of {_grouped(commands.rows)} commands are not "
-            f"reproduced, the first at {commands.first_different_s:.3f} s."
-        )
-    if simulation is not None and not simulation.passed:
-        name, value = max(simulation.largest_difference.items(), key=lambda pair: pair[1] / TOLERANCES[pair[0]])
-        return (
-            f"The replica differs: {name} is {value:.3g} {_TOLERANCE_UNITS[name]} {_BEYOND}; {TOLERANCES[name]:g} is "
-            "allowed."
-        )
-    apart = sum(commands.stale.values())
-    more = "" if not apart else f", the other {_grouped(apart)} with fields one step of 1/512 s apart"
-    exact = f"{_grouped(commands.exact)} of {_grouped(commands.rows)}"
-    return f"The replica agrees: {exact} commands are bit-exact{more}."
-
-
-def _notes(checked: LogCheck) -> Iterable[str]:
-    if checked.better_gains is not None:
-        yield f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?"
-    yield from _notes_on(checked.commands)
-    if checked.simulation is None:
-        yield "Reference and integrator were not simulated: no command in the log, or another command within 2 s."
-    else:
-        yield (
-            f"Reference and integrator were simulated again from the command at {checked.simulation.command_s:.3f} s "
-            f"for {checked.simulation.duration_s:.1f} s."
-        )
-
-
-def _notes_on(commands: CommandCheck) -> Iterable[str]:
-    if commands.tilted:
-        tilt = f"{commands.largest_tilt_deg:.1f}°"
-        yield f"Commands reproduced under a tilt of up to {tilt}: {_grouped(commands.tilted)}."
-    for fields, count in commands.stale.items():
-        if count:
-            yield f"Commands reproduced only with the {fields} one step apart: {_grouped(count)}."
-
-
-def _curves(overlays: Iterable[Overlay]) -> dict[str, Overlaid]:
-    return {name: _curve(name, overlay) for overlay in overlays for name in overlay.recorded if len(overlay.time_s)}
-
-
-def _curve(name: str, overlay: Overlay) -> Overlaid:
+def _curve(name: str, signal: Signal, overlay: Overlay) -> Overlaid:
     """Curves of a signal, thinned to common times such that both keep their shape and extremes."""
-    shown = _SHOWN[name]
-    known = np.flatnonzero(np.isfinite(overlay.replica[name]))
-    recorded, replica = (_scaled(values[known], shown) for values in (overlay.recorded[name], overlay.replica[name]))
+    known = np.flatnonzero(np.isfinite(overlay.recorded[name]) & np.isfinite(overlay.replica[name]))
+    recorded, replica = (
+        np.asarray(values[known], dtype=np.float64) * signal.scale
+        for values in (overlay.recorded[name], overlay.replica[name])
+    )
     time_s = overlay.time_s[known]
     kept = sorted({*_kept(recorded), *_kept(replica)})
     wrong = np.flatnonzero(overlay.differs[name][known])
     marked = wrong if len(wrong) <= MARKS else wrong[np.linspace(0, len(wrong) - 1, MARKS).astype(np.int64)]
     return Overlaid(
-        label=f"{name} ({shown.unit})",
-        digits=shown.digits,
+        label=f"{name} ({signal.unit})" if signal.unit else name,
+        digits=signal.digits,
         time_s=_rounded(time_s[kept]),
         recorded=_rounded(recorded[kept]),
         replica=_rounded(replica[kept]),
@@ -256,17 +205,9 @@ def _curve(name: str, overlay: Overlay) -> Overlaid:
     )
 
 
-def _scaled(values: Values, shown: _Shown) -> Samples:
-    return np.asarray(values, dtype=np.float64) * shown.scale
-
-
 def _rounded(values: Samples) -> tuple[float, ...]:
     return tuple(round(float(each), 6) for each in values)
 
 
 def _kept(values: Samples) -> list[int]:
     return [int(place) for place in thinned(np.arange(len(values), dtype=np.float64), values, CURVE_POINTS)[0]]
-
-
-def _grouped(count: int) -> str:
-    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")

@@ -1,11 +1,12 @@
 """Controller checks over HTTP."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, status
 
 from app.common.schemas import FigureCard, Page, figure_card
 from app.controller_checks import service
+from app.controller_checks.results import FigureName
 from app.controller_checks.service import ControllerCheck, ControllerCheckSummary
 from app.web.dependencies import (
     REQUEST_BODY,
@@ -42,8 +43,9 @@ def check_controller(
         str | None, Query(max_length=40, description="KP,KI,KD flown, if the log does not contain them")
     ] = None,
 ) -> ControllerCheck:
-    """Compare a recording of the vertical loop with the replica: Paparazzi's .data file with VERT_LOOP (its .log as the
-    form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording itself is not kept."""
+    """Compare a recording of the vertical loop with the replica of its autopilot: Paparazzi's .data file with VERT_LOOP
+    (its .log as the form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording
+    itself is not kept."""
     result = service.check_upload(record.content(), name=record.name, companion=record.read_companion(), gains=gains)
     return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
 
@@ -61,9 +63,7 @@ def get_controller_check(session: Reader, check_id: Id) -> ControllerCheck:
 
 
 @router.get("/{check_id}/figures/{name}")
-def get_controller_check_figure(
-    session: Reader, check_id: Id, name: Literal["reference", "commands"], theme: Theme = "light"
-) -> FigureCard:
+def get_controller_check_figure(session: Reader, check_id: Id, name: FigureName, theme: Theme = "light") -> FigureCard:
     """The signals of the reference model and the integrator, or the commands; recording and replica overlaid."""
     return figure_card(service.figure(session, check_id, name, theme))
 

@@ -11,13 +11,14 @@ from sqlalchemy.orm import Session, undefer
 
 from app.common.errors import NotFoundError, StorageError
 from app.common.schemas import Gains, Page, decode_cursor, encode_cursor, without_control_characters
-from app.controller_checks.check import check_trace, parse_gains
-from app.controller_checks.results import FIGURES, Result, examine_content, result_of
+from app.controller_checks.autopilot import Autopilot
+from app.controller_checks.check import AUTOPILOTS, examine_content, examine_file
+from app.controller_checks.paparazzi import parse_gains
+from app.controller_checks.results import FigureName, Result
 from app.db.models import ControllerCheckRow
 from app.figures.base import Card, card_of
 from app.figures.panels import ControllerFigure
 from app.figures.theme import ThemeName
-from app.logs.loop_trace import read_loop_trace
 from app.processes.sandbox import FILE, run_limited
 from app.reproductions.controller import RECORDED_TAKEOFF
 
@@ -40,8 +41,8 @@ def page(session: Session, *, before_id: int | None, limit: int) -> tuple[Sequen
 
 
 class ControllerCheckSummary(BaseModel):
-    """A recording that was compared with the replica: `log`, of a flight with Paparazzi, or `trace`, with every
-    step."""
+    """A recording that was compared with the replica of its autopilot's loop: `log`, of a flight, or `trace`, with
+    every step."""
 
     id: int
     file_name: str
@@ -67,13 +68,14 @@ class CheckedSignal(BaseModel):
 class CheckFigure(BaseModel):
     """An available figure of the check."""
 
-    name: Literal["reference", "commands"]
+    name: FigureName
     title: str
 
 
 class ControllerCheck(ControllerCheckSummary):
     """The result as a sentence, the gains and notes behind it, and one line for each signal."""
 
+    autopilot: Annotated[str, Field(description="the autopilot whose replica was used")]
     sentence: str
     rows: Annotated[int, Field(description="number of samples or steps compared")]
     gains: Annotated[Gains | None, Field(description="null if they change within the recording")]
@@ -100,7 +102,7 @@ def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: s
 
 def examine_example() -> Result:
     """Check the takeoff that comes with the program, recorded from the autopilot's own code."""
-    return result_of(check_trace(read_loop_trace(RECORDED_TAKEOFF)))
+    return examine_file(RECORDED_TAKEOFF)
 
 
 def store_example(session: Session, result: Result) -> ControllerCheck:
@@ -130,19 +132,21 @@ def get_check(session: Session, check_id: int) -> ControllerCheck:
     return _view(row, _result(row))
 
 
-def figure(session: Session, check_id: int, name: str, theme: ThemeName) -> Card:
+def figure(session: Session, check_id: int, name: FigureName, theme: ThemeName) -> Card:
     """Figure of one group of signals, recording and replica overlaid. Raises NotFoundError."""
     result = _result(get_one(session, check_id))
-    if name not in FIGURES:
-        raise NotFoundError("figure", name, hint=f"Available: {', '.join(FIGURES)}.")
-    title, signals = FIGURES[name]
+    autopilot = _autopilot(result)
+    if name not in autopilot.figures:
+        raise NotFoundError("figure", name, hint=f"Available: {', '.join(autopilot.figures)}.")
+    title, signals = autopilot.figures[name]
     summary = "; ".join(
         f"{signal.name} {signal.verdict}, largest difference {signal.largest_difference:.4g} {signal.difference_unit}"
         for signal in result.signals
         if signal.name in signals
     )
     drawn = [result.curves[signal] for signal in signals if signal in result.curves]
-    return card_of(ControllerFigure(drawn, title, f"Recorded and replica overlaid: {summary}. z points down.", theme))
+    described = f"Recorded and replica overlaid: {summary}. {autopilot.note}"
+    return card_of(ControllerFigure(drawn, title, described, theme))
 
 
 def delete_check(session: Session, check_id: int) -> None:
@@ -164,6 +168,10 @@ def _result(row: ControllerCheckRow) -> Result:
         ) from error
 
 
+def _autopilot(result: Result) -> Autopilot:
+    return AUTOPILOTS[result.autopilot]
+
+
 def _view(row: ControllerCheckRow, result: Result) -> ControllerCheck:
     return ControllerCheck.model_validate(
         {
@@ -171,7 +179,8 @@ def _view(row: ControllerCheckRow, result: Result) -> ControllerCheck:
             "file_name": row.file_name,
             "checked_at": row.checked_at,
             **{name: getattr(result, name) for name in _FROM_RESULT},
-            "figures": [{"name": name, "title": title} for name, (title, _) in FIGURES.items()],
+            "autopilot": _autopilot(result).title,
+            "figures": [{"name": name, "title": title} for name, (title, _) in _autopilot(result).figures.items()],
         },
         from_attributes=True,
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.controller_checks.results import examine_content
+from app.controller_checks.check import examine_content
 from app.logs.readers import read_content
 
 NUMERICS = ("jsbsim", "numba", "plotly", "pymavlink", "scipy")

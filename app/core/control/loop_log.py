@@ -117,7 +117,7 @@ class Overlay:
     """
 
     time_s: Samples
-    recorded: Mapping[str, Counts]
+    recorded: Mapping[str, Samples | Counts]
     replica: Mapping[str, Samples | Counts]
     differs: Mapping[str, NDArray[np.bool_]]
 

@@ -811,6 +811,12 @@ export type ControllerCheck = {
      */
     checked_at: string;
     /**
+     * Autopilot
+     *
+     * the autopilot whose replica was used
+     */
+    autopilot: string;
+    /**
      * Sentence
      */
     sentence: string;
@@ -857,8 +863,8 @@ export type ControllerCheck = {
 /**
  * ControllerCheckSummary
  *
- * A recording that was compared with the replica: `log`, of a flight with Paparazzi, or `trace`, with every
- * step.
+ * A recording that was compared with the replica of its autopilot's loop: `log`, of a flight, or `trace`, with
+ * every step.
  */
 export type ControllerCheckSummary = {
     /**

@@ -5,6 +5,7 @@ import { useNavigate } from "react-router";
 import { type RecordingCheck, useCheckExample } from "../../api/checks";
 import { problemOf } from "../../api/problems";
 import { ErrorNotice } from "../../ui/Notices";
+import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import classes from "./Checks.module.css";
 import { RECORDINGS } from "./checks";
@@ -35,12 +36,17 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
         </Text>
       )}
       <Text maw="90ch" lh={1.45} mb={10}>
-        Drop a file here or choose one: Paparazzi's <code>.data</code> file with <code>VERT_LOOP</code> messages (add
-        its <code>.log</code>, which contains the gains), or a recording of every control step as <code>.csv</code> or{" "}
-        <code>.csv.gz</code>. The file is not stored.
+        Drop a file here or choose one. The file is not stored.
       </Text>
+      <ul className={page["notes"]}>
+        {RECORDINGS.map(({ autopilot, text }) => (
+          <li key={autopilot}>
+            {autopilot}: {text}.
+          </li>
+        ))}
+      </ul>
       <Group gap={10} align="end" mt={4} mb={10}>
-        <FileButton multiple accept={RECORDINGS} onChange={(files) => onCheck(files)}>
+        <FileButton multiple accept={RECORDINGS.flatMap(({ types }) => types).join()} onChange={(files) => onCheck(files)}>
           {(props) => (
             <Button {...props} loading={upload.isPending} leftSection={<IconFileUpload size={20} aria-hidden />}>
               Choose recording

@@ -40,6 +40,7 @@ export function CheckResult({ checkId, upload, onCheck }: Props) {
           {check.sentence}
         </p>
         <p className={`${row["facts"]} numbers`}>
+          <span>{check.autopilot}</span>
           <span>{KINDS[check.kind]}</span>
           <span>
             gains {check.gains === null ? "" : gainsText(check.gains)} {check.gains_from}

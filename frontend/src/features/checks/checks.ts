@@ -5,8 +5,14 @@ import type { FigureTable } from "../../api/types";
 import { gainText, NOTHING } from "../../ui/format";
 import type { StateLabel } from "../../ui/states";
 
-/** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
-export const RECORDINGS = ".data,.log,.csv,.gz,text/csv";
+/** The recordings that can be checked: one entry per autopilot, with the file types of the file chooser. */
+export const RECORDINGS = [
+  {
+    autopilot: "Paparazzi",
+    types: [".data", ".log", ".csv", ".gz", "text/csv"],
+    text: "the .data file with VERT_LOOP messages (add its .log, which contains the gains), or a trace with a row for every control step, .csv or .csv.gz",
+  },
+] as const;
 
 export const KINDS: Record<ControllerCheckSummary["kind"], string> = {
   log: "Flight log",

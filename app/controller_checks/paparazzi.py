@@ -1,0 +1,247 @@
+"""Paparazzi's entry in the registry: its log of a flight, `.data` with VERT_LOOP, and traces with a row per step."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import BinaryIO, Final
+
+import numpy as np
+
+from app.controller_checks.autopilot import Autopilot, Beginning, Recording
+from app.controller_checks.results import (
+    Result,
+    Signal,
+    TraceReplay,
+    curves,
+    grouped,
+    result_of_trace,
+    signal_result,
+)
+from app.core.control.loop_log import (
+    COMMANDS,
+    GAINS,
+    SIMULATED,
+    TIME_TOLERANCE_S,
+    TOLERANCES,
+    UNITS,
+    CommandCheck,
+    Overlay,
+    SimulationCheck,
+    compare_commands,
+    compare_simulation,
+    infer_gains,
+)
+from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
+from app.core.errors import InputError, Problem
+from app.core.formatting import format_gains
+from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
+from app.logs.paparazzi import is_paparazzi, read_loop_log
+
+_HEAD_BYTES: Final = 4096
+_MAX_DIGITS: Final = 9
+
+_SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
+    {
+        "z_ref": Signal(title="Reference altitude", unit="m", difference_unit="counts", scale=UNITS["z_ref"], digits=3),
+        "zd_ref": Signal(
+            title="Reference speed", unit="m/s", difference_unit="counts", scale=UNITS["zd_ref"], digits=3
+        ),
+        "zdd_ref": Signal(
+            title="Reference acceleration", unit="m/s²", difference_unit="counts", scale=UNITS["zdd_ref"], digits=2
+        ),
+        "z_sum_err": Signal(
+            title="Summed error", unit="m·s", difference_unit="counts", scale=UNITS["z_ref"] / RATE_HZ, digits=3
+        ),
+        "ff_cmd": Signal(title="Feed-forward", unit="of 9600", difference_unit="counts", digits=0),
+        "fb_cmd": Signal(title="Feedback", unit="of 9600", difference_unit="counts", digits=0),
+        "thrust": Signal(title="Commanded thrust", unit="of 9600", difference_unit="counts", digits=0),
+    }
+)
+_TOLERANCE_UNITS: Final = {"z_ref": "m", "zd_ref": "m/s", "zdd_ref": "m/s²", "z_sum_err": "of its largest"}
+_BEYOND: Final = f"beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty"
+_STEP_APART: Final = "compared bit for bit; fields may be one step of 1/512 s apart"
+_COUNTED: Final = f"only differences beyond the effect of {1000 * TIME_TOLERANCE_S:g} ms of time uncertainty count"
+_DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 m."
+
+
+@dataclass(frozen=True, slots=True)
+class LogCheck:
+    """Result of checking a log.
+
+    Its gains and their source, the gains inferred from its commands, and both parts of the comparison with their
+    overlays.
+    """
+
+    gains: Mapping[str, float]
+    gains_from: str
+    inferred: Mapping[str, float] | None
+    commands: CommandCheck
+    simulation: SimulationCheck | None
+    overlays: tuple[Overlay, ...]
+
+    @property
+    def passed(self) -> bool:
+        return self.commands.passed and (self.simulation is None or self.simulation.passed)
+
+    @property
+    def better_gains(self) -> Mapping[str, float] | None:
+        """The inferred gains, if they differ: more of the commands follow from these."""
+        return None if self.inferred is None or dict(self.inferred) == dict(self.gains) else self.inferred
+
+
+def check_log(
+    stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
+) -> LogCheck:
+    """Check a .data file of Paparazzi.
+
+    The gains are those given, else the log's own, else those inferred from its commands. Raises InputError when it has
+    no VERT_LOOP, or its gains cannot be determined.
+    """
+    log, logged = read_loop_log(stream, companion)
+    inferred = infer_gains(log)
+    for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "computed from the commands")):
+        if gains is not None:
+            commands, drawn = compare_commands(log, gains)
+            simulated = compare_simulation(log)
+            if simulated is None:
+                return LogCheck(gains, source, inferred, commands, None, (drawn,))
+            return LogCheck(gains, source, inferred, commands, simulated[0], (simulated[1], drawn))
+    raise InputError(
+        f"{name} does not contain the gains flown, and its motion is too small to compute them.",
+        problems=(Problem("gains", "are needed"),),
+        hint="Add the .log file that was written with it, or give the gains (on the command line: --gains KP,KI,KD).",
+    )
+
+
+def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
+    """Parse gains from `KP,KI,KD`. Raises InputError that names `field`."""
+    parts = given.split(",")
+    if len(parts) != len(GAINS) or not all(_is_whole(part.strip()) for part in parts):
+        raise InputError(
+            f"{given[:60]!r} is not a gain set.",
+            problems=(Problem(field, "must be three whole numbers, KP,KI,KD"),),
+            hint="For example 283,13,82.",
+        )
+    return {name: float(part) for name, part in zip(GAINS, parts, strict=True)}
+
+
+def _is_whole(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) <= _MAX_DIGITS
+
+
+def _recognises(beginning: Beginning) -> bool:
+    return is_paparazzi(beginning.raw) or may_be_loop_trace(beginning.raw)
+
+
+def _examine(recording: Recording) -> Result:
+    stream, name = recording.stream, recording.name
+    stream.seek(0)
+    if is_paparazzi(stream.read(_HEAD_BYTES)):
+        return _result_of_log(check_log(stream, name=name, companion=recording.companion, given=recording.given))
+    return result_of_trace(PAPARAZZI.name, _SIGNALS, _replayed(read_loop_trace_stream(stream, name=name)))
+
+
+def _replayed(trace: LoopTrace) -> TraceReplay:
+    constant = {name: np.unique(trace.inputs[:, INPUTS.index(name)]) for name in GAINS}
+    is_constant = all(len(values) == 1 for values in constant.values())
+    return TraceReplay(
+        time_s=np.arange(len(trace)) / RATE_HZ,
+        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
+        replica=dict(zip(OUTPUTS, replayed(trace).T, strict=True)),
+        gains={name: float(values[0]) for name, values in constant.items()} if is_constant else None,
+        notes=(_DOWN,),
+    )
+
+
+def _result_of_log(checked: LogCheck) -> Result:
+    commands, simulation = checked.commands, checked.simulation
+    *simulated, drawn = checked.overlays
+    apart = {name: float(np.abs(drawn.recorded[name] - drawn.replica[name]).max(initial=0)) for name in COMMANDS}
+    signals = [
+        signal_result(name, _SIGNALS[name], drawn, largest_difference=difference, allowance=_STEP_APART)
+        for name, difference in apart.items()
+    ]
+    if simulation is not None:
+        signals[:0] = [
+            signal_result(
+                name,
+                _SIGNALS[name],
+                simulated[0],
+                largest_difference=difference,
+                tolerance=TOLERANCES[name],
+                difference_unit=_TOLERANCE_UNITS[name],
+                allowance=_COUNTED,
+            )
+            for name, difference in simulation.largest_difference.items()
+        ]
+    return Result(
+        kind="log",
+        passed=checked.passed,
+        sentence=_log_sentence(checked),
+        rows=commands.rows,
+        gains=dict(checked.gains),
+        gains_from=checked.gains_from,
+        better_gains=checked.better_gains,
+        notes=(*_notes(checked), _DOWN),
+        signals=tuple(signals),
+        curves=curves(_SIGNALS, checked.overlays),
+        autopilot=PAPARAZZI.name,
+    )
+
+
+def _log_sentence(checked: LogCheck) -> str:
+    commands, simulation = checked.commands, checked.simulation
+    if not commands.rows:
+        return "Nothing could be compared: the loop was not in control in this log."
+    if not commands.passed:
+        return (
+            f"The replica differs: {grouped(commands.different)} of {grouped(commands.rows)} commands are not "
+            f"reproduced, the first at {commands.first_different_s:.3f} s."
+        )
+    if simulation is not None and not simulation.passed:
+        name, value = max(simulation.largest_difference.items(), key=lambda pair: pair[1] / TOLERANCES[pair[0]])
+        return (
+            f"The replica differs: {name} is {value:.3g} {_TOLERANCE_UNITS[name]} {_BEYOND}; {TOLERANCES[name]:g} is "
+            "allowed."
+        )
+    apart = sum(commands.stale.values())
+    more = "" if not apart else f", the other {grouped(apart)} with fields one step of 1/512 s apart"
+    exact = f"{grouped(commands.exact)} of {grouped(commands.rows)}"
+    return f"The replica agrees: {exact} commands are bit-exact{more}."
+
+
+def _notes(checked: LogCheck) -> Iterable[str]:
+    if checked.better_gains is not None:
+        yield f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?"
+    yield from _notes_on(checked.commands)
+    if checked.simulation is None:
+        yield "Reference and integrator were not simulated: no command in the log, or another command within 2 s."
+    else:
+        yield (
+            f"Reference and integrator were simulated again from the command at {checked.simulation.command_s:.3f} s "
+            f"for {checked.simulation.duration_s:.1f} s."
+        )
+
+
+def _notes_on(commands: CommandCheck) -> Iterable[str]:
+    if commands.tilted:
+        tilt = f"{commands.largest_tilt_deg:.1f}°"
+        yield f"Commands reproduced under a tilt of up to {tilt}: {grouped(commands.tilted)}."
+    for fields, count in commands.stale.items():
+        if count:
+            yield f"Commands reproduced only with the {fields} one step apart: {grouped(count)}."
+
+
+PAPARAZZI: Final = Autopilot(
+    name="paparazzi",
+    title="Paparazzi",
+    recordings="the .data file of Paparazzi's ground log with VERT_LOOP messages, together with its .log, or a trace "
+    "with one row per step of 1/512 s",
+    signals=_SIGNALS,
+    figures=MappingProxyType(
+        {"reference": ("Reference and integrator", SIMULATED), "commands": ("Commands", COMMANDS)}
+    ),
+    note=_DOWN,
+    recognises=_recognises,
+    examine=_examine,
+)
