@@ -19,8 +19,8 @@ from app.core.errors import InputError, Problem
 COLUMNS: Final = ("step", *INPUTS[:7], "zdd", *INPUTS[7:], *OUTPUTS)
 MAX_ROWS: Final = 1_000_000
 MAX_BYTES: Final = 256 * 2**20
-_GZIP: Final = b"\x1f\x8b"
-_IN_MEMORY_BYTES: Final = 2**22
+GZIP: Final = b"\x1f\x8b"
+IN_MEMORY_BYTES: Final = 2**22
 _INTEGER: Final = re.compile(r"[+-]?[0-9]{1,19}")
 
 _HINT: Final = f"A trace has the columns {','.join(COLUMNS)}, one row per 1/512 s, as 32-bit integers."
@@ -40,7 +40,7 @@ def read_loop_trace(path: Path) -> LoopTrace:
 def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
     """As `read_loop_trace`, from a stream; gzip is detected from its first bytes."""
     stream.seek(0)
-    zipped = stream.read(len(_GZIP)) == _GZIP
+    zipped = stream.read(len(GZIP)) == GZIP
     stream.seek(0)
     try:
         return _read_bytes(name, stream, zipped=zipped)
@@ -51,22 +51,20 @@ def read_loop_trace_stream(stream: BinaryIO, *, name: str) -> LoopTrace:
 def may_be_loop_trace(head: bytes) -> bool:
     """Whether a file with this head can be a trace: gzipped, or text whose first line names a column of a trace."""
     first = head.partition(b"\n")[0]
-    return head.startswith(_GZIP) or bool(
-        {b"mode", b"z_ref", b"r33"} & {column.strip() for column in first.split(b",")}
-    )
+    return head.startswith(GZIP) or bool({b"mode", b"z_ref", b"r33"} & {column.strip() for column in first.split(b",")})
 
 
 def _read_bytes(name: str, raw: BinaryIO, *, zipped: bool) -> LoopTrace:
     try:
-        with tempfile.SpooledTemporaryFile(_IN_MEMORY_BYTES) as plain:
-            _unpack(name, gzip.GzipFile(fileobj=raw, mode="rb") if zipped else raw, plain)  # type: ignore[arg-type]
+        with tempfile.SpooledTemporaryFile(IN_MEMORY_BYTES) as plain:
+            unpack(name, gzip.GzipFile(fileobj=raw, mode="rb") if zipped else raw, plain)
             with io.TextIOWrapper(plain, encoding="utf-8", newline="") as text:
                 return _read(name, text)
     except (EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise _damaged(name, error) from error
 
 
-def _unpack(name: str, source: BinaryIO, plain: BinaryIO) -> None:
+def unpack(name: str, source: BinaryIO | gzip.GzipFile, plain: BinaryIO | tempfile.SpooledTemporaryFile[bytes]) -> None:
     """Decompress to a bounded size: a small file may expand to a huge one."""
     while chunk := source.read(2**20):
         plain.write(chunk)

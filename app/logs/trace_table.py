@@ -1,0 +1,128 @@
+"""Reader of recorded runs of the loops of ArduCopter and PX4: CSV, optionally gzipped, one row per step.
+
+Line 1 is `# ` and a JSON object that describes the run, line 2 the header, then come rows of numbers; an empty field is
+NaN.
+"""
+
+import csv
+import gzip
+import io
+import json
+import tempfile
+import zlib
+from array import array
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import BinaryIO, Final
+
+import numpy as np
+
+from app.core.errors import InputError, Problem
+from app.core.records.trajectory import Samples
+from app.logs.loop_trace import GZIP, IN_MEMORY_BYTES, MAX_ROWS, unpack
+
+_DESCRIPTION_CHARACTERS: Final = 2**16
+
+
+@dataclass(frozen=True, slots=True)
+class TraceTable:
+    """A recorded run: its description, and its columns by name, shape (n,) each, n ≥ 1."""
+
+    description: Mapping[str, object]
+    columns: Mapping[str, Samples]
+
+    def __getitem__(self, column: str) -> Samples:
+        return self.columns[column]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+
+def has_columns(beginning: bytes, columns: Collection[str]) -> bool:
+    """Whether text with this beginning is such a run with at least these columns."""
+    first, _, rest = beginning.partition(b"\n")
+    header = rest.partition(b"\n")[0].decode("utf-8", "replace")
+    return first.startswith(b"#") and set(columns) <= {name.strip() for name in header.split(",")}
+
+
+def read_trace_table(
+    stream: BinaryIO, *, name: str, columns: Collection[str], may_be_empty: Collection[str] = ()
+) -> TraceTable:
+    """Read a run with at least these columns; fields of `may_be_empty` may be empty.
+
+    Raises InputError naming the line and the column of the first error.
+    """
+    stream.seek(0)
+    zipped = stream.read(len(GZIP)) == GZIP
+    stream.seek(0)
+    try:
+        with tempfile.SpooledTemporaryFile(IN_MEMORY_BYTES) as plain:
+            unpack(name, gzip.GzipFile(fileobj=stream, mode="rb") if zipped else stream, plain)
+            with io.TextIOWrapper(plain, encoding="utf-8", newline="") as text:
+                return _read(name, text, columns, frozenset(may_be_empty))
+    except (EOFError, zlib.error, UnicodeDecodeError, csv.Error, gzip.BadGzipFile) as error:
+        raise InputError(
+            f"{name} is damaged or not a text file: {error}.",
+            hint=_hint(columns),
+            problems=(Problem("file", "is damaged or not a text file"),),
+        ) from error
+
+
+def _read(name: str, text: io.TextIOWrapper, columns: Collection[str], may_be_empty: frozenset[str]) -> TraceTable:
+    description = _description(name, text.readline(_DESCRIPTION_CHARACTERS), columns)
+    reader = csv.reader(text)
+    header = next(reader, [])
+    if missing := tuple(Problem(f"line 2, {each}", "column is missing") for each in columns if each not in header):
+        raise InputError(f"{name} is not a trace of this loop.", hint=_hint(columns), problems=missing)
+    if twice := next((each for each in header if header.count(each) > 1), None):
+        raise _malformed(name, 2, twice, "column appears twice", columns)
+    values = array("d")
+    for line, row in enumerate(reader, start=3):
+        values.extend(_row(name, line, header, row, may_be_empty, columns))
+    if not values:
+        raise InputError(
+            f"{name} has a header and no rows.", hint=_hint(columns), problems=(Problem("file", "has no rows"),)
+        )
+    table = np.array(values).reshape(-1, len(header))
+    return TraceTable(description, {each: np.ascontiguousarray(table[:, k]) for k, each in enumerate(header)})
+
+
+def _description(name: str, line: str, columns: Collection[str]) -> Mapping[str, object]:
+    try:
+        read: object = json.loads(line.removeprefix("#"))
+    except ValueError:
+        read = None
+    if not line.startswith("#") or not isinstance(read, dict):
+        raise _malformed(name, 1, "description", "must be # and a JSON object", columns)
+    return read
+
+
+def _row(
+    name: str, line: int, header: Sequence[str], row: list[str], may_be_empty: frozenset[str], columns: Collection[str]
+) -> Iterator[float]:
+    if line > MAX_ROWS + 2:
+        raise _malformed(name, line, header[0], f"a trace may have at most {MAX_ROWS} rows", columns)
+    if len(row) != len(header):
+        column = header[min(len(row), len(header) - 1)]
+        reason = f"the row has {len(row)} values, the header {len(header)}"
+        raise _malformed(name, line, column, reason, columns)
+    for column, text in zip(header, row, strict=True):
+        if not text and column in may_be_empty:
+            yield np.nan
+            continue
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
+            raise _malformed(name, line, column, f"must be a finite number, got {text[:40]!r}", columns)
+        yield value
+
+
+def _hint(columns: Collection[str]) -> str:
+    return f"A trace has # and a JSON object, the columns {','.join(columns)}, and one row of numbers per step."
+
+
+def _malformed(name: str, line: int, column: str, reason: str, columns: Collection[str]) -> InputError:
+    problems = (Problem(f"line {line}, {column}", reason),)
+    return InputError(f"{name} cannot be replayed.", hint=_hint(columns), problems=problems)
