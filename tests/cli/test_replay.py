@@ -10,7 +10,8 @@ from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
 
-TRACES = sorted((Path(__file__).parents[1] / "data" / "vertical_loop").glob("*.csv.gz"))
+DATA = Path(__file__).parents[1] / "data"
+TRACES = sorted((DATA / "vertical_loop").glob("*.csv.gz"))
 
 
 def replay(*arguments: str | Path) -> Result:
@@ -61,3 +62,16 @@ def test_the_other_files_are_still_replayed_when_one_is_missing(tmp_path: Path) 
     assert result.exit_code == 1
     assert "absent.csv" in result.stderr
     assert "exact" in result.stdout
+
+
+def test_a_run_of_arducopter_is_told_by_its_columns_and_agrees_within_the_tolerances(tmp_path: Path) -> None:
+    out = tmp_path / "replay.json"
+    result = replay(DATA / "ardupilot_loop" / "takeoff_heavy.csv.gz", TRACES[0], "--json", out)
+    assert result.exit_code == 0
+    assert "ArduCopter: largest difference" in result.stdout
+    arducopter, paparazzi = json.loads(out.read_text())["files"]
+    assert (arducopter["autopilot"], arducopter["rows"]) == ("ardupilot", 5600)
+    assert (arducopter["passed"], arducopter["exact"], arducopter["first_different_row"]) == (True, False, None)
+    assert 0.0 < arducopter["largest_difference"]["z_d_m"] < 8e-5
+    assert arducopter["notes"][0].startswith("2 rows at a throttle limit")
+    assert (paparazzi["autopilot"], paparazzi["exact"]) == ("paparazzi", True)

@@ -20,7 +20,9 @@ from tests.logs.paparazzi_flights import COMPANION, Flight, data_of, write
 
 Json = dict[str, Any]
 PATH = "/api/controller-checks"
-TRACES = sorted((Path(__file__).parents[1] / "data" / "vertical_loop").glob("*.csv.gz"))
+DATA = Path(__file__).parents[1] / "data"
+TRACES = sorted((DATA / "vertical_loop").glob("*.csv.gz"))
+ARDUCOPTER = DATA / "ardupilot_loop" / "steps_default.csv.gz"
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
 
 
@@ -55,6 +57,44 @@ def test_a_recorded_run_is_exact_in_every_signal(client: TestClient, database: D
         row = session.get(ControllerCheckRow, check["id"])
         assert row is not None
         assert len(json.dumps(row.result)) < 1_000_000
+
+
+def test_a_run_of_arducopter_agrees_within_the_tolerance_of_each_signal(client: TestClient) -> None:
+    check = send(client, ARDUCOPTER.name, ARDUCOPTER.read_bytes()).json()
+    assert (check["autopilot"], check["kind"], check["passed"]) == ("ArduCopter", "trace", True)
+    assert "5\N{NARROW NO-BREAK SPACE}600 steps are within the tolerances in all 8 signals" in check["sentence"]
+    assert check["gains"] == {
+        "PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I": 1.0, "PSC_ACCZ_D": 0.0,
+    }  # fmt: skip
+    found = {signal["name"]: signal for signal in check["signals"]}
+    assert {signal["verdict"] for signal in found.values()} == {"agrees"}
+    assert (found["z_d_m"]["tolerance"], found["z_d_m"]["difference_unit"]) == (1e-4, "m")
+    reference, commands = figures(client, check)
+    assert [reference["state"], commands["state"]] == ["ready", "ready"]
+    assert len(reference["figure"]["data"]) == 2 * 3
+    assert len(commands["figure"]["data"]) == 2 * 5
+
+
+def test_a_difference_beyond_the_tolerance_is_found_in_a_run_of_arducopter(client: TestClient) -> None:
+    lines = gzip.decompress(ARDUCOPTER.read_bytes()).decode().splitlines()
+    row = lines[1002].split(",")
+    row[-2] = str(float(row[-2]) + 6e-4)
+    lines[1002] = ",".join(row)
+    check = send(client, "spoilt.csv", "\n".join(lines)).json()
+    assert check["passed"] is False
+    assert "steps are not within the tolerances, the first at 2.500 s in throttle" in check["sentence"]
+
+
+def test_a_check_of_an_earlier_version_is_one_of_paparazzi(client: TestClient, database: Database) -> None:
+    made = client.post(f"{PATH}/example").json()["id"]
+    with database.write() as session:
+        row = session.get(ControllerCheckRow, made)
+        assert row is not None
+        row.result = {
+            key: value for key, value in row.result.items() if key not in {"autopilot", "first_different_row"}
+        }
+    assert get(client, f"{PATH}/{made}")["autopilot"] == "Paparazzi"
+    assert get(client, f"{PATH}/{made}/figures/commands")["state"] == "ready"
 
 
 def test_what_is_drawn_is_the_recording_in_its_units_and_the_replica_over_it(client: TestClient) -> None:

@@ -12,6 +12,11 @@ export const RECORDINGS = [
     types: [".data", ".log", ".csv", ".gz", "text/csv"],
     text: "the .data file with VERT_LOOP messages (add its .log, which contains the gains), or a trace with a row for every control step, .csv or .csv.gz",
   },
+  {
+    autopilot: "ArduCopter",
+    types: [".csv", ".gz"],
+    text: "a trace with a row for every control step, .csv or .csv.gz",
+  },
 ] as const;
 
 export const KINDS: Record<ControllerCheckSummary["kind"], string> = {

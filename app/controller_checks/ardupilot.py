@@ -1,0 +1,69 @@
+"""ArduCopter's entry in the registry: traces with a row per step."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from app.controller_checks.autopilot import Autopilot, Beginning, Recording
+from app.controller_checks.results import Result, Signal, TraceReplay, grouped, result_of_trace
+from app.core.control.ardupilot import OUTPUTS
+from app.core.control.ardupilot_replay import LoopTrace, replayed
+from app.logs.ardupilot_trace import is_ardupilot_trace, read_ardupilot_trace
+
+_PRECISION: Final = "the firmware computes in single precision, the replica in double"
+
+
+def _signal(title: str, unit: str, digits: int, tolerance: float) -> Signal:
+    return Signal(
+        title=title, unit=unit, difference_unit=unit, digits=digits, tolerance=tolerance, allowance=_PRECISION
+    )
+
+
+_SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
+    {
+        "z_d_m": _signal("Desired altitude", "m", 3, 1e-4),
+        "v_d_m_s": _signal("Desired climb rate", "m/s", 3, 1e-4),
+        "a_d_m_s2": _signal("Desired acceleration", "m/s²", 3, 3e-4),
+        "v_t_m_s": _signal("Climb rate target", "m/s", 3, 1e-4),
+        "a_t_m_s2": _signal("Acceleration target", "m/s²", 3, 5e-4),
+        "i_term_permille": _signal("Integrator of the acceleration controller", "‰ of throttle", 1, 0.14),
+        "throttle": _signal("Demanded throttle", "of full", 4, 5e-4),
+        "throttle_filtered": _signal("Filtered throttle", "of full", 4, 5e-4),
+    }
+)
+_UP: Final = "Altitude, climb rate and acceleration are positive up."
+
+
+def _recognises(beginning: Beginning) -> bool:
+    return is_ardupilot_trace(beginning.unzipped)
+
+
+def _examine(recording: Recording) -> Result:
+    trace = read_ardupilot_trace(recording.stream, name=recording.name)
+    return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(trace))
+
+
+def _replayed(trace: LoopTrace) -> TraceReplay:
+    followed = int(trace.followed.sum())
+    limited = f"{grouped(followed)} rows at a throttle limit are computed each from the recorded row before it."
+    return TraceReplay(
+        time_s=trace.time_s,
+        recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
+        replica=dict(zip(OUTPUTS, replayed(trace).T, strict=True)),
+        gains=trace.parameters.gains,
+        notes=(limited, _UP) if followed else (_UP,),
+    )
+
+
+ARDUPILOT: Final = Autopilot(
+    name="ardupilot",
+    title="ArduCopter",
+    recordings="a trace of ArduCopter's vertical loop with one row per step, .csv or .csv.gz",
+    signals=_SIGNALS,
+    figures=MappingProxyType(
+        {"reference": ("Shaped target", OUTPUTS[:3]), "commands": ("Controllers and throttle", OUTPUTS[3:])}
+    ),
+    note=_UP,
+    recognises=_recognises,
+    examine=_examine,
+)

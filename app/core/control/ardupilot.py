@@ -1,0 +1,311 @@
+"""ArduCopter's vertical loop (4.7, October 2025): shaped altitude target, position, velocity and acceleration
+controllers, throttle filter, and the takeoff before them.
+
+The loop runs at 400 Hz, in double precision where the firmware has single. Altitude, climb rate and acceleration are
+positive up, in m, m/s and m/s²; inside the velocity controller they are cm/s, inside the acceleration controller cm/s²
+and per mille of throttle, as the gains are. A step is `take_off` or, in flight, `shape` and `control`, on a
+state array that the caller owns: two kernels, because compiled code with a call inside counts references.
+docs/models.md has the formulas.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.control.ardupilot_parameters import (
+    ACCELERATION,
+    ACCELERATION_D,
+    ACCELERATION_D_FF,
+    ACCELERATION_DERIVATIVE_GAIN,
+    ACCELERATION_ERROR_GAIN,
+    ACCELERATION_FF,
+    ACCELERATION_I,
+    ACCELERATION_IMAX,
+    ACCELERATION_P,
+    CLIMB,
+    DESCENT,
+    DT,
+    HOVER,
+    JERK,
+    POSITION_P,
+    RAMP_END,
+    RAMP_STEP,
+    RELAXATION_GAIN,
+    TARGET_GAIN,
+    THROTTLE_GAIN,
+    VELOCITY_D,
+    VELOCITY_DERIVATIVE_GAIN,
+    VELOCITY_ERROR_GAIN,
+    VELOCITY_FF,
+    VELOCITY_I,
+    VELOCITY_IMAX,
+    VELOCITY_P,
+    Packed,
+)
+from app.core.control.ardupilot_shaping import (
+    LARGEST_DESCENT_ACCELERATION_M_S2,
+    approach_rate,
+    clip,
+    extrapolated,
+    inverse_square_root,
+    overspeed_factor,
+    square_root,
+)
+from app.core.kernels import kernel
+
+SPOOL: Final = 0.0
+RAMP: Final = 1.0
+FLIGHT: Final = 2.0
+"""Phases: motors spooling up, throttle rising on the ground, the controllers in control."""
+
+# Indices in the state array.
+Z_D: Final = 0
+V_D: Final = 1
+A_D: Final = 2
+V_T: Final = 3
+A_T: Final = 4
+ACCELERATION_SUM: Final = 5
+THROTTLE: Final = 6
+THROTTLE_FILTERED: Final = 7
+POSITION_ERROR: Final = 8
+POSITION_ERROR_MIN: Final = 9
+POSITION_ERROR_MAX: Final = 10
+VELOCITY_ERROR: Final = 11
+VELOCITY_DERIVATIVE: Final = 12
+VELOCITY_SUM: Final = 13
+FILTERED_TARGET: Final = 14
+ACCELERATION_ERROR: Final = 15
+ACCELERATION_DERIVATIVE: Final = 16
+SATURATED: Final = 17
+RESET: Final = 18
+PHASE: Final = 19
+SPOOL_LEFT_S: Final = 20
+UNFILTERED: Final = 21
+STATE_SIZE: Final = 22
+
+State = NDArray[np.float64]
+
+INPUTS: Final = ("target_m", "z_m", "v_m_s", "a_m_s2", "limit_lower", "limit_upper")
+OUTPUTS: Final = (
+    "z_d_m", "v_d_m_s", "a_d_m_s2", "v_t_m_s", "a_t_m_s2", "i_term_permille", "throttle", "throttle_filtered",
+)  # fmt: skip
+"""The first elements of the state array."""
+
+_RAMP_END_ACCELERATION: Final = 0.5
+_RAMP_END_CLIMB: Final = 0.1
+
+
+@kernel
+def enter_position_mode(state: State, p: Packed, z: float, v: float, a: float) -> None:
+    """What the first position target does: hold the present altitude, with limits from the gain of this moment."""
+    state[POSITION_ERROR_MIN] = inverse_square_root(-p[DESCENT], p[POSITION_P], p[ACCELERATION])
+    state[POSITION_ERROR_MAX] = inverse_square_root(p[CLIMB], p[POSITION_P], p[ACCELERATION])
+    _initialise(state, p, z, v, a)
+
+
+@kernel
+def start_hover(state: State, p: Packed, throttle: float, z: float, v: float, a: float) -> None:
+    """Enter the loop in flight with `throttle`, demanded and filtered; overwrites the state, shape (STATE_SIZE,)."""
+    state[:] = 0.0
+    state[THROTTLE] = state[THROTTLE_FILTERED] = throttle
+    state[PHASE] = FLIGHT
+    enter_position_mode(state, p, z, v, a)
+
+
+@kernel
+def start_takeoff(state: State, p: Packed, spool_s: float) -> None:
+    """Enter the loop on the ground with the takeoff command; overwrites the state, shape (STATE_SIZE,).
+
+    The throttle begins to rise after `spool_s`: 0.17 s from arming idle, else 2 s after arming and MOT_SPOOL_TIME.
+    """
+    state[:] = 0.0
+    state[PHASE] = SPOOL if spool_s > 0.0 else RAMP
+    state[SPOOL_LEFT_S] = spool_s
+    state[UNFILTERED] = 1.0
+    enter_position_mode(state, p, 0.0, 0.0, 0.0)
+
+
+@kernel
+def shape(state: State, p: Packed, target: float) -> None:
+    """The first half of a step in flight: advance the desired motion on the way to `target`, within its limits."""
+    factor = overspeed_factor(state[V_D], p[CLIMB], p[DESCENT])
+    acceleration, jerk, dt = factor * p[ACCELERATION], factor * p[JERK], p[DT]
+    downward = clip(acceleration, 0.0, LARGEST_DESCENT_ACCELERATION_M_S2)
+    z, v = extrapolated(
+        state[Z_D], state[V_D], state[A_D], state[SATURATED], state[POSITION_ERROR], state[VELOCITY_ERROR], dt
+    )
+    change = approach_rate(target - z, p[CLIMB], p[DESCENT], acceleration, downward, jerk, dt) - v
+    slope = jerk / (acceleration if change > 0.0 else downward)
+    wanted = clip(square_root(change, slope, jerk, dt), -downward, acceleration)
+    state[Z_D], state[V_D] = z, v
+    state[A_D] += clip(wanted - state[A_D], -jerk * dt, jerk * dt)
+
+
+@kernel
+def control(state: State, p: Packed, z: float, v: float, a: float, lower: bool, upper: bool) -> None:
+    """The second half of a step in flight: the throttle of its motor step, and the demand for the next one.
+
+    `z`, `v` and `a` are the estimates; `lower` and `upper` tell whether this motor step was at a throttle limit.
+    """
+    _filter_throttle(state, p)
+    state[UNFILTERED] = 0.0
+    _control_position(state, p, z)
+    _control_velocity(state, p, state[V_T], v, lower, upper)
+    _control_acceleration(state, p, state[A_T], a, lower, upper)
+
+
+@kernel
+def take_off(state: State, p: Packed, z: float, v: float, a: float) -> None:
+    """One step of the phases before flight, in which the controllers start anew in every step."""
+    _filter_throttle(state, p)
+    if state[PHASE] == RAMP:
+        state[THROTTLE] += p[RAMP_STEP]
+    _initialise(state, p, z, v, a)
+    if state[PHASE] == SPOOL:
+        state[ACCELERATION_SUM] += p[RELAXATION_GAIN] * (-1000.0 * p[HOVER] - state[ACCELERATION_SUM])
+        state[THROTTLE] = p[HOVER] + (state[ACCELERATION_SUM] + _bump(state, p, a)) / 1000.0
+        state[SPOOL_LEFT_S] -= p[DT]
+        if state[SPOOL_LEFT_S] <= 0.0:
+            state[PHASE] = RAMP
+    elif (
+        state[THROTTLE] >= p[RAMP_END]
+        or a >= _RAMP_END_ACCELERATION * p[ACCELERATION]
+        or state[V_D] >= _RAMP_END_CLIMB * p[CLIMB]
+    ):
+        state[PHASE] = FLIGHT
+
+
+@kernel
+def _filter_throttle(state: State, p: Packed) -> None:
+    """Throttle of level flight, 0 … 1, from the demand of the last step; unfiltered on the ground."""
+    gain = 1.0 if state[UNFILTERED] > 0.0 else p[THROTTLE_GAIN]
+    filtered = state[THROTTLE_FILTERED]
+    state[THROTTLE_FILTERED] = clip(filtered + gain * (state[THROTTLE] - filtered), 0.0, 1.0)
+
+
+@kernel
+def follow(
+    state: State, p: Packed, recorded: NDArray[np.float64], z: float, v: float, a: float, lower: bool, upper: bool
+) -> None:
+    """Put the loop in the state that the recorded row `recorded`, shape (8,) as `OUTPUTS`, left, in flight.
+
+    What the row lacks, the filters and the velocity integrator, advances from the state of the row before.
+    """
+    _control_velocity(state, p, recorded[V_T], v, lower, upper)
+    _control_acceleration(state, p, recorded[A_T], a, lower, upper)
+    for place in range(len(OUTPUTS)):
+        state[place] = recorded[place]
+    state[POSITION_ERROR] = recorded[Z_D] - z
+    state[UNFILTERED] = 0.0
+
+
+@kernel
+def _initialise(state: State, p: Packed, z: float, v: float, a: float) -> None:
+    """Desired motion = the present one, filters reset, and an integrator that keeps the throttle where it is."""
+    state[Z_D], state[V_D] = z, v
+    state[A_D] = clip(a, -p[ACCELERATION], p[ACCELERATION])
+    state[V_T], state[A_T] = state[V_D], state[A_D]
+    state[RESET] = 1.0
+    state[VELOCITY_SUM] = 0.0
+    state[ACCELERATION_SUM] = 1000.0 * (state[THROTTLE] - p[HOVER]) - _bump(state, p, a)
+
+
+@kernel
+def _bump(state: State, p: Packed, a: float) -> float:
+    """Throttle that the acceleration controller adds to its integrator in the step after a reset, per mille."""
+    bump: float = p[ACCELERATION_P] * 100.0 * (state[A_D] - a) + p[ACCELERATION_FF] * 100.0 * state[A_D]
+    return bump
+
+
+@kernel
+def _control_position(state: State, p: Packed, z: float) -> None:
+    """Sets the climb rate target; a desired altitude further away than its limit is pulled along."""
+    error = state[Z_D] - z
+    limited = clip(error, state[POSITION_ERROR_MIN], state[POSITION_ERROR_MAX])
+    if limited != error:
+        state[Z_D] = z + limited
+    state[POSITION_ERROR] = limited
+    state[V_T] = square_root(limited, p[POSITION_P], p[ACCELERATION], 0.0) + state[V_D]
+
+
+@kernel
+def _control_velocity(state: State, p: Packed, v_t: float, v: float, lower: bool, upper: bool) -> None:
+    """Sets the acceleration target from the climb rate target `v_t`."""
+    difference, before = 100.0 * (v_t - v), state[VELOCITY_ERROR]
+    if state[RESET] > 0.0:
+        error, derivative = difference, 0.0
+    else:
+        error = before + p[VELOCITY_ERROR_GAIN] * (difference - before)
+        derivative = state[VELOCITY_DERIVATIVE]
+        derivative += p[VELOCITY_DERIVATIVE_GAIN] * ((error - before) / p[DT] - derivative)
+    state[VELOCITY_ERROR], state[VELOCITY_DERIVATIVE] = error, derivative
+    if p[VELOCITY_I] == 0.0:
+        state[VELOCITY_SUM] = 0.0
+    elif not ((lower and error < 0.0) or (upper and error > 0.0)):
+        total = state[VELOCITY_SUM] + p[VELOCITY_I] * error * p[DT]
+        state[VELOCITY_SUM] = clip(total, -p[VELOCITY_IMAX], p[VELOCITY_IMAX])
+    feedback = p[VELOCITY_P] * error + state[VELOCITY_SUM] + p[VELOCITY_D] * derivative
+    state[A_T] = (feedback + p[VELOCITY_FF] * 100.0 * v_t) / 100.0 + state[A_D]
+
+
+@kernel
+def _control_acceleration(state: State, p: Packed, a_t: float, a: float, lower: bool, upper: bool) -> None:
+    """Sets the throttle demand, which may be negative or above 1, from the acceleration target `a_t`."""
+    target, error, derivative = state[FILTERED_TARGET], state[ACCELERATION_ERROR], state[ACCELERATION_DERIVATIVE]
+    if state[RESET] > 0.0:
+        target, target_rate, derivative = 100.0 * a_t, 0.0, 0.0
+        error = target - 100.0 * a
+    else:
+        change = p[TARGET_GAIN] * (100.0 * a_t - target)
+        target, target_rate = target + change, change / p[DT]
+        change = p[ACCELERATION_ERROR_GAIN] * (target - 100.0 * a - error)
+        error += change
+        derivative += p[ACCELERATION_DERIVATIVE_GAIN] * (change / p[DT] - derivative)
+    state[FILTERED_TARGET], state[ACCELERATION_ERROR], state[ACCELERATION_DERIVATIVE] = target, error, derivative
+    state[RESET] = 0.0
+    total = state[ACCELERATION_SUM]
+    if p[ACCELERATION_I] == 0.0:
+        total = 0.0
+    elif not (lower or upper) or total * error < 0.0:
+        total = clip(total + p[ACCELERATION_I] * error * p[DT], -p[ACCELERATION_IMAX], p[ACCELERATION_IMAX])
+    state[ACCELERATION_SUM] = total
+    feedback = p[ACCELERATION_P] * error + p[ACCELERATION_D] * derivative + total
+    feed_forward = p[ACCELERATION_FF] * target + p[ACCELERATION_D_FF] * target_rate
+    state[THROTTLE] = p[HOVER] + (feedback + feed_forward) / 1000.0
+    state[SATURATED] = 1.0 if upper else -1.0 if lower else 0.0
+
+
+@kernel
+def rollout(
+    state: State,
+    p: Packed,
+    inputs: NDArray[np.float64],
+    recorded: NDArray[np.float64],
+    followed: NDArray[np.bool_],
+    outputs: NDArray[np.float64],
+) -> None:
+    """One step per row of `inputs`, shape (n, 6) as `INPUTS`; fills `outputs`, shape (n, 8) as `OUTPUTS`.
+
+    After a row that is marked in `followed`, shape (n,), the loop continues from that row of `recorded`, shape (n, 8),
+    instead of its own result.
+    """
+    before = np.empty_like(state)
+    for row in range(len(inputs)):
+        target, z, v, a = inputs[row, 0], inputs[row, 1], inputs[row, 2], inputs[row, 3]
+        lower, upper = inputs[row, 4] > 0.0, inputs[row, 5] > 0.0
+        follows = followed[row] and state[PHASE] == FLIGHT
+        if follows:
+            for place in range(STATE_SIZE):
+                before[place] = state[place]
+        if state[PHASE] == FLIGHT:
+            shape(state, p, target)
+            control(state, p, z, v, a, lower, upper)
+        else:
+            take_off(state, p, z, v, a)
+        for place in range(len(OUTPUTS)):
+            outputs[row, place] = state[place]
+        if follows:
+            for place in range(STATE_SIZE):
+                state[place] = before[place]
+            follow(state, p, recorded[row], z, v, a, lower, upper)

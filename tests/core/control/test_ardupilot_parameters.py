@@ -1,0 +1,84 @@
+import math
+
+import pytest
+
+from app.core.control.ardupilot_parameters import (
+    ACCELERATION_IMAX,
+    HOVER,
+    RAMP_END,
+    THROTTLE_GAIN,
+    Parameters,
+    low_pass_gain,
+    parameters_from,
+)
+from app.core.errors import InputError
+
+
+def test_values_by_the_firmwares_names_and_units() -> None:
+    parameters = parameters_from({"PSC_POSZ_P": 2.2, "WPNAV_SPEED_UP": 250.0, "WPNAV_ACCEL_Z": 100.0, "RTL_ALT": 15.0})
+    assert parameters == Parameters(position_p_1_s=2.2, climb_m_s=2.5, acceleration_m_s2=1.0)
+    assert parameters.gains == {
+        "PSC_POSZ_P": 2.2, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I": 1.0, "PSC_ACCZ_D": 0.0,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("filters_hz", "acceleration", "jerk"),
+    [
+        ((0.0, 20.0), 1.0, 5.0),
+        ((0.0, 2.0), 1.0, 4.0 * math.pi / 5.0),
+        ((1.0, 2.0), 1.0, 2.0 * math.pi / 5.0),
+        ((0.0, 0.0), 1.0, 5.0),
+        ((0.1, 0.0), 20.0, 9.80665 * 0.2 * math.pi / 5.0),
+    ],
+)
+def test_filters_limit_the_jerk_of_the_trajectory(
+    filters_hz: tuple[float, float], acceleration: float, jerk: float
+) -> None:
+    parameters = Parameters(
+        acceleration_target_filter_hz=filters_hz[0],
+        acceleration_error_filter_hz=filters_hz[1],
+        acceleration_m_s2=acceleration,
+    )
+    assert parameters.shaping_jerk_m_s3 == pytest.approx(jerk)
+
+
+def test_gain_of_a_low_pass() -> None:
+    assert low_pass_gain(0.0, 0.0025) == 1.0
+    assert low_pass_gain(20.0, 0.0025) == pytest.approx(0.0025 / (0.0025 + 0.0079577472))
+    assert Parameters().packed(0.005)[THROTTLE_GAIN] == pytest.approx(0.005 / (0.005 + 0.0795774715))
+
+
+@pytest.mark.parametrize(("hover", "used"), [(0.05, 0.125), (0.39, 0.39), (0.9, 0.6875)])
+def test_hover_throttle_is_limited_as_in_the_firmware(hover: float, used: float) -> None:
+    assert Parameters(hover_throttle=hover).packed()[HOVER] == used
+
+
+def test_the_integrator_may_always_remove_the_hover_throttle() -> None:
+    limits = [Parameters(acceleration_imax_per_mille=imax).packed()[ACCELERATION_IMAX] for imax in (0.0, 800.0)]
+    assert limits == pytest.approx([350.0, 800.0])
+
+
+@pytest.mark.parametrize(("most", "end"), [(0.5, 0.5), (0.95, 0.9)])
+def test_the_ramp_ends_at_ninety_percent_at_the_latest(most: float, end: float) -> None:
+    assert Parameters(takeoff_throttle=most).packed()[RAMP_END] == end
+
+
+@pytest.mark.parametrize(
+    ("values", "problem"),
+    [
+        ({"PSC_POSZ_P": 0.0}, "position_p_1_s: must be positive"),
+        ({"PSC_ACCZ_I": -1.0}, "acceleration_i_1_s: must be at least 0"),
+        ({"PSC_ACCZ_FLTE": math.nan}, "acceleration_error_filter_hz: must be at least 0"),
+        ({"PSC_JERK_Z": math.inf}, "jerk_m_s3: must be positive"),
+        ({"PSC_ACCZ_SMAX": 50.0}, "PSC_ACCZ_SMAX: must be 0"),
+    ],
+)
+def test_parameters_that_the_loop_is_not_defined_for_are_refused(values: dict[str, float], problem: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        parameters_from(values)
+    assert problem in str(refusal.value)
+
+
+def test_what_the_replica_lacks_may_be_switched_off() -> None:
+    assert parameters_from({"PSC_ACCZ_SMAX": 0.0}) == Parameters()
