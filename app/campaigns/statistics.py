@@ -18,7 +18,7 @@ from app.campaigns.schemas import (
     Trend,
 )
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, format_gains, percent, plus_minus, short
+from app.core.formatting import count, format_gains, percent, plus_minus, short, signed
 from app.core.statistics.comparisons import Group, PooledScatter, drift_of, optimism, pool_scatter, trend_of
 from app.core.tuning import predictions
 from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
@@ -196,8 +196,8 @@ def _trend(
         slope=found.slope,
         lower=found.lower,
         upper=found.upper,
-        sentence=f"The error {relation} the {against}: {found.slope:+.2g} {unit}, {percent(_SURE)} interval "
-        f"{found.lower:+.2g} … {found.upper:+.2g}.",
+        sentence=f"The error {relation} the {against}: {signed(found.slope)} {unit}, {percent(_SURE)} interval "
+        f"{signed(found.lower)} … {signed(found.upper)}.",
     )
 
 

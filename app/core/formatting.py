@@ -60,6 +60,12 @@ def count(amount: int, noun: str) -> str:
     return f"{amount} {noun}{'' if amount == 1 else 's'}"
 
 
+def signed(value: float) -> str:
+    """`-0.012`, `+0.0000073`: two significant digits without an exponent."""
+    power = math.floor(math.log10(abs(value))) if value else 0
+    return f"{value:+.{max(0, 1 - power)}f}"
+
+
 def named_flights(numbers: Sequence[int]) -> str:
     """`flight 3`, `flights 1–3, 7`; if that were a long list, `153 flights from 42 to 498`. Ascending numbers."""
     runs: list[tuple[int, int]] = []

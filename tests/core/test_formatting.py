@@ -14,6 +14,7 @@ from app.core.formatting import (
     plus_minus,
     short,
     short_percent,
+    signed,
 )
 
 
@@ -57,6 +58,10 @@ def test_a_range_states_only_the_limits_that_exist() -> None:
 
 def test_amounts_have_their_nouns_and_groups_of_digits() -> None:
     assert [count(1, "flight"), count(0, "flight"), grouped(2147483647)] == ["1 flight", "0 flights", "2 147 483 647"]
+
+
+def test_a_slope_has_its_sign_and_no_exponent() -> None:
+    assert [signed(value) for value in (0.0123, -7.3e-06, 140.0, 0.0)] == ["+0.012", "-0.0000073", "+140", "+0.0"]
 
 
 def test_flights_are_listed_in_runs_and_counted_where_there_are_many() -> None:

@@ -144,7 +144,7 @@ function TrialsTable({ campaign, trials, shown, unit, onChoose, selected, onSele
           ))}
         </Group>
       </details>
-      <ScrollTable label="All flights" className={classes["table"]}>
+      <ScrollTable label="All flights" framed className={classes["table"]}>
         <thead>
           <tr>
             <th>
@@ -198,11 +198,13 @@ function Heading({ column: { id, title, detail, topic, className }, order, onSor
       className={className}
       aria-sort={own === null ? undefined : own.descending ? "descending" : "ascending"}
     >
-      <button type="button" title={`Sort by ${title}`} onClick={() => onSort(nextOrder(order, id))}>
-        {title}
-        {own && <Icon size={15} aria-hidden />}
-      </button>{" "}
-      {topic && <HelpTip topic={topic} />}
+      <span className={classes["heading"]}>
+        <button type="button" title={`Sort by ${title}`} onClick={() => onSort(nextOrder(order, id))}>
+          {title}
+          {own && <Icon size={15} aria-hidden />}
+        </button>
+        {topic && <HelpTip topic={topic} />}
+      </span>
       {detail && <small>{detail}</small>}
     </th>
   );

@@ -101,15 +101,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
   );
 }
 
-function Scatter({
-  sigma,
-  degrees_of_freedom: freedom,
-  scatter_source: source,
-  groups,
-  error_unit: unit,
-  optimism,
-  shrunk_error,
-}: CampaignStatistics) {
+function Scatter({ sigma, degrees_of_freedom: freedom, scatter_source: source, error_unit: unit }: CampaignStatistics) {
   return (
     <Aside className={classes["fact"] ?? ""}>
       <h3>
@@ -125,18 +117,18 @@ function Scatter({
         </p>
       )}
       <p>{source}</p>
-      {sigma !== null && optimism > 0.1 * sigma && shrunk_error !== null && (
-        <p className={`${classes["fine"]} numbers`}>
-          Selection bias: the best of {groups.length} looks {plusMinus(optimism, null, unit)} better than it is. Likely
-          error: {plusMinus(shrunk_error, null, unit)}.
-        </p>
-      )}
     </Aside>
   );
 }
 
+/** What the record says besides the intervals. */
+function directionText({ of, agreeing, disagreeing, sentence }: CampaignStatistics["track_record"]): string {
+  const changed = agreeing + disagreeing;
+  if (of === 0) return sentence;
+  return changed === 0 ? "" : `${agreeing} of ${changed} flights changed the error in the predicted direction.`;
+}
+
 function Predictions({ record }: { record: CampaignStatistics["track_record"] }) {
-  const steps = record.agreeing + record.disagreeing;
   return (
     <Aside tone={record.trustworthy ? undefined : "bad"} className={classes["fact"] ?? ""}>
       <h3>
@@ -152,21 +144,22 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
           <IconAlertTriangle size={18} aria-hidden /> Gradient unreliable
         </p>
       )}
-      {steps > 0 && (
-        <p className={classes["fine"]}>
-          {record.agreeing} of {count(steps, "step")} changed the error in the predicted direction.
-        </p>
-      )}
+      <p className={classes["fine"]}>{directionText(record)}</p>
     </Aside>
   );
+}
+
+/** Rows that stay in sight: the best and the first gains, and what was flown repeatedly. */
+function isKept({ is_best, is_baseline, trial_numbers }: CampaignStatistics["groups"][number]): boolean {
+  return is_best || is_baseline || trial_numbers.length > 1;
 }
 
 /** One row for each gain set. */
 function Groups({ groups, error_unit: unit }: CampaignStatistics) {
   const names = Object.keys(groups[0]?.gains ?? {});
-  const { more, listed } = useLastRows(groups, 4, "gain sets", (group) => group.is_best || group.is_baseline);
+  const { more, listed } = useLastRows(groups, 4, "gain sets", isKept);
   return (
-    <ScrollTable label="Gain sets flown" className={`${table["numeric"]} ${classes["groups"]}`}>
+    <ScrollTable label="Gain sets flown" framed className={`${table["numeric"]} ${classes["groups"]}`}>
       <thead>
         <tr>
           <th scope="col">[{names.join(" ")}]</th>
