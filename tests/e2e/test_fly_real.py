@@ -72,6 +72,8 @@ def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, 
     hold_until_it_flies(dashboard, trial_id)
     expect(word(dashboard)).to_have_text("In flight")
     see_it_fly(dashboard, 40)
+    throttle = dashboard.page.locator("dt", has_text="Throttle").locator("xpath=following-sibling::dd")
+    expect(throttle).to_have_text(re.compile(r"^[1-9]\d*\s%$"))
     abort(dashboard)
     expect(word(dashboard)).to_have_text("Aborted")
     expect(dashboard.page.get_by_text("Safe gains restored and read back.")).to_be_visible()
