@@ -228,6 +228,7 @@ class SimplexSearch:
 class Experiment(Protocol):
     """One manoeuvre with its policy space and its performance measure (lower is better)."""
 
+    def __hash__(self) -> int: ...
     @property
     def name(self) -> str: ...
     @property
