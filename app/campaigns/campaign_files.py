@@ -110,7 +110,7 @@ def _load(path: Path) -> "CommentedMap":
     except OSError as error:
         raise InputError(
             f"{path} could not be read: {error.strerror or error}.",
-            hint=f"Give a YAML file, or a preset: {', '.join(preset_names())}.",
+            hint=f"Use a YAML file, or a preset: {', '.join(preset_names())}.",
         ) from error
     except MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark is not None else 1
@@ -239,7 +239,7 @@ def _gains(text: str, experiment: str, option: str, others: str = "") -> dict[st
         raise InputError(
             "Invalid gains.",
             problems=(Problem(option, f"is not a gain set: {text!r}"),),
-            hint=f"Give {others}every gain by name, {example}, or only the numbers in this order.",
+            hint=f"Use {others}every gain by name, {example}, or only the numbers in this order.",
         )
     return dict(zip(names, values, strict=True))
 

@@ -191,7 +191,7 @@ def _window(from_s: float | None, to_s: float | None) -> Range | None:
         raise InputError(
             "Invalid time range.",
             problems=(Problem("to_s", "must be given together with from_s, and be later"),),
-            hint="Give both limits in seconds since the command, or neither for the whole flight.",
+            hint="Send both limits in seconds since the command, or neither for the whole flight.",
         )
     return Range(from_s, to_s)
 

@@ -81,11 +81,11 @@ def find_by_id_or_name(session: Session, wanted: str) -> int:
         return get_row(session, int(wanted)).id
     found = repository.ids_of_name(session, wanted)
     if not found:
-        raise NotFoundError("campaign", repr(wanted), hint="Give its complete name, or the number in its URL.")
+        raise NotFoundError("campaign", repr(wanted), hint="Use its complete name, or the number in its URL.")
     if len(found) > 1:
         raise InputError(
             f"{len(found)} campaigns have the name {wanted!r}.",
-            hint="Give the number of the campaign.",
+            hint="Use the number of the campaign.",
             problems=(Problem("campaign", f"matches {', '.join(map(str, found))}"),),
         )
     return found[0]

@@ -66,7 +66,7 @@ def _unreadable_error(file: Path, error: OSError, needed: str) -> InputError:
     return InputError(
         f"{file} could not be read: {error.strerror or error}.",
         problems=(Problem("FILE", "cannot be read"),),
-        hint=f"Give a {needed} that this user can read.",
+        hint=f"Use a {needed} that this user can read.",
     )
 
 

@@ -171,7 +171,7 @@ def _check(file: Path, given: Mapping[str, float] | None) -> LogCheck:
             return check_log(data, name=file.name, companion=companion, given=given)
     except OSError as error:
         raise InputError(
-            f"{file} could not be read: {error.strerror or error}.", hint="Give a readable Paparazzi .data file."
+            f"{file} could not be read: {error.strerror or error}.", hint="Use a readable Paparazzi .data file."
         ) from error
 
 

@@ -38,7 +38,7 @@ def examine(
     reason = "is empty" if not head else "is neither a log nor a trace of a loop that Gainline has a replica of"
     raise InputError(
         f"{name} is not a recording of the vertical loop.",
-        hint=f"Give {'; '.join(each.recordings for each in AUTOPILOTS.values())}.",
+        hint=f"Use {'; '.join(each.recordings for each in AUTOPILOTS.values())}.",
         problems=(Problem("file", reason),),
     )
 

@@ -40,7 +40,7 @@ _MODES: Final[Mapping[float, str]] = MappingProxyType(
 )
 
 _WANTED: Final = frozenset({"PSCD", "CTUN", "PARM", "MODE", "MAVC", "EV", "BAT"})
-_HINT: Final = "Give ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN)."
+_HINT: Final = "Use ArduPilot's .bin log of the flight, recorded with control tuning in LOG_BITMASK (PSCD, CTUN)."
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ def read_loop_trace(path: Path) -> LoopTrace:
             return _read_bytes(path.name, raw, zipped=path.suffix == ".gz")
     except OSError as error:
         raise InputError(
-            f"{path} could not be read: {error.strerror or error}.", hint="Give a readable trace file, .csv or .csv.gz."
+            f"{path} could not be read: {error.strerror or error}.", hint="Use a readable trace file, .csv or .csv.gz."
         ) from error
 
 

@@ -29,7 +29,7 @@ _AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
 _PLATEAU_S: Final = 2.0
 
 _WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
-_HINT: Final = "Give the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
+_HINT: Final = "Use the .data file of Paparazzi's ground log, with VERT_LOOP or ROTORCRAFT_FP in it."
 
 
 def is_paparazzi(head: bytes) -> bool:

@@ -43,7 +43,7 @@ _MOTORS, _LAND, _TAKEOFF, _SET_MODE = 400, 21, 22, 176
 _PX4_TAKEOFF_MODE, _PX4_HOVER_MODE = 2, 3
 
 _HINT: Final = (
-    "Give a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
+    "Use a .tlog with the vehicle's heartbeats and LOCAL_POSITION_NED from before the takeoff; it should also "
     "contain the ground station's commands."
 )
 

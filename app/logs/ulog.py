@@ -49,7 +49,7 @@ _BOUNCE_S: Final = 2.0
 """Leaving the ground sooner than this after a touchdown is not a new takeoff."""
 _MODES: Final[Mapping[float, str]] = {0: "manual", 1: "altitude", 2: "position", 3: "mission", 5: "return", 18: "land"}
 
-_HINT: Final = "Give PX4's .ulg log of the flight, with vehicle_local_position in it."
+_HINT: Final = "Use PX4's .ulg log of the flight, with vehicle_local_position in it."
 
 
 def is_ulog(head: bytes) -> bool:

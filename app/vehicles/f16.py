@@ -147,7 +147,7 @@ def _numbers(gains: Gains) -> dict[str, float]:
 
 def _refusal(value: float) -> str | None:
     if not is_finite(value) or abs(value) > _LARGEST_GAIN:
-        return f"must be a finite number that single precision holds, got {shortened(value)}"
+        return f"must be a finite number in single precision, got {shortened(value)}"
     return None
 
 
@@ -158,7 +158,7 @@ def _open(options: Options, safe_gains: Gains, _trial_parameters: Path | None) -
 LTI: Final = VehicleKind(
     name="lti",
     title="F-16, longitudinal",
-    line="The linear F-16 at 15 000 ft and 500 ft/s that stands for the truth in the paper's first experiment.",
+    line="The linear F-16 at 15 000 ft and 500 ft/s that serves as the true system in the paper's first experiment.",
     is_real=False,
     can_fly=True,
     experiments=("pitch-tracking",),

@@ -88,7 +88,7 @@ class Pacer:
             raise InputError(
                 "This flight cannot be paced.",
                 problems=(Problem("speed", f"must be above 0 and finite, got {speed:g}"),),
-                hint="Give the ratio of simulated to wall-clock time, such as 10; omit it to fly at full speed.",
+                hint="Use the ratio of simulated to wall-clock time, such as 10; omit it to fly at full speed.",
             )
         self._speed = speed
         self._clock = clock

@@ -115,7 +115,7 @@ _PARSERS: Final[Mapping[str, Callable[[str, str, str], Address]]] = MappingProxy
 def _port(text: str, digits: str) -> int:
     port = _positive(text, digits, "the port")
     if port > LARGEST_PORT:
-        raise _error(text, f"the port is at most {LARGEST_PORT}, got {port}")
+        raise _error(text, f"the port must be at most {LARGEST_PORT}, got {port}")
     return port
 
 
