@@ -85,7 +85,7 @@ class StrategyInfo(BaseModel):
 
 
 class VehicleKindInfo(BaseModel):
-    """A kind of vehicle. `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those
+    """A kind of vehicle. `can_fly` is false when flights are flown elsewhere and uploaded; `experiments` names those
     that it can fly. Vehicles of a kind that is `registered` are registered one by one and chosen by their id."""
 
     name: str

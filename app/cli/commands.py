@@ -300,7 +300,7 @@ def import_log(
     data_dir: DataDir = None,
     json_out: JsonOut = None,
 ) -> None:
-    """Import the log of a flight made elsewhere; takeoff and gains are read from it."""
+    """Import the log of a flight flown elsewhere; takeoff and gains are read from it."""
     from app.cli.files import import_log as run
 
     settings = _settings(data_dir=data_dir)
@@ -339,7 +339,7 @@ def bundle(
     ] = None,
     data_dir: DataDir = None,
 ) -> None:
-    """Export a campaign with its records, photos and logs as one file, to import into another installation."""
+    """Export a campaign with its records, photos and logs as one file, for import into another installation."""
     from app.cli.files import bundle as run
 
     run(campaign, _settings(data_dir=data_dir), out=out)

@@ -192,7 +192,7 @@ class Client:
         )
 
     def tell(self, campaign_id: int, flown: Proposal | Mapping[str, float], record: Record, *, note: str = "") -> Trial:
-        """Upload a flight made elsewhere, with the gains it was flown with; returns it scored and classified."""
+        """Upload a flight flown elsewhere, with the gains it was flown with; returns it scored and classified."""
         trial = self._plan(campaign_id, flown, note=note, fly=None)
         return self.upload(trial.id, record)
 

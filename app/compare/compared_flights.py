@@ -144,7 +144,7 @@ def sides_of(session: Session, trial_ids: Sequence[int]) -> list[ComparisonFligh
 def population_of(campaign: CampaignRow) -> str:
     """A key common to campaigns whose flights differ only in their gains: same vehicle, settings and experiment.
 
-    For flights made elsewhere the vehicle is not known, so such a campaign is a population of its own.
+    For flights flown elsewhere the vehicle is not known, so such a campaign is a population of its own.
     """
     vehicle = campaign.vehicle
     if not fleet.can_fly(vehicle):

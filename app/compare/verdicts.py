@@ -143,7 +143,7 @@ def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, 
         how, what = "flown by another vehicle", f"Different vehicles ({other.title}, {one.title})"
     elif not fleet.can_fly(one):
         how = "perhaps flown by another vehicle"
-        what = "Flights made elsewhere: it is unknown whether the same vehicle flew both campaigns"
+        what = "Flights flown elsewhere: it is unknown whether the same vehicle flew both campaigns"
     else:
         how, what = "flown with different settings of the vehicle", "One vehicle with different settings"
     return (

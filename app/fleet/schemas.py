@@ -30,7 +30,7 @@ class CampaignVehicle(BaseModel):
     title: str
     is_real: bool
     registered: bool
-    can_fly: Annotated[bool, Field(description="false when flights are made elsewhere and uploaded")]
+    can_fly: Annotated[bool, Field(description="false when flights are flown elsewhere and uploaded")]
     needs_staging: Annotated[
         bool, Field(description="true if a flight is staged first and its operator starts the takeoff")
     ]

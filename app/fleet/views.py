@@ -16,7 +16,7 @@ from app.vehicles.registry import VEHICLE_KINDS
 
 
 def can_fly(row: VehicleRow) -> bool:
-    """Whether the program can fly it, rather than import records of flights made elsewhere."""
+    """Whether the program can fly it, rather than import records of flights flown elsewhere."""
     kind = VEHICLE_KINDS.get(row.kind)
     return kind is not None and kind.can_fly
 

@@ -25,7 +25,7 @@ Change = Callable[[Any], object]
 
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory: pytest.TempPathFactory, migrated_file: Path) -> Parts:
-    """Of a campaign with one flight, made elsewhere."""
+    """Of a campaign with one flight, flown elsewhere."""
     with second_installation(tmp_path_factory.mktemp("elsewhere"), migrated_file) as (client, database):
         campaign = create_ready_campaign(client, database)
         create_flown_trial(client, database, campaign["id"])

@@ -25,7 +25,7 @@ SETTLED_S = (1.5, 0.8, 1.0)
 
 
 def flown_by_hand(client: TestClient, database: Database) -> tuple[Json, list[Json]]:
-    """A campaign of three flights made elsewhere: the defaults as proposed, then two sets of a script's."""
+    """A campaign of three flights flown elsewhere: the defaults as proposed, then two sets of a script's."""
     campaign = create_ready_campaign(client, database, vehicle="import", definition=PX4)
     trials = [create_imported_trial(client, campaign["id"], create_csv(SETTLED_S[0]))]
     for gains, settling_s in zip((FIRMER, {**FIRMER, "MPC_Z_VEL_P_ACC": 6.0}), SETTLED_S[1:], strict=True):

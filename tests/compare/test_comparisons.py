@@ -159,7 +159,7 @@ def test_flights_made_elsewhere_are_not_taken_for_those_of_one_vehicle(client: T
     campaigns = [create_ready_campaign(client, database, vehicle="import")["id"] for _ in range(2)]
     trials = [create_imported_trial(client, campaign)["id"] for campaign in campaigns]
     (note,) = get(client, address(trials))["notes"]
-    assert note.startswith("Flights made elsewhere: it is unknown whether the same vehicle")
+    assert note.startswith("Flights flown elsewhere: it is unknown whether the same vehicle")
 
 
 def test_repeats_are_told_apart_only_when_something_has_changed(client: TestClient, database: Database) -> None:

@@ -1,4 +1,4 @@
-"""Logs of flights made elsewhere, handed in through the page."""
+"""Logs of flights flown elsewhere, handed in through the page."""
 
 import re
 

@@ -214,7 +214,7 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
 def import_record(
     session: Session, trial_id: int, flown: Takeoff, context: RequestContext = LOCAL_CLI, *, confirmed: bool = False
 ) -> Trial:
-    """Import the record of a flight made elsewhere, or the recovered record of a lost flight; score and classify it.
+    """Import the record of a flight flown elsewhere, or the recovered record of a lost flight; score and classify it.
 
     Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains and
     that is not `confirmed`, TrajectoryError when the record cannot be stored, NotAllowedError when the client may not

@@ -174,7 +174,7 @@ def upload_trajectory(
         bool, Query(description="accept a log that was flown with other gains; the trial takes the gains in the log")
     ] = False,
 ) -> Trial:
-    """Upload the record of a flight made elsewhere, or the recovered record of a lost flight.
+    """Upload the record of a flight flown elsewhere, or the recovered record of a lost flight.
 
     A log (MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data, with its .log as the form field `companion`), in
     which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),

@@ -318,7 +318,7 @@ export const getTrajectory = <ThrowOnError extends boolean = false>(options: Opt
 /**
  * Upload Trajectory
  *
- * Upload the record of a flight made elsewhere, or the recovered record of a lost flight.
+ * Upload the record of a flight flown elsewhere, or the recovered record of a lost flight.
  *
  * A log (MAVLink .tlog, ArduPilot .bin, PX4 .ulg, Paparazzi .data, with its .log as the form field `companion`), in
  * which takeoff and gains are found; or CSV with the columns time_s (seconds since the command) and altitude_m (up),

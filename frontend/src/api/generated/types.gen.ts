@@ -446,7 +446,7 @@ export type CampaignVehicle = {
     /**
      * Can Fly
      *
-     * false when flights are made elsewhere and uploaded
+     * false when flights are flown elsewhere and uploaded
      */
     can_fly: boolean;
     /**
@@ -3934,7 +3934,7 @@ export type VehicleEdit = {
 /**
  * VehicleKindInfo
  *
- * A kind of vehicle. `can_fly` is false when flights are made elsewhere and uploaded; `experiments` names those
+ * A kind of vehicle. `can_fly` is false when flights are flown elsewhere and uploaded; `experiments` names those
  * that it can fly. Vehicles of a kind that is `registered` are registered one by one and chosen by their id.
  */
 export type VehicleKindInfo = {
