@@ -25,7 +25,7 @@ from app.db import trajectories
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
-from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats
+from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats, curve_name
 from app.figures.flight import ChannelPanel, FlightFigure, FlightRecordData
 from app.figures.overlays import select_individual_flights
 from app.figures.theme import ThemeName
@@ -279,6 +279,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     glitches_s = [glitch.low for glitch in glitches]
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
     predicted = _predicted(session, _proposal_of(session, row), experiment.output)
+    predicts = _flight(row, corrected=history.is_corrected(trials, row.number)).predicted_error is not None
     return FlightRecordData(
         number=row.number,
         output_title=_TITLES.get(experiment.output, experiment.output),
@@ -287,7 +288,8 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         reference=modelled if record is None else _recorded_reference(record) or modelled,
         curve=None if record is None else _curve(record, experiment.output),
         predicted=predicted["curve"],
-        band=predicted["band"],
+        predicted_name=curve_name(predicts=predicts),
+        band=predicted["band"] if predicts else None,
         glitches=glitches,
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,

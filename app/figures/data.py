@@ -71,7 +71,10 @@ class Band:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NextFlight:
-    """The proposed next flight, with the model's curve, its band, and the interval of its error, if there are any."""
+    """The proposed next flight, with the model's curve, its band, and the interval of its error, if there are any.
+
+    A curve without an error is that of a model too uncertain to predict one.
+    """
 
     number: int
     gains: Gains
@@ -79,6 +82,15 @@ class NextFlight:
     predicted_error: float | None
     band: Band | None = None
     interval: Range | None = None
+
+    @property
+    def curve_name(self) -> str:
+        return curve_name(predicts=self.predicted_error is not None)
+
+
+def curve_name(*, predicts: bool) -> str:
+    """Name of a model's curve: a prediction, or only the curve of a model that no flight has calibrated."""
+    return "Predicted" if predicts else "Model, not calibrated"
 
 
 @dataclass(frozen=True, slots=True)

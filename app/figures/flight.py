@@ -53,6 +53,7 @@ class FlightRecordData:
     set_point: Curve
     reference: Curve | None = None
     predicted: Curve | None = None
+    predicted_name: str = "Predicted"
     band: Band | None = None
     glitches: tuple[Range, ...] = ()
     best: Curve | None = None
@@ -177,7 +178,9 @@ class FlightFigure:
         if record.best is not None:
             drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit))
         if record.predicted is not None:
-            drawn.append(_line("Predicted", record.predicted, palette.prediction, 2, "prediction", unit, "dash"))
+            drawn.append(
+                _line(record.predicted_name, record.predicted, palette.prediction, 2, "prediction", unit, "dash")
+            )
         return drawn
 
     def _summary(self) -> str:
@@ -196,7 +199,7 @@ class FlightFigure:
             (Column("set_point", "Set point", record.output_unit, 3), record.set_point),
         ]
         if record.predicted is not None:
-            named.append((Column("predicted", "Predicted", record.output_unit, 3), record.predicted))
+            named.append((Column("predicted", record.predicted_name, record.output_unit, 3), record.predicted))
         named += [
             (Column(title.lower().replace(" ", "_"), title, "", 3), channel)
             for panel in record.panels

@@ -156,7 +156,7 @@ class TrajectoriesFigure:
         if proposal is None or proposal.curve is None:
             return own
         predicted = self._trace(
-            "Predicted deviation",
+            f"{proposal.curve_name}: deviation",
             deviation_of(proposal.curve, self.history.set_point),
             points,
             role="deviation",
@@ -164,7 +164,9 @@ class TrajectoriesFigure:
             line=_style(palette, "prediction"),
             showlegend=False,
             yaxis="y2",
-            hovertemplate=reading(f"Flight {proposal.number}, predicted deviation", unit, form="+.3f"),
+            hovertemplate=reading(
+                f"Flight {proposal.number}, {proposal.curve_name.lower()}: deviation", unit, form="+.3f"
+            ),
         )
         return [*own, predicted]
 
@@ -275,14 +277,16 @@ class TrajectoriesFigure:
             return []
         return [
             self._trace(
-                "Predicted",
+                proposal.curve_name,
                 proposal.curve,
                 CURVE_POINTS,
                 role="prediction",
                 about={"trial": proposal.number},
                 line=_style(palette, "prediction"),
                 legendrank=899,
-                hovertemplate=reading(f"Flight {proposal.number}, predicted", self.history.output_unit),
+                hovertemplate=reading(
+                    f"Flight {proposal.number}, {proposal.curve_name.lower()}", self.history.output_unit
+                ),
             )
         ]
 
@@ -341,7 +345,7 @@ class TrajectoriesFigure:
             if flight.curve is not None
         ]
         if history.proposal is not None and history.proposal.curve is not None:
-            title = f"Flight {history.proposal.number}, predicted"
+            title = f"Flight {history.proposal.number}, {history.proposal.curve_name.lower()}"
             named.append((Column("prediction", title, unit, 3), history.proposal.curve))
             if history.proposal.band is not None:
                 named.append((Column("prediction_lower", f"{title}, at least", unit, 3), history.proposal.band.lower))

@@ -56,7 +56,7 @@ def test_the_takeoff_curves_are_the_stored_records(client: TestClient, campaign_
 def test_the_prediction_of_the_next_flight_is_drawn_until_it_has_flown(client: TestClient, database: Database) -> None:
     path = f"/api/campaigns/{create_ready_campaign(client, database)['id']}"
     predicted = trace(traces(client, f"{path}/figures/takeoffs"), "prediction")
-    assert (predicted["name"], predicted["line"]["dash"]) == ("Predicted", "dash")
+    assert (predicted["name"], predicted["line"]["dash"]) == ("Model, not calibrated", "dash")
     assert 3.0 < max(predicted["y"]) < 4.0
 
 

@@ -4,7 +4,7 @@ action that is recommended to the operator.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Final, Literal
 
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
@@ -16,7 +16,7 @@ from app.core.tuning.calibration import known_distribution
 from app.core.tuning.confirmation import Confirmation, compare_winner, confirm, standing_within_bounds
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
 from app.core.tuning.gate import GateResult, check_policy
-from app.core.tuning.predictions import repeat_proposal, track_record, with_interval
+from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
 from app.core.tuning.stop_rules import StopVerdict
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.manual import propose as by_hand
@@ -95,10 +95,6 @@ def _start(
     model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
     trajectory, error = model.predict(space.vector(gains))
     source = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
-    summary = (
-        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {source} "
-        f"predicts {short(error)} {experiment.error_unit}."
-    )
     lesson = (
         "How much this vehicle deviates from the model." if donor is None else "Whether the two vehicles are similar."
     )
@@ -107,9 +103,16 @@ def _start(
         gains=gains,
         predicted=trajectory,
         predicted_error=error,
-        explanation=Explanation(summary=summary, lesson=lesson),
+        explanation=Explanation(summary="", lesson=lesson),
     )
-    return with_interval(experiment, space, flights, start, pool_scatter((), experiment.scatter), base=None)
+    start = with_interval(experiment, space, flights, start, pool_scatter((), experiment.scatter), base=None)
+    told = (
+        f"predicts {short(error)} {experiment.error_unit}"
+        if is_informative(None if start.interval is None else start.interval.lower, corrected=False)
+        else "is too uncertain to predict its error"
+    )
+    summary = f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {source} {told}."
+    return replace(start, explanation=replace(start.explanation, summary=summary))
 
 
 def _confirmed(
@@ -160,6 +163,9 @@ def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | 
 AdviceKind = Literal["step", "repeat", "baseline", "stop"]
 
 _MANUAL_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
+_NOTHING_BETTER: Final = (
+    "No further step is proposed; flying the best gains again shows whether their error stays the same."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,6 +197,9 @@ def advise(
     )
     if verdict.stop:
         return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=verdict.why)
+    if now is not None and proposal.kind == "none" and tells_noise:
+        why = f"{proposal.explanation.summary} {_NOTHING_BETTER}"
+        return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
     if now is None or tells_noise:
         kind = _MANUAL_KINDS.get(proposal.kind, "step")
         return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)

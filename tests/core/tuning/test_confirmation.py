@@ -212,3 +212,13 @@ def test_under_the_rule_noise_the_advice_is_the_proposal() -> None:
             NOISE, QuadraticExperiment(), flights, proposed(kind), evaluate_stop_rule(NOISE, flights, proposed(kind))
         )
         assert (advice.kind, advice.gains["a"]) == (kind, 99.0)
+
+
+def test_a_campaign_reopened_after_its_decision_is_advised_to_repeat_the_best_gains() -> None:
+    """Nothing else is offered, so a step must not be recommended."""
+    flights = flown((1, 0.5), (2, 0.2), (2, 0.2), (1, 0.5))
+    proposal = proposed("none", 0.2, a=2.0)
+    verdict = evaluate_stop_rule(NOISE, flights, proposal, open_until_flight=7)
+    advice = advise(NOISE, QuadraticExperiment(), flights, proposal, verdict)
+    assert (advice.kind, advice.gains["a"]) == ("repeat", 2.0)
+    assert "No further step is proposed" in advice.why

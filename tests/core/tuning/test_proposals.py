@@ -101,6 +101,7 @@ def test_without_a_valid_flight_the_start_gains_are_proposed() -> None:
     assert (start.kind, start.gains) == ("start", {"kp": 283, "ki": 13, "kd": 82})
     assert start.predicted_error == pytest.approx(0.3267, abs=0.004)
     assert "default gains" in start.explanation.summary
+    assert "not yet corrected by any flight, is too uncertain to predict its error" in start.explanation.summary
     flown = fly(1, start.gains)
     aborted = Flight(number=1, gains=flown.gains, trajectory=flown.trajectory, error=None, outcome="aborted")
     assert same(start, next_proposal(Definition(), [aborted]))

@@ -23,7 +23,7 @@ export function PredictedError({ predicted, isCurrent, best, unit }: PredictedEr
   const { predicted_error: error = null, interval = null } = predicted ?? {};
   const change = percentChange(error, best);
   if (error === null && isCurrent) {
-    const none = best === null ? "No prediction yet." : "No prediction for these gains.";
+    const none = best === null ? "No predicted error before the first valid flight." : "No prediction for these gains.";
     return <Note fz="body">{none}</Note>;
   }
   return (

@@ -111,7 +111,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Fact>
         <Fact title="Predicted" topic="predicted">
           {trial.predicted_error === null && bestBefore === null
-            ? "No prediction yet"
+            ? "None before the first valid flight"
             : withUnit(trial.predicted_error, unit)}{" "}
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <PredictionResult trial={trial} />
