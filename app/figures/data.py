@@ -107,7 +107,7 @@ class Noise:
     """Scatter of the errors.
 
     `sd` is that of a single flight, `repeats` are the repeated flights, `around_best` is the range in which another
-    flight of the best gains would lie with 90 % probability.
+    flight of the best gains would lie with 90 % probability. Without repeats all of it is the prior's.
     """
 
     sd: float

@@ -124,7 +124,7 @@ class ErrorsFigure:
         right = last + 0.95
         return [
             scatter(
-                "Scatter of the best",
+                "Scatter of the best" if noise.repeats else "Scatter of the best, prior estimate",
                 ([0.5, right, right, 0.5, 0.5], [low, low, high, high, low]),
                 role="noise",
                 line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),

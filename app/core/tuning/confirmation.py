@@ -180,10 +180,21 @@ def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
     if now.looks and comparison.verdict != "unresolved":
         return Confirmation(phase="decided", why=sentence)
     if now.winner.size <= now.baseline.size:
-        why = "The winner is flown again, to confirm that it is better."
+        why = f"The best gains are flown again{_only_once(now)}."
         return Confirmation(phase="repeat", why=f"{why}{_missing(comparison)}")
-    why = "The first flight's gains are flown again under the winner's conditions."
+    why = (
+        f"The first flight's gains are flown again: they were flown {count(now.baseline.size, 'time')}, the best gains "
+        f"{count(now.winner.size, 'time')}. A vehicle that has changed meanwhile would look like better gains."
+    )
     return Confirmation(phase="baseline", why=f"{why}{_missing(comparison)}")
+
+
+def _only_once(now: ComparisonState) -> str:
+    """Why a difference that looks certain is flown again while no gains were repeated."""
+    if any(group.size > 1 for group in now.groups):
+        return ""
+    assumed = ", and the confidence assumes a prior estimate of the scatter" if now.scatter.known else ""
+    return f", because each gain set was flown only once{assumed}"
 
 
 def _is_worth_a_step(definition: Definition, now: ComparisonState, left: int, proposal: Proposal) -> bool:

@@ -169,11 +169,15 @@ def repeat_proposal(
     kind: Kind,
     why: Explanation,
 ) -> Proposal:
-    """Proposal to repeat a policy: predicts the mean of its flights, with the scatter as interval if it is known."""
+    """Proposal to repeat a policy: predicts the mean of its flights, with the scatter as interval.
+
+    Without a reported scatter there is no interval: it is unknown, or the repeats were identical to the last digit and
+    contradict the prior.
+    """
     measured = np.array([resample_to_grid(experiment, flight) for flight in flights if flight.number in group.numbers])
     curve = Trajectory(experiment.grid_s, {experiment.output: measured.mean(axis=0)}, "flights", "simulation")
     bare = Proposal(kind=kind, gains=dict(group.gains), predicted=curve, predicted_error=group.mean, explanation=why)
-    if not scatter.known:
+    if scatter.reported is None:
         return bare
     half = scatter.half_width(1.0 + 1.0 / group.size, CONFIDENCE)
     offset = half / offset_sensitivity(experiment)

@@ -34,5 +34,5 @@ test("an interval shows both ends, in the digits of an error, and its confidence
 
 test("a share is a percentage, and certainty is not claimed", () => {
   expect([percent(0.9), percent(0.995), percent(1)]).toEqual(["90\u00a0%", "99.5\u00a0%", "100\u00a0%"]);
-  expect([confidenceText(0.93), confidenceText(0.9999)]).toEqual(["93\u00a0%", "more than 99\u00a0%"]);
+  expect([0.93, 0.9971, 0.9999].map(confidenceText)).toEqual(["93\u00a0%", "99.7\u00a0%", "more than 99.9\u00a0%"]);
 });

@@ -60,5 +60,5 @@ export function percent(share: number): string {
 
 /** A confidence as text; never 100 %. */
 export function confidenceText(confidence: number): string {
-  return confidence > 0.995 ? `more than ${percent(0.99)}` : percent(confidence);
+  return confidence > 0.999 ? `more than ${percent(0.999)}` : percent(confidence);
 }

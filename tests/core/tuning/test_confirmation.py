@@ -222,3 +222,13 @@ def test_a_campaign_reopened_after_its_decision_is_advised_to_repeat_the_best_ga
     advice = advise(NOISE, QuadraticExperiment(), flights, proposal, verdict)
     assert (advice.kind, advice.gains["a"]) == ("repeat", 2.0)
     assert "No further step is proposed" in advice.why
+
+
+def test_gains_that_look_certainly_better_are_flown_again_for_a_reason_that_is_given() -> None:
+    confirmed = proposed(error=0.199)
+    first = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.2)), confirmed)
+    assert first.phase == "repeat"
+    assert "because each gain set was flown only once, and the confidence assumes a prior estimate" in first.why
+    then = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.2), (2, 0.2)), confirmed)
+    assert then.phase == "baseline"
+    assert "they were flown 1 time, the best gains 2 times" in then.why

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from app.core.definition import Flight, Prediction
-from app.core.statistics.comparisons import PooledScatter, groups_of
+from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
 from app.core.tuning.predictions import interval_scale, prediction_of, repeat_proposal, track_record, with_interval
 from app.core.tuning.strategy import Explanation, Proposal
@@ -108,6 +108,18 @@ def test_another_flight_of_a_policy_is_expected_at_the_mean_of_its_flights() -> 
     assert again.predicted_error == pytest.approx(group.mean)
     assert again.predicted["depth"] == pytest.approx(np.full(11, 6.25), abs=1e-6)
     assert again.interval.upper - group.mean == pytest.approx(T * 0.01 * np.sqrt(1.5))
+
+
+def test_gains_whose_repeats_gave_the_same_error_are_predicted_without_scatter() -> None:
+    """As in a simulation without noise: an interval would be the prior's, which the flights contradict."""
+    flights = [fly(1, 50, 50), fly(2, 30, 40), fly(3, 30, 40)]
+    groups = groups_of(flights)
+    scatter = pool_scatter(groups, QuadraticExperiment.scatter)
+    again = repeat_proposal(QuadraticExperiment(), flights, groups[0], scatter, "repeat", WHY)
+    assert again.predicted_error == groups[0].mean
+    assert again.interval is None
+    assert again.predicted is not None
+    assert set(again.predicted.channels) == {"depth"}
 
 
 def test_misses_widen_the_next_interval_and_hits_narrow_it() -> None:

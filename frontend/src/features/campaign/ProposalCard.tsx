@@ -3,12 +3,14 @@ import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useReadOnlyReason } from "../../api/access";
 import { type RecordUpload, useCreateTrial } from "../../api/mutations";
 import { offersOf } from "../../api/problems";
+import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
 import { useConnection } from "../../live/store";
+import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useUnits } from "../../ui/units";
-import { refusalOf, trialOf } from "./choices";
+import { isRepeat, refusalOf, trialOf } from "./choices";
 import { FlightChoices } from "./FlightChoices";
 import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
@@ -20,6 +22,7 @@ import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { StopCampaign } from "./StopCampaign";
 import { type ChosenFlight, type ShowPreview, useNextFlight } from "./useNextFlight";
+import { isPriorScatter } from "./verdict";
 
 interface Props {
   campaign: Campaign;
@@ -55,6 +58,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             unit={units.error}
           />
         )}
+        {isEvaluated && isRepeat(chosen.name) && <PriorScatter campaignId={campaign.id} />}
         <FlightWindow definition={campaign.definition} />
         <ErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
         {isRefused && chosen.gate !== null && chosen.choice === undefined && (
@@ -80,6 +84,13 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
       </Stack>
     </Panel>
   );
+}
+
+/** Names the source of a repeat's interval while no gain set has been flown twice. */
+function PriorScatter({ campaignId }: { campaignId: number }) {
+  const statistics = useStatistics(campaignId).data;
+  if (statistics === undefined || !isPriorScatter(statistics)) return null;
+  return <Note>The interval assumes the prior estimate of the scatter: no gain set has been flown twice.</Note>;
 }
 
 function Refusal({ chosen, problem }: { chosen: ChosenFlight; problem: ReturnType<typeof refusalOf> }) {

@@ -24,7 +24,15 @@ import { speedOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
 import { useSpeed } from "./SpeedSwitch";
 import classes from "./Verdict.module.css";
-import { bestBeforeOf, isScored, repeatPurpose, sentenceOf, standingWithout, VERDICTS } from "./verdict";
+import {
+  bestBeforeOf,
+  isScored,
+  repeatPurpose,
+  scatterMeaning,
+  sentenceOf,
+  standingWithout,
+  VERDICTS,
+} from "./verdict";
 
 interface Props {
   trial: Trial;
@@ -107,7 +115,8 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
       )}
       <dl className={`${classes["figures"]} numbers`}>
         <Fact title="Error" topic="error">
-          {plusMinus(trial.error, scatter, unit)} {scatter ? <small>(± flight-to-flight scatter)</small> : null}
+          {plusMinus(trial.error, scatter, unit)}{" "}
+          {statistics && scatter ? <small>({scatterMeaning(statistics)})</small> : null}
         </Fact>
         <Fact title="Predicted" topic="predicted">
           {trial.predicted_error === null && bestBefore === null

@@ -15,6 +15,11 @@ export const CHOICES: Record<ChoiceName, { label: string; hint: string }> = {
   own: { label: "Custom gains", hint: "" },
 };
 
+/** Whether a choice flies gains again, so that its interval is the scatter's. */
+export function isRepeat(name: ChoiceName): boolean {
+  return name === "repeat" || name === "baseline";
+}
+
 /** The recommended choice; without one the proposal's own. */
 export function preselected({ choices }: Proposal): ChoiceName {
   return (choices.find(({ recommended }) => recommended) ?? choices.find(({ proposed }) => proposed))?.kind ?? "own";

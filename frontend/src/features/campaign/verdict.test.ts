@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { Trial } from "../../api/types";
+import type { CampaignStatistics, Trial } from "../../api/types";
 import {
   abortSentence,
   abortWords,
@@ -11,6 +11,7 @@ import {
   predictionResult,
   promotable,
   repeatPurpose,
+  scatterMeaning,
   selectedTrial,
   sentenceOf,
   standingWithout,
@@ -154,4 +155,10 @@ test("a class is suggested from how the record ended, with its reason", () => {
   expect(suggestedClass(doubted)).toEqual({ outcome: "invalid", why: "clock jumped" });
   expect(suggestedClass({ ...landed, glitches: [], state: "valid" })).toBeNull();
   expect(suggestedClass({ ...landed, glitches: [], record: null, state: "lost" })?.outcome).toBe("invalid");
+});
+
+test("a scatter without a repeated gain set is named as the prior's", () => {
+  const group = (...errors: number[]) => ({ errors }) as unknown as CampaignStatistics["groups"][number];
+  expect(scatterMeaning({ sigma: 0.01, groups: [group(0.3), group(0.1)] })).toContain("prior");
+  expect(scatterMeaning({ sigma: 0.01, groups: [group(0.3, 0.31), group(0.1)] })).not.toContain("prior");
 });

@@ -1,6 +1,6 @@
 /** Texts and decisions about the result of a flight. */
 
-import type { Campaign, Trial, Vehicle } from "../../api/types";
+import type { Campaign, CampaignStatistics, Trial, Vehicle } from "../../api/types";
 import { gainsInBrackets, inOrder, sameHeld } from "../../ui/gains";
 import { wasFlown } from "../../ui/states";
 
@@ -17,6 +17,16 @@ export function predictionResult(trial: Trial): "inside" | "above" | "below" | n
   if (!interval || error === null) return null;
   if (error < interval.lower) return "below";
   return error > interval.upper ? "above" : "inside";
+}
+
+/** Whether the scatter is only the prior estimate, because no gain set has been flown twice. */
+export function isPriorScatter({ sigma, groups }: Pick<CampaignStatistics, "sigma" | "groups">): boolean {
+  return sigma !== null && sigma > 0 && groups.every(({ errors }) => errors.length < 2);
+}
+
+/** What the ± of a single flight's error is. */
+export function scatterMeaning(statistics: Pick<CampaignStatistics, "sigma" | "groups">): string {
+  return isPriorScatter(statistics) ? "± prior estimate of the scatter" : "± flight-to-flight scatter";
 }
 
 const ASKED: Partial<Record<Trial["kind"], string>> = {

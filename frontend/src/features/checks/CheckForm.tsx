@@ -46,7 +46,11 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
         ))}
       </ul>
       <Group gap={10} align="end" mt={4} mb={10}>
-        <FileButton multiple accept={RECORDINGS.flatMap(({ types }) => types).join()} onChange={(files) => onCheck(files)}>
+        <FileButton
+          multiple
+          accept={RECORDINGS.flatMap(({ types }) => types).join()}
+          onChange={(files) => onCheck(files)}
+        >
           {(props) => (
             <Button {...props} loading={upload.isPending} leftSection={<IconFileUpload size={20} aria-hidden />}>
               Choose recording
