@@ -11,6 +11,7 @@ import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { percent } from "../../ui/uncertainty";
 import classes from "./Fleet.module.css";
+import { autopilotTitle } from "./fleet";
 
 function armedText(armed: boolean | null | undefined): string {
   if (armed === null || armed === undefined) return NOTHING;
@@ -56,8 +57,8 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
         {status?.said && <Note>Vehicle message: {status.said}</Note>}
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
         <Note>
-          {String(vehicle.options["address"] ?? "")}, {String(vehicle.options["autopilot"] ?? "")}
-          {identity !== null && `; pinned: system ${identity.system_id}, ${identity.autopilot} ${identity.version}`}
+          {autopilotTitle(vehicle)} at {String(vehicle.options["address"] ?? "")}
+          {identity !== null && `; pinned: system ${identity.system_id}, version ${identity.version}`}
           {identity?.uid && `, hardware id ${identity.uid}`}
         </Note>
       </Stack>

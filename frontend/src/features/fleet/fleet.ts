@@ -33,7 +33,7 @@ export const ACTS: Record<ActKind, string> = {
 export const PURPOSES: Record<GivenGains["purpose"], string> = {
   flight: "Flight",
   "restore after flight": "Safe gains after flight",
-  connect: "Safe gains at connection",
+  connect: "Check at connection",
   restore: "Safe gains restored",
   release: "Safe gains at release",
 };
