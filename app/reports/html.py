@@ -36,6 +36,11 @@ _STATES: Final = {
     "finished": "Finished",
     "archived": "Finished and archived",
 }
+_STANDINGS: Final = {
+    "candidate": "Candidate: not yet confirmed by repeat flights.",
+    "confirmed": "Confirmed: better than the first gains in repeat flights.",
+    "not confirmed": "Not confirmed: no improvement over the first gains in repeat flights.",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +66,7 @@ def render(report: Report, plotly: str) -> Document:
         .render(
             report=report,
             state=_state(report.campaign),
+            standing=_STANDINGS.get(report.campaign.standing or ""),
             baseline=next((group for group in groups if group.is_baseline), None),
             winner=next((group for group in groups if group.is_best), None),
             policy=own,
@@ -138,7 +144,7 @@ def _environment() -> "Environment":
         "gains": formatting.gains,
         "signed_gain": _signed_gain,
         "count": formatting.count,
-        "flights": _flights,
+        "flights": formatting.named_flights,
         "cell": _cell,
         "panels": _panels,
         "data_uri": _data_uri,
@@ -166,10 +172,6 @@ def _instant(at: datetime | None) -> str:
 
 def _signed_gain(change: float) -> str:
     return f"+{formatting.gain(change)}" if change > 0 else formatting.gain(change)
-
-
-def _flights(numbers: list[int]) -> str:
-    return f"flight{'' if len(numbers) == 1 else 's'} {', '.join(map(str, numbers))}"
 
 
 def _panels(card: Card) -> int:

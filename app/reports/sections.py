@@ -86,6 +86,7 @@ class Report:
     campaign: Campaign
     statistics: CampaignStatistics
     trials: tuple[Trial, ...]
+    experiment: str
     gains: tuple[Gain, ...]
     what: tuple[Fact, ...]
     how: tuple[Fact, ...]

@@ -40,6 +40,7 @@ def report_of(session: Session, campaign_id: int) -> Report:
         campaign=campaign,
         statistics=statistics,
         trials=trials,
+        experiment=experiment.title,
         gains=experiment.space.gains,
         what=describe_vehicle(campaign, experiment, vehicle.identity),
         how=describe_method(campaign, experiment),

@@ -320,7 +320,7 @@ def runs_row(trial: Json, sigma: float) -> list[str]:
 
 
 def runs_of(report: Page) -> list[list[str]]:
-    rows = report.locator("#runs-table tbody tr").all()
+    rows = report.locator("#runs-table tbody tr:has(th)").all()
     return [[cell.strip() for cell in row.locator("td").all_inner_texts()[:4]] for row in rows]
 
 

@@ -9,6 +9,7 @@ import select
 import shutil
 import subprocess
 import zlib
+from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from tests.campaigns.trials.test_photos import JPEG, add, png
 from tests.reports.conftest import NAME, REASON
 
 POLICY = "content-security-policy"
+HEADINGS = {"h1", "h2", "h3"}
 
 
 class Page(HTMLParser):
@@ -34,6 +36,7 @@ class Page(HTMLParser):
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.scripts: list[str] = []
         self.cells: list[str] = []
+        self.headings: list[tuple[str, str]] = []
         self.text = ""
         self._open: list[str] = []
         self.feed(html)
@@ -43,6 +46,8 @@ class Page(HTMLParser):
         self._open.append(tag)
         if tag in {"td", "th"}:
             self.cells.append("")
+        if tag in HEADINGS:
+            self.headings.append((tag, ""))
         if tag == "script" and dict(attrs).get("type") is None:
             self.scripts.append("")
 
@@ -59,6 +64,9 @@ class Page(HTMLParser):
             self.text += data
         if "td" in self._open or "th" in self._open:
             self.cells[-1] += data
+        if HEADINGS & set(self._open):
+            tag, text = self.headings[-1]
+            self.headings[-1] = (tag, " ".join((text + data).split()))
 
     @property
     def said(self) -> str:
@@ -197,6 +205,94 @@ def test_the_pdf_is_one_and_its_text_can_be_read(client: TestClient, campaign: J
     assert measured(campaign["best"]["mean"], campaign["best"]["standard_error"], "m") in text
     assert "Takeoff curves" in text
     assert "Time since the command (s)" in text, "the charts are not drawn"
+
+
+PRINTS = pytest.mark.skipif(
+    not any(map(shutil.which, pdf.PRINTERS)) or shutil.which("pdftotext") is None,
+    reason="no Chromium to print with, or no pdftotext to read what it printed",
+)
+
+
+@dataclass(frozen=True)
+class Printed:
+    """One page: its lines from top to bottom without the page number, and the lowest word as a share of the height."""
+
+    lines: list[str]
+    filled: float
+
+    @property
+    def said(self) -> str:
+        return " ".join(self.lines)
+
+
+def pages_of(client: TestClient, campaign: Json, folder: Path, *, paper: str = "A4") -> list[Printed]:
+    html = client.get(f"/api/campaigns/{campaign['id']}/report.html").text
+    file = folder / f"{paper}.pdf"
+    file.write_bytes(pdf.print_pdf(lambda: html.replace("size: A4;", f"size: {paper};")))
+
+    def read_text(*how: str) -> str:
+        return subprocess.run(["pdftotext", *how, file, "-"], capture_output=True, text=True, check=True).stdout
+
+    boxes = re.findall(r'<page [^>]*height="([\d.]+)">(.*?)</page>', read_text("-bbox"), re.DOTALL)
+    texts = read_text("-layout").removesuffix("\f").split("\f")
+    return [
+        Printed(lines_of(text), filled_of(float(height), words))
+        for (height, words), text in zip(boxes, texts, strict=True)
+    ]
+
+
+def lines_of(text: str) -> list[str]:
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    return [line for line in lines if line and re.fullmatch(r"Gainline \d+ ?/ ?\d+", line) is None]
+
+
+def filled_of(height: float, words: str) -> float:
+    """How far down the text reaches, above the line of the page number."""
+    bottoms = [float(bottom) / height for bottom in re.findall(r'yMax="([\d.]+)"', words)]
+    return max(bottom for bottom in bottoms if bottom < 0.95)
+
+
+@PRINTS
+@pytest.mark.parametrize("paper", ["A4", "Letter"])
+def test_the_first_page_is_full_with_result_curves_and_gains(
+    client: TestClient, campaign: Json, tmp_path: Path, paper: str
+) -> None:
+    first, second, *_ = pages_of(client, campaign, tmp_path, paper=paper)
+    statistics = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    for expected in (
+        "Takeoff to 3 m",
+        measured(campaign["best"]["mean"], campaign["best"]["standard_error"], "m"),
+        statistics["comparison"]["sentence"],
+        statistics["scatter_source"],
+        "Takeoff curves",
+        "Time since the command (s)",
+        "From the first gains to the best",
+        "Error mean ± standard error (m)",
+    ):
+        assert " ".join(expected.split()) in first.said
+    assert first.filled > 0.8
+    assert second.lines[0] == "Flights"
+
+
+@PRINTS
+def test_photos_are_printed_on_the_page_of_their_note_and_no_heading_ends_a_page(
+    client: TestClient, campaign: Json, tmp_path: Path
+) -> None:
+    trials = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
+    for trial in trials:
+        note = "\n".join(f"Line {line} of flight {trial['number']}." for line in range(1, 13))
+        assert client.patch(f"/api/trials/{trial['id']}", json={"version": trial["version"], "note": note}).is_success
+        for _ in range(5):
+            assert add(client, trial, png()).status_code == 201
+    pages = pages_of(client, campaign, tmp_path)
+    for trial in trials:
+        number = trial["number"]
+        (page,) = [page for page in pages if f"Line 1 of flight {number}." in page.said]
+        for part in ("Line 12 of flight {}.", "Flight {}, photo 1 of 5", "Flight {}, photo 5 of 5"):
+            assert part.format(number) in page.said
+    headings = {text for tag, text in read(client, campaign).headings if tag != "h1"}
+    assert {"Runs", "Takeoff curves", "Records"} <= headings
+    assert [page.lines[-1] for page in pages if page.lines[-1] in headings] == []
 
 
 def unpacked(pdf: bytes) -> bytes:
