@@ -109,7 +109,7 @@ def test_a_flight_marked_invalid_is_left_out_and_can_be_taken_back(dashboard: Da
     dashboard.open_campaign(campaign_id)
     second = dashboard.trials(campaign_id)[1]
     verdict = dashboard.panel("Flight 2")
-    expect(verdict).to_contain_text(f"{second['error']:.3f} m")
+    expect(verdict).to_contain_text(f"{second['error']:.3f} ± ")
     verdict.get_by_role("button", name="Mark invalid").click()
     verdict.get_by_text("Tracking glitch").click()
     verdict.get_by_role("button", name="Mark invalid").click()

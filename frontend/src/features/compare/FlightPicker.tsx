@@ -96,7 +96,7 @@ function Campaign({ id, title, flights, experiment, open = false, chosen, onTogg
       onToggle={(event) => setOpened((event.currentTarget as HTMLDetailsElement).open)}
     >
       <summary>
-        {title} <small className={classes["dim"]}>{count(flights, "flight")}</small>
+        <span>{title}</span> <small className={classes["dim"]}>{count(flights, "flight")}</small>
       </summary>
       {opened && <Flights campaignId={id} {...{ experiment, chosen, onToggle }} />}
     </details>

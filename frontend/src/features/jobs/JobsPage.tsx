@@ -3,6 +3,7 @@ import { useState } from "react";
 import { JOBS_PAGE, type JobState, useJobs, useReproductions } from "../../api/jobs";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
+import { Panel } from "../../ui/Panel";
 import { addPage } from "../../ui/paging";
 import { useTitle } from "../../ui/useTitle";
 import { JobTable } from "./JobTable";
@@ -54,7 +55,7 @@ export function JobsPage() {
             : GROUPS[filter].none}
         </Note>
       )}
-      <Stack gap={28}>
+      <Stack gap="var(--gap)">
         {shown
           .filter((group) => jobs[group].total > 0)
           .map((group) => (
@@ -82,10 +83,7 @@ interface JobGroupProps {
 function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, onAll }: JobGroupProps) {
   const { title } = GROUPS[group];
   return (
-    <section>
-      <Title order={2} c="dimmed" fz="body" mb={10}>
-        {title}
-      </Title>
+    <Panel title={title}>
       <JobTable label={title} jobs={items} titles={titles} />
       {query.hasNextPage && (
         <Box mt={20} ta="center">
@@ -98,6 +96,6 @@ function JobGroup({ group, found: { items, total, isBrief, ...query }, titles, o
           </Button>
         </Box>
       )}
-    </section>
+    </Panel>
   );
 }

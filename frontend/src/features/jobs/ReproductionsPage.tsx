@@ -1,4 +1,4 @@
-import { Button, Group, Skeleton, Stack, Title } from "@mantine/core";
+import { Button, Group, SimpleGrid, Skeleton, Title } from "@mantine/core";
 import { IconPlayerPlay } from "@tabler/icons-react";
 import { useEffect } from "react";
 import { useLocation } from "react-router";
@@ -38,11 +38,11 @@ export function ReproductionsPage() {
       </Note>
       <ErrorNotice error={list.error ?? run.error} />
       {list.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
-      <Stack gap={28}>
+      <SimpleGrid type="container" cols={{ base: 1, "1400px": 2 }} spacing="var(--gap)">
         {found.map((reproduction) => (
           <ReproductionCard key={reproduction.name} reproduction={reproduction} />
         ))}
-      </Stack>
+      </SimpleGrid>
     </>
   );
 }

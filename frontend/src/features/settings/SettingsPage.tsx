@@ -44,8 +44,8 @@ export function SettingsPage() {
       <Group justify="space-between" gap={12} mb={14}>
         <Title order={1}>Settings</Title>
       </Group>
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" style={{ alignItems: "start" }}>
-        <Stack gap="var(--gap)">
+      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)">
+        <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
           <Panel title="This browser">
             <ThisBrowser />
           </Panel>
@@ -57,7 +57,7 @@ export function SettingsPage() {
             {system.isPending && <Skeleton height={320} radius="md" aria-busy="true" />}
           </div>
         ) : (
-          <Stack gap="var(--gap)">
+          <Stack gap="var(--gap)" className={classes["column"] ?? ""}>
             <RemoteAccess system={system.data} />
             <Backup system={system.data} />
           </Stack>
