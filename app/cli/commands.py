@@ -362,10 +362,12 @@ def unbundle(
 @controller.command()
 @report_errors
 def replay(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recorded runs, .csv or .csv.gz.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE…", help="Recorded runs, .csv or .csv.gz; .bin logs of ArduCopter.")
+    ],
     json_out: JsonOut = None,
 ) -> None:
-    """Replay recorded runs through the replica; exit code 1 on any difference or malformed file."""
+    """Replay recorded runs through the replica of their autopilot; exit code 1 if one differs or cannot be read."""
     from app.cli.reproduce import replay_files
 
     if not replay_files(files, json_out):

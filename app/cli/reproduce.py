@@ -110,12 +110,16 @@ def _replays_table(title: str, checked: Mapping[Path, CheckResult]) -> Table:
         (
             file.name,
             str(each.rows),
-            *(f"{_largest_differences(each)[name]:.3g}" for name in names),
+            *(_digits(_largest_differences(each).get(name)) for name in names),
             _verdict(each),
         )
         for file, each in checked.items()
     ]
     return table(("file", "rows", *names, ""), rows, title=f"{title}: largest difference between recording and replica")
+
+
+def _digits(difference: float | None) -> str:
+    return "" if difference is None else f"{difference:.3g}"
 
 
 def _largest_differences(checked: CheckResult) -> dict[str, float]:

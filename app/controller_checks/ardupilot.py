@@ -1,15 +1,21 @@
-"""ArduCopter's entry in the registry: traces with a row per step."""
+"""ArduCopter's entry in the registry: its on-board log, and traces with a row per step."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
+
+import numpy as np
 
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import Result, Signal, TraceReplay, grouped, result_of_trace
 from app.core.control.ardupilot import OUTPUTS
+from app.core.control.ardupilot_log import LogComparison, LoopLog, compare_log
 from app.core.control.ardupilot_replay import LoopTrace, replayed
+from app.logs.ardupilot_log import read_ardupilot_log
 from app.logs.ardupilot_trace import is_ardupilot_trace, read_ardupilot_trace
+from app.logs.dataflash import is_dataflash
 
+_HEAD_BYTES: Final = 4096
 _PRECISION: Final = "the firmware computes in single precision, the replica in double"
 
 
@@ -35,12 +41,16 @@ _UP: Final = "Altitude, climb rate and acceleration are positive up."
 
 
 def _recognises(beginning: Beginning) -> bool:
-    return is_ardupilot_trace(beginning.unzipped)
+    return is_dataflash(beginning.raw) or is_ardupilot_trace(beginning.unzipped)
 
 
 def _examine(recording: Recording) -> Result:
-    trace = read_ardupilot_trace(recording.stream, name=recording.name)
-    return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(trace))
+    stream, name = recording.stream, recording.name
+    stream.seek(0)
+    if is_dataflash(stream.read(_HEAD_BYTES)):
+        compared = _compared(read_ardupilot_log(stream, name=name))
+        return result_of_trace(ARDUPILOT.name, _SIGNALS, compared, kind="log")
+    return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(read_ardupilot_trace(stream, name=name)))
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -55,10 +65,34 @@ def _replayed(trace: LoopTrace) -> TraceReplay:
     )
 
 
+def _compared(log: LoopLog) -> TraceReplay:
+    comparison = compare_log(log)
+    compared = {name: values for name, values in comparison.recorded.items() if np.isfinite(values).any()}
+    return TraceReplay(
+        time_s=log.time_s - log.time_s[0],
+        recorded=compared,
+        replica={name: comparison.replica[name] for name in compared},
+        gains=log.parameters.gains,
+        notes=(*_notes(comparison), _UP),
+    )
+
+
+def _notes(comparison: LogComparison) -> Iterable[str]:
+    rows = {name: int(np.isfinite(values).sum()) for name, values in comparison.recorded.items()}
+    yield "Climb rate target and demanded throttle were computed from the same row of the log."
+    if rows["z_d_m"]:
+        yield f"The desired motion was shaped again from the row before, up to {grouped(rows['z_d_m'])} rows."
+    else:
+        yield "The desired motion was not shaped again: the log has no position targets (GUIP), or also other targets."
+    if not rows["throttle"]:
+        yield "The demanded throttle was not computed: the log has no PIDA and CTUN beside PSCD."
+
+
 ARDUPILOT: Final = Autopilot(
     name="ardupilot",
     title="ArduCopter",
-    recordings="a trace of ArduCopter's vertical loop with one row per step, .csv or .csv.gz",
+    recordings="ArduCopter's .bin log of a flight in GUIDED, or a trace of its vertical loop with one row per step, "
+    ".csv or .csv.gz",
     signals=_SIGNALS,
     figures=MappingProxyType(
         {"reference": ("Shaped target", OUTPUTS[:3]), "commands": ("Controllers and throttle", OUTPUTS[3:])}

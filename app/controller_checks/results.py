@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
@@ -16,6 +17,8 @@ Kind = Literal["log", "trace"]
 Verdict = Literal["exact", "agrees", "differs"]
 FigureName = Literal["reference", "commands"]
 Values = NDArray[np.int64] | Samples
+
+_ROWS: Final[Mapping[Kind, str]] = MappingProxyType({"log": "logged rows", "trace": "steps"})
 
 CURVE_POINTS: Final = 1000
 MARKS: Final = 200
@@ -97,7 +100,7 @@ class TraceReplay:
     notes: tuple[str, ...] = field(default=())
 
 
-def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay) -> Result:
+def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay, *, kind: Kind = "trace") -> Result:
     """Compare every signal of every row with the replica, within the tolerance of each signal; NaN equals NaN."""
     apart = {name: _apart(replay.recorded[name], replay.replica[name]) for name in replay.recorded}
     differs = {name: ~(values <= signals[name].tolerance) for name, values in apart.items()}
@@ -108,9 +111,9 @@ def result_of_trace(autopilot: str, signals: Signals, replay: TraceReplay) -> Re
         for name, values in apart.items()
     )
     return Result(
-        kind="trace",
+        kind=kind,
         passed=rows.size == 0,
-        sentence=_trace_sentence(results, overlay, rows),
+        sentence=_trace_sentence(results, overlay, rows, _ROWS[kind]),
         rows=len(replay.time_s),
         gains=replay.gains,
         gains_from="not constant" if replay.gains is None else "of the recording",
@@ -170,15 +173,15 @@ def _apart(recorded: Values, replica: Values) -> Samples:
     return apart
 
 
-def _trace_sentence(results: tuple[SignalResult, ...], overlay: Overlay, rows: NDArray[np.int64]) -> str:
+def _trace_sentence(results: tuple[SignalResult, ...], overlay: Overlay, rows: NDArray[np.int64], unit: str) -> str:
     total = grouped(len(overlay.time_s))
     exact = all(signal.tolerance == 0.0 for signal in results)
     met = "exact" if exact else "within the tolerances"
     if not rows.size:
-        return f"The replica agrees: all {total} steps are {met} in all {len(results)} signals."
+        return f"The replica agrees: all {total} {unit} are {met} in all {len(results)} signals."
     names = ", ".join(name for name, wrong in overlay.differs.items() if wrong[rows[0]])
     return (
-        f"The replica differs: {grouped(len(rows))} of {total} steps are not {met}, the first at "
+        f"The replica differs: {grouped(len(rows))} of {total} {unit} are not {met}, the first at "
         f"{overlay.time_s[rows[0]]:.3f} s in {names}."
     )
 

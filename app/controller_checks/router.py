@@ -44,8 +44,8 @@ def check_controller(
     ] = None,
 ) -> ControllerCheck:
     """Compare a recording of the vertical loop with the replica of its autopilot: Paparazzi's .data file with VERT_LOOP
-    (its .log as the form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording
-    itself is not kept."""
+    (its .log as the form field `companion`), ArduCopter's .bin log, or a trace with a row for every step, .csv or
+    .csv.gz. The recording itself is not kept."""
     result = service.check_upload(record.content(), name=record.name, companion=record.read_companion(), gains=gains)
     return record.once(ControllerCheck, lambda session: service.store_check(session, record.name, result))
 

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
+from tests.logs.recorded import recorded
 
 DATA = Path(__file__).parents[1] / "data"
 TRACES = sorted((DATA / "vertical_loop").glob("*.csv.gz"))
@@ -75,3 +76,16 @@ def test_a_run_of_arducopter_is_told_by_its_columns_and_agrees_within_the_tolera
     assert 0.0 < arducopter["largest_difference"]["z_d_m"] < 8e-5
     assert arducopter["notes"][0].startswith("2 rows at a throttle limit")
     assert (paparazzi["autopilot"], paparazzi["exact"]) == ("paparazzi", True)
+
+
+def test_the_log_of_an_arducopter_is_compared_beside_a_trace_with_more_signals(tmp_path: Path) -> None:
+    log, out = tmp_path / "flight.bin", tmp_path / "replay.json"
+    log.write_bytes(recorded("arducopter_steps.bin"))
+    result = replay(log, DATA / "ardupilot_loop" / "steps_default.csv.gz", "--json", out)
+    assert result.exit_code == 0
+    flown, trace = json.loads(out.read_text())["files"]
+    assert set(flown["largest_difference"]) == {"z_d_m", "v_d_m_s", "a_d_m_s2", "v_t_m_s", "throttle"}
+    assert flown["largest_difference"]["z_d_m"] < 1e-5
+    assert flown["largest_difference"]["throttle"] < 1e-7
+    assert "160 rows" in flown["notes"][1]
+    assert len(trace["largest_difference"]) == 8

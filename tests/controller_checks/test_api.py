@@ -16,6 +16,7 @@ from app.core.control.paparazzi import OUTPUTS
 from app.db.models import ControllerCheckRow
 from app.db.session import Database
 from tests.builders import get, problems_of
+from tests.logs import recorded as logs
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of, write
 
 Json = dict[str, Any]
@@ -73,6 +74,21 @@ def test_a_run_of_arducopter_agrees_within_the_tolerance_of_each_signal(client: 
     assert [reference["state"], commands["state"]] == ["ready", "ready"]
     assert len(reference["figure"]["data"]) == 2 * 3
     assert len(commands["figure"]["data"]) == 2 * 5
+
+
+def test_the_log_of_an_arducopter_is_compared_row_by_row(client: TestClient) -> None:
+    content = logs.recorded("arducopter_steps.bin")
+    check = send(client, "flight.bin", content).json()
+    assert (check["autopilot"], check["kind"], check["passed"]) == ("ArduCopter", "log", True)
+    assert "238 logged rows are within the tolerances in all 5 signals" in check["sentence"]
+    assert [card["state"] for card in figures(client, check)] == ["ready", "ready"]
+    takeoff = send(client, "takeoff.bin", content.replace(b"GUIP", b"XUIP").replace(b"PIDA", b"XIDA")).json()
+    assert [signal["name"] for signal in takeoff["signals"]] == ["v_t_m_s"]
+    assert "has no position targets (GUIP)" in takeoff["notes"][1]
+    assert "has no PIDA and CTUN" in takeoff["notes"][2]
+    assert [card["state"] for card in figures(client, takeoff)] == ["waiting", "ready"]
+    refused = send(client, "empty.bin", content.replace(b"PSCD", b"XSCD"))
+    assert "is missing" in problems_of(refused)["PSCD"]
 
 
 def test_a_difference_beyond_the_tolerance_is_found_in_a_run_of_arducopter(client: TestClient) -> None:

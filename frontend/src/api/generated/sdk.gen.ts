@@ -677,8 +677,8 @@ export const listControllerChecks = <ThrowOnError extends boolean = false>(optio
  * Check Controller
  *
  * Compare a recording of the vertical loop with the replica of its autopilot: Paparazzi's .data file with VERT_LOOP
- * (its .log as the form field `companion`), or a trace with a row for every step, .csv or .csv.gz. The recording
- * itself is not kept.
+ * (its .log as the form field `companion`), ArduCopter's .bin log, or a trace with a row for every step, .csv or
+ * .csv.gz. The recording itself is not kept.
  */
 export const checkController = <ThrowOnError extends boolean = false>(options: Options<CheckControllerData, ThrowOnError>): RequestResult<CheckControllerResponses, CheckControllerErrors, ThrowOnError> => (options.client ?? client).post<CheckControllerResponses, CheckControllerErrors, ThrowOnError>({
     ...formDataBodySerializer,

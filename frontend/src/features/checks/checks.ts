@@ -14,8 +14,8 @@ export const RECORDINGS = [
   },
   {
     autopilot: "ArduCopter",
-    types: [".csv", ".gz"],
-    text: "a trace with a row for every control step, .csv or .csv.gz",
+    types: [".bin", ".csv", ".gz"],
+    text: "the .bin log of a flight in GUIDED, or a trace with a row for every control step, .csv or .csv.gz",
   },
 ] as const;
 
