@@ -96,6 +96,60 @@ def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
         assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
 
 
+FLOWN_HERE = {"twin": "takeoff", "jsbsim": "takeoff", "lti": "pitch-tracking"}
+
+
+@pytest.mark.parametrize("vehicle", FLOWN_HERE)
+@pytest.mark.parametrize("log", sorted(set().union(*EXPERIMENTS.values())))
+def test_no_log_is_taken_for_a_trial_that_gainline_flies_itself(
+    client: TestClient, database: Database, vehicle: str, log: str
+) -> None:
+    definition = {"experiment": FLOWN_HERE[vehicle], "strategy": "manual"}
+    campaign = create_ready_campaign(client, database, vehicle=vehicle, definition=definition)
+    trial = create_trial(client, campaign["id"])
+    answer = client.post(f"{path_of(trial)}?confirm=true&takeoff=1", content=recorded(log), headers=ANY)
+    assert answer.status_code == 409
+    assert "is flown from here" in answer.json()["detail"]
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["record"], after["read_back"]) == ("planned", None, None)
+
+
+def test_pitch_tracking_has_no_campaign_for_records_of_flights_made_elsewhere(client: TestClient) -> None:
+    definition = {"experiment": "pitch-tracking", "strategy": "manual"}
+    wanted = {"name": "Test", "vehicle": {"kind": "import"}, "definition": definition}
+    answer = client.post("/api/campaigns", json=wanted)
+    assert answer.status_code == 422
+    assert set(problems_of(answer)) == {"definition.experiment", "vehicle.kind"}
+
+
+def test_the_content_of_a_log_counts_and_not_its_file_extension(client: TestClient, trial: Json) -> None:
+    empty = client.post(path_of(trial), files={"file": ("flight.ulg", b"")})
+    assert (empty.status_code, set(problems_of(empty))) == (422, {"file"})
+    answer = client.post(path_of(trial), files={"file": ("flight.csv", recorded(f"{DEFAULT}.tlog"))})
+    assert (answer.status_code, answer.json()["read_back"]) == (201, TLOGS[DEFAULT])
+
+
+CUT = {
+    f"{DEFAULT}.tlog": "without a rise by 0.5 m",
+    "arducopter_takeoff.bin": "contains neither PSCD.PD nor CTUN.Alt, the altitude",
+    "px4_takeoff.ulg": "contains no vehicle_local_position.z, the altitude",
+}
+
+
+@pytest.mark.parametrize("log", CUT)
+def test_a_log_that_was_cut_before_the_flight_is_refused_and_stores_nothing(
+    client: TestClient, database: Database, log: str
+) -> None:
+    experiment = next(name for name, logs in EXPERIMENTS.items() if log in logs)
+    definition = {"experiment": experiment, "strategy": "manual"}
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=definition)
+    trial = create_trial(client, campaign["id"])
+    answer = client.post(f"{path_of(trial)}?confirm=true", content=recorded(log)[:20_000], headers=ANY)
+    assert answer.status_code == 422
+    assert CUT[log] in next(iter(problems_of(answer).values()))
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
+
+
 def test_a_log_of_another_autopilot_is_refused_also_where_its_gains_are_not_in_it(
     client: TestClient, database: Database
 ) -> None:
