@@ -81,7 +81,7 @@ def _notes(comparison: LogComparison) -> Iterable[str]:
     rows = {name: int(np.isfinite(values).sum()) for name, values in comparison.recorded.items()}
     yield "Climb rate target and demanded throttle were computed from the same row of the log."
     if rows["z_d_m"]:
-        yield f"The desired motion was shaped again from the row before, up to {grouped(rows['z_d_m'])} rows."
+        yield f"The desired motion was shaped again from the row before, in {grouped(rows['z_d_m'])} rows."
     else:
         yield "The desired motion was not shaped again: the log has no position targets (GUIP), or also other targets."
     if not rows["throttle"]:

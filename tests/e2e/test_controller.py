@@ -9,6 +9,7 @@ from playwright.sync_api import FilePayload, expect
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import PHONE, Dashboard, Json
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
+from tests.logs.recorded import recorded
 
 TRACES = Path(__file__).parents[1] / "data" / "vertical_loop"
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
@@ -97,6 +98,20 @@ def test_a_calm_log_asks_for_its_gains(page_of_checks: Dashboard) -> None:
     dashboard.button("Check calm.data with these gains").click()
     expect(page.get_by_text("The replica agrees: ")).to_be_visible()
     assert newest(dashboard)["gains_from"] == "given"
+
+
+def test_the_log_of_an_arducopter_is_compared_with_its_own_replica(page_of_checks: Dashboard) -> None:
+    dashboard, page = page_of_checks, page_of_checks.page
+    content = recorded("arducopter_steps.bin")
+    choose(dashboard, FilePayload(name="steps.bin", mimeType="application/octet-stream", buffer=content))
+    article = page.get_by_role("article", name="Check of steps.bin")
+    expect(article).to_contain_text(
+        "The replica agrees: all 238 logged rows are within the tolerances in all 5 signals."
+    )
+    expect(article).to_contain_text("ArduCopter")
+    check = newest(dashboard)
+    assert (check["passed"], check["kind"], check["gains"]["PSC_VELZ_P"]) == (True, "log", 5.0)
+    assert_drawn_as_told(dashboard, check)
 
 
 def test_what_is_no_recording_is_refused_in_words(page_of_checks: Dashboard) -> None:

@@ -45,7 +45,7 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
           </li>
         ))}
       </ul>
-      <Group gap={10} align="end" mt={4} mb={10}>
+      <Group gap={10} align="end" mt={12} mb={10}>
         <FileButton
           multiple
           accept={RECORDINGS.flatMap(({ types }) => types).join()}
