@@ -3,9 +3,9 @@ controllers, throttle filter, and the takeoff before them.
 
 The loop runs at 400 Hz, in double precision where the firmware has single. Altitude, climb rate and acceleration are
 positive up, in m, m/s and m/s²; inside the velocity controller they are cm/s, inside the acceleration controller cm/s²
-and per mille of throttle, as the gains are. A step is `take_off` or, in flight, `shape` and `control`, on a
-state array that the caller owns: two kernels, because compiled code with a call inside counts references.
-docs/models.md has the formulas.
+and per mille of throttle, as the gains are. A step is `take_off` or, in flight, `shape` and `control`, on a state array
+that the caller owns: two kernels, because compiled code that calls what is not inlined counts references, which takes
+as long as the step. docs/models.md has the formulas.
 """
 
 from typing import Final
