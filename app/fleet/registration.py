@@ -174,7 +174,7 @@ def _require_free(session: Session, name: str, *, unless: int | None = None) -> 
 def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
     problems = []
     if not new.safe_gains_confirmed:
-        problems.append(Problem("safe_gains_confirmed", "must be true once a person has reviewed the safe gains"))
+        problems.append(Problem("safe_gains_confirmed", "must be confirmed by the person who reviewed the safe gains"))
     if not new.statement.strip():
         problems.append(Problem("statement", "must name the reviewer"))
     if problems:

@@ -33,6 +33,7 @@ from app.common.errors import (
 )
 from app.common.schemas import Problem, ProblemField
 from app.live.link import LinkDownError
+from app.web.refusals import reason_of
 
 MEDIA_TYPE: Final = "application/problem+json"
 
@@ -154,8 +155,7 @@ def _refused(found: Mapping[str, Any]) -> ProblemField:
     part, *inner = found["loc"]
     if found["type"] == "json_invalid":
         return ProblemField(field="body", reason=f"is not JSON: {found['ctx']['error']}, at character {inner[0]}")
-    text: str = found["msg"]
-    return ProblemField(field=".".join(map(str, inner or [part])), reason=text[:1].lower() + text[1:])
+    return ProblemField(field=".".join(map(str, inner or [part])), reason=reason_of(found))
 
 
 async def _http_error(request: Request, error: Exception) -> Response:

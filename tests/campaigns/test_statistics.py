@@ -299,7 +299,9 @@ def test_a_donor_that_cannot_be_one_is_refused_by_name(client: TestClient, datab
     )
     assert "there is no campaign 99" in refusal({"campaign_id": 99})["definition.start.donor.campaign_id"]
     assert "leave it out" in refusal({"campaign_id": donor, "checksum": "0" * 64})["definition.start.donor.checksum"]
-    assert "must be between" in refusal({"campaign_id": donor}, bounds={"kp": (0, 290)})["definition.start.gains.kp"]
+    assert (
+        "must hold the start gain" in refusal({"campaign_id": donor}, bounds={"kp": (0, 290)})["definition.bounds.kp"]
+    )
     other = refusal({"campaign_id": donor}, experiment_options={"window_s": 20.0})["definition.start.donor.campaign_id"]
     assert other == f"campaign {donor} has a scored window of 32.6 s, this one of 20 s"
     assert (

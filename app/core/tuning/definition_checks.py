@@ -1,7 +1,7 @@
 """Validation of a campaign's definition, before it is frozen."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from app.core.definition import Definition, StopRule, problems_of_options
@@ -98,8 +98,28 @@ def _check_start(definition: Definition, space: PolicySpace) -> None:
     if (start.kind == "campaign") != (start.donor is not None):
         reason = "is required with start.kind 'campaign', and not allowed with any other"
         raise InputError("Invalid start.", hint="", problems=(Problem("start.donor", reason),))
-    if start.kind != "simplex":
-        space.check(start.gains or space.mapping(space.default), field="start.gains")
+    if start.kind == "given" and start.gains is not None:
+        space.check(start.gains, field="start.gains")
+    elif start.kind != "simplex":
+        given = start.gains or space.mapping(space.default)
+        _check_bounds_hold(space, space.complete(given, field="start.gains"))
+
+
+def _check_bounds_hold(space: PolicySpace, gains: Mapping[str, float]) -> None:
+    """Gains that the definition does not name are not at fault: the bounds are, because they leave them out."""
+    left_out = [gain for gain in space.gains if gain.refusal_by_bounds(gains[gain.name]) is not None]
+    if left_out:
+        raise InputError(
+            "Invalid bounds.",
+            hint="Choose bounds that hold the start gains, or another start.",
+            problems=tuple(
+                Problem(
+                    f"bounds.{gain.name}",
+                    f"must hold the start gain {gains[gain.name]:g}, got {gain.lower:g} … {gain.upper:g}",
+                )
+                for gain in left_out
+            ),
+        )
 
 
 def _fractions(definition: Definition) -> Iterator[Problem]:

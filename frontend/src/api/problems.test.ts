@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import {
   ApiError,
+  inPercent,
   limitsOf,
   offersOf,
   otherProblems,
@@ -9,6 +10,7 @@ import {
   reasonsByField,
   reasonsByWeight,
   retries,
+  standingProblem,
 } from "./problems";
 
 const refused = problemFrom(422, {
@@ -84,4 +86,33 @@ test("the reason that harms in flight comes first, and sentences are joined by a
   expect(reasonsByWeight(problem)[0]).toBe("The vehicle can be stuck on the ground.");
   expect(reasonsByWeight(problem)).toHaveLength(3);
   expect(reasonsByField(problem, ["ki"])["ki"]).toBe("The step is too large. The vehicle can be stuck on the ground.");
+});
+
+test("a refusal of a form leaves a field that is edited, and ends with the last of them", () => {
+  const sent = { name: "", definition: { stop: { max_flights: 0 } } };
+  const error = new ApiError(
+    problemFrom(422, {
+      problems: [
+        { field: "name", reason: "must not be empty" },
+        { field: "definition.stop.max_flights", reason: "must be at least 1, got 0" },
+      ],
+    }),
+  );
+  const fieldsAfter = (current: unknown) =>
+    standingProblem(error, sent, current)?.problems.map(({ field }) => field) ?? null;
+  expect(fieldsAfter(sent)).toEqual(["name", "definition.stop.max_flights"]);
+  expect(fieldsAfter({ ...sent, name: "Drone 7" })).toEqual(["definition.stop.max_flights"]);
+  expect(fieldsAfter({ name: "Drone 7", definition: { stop: { max_flights: 7 } } })).toBeNull();
+});
+
+test("a refusal that names no field stays", () => {
+  const error = new ApiError(problemFrom(409, { title: "Conflict" }));
+  expect(standingProblem(error, { name: "a" }, { name: "b" })?.title).toBe("Conflict");
+});
+
+test("a reason about a share is given in percent", () => {
+  expect(inPercent("must be below 1, got 1.01")).toBe("must be below 100\u00a0%, got 101\u00a0%");
+  expect(inPercent("must be above 0 and at most 0.5, got -0.07")).toBe(
+    "must be above 0\u00a0% and at most 50\u00a0%, got −7\u00a0%",
+  );
 });

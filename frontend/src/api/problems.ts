@@ -95,9 +95,14 @@ export function problemFrom(status: number | undefined, body: unknown): Problem 
   };
 }
 
+function isProblem(error: unknown): error is Problem {
+  return typeof error === "object" && error !== null && "problems" in error && "hint" in error;
+}
+
 export function problemOf(error: unknown): Problem | null {
   if (error === null || error === undefined) return null;
   if (error instanceof ApiError) return error.problem;
+  if (isProblem(error)) return error;
   return { ...UNREACHABLE, title: error instanceof Error ? error.message : UNREACHABLE.title };
 }
 
@@ -111,6 +116,30 @@ export function reasonsByField(problem: Problem | null, fields: readonly string[
     if (owner !== undefined) reasons[owner] = reasons[owner] ? joined(reasons[owner], reason) : reason;
   }
   return reasons;
+}
+
+function valueAt(request: unknown, path: readonly string[]): unknown {
+  return path.reduce<unknown>(
+    (part, name) => (typeof part === "object" && part !== null ? (part as Record<string, unknown>)[name] : undefined),
+    request,
+  );
+}
+
+/** Refusal of a form's request without the fields that have been edited since; null once all of them have. */
+export function standingProblem(error: unknown, sent: unknown, current: unknown): Problem | null {
+  const problem = problemOf(error);
+  if (problem === null || problem.problems.length === 0) return problem;
+  const written = (request: unknown, field: string) => JSON.stringify(valueAt(request, field.split(".")));
+  const problems = problem.problems.filter(({ field }) => written(sent, field) === written(current, field));
+  return problems.length === 0 ? null : { ...problem, problems };
+}
+
+/** A reason about a share, in percent: `must be below 1, got 1.01` as `must be below 100 %, got 101 %`. */
+export function inPercent(reason: string | undefined): string | undefined {
+  return reason?.replace(/[-−]?\d+(?:\.\d+)?/g, (share) => {
+    const percent = Number((100 * Number(share.replace("−", "-"))).toPrecision(12));
+    return `${percent}\u00a0%`.replace("-", "−");
+  });
 }
 
 /** Join sentences by a space, and other texts by a semicolon. */

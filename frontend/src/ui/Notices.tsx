@@ -3,6 +3,7 @@ import { otherProblems, type Problem, problemOf } from "../api/problems";
 import classes from "./Notices.module.css";
 
 interface Props {
+  /** An error of a request, or its problem. */
   error: unknown;
   /** Fields whose reasons are shown at their inputs. */
   shown?: readonly string[];
@@ -38,6 +39,21 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
           </ul>
         )}
         {problem.hint && <p className={classes["hint"]}>{problem.hint}</p>}
+      </div>
+    </div>
+  );
+}
+
+/** A form's refusal: all that is left to say, where the reasons are written at their fields. */
+export function FormErrorNotice({ error, shown }: Required<Props>) {
+  const problem = problemOf(error);
+  const isMarked = problem !== null && problem.problems.length > 0 && otherProblems(problem, shown).length === 0;
+  if (!isMarked) return <ErrorNotice error={error} shown={shown} />;
+  return (
+    <div className={classes["trouble"]} role="alert">
+      <IconAlertTriangle size={20} aria-hidden />
+      <div>
+        <strong>Correct the marked fields, then try again.</strong>
       </div>
     </div>
   );

@@ -61,7 +61,7 @@ def test_the_default_definition_has_no_problems() -> None:
         ),
         (replace(GOOD, bounds={"kp": (0, math.nan)}), "bounds.kp", "must be whole numbers, got 0 … nan"),
         (replace(GOOD, bounds={"ki": (0.5, 99)}), "bounds.ki", "must be whole numbers, got 0.5 … 99"),
-        (replace(GOOD, bounds={"kp": (500, 600)}), "start.gains.kp", "must be between 500 and 600 counts, got 283"),
+        (replace(GOOD, bounds={"kp": (500, 600)}), "bounds.kp", "must hold the start gain 283, got 500 … 600"),
         (replace(GOOD, start=Start(kind="given")), "start.gains", "are required with start.kind 'given'"),
         (replace(GOOD, start=Start(gains={"kp": 1})), "start.gains", "are not allowed with start.kind 'default'"),
         (

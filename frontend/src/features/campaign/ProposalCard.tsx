@@ -7,7 +7,7 @@ import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
 import { useConnection } from "../../live/store";
 import { Note } from "../../ui/Note";
-import { ErrorNotice } from "../../ui/Notices";
+import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { isRepeat, refusalOf, trialOf } from "./choices";
@@ -60,7 +60,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         )}
         {isEvaluated && isRepeat(chosen.name) && <PriorScatter campaignId={campaign.id} />}
         <FlightWindow definition={campaign.definition} />
-        <ErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
+        <FormErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
         {isRefused && chosen.gate !== null && chosen.choice === undefined && (
           <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />
         )}

@@ -5,7 +5,7 @@ import type { Catalogue, OptionInfo } from "../../api/types";
 import { NumberField, OptionField, type OptionValue } from "../../ui/Fields";
 import { unitsOf } from "../../ui/units";
 import classes from "./NewCampaign.module.css";
-import { type CampaignForm, gainsOf, hasModel, optionsOf, type StopKind } from "./newCampaign";
+import { boundReasons, type CampaignForm, gainsOf, hasModel, optionsOf, type StopKind } from "./newCampaign";
 
 interface Props {
   form: CampaignForm;
@@ -165,13 +165,19 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
         const [low, high] = form.bounds[gain.name] ?? [gain.lower, gain.upper];
         const change = (pair: [number | string, number | string]): void =>
           set({ bounds: { ...form.bounds, [gain.name]: pair } });
+        const [lowReason, highReason] = boundReasons(gain, [low, high], reasons[`bounds.${gain.name}`]);
         return (
           <div key={gain.name} className={classes["bounds"]}>
-            <NumberField label={`${gain.name} minimum`} value={low} onChange={(value) => change([value, high])} />
+            <NumberField
+              label={`${gain.name} minimum`}
+              value={low}
+              error={lowReason}
+              onChange={(value) => change([value, high])}
+            />
             <NumberField
               label={`${gain.name} maximum`}
               value={high}
-              error={reasons[`bounds.${gain.name}`]}
+              error={highReason}
               onChange={(value) => change([low, value])}
             />
           </div>

@@ -3,7 +3,7 @@ import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate, useSearchParams } from "react-router";
 import { useCreateCampaign } from "../../api/mutations";
-import { problemOf, reasonsByField } from "../../api/problems";
+import { reasonsByField, standingProblem } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue, Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
@@ -11,7 +11,7 @@ import { Aside } from "../../ui/Aside";
 import { SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
 import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
-import { ErrorNotice } from "../../ui/Notices";
+import { FormErrorNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import { AdvancedFields } from "./AdvancedFields";
 import { DonorPicker } from "./DonorPicker";
@@ -20,6 +20,7 @@ import {
   fieldsOf,
   flyingOther,
   gainsOf,
+  inUnitsOfForm,
   kindsFor,
   registeredFor,
   requestFrom,
@@ -79,7 +80,9 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   const navigate = useNavigate();
   const create = useCreateCampaign();
   const { plain, advanced } = fieldsOf(form, catalogue);
-  const reasons = reasonsByField(problemOf(create.error), [...plain, ...advanced]);
+  const request = requestFrom(form, catalogue);
+  const problem = standingProblem(create.error, create.variables, request);
+  const reasons = inUnitsOfForm(reasonsByField(problem, [...plain, ...advanced]));
 
   const refusedBelow = advanced.some((field) => reasons[field] !== undefined);
   const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
@@ -94,7 +97,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       className={classes["form"]}
       onSubmit={(event) => {
         event.preventDefault();
-        create.mutate(requestFrom(form, catalogue), { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
+        create.mutate(request, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
       }}
     >
       {catalogue.experiments.length > 1 && (
@@ -167,7 +170,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
       <FoldedSection title="Advanced: stop rule, window, bounds, vehicle settings, seed" forcedOpen={refusedBelow}>
         <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
       </FoldedSection>
-      <ErrorNotice error={create.error} shown={[...plain, ...advanced]} />
+      <FormErrorNotice error={problem} shown={[...plain, ...advanced]} />
       <MissingNumbers fields={unread} />
       <div className={classes["create"]}>
         <Button

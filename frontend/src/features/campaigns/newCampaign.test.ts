@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { CampaignSummary, Catalogue, Vehicle } from "../../api/types";
 import {
+  boundReasons,
   fieldsOf,
   firstPreset,
   flyingOther,
@@ -216,4 +217,12 @@ test("a vehicle that flies another experiment brings it along, with its gains; a
     name: "Mine",
   });
   expect(requestFrom(form, catalogue).vehicle).toEqual({ kind: "mavlink", id: 8 });
+});
+
+test("a reason about bounds is given at the wrong one, or at both", () => {
+  const kp = gain("kp", 4000, 283);
+  expect(boundReasons(kp, [4001, 4000], "wrong")).toEqual(["wrong", undefined]);
+  expect(boundReasons(kp, [0, 100.5], "wrong")).toEqual([undefined, "wrong"]);
+  expect(boundReasons(kp, [300, 200], "wrong")).toEqual(["wrong", "wrong"]);
+  expect(boundReasons(kp, [0, 100], undefined)).toEqual([undefined, undefined]);
 });

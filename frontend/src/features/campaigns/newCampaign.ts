@@ -1,8 +1,10 @@
 /** Form of a new campaign: its defaults and its request. Number fields contain text until it is a valid number. */
 
+import { inPercent } from "../../api/problems";
 import type {
   CampaignSummary,
   Catalogue,
+  GainInfo,
   NewCampaign,
   OptionInfo,
   PresetInfo,
@@ -268,6 +270,27 @@ export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: str
       "seed",
     ],
   };
+}
+
+const SHARES = ["stop.improvement", "stop.confidence", "first_step_fraction", "step_fraction"] as const;
+
+/** Reasons by field, those about shares in percent, as the form shows them. */
+export function inUnitsOfForm(reasons: Readonly<Record<string, string>>): Record<string, string> {
+  const shares = SHARES.flatMap((field) => (reasons[field] === undefined ? [] : [[field, inPercent(reasons[field])]]));
+  return { ...reasons, ...Object.fromEntries(shares) };
+}
+
+/** A reason about a gain's bounds, at the bounds that are wrong: both, where each is right by itself. */
+export function boundReasons(
+  { lower, upper, integer }: Pick<GainInfo, "lower" | "upper" | "integer">,
+  [low, high]: readonly [NumberEntry, NumberEntry],
+  reason: string | undefined,
+): [minimum: string | undefined, maximum: string | undefined] {
+  const isWrong = (bound: NumberEntry): boolean =>
+    typeof bound === "number" && (bound < lower || bound > upper || (integer && !Number.isInteger(bound)));
+  const wrong = [isWrong(low), isWrong(high)] as const;
+  const both = !wrong[0] && !wrong[1];
+  return [wrong[0] || both ? reason : undefined, wrong[1] || both ? reason : undefined];
 }
 
 /** Labels of fields without a valid number; the campaign cannot be created until they are corrected. */

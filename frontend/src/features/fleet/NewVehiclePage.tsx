@@ -4,14 +4,14 @@ import { useState } from "react";
 import { useNavigate } from "react-router";
 import { useRegistrationRefusal } from "../../api/access";
 import { useRegisterVehicle } from "../../api/fleet";
-import { problemOf, reasonsByField } from "../../api/problems";
+import { reasonsByField, standingProblem } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
 import { OptionField, SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
 import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
-import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
+import { FormErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import {
   AUTOPILOTS,
@@ -56,7 +56,9 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
     ...gains.map(({ name }) => `safe_gains.${name}`),
     ...folded,
   ];
-  const reasons = reasonsByField(problemOf(register.error), fields);
+  const request = vehicleRequest(form);
+  const problem = standingProblem(register.error, register.variables, request);
+  const reasons = reasonsByField(problem, fields);
   const refusedBelow = folded.some((field) => reasons[field] !== undefined);
 
   const unread = unreadGains(form);
@@ -68,7 +70,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
       className={classes["form"]}
       onSubmit={(event) => {
         event.preventDefault();
-        register.mutate(vehicleRequest(form), { onSuccess: ({ id }) => void navigate(`/vehicles/${id}`) });
+        register.mutate(request, { onSuccess: ({ id }) => void navigate(`/vehicles/${id}`) });
       }}
     >
       <ReadOnlyNotice why={refusal} />
@@ -155,7 +157,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           ))}
         </div>
       </FoldedSection>
-      <ErrorNotice error={register.error} shown={fields} />
+      <FormErrorNotice error={problem} shown={fields} />
       <MissingNumbers fields={unread} />
       <Button
         type="submit"

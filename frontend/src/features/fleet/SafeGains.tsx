@@ -10,7 +10,7 @@ import { gainText, NOTHING } from "../../ui/format";
 import { inOrder, sameHeld } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
-import { ErrorNotice } from "../../ui/Notices";
+import { FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
@@ -150,7 +150,7 @@ function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
           error={reasons["statement"]}
           onChange={(event) => setStatement(event.currentTarget.value)}
         />
-        <ErrorNotice error={edit.error} shown={fields} />
+        <FormErrorNotice error={edit.error} shown={fields} />
         <Group gap={10}>
           <Button
             type="submit"
