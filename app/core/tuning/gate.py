@@ -131,7 +131,8 @@ def check_policy(
 
     Checks the numbers, the campaign's bounds, its step limit, and the experiment's hazards if it has a model. Gains of
     a valid flight of this campaign may fly again even if simulated takeoffs exceed the altitude or diverge, because the
-    flight is better evidence. Pure; takes a tenth of a second for a takeoff.
+    flight is better evidence. The step of a gain outside its bounds is that to the bound. Pure; takes a tenth of a
+    second for a takeoff.
 
     `space` is the experiment's, narrowed to the campaign's bounds. Before the first valid flight a gain may change by
     `first_step_fraction` of its range from the start gains, afterwards by `step_fraction` from any valid flight.
@@ -145,7 +146,8 @@ def check_policy(
     )
     if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
         hazards = tuple(_flown_before(check) for check in hazards)
-    limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
+    inside = space.mapping(space.nearest(space.vector(gains)))
+    limits = (*check_bounds(space, gains), _step(definition, experiment, space, inside, flights, start))
     return GateResult(jointly_offered(gains, (*limits, *hazards)))
 
 

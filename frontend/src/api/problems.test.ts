@@ -116,3 +116,13 @@ test("a reason about a share is given in percent", () => {
     "must be above 0\u00a0% and at most 50\u00a0%, got −7\u00a0%",
   );
 });
+
+test("a gain out of bounds is the first reason, before what a simulation of it shows", () => {
+  const problem = problemFrom(422, {
+    problems: [
+      { field: "gains", reason: "The highest of 32 simulated takeoffs rises to 9.40 m." },
+      { field: "gains.kp", reason: "kp must be between 0 and 4000 counts, got -5." },
+    ],
+  });
+  expect(reasonsByWeight(problem)[0]).toContain("between 0 and 4000");
+});

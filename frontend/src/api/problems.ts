@@ -147,8 +147,8 @@ function joined(one: string, other: string): string {
   return /[.!?]$/.test(one) ? `${one} ${other}` : `${one}; ${other}`;
 }
 
-/** Most important reasons first: harm in flight before limits. */
-const WEIGHT = [/stuck on the ground/, /wrap/, /ceiling|diverge|rise/];
+/** Most important reasons first: a gain out of bounds, then harm in flight, then other limits. */
+const WEIGHT = [/^\S+ must be /, /stuck on the ground/, /wrap/, /ceiling|diverge|rise/];
 
 /** Reasons of a gain refusal, most important first. */
 export function reasonsByWeight(problem: Problem | null): string[] {

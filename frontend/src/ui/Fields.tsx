@@ -13,16 +13,27 @@ interface Props extends Omit<TextInputProps, "value" | "onChange"> {
   suffix?: string;
   /** Value of an empty field; without it the field must be filled. */
   empty?: number;
+  /** Whether only whole numbers are valid. */
+  whole?: boolean;
 }
 
 /** Number input. Passes on valid input as a number and anything else as text, with an error message. */
-export function NumberField({ value, onChange, suffix, empty, error, required = false, ...props }: Props) {
+export function NumberField({
+  value,
+  onChange,
+  suffix,
+  empty,
+  error,
+  required = false,
+  whole = false,
+  ...props
+}: Props) {
   const written = typeof value === "number" ? typed(value) : value;
   const [text, setText] = useState(written);
   const meant = (typing: string): NumberEntry =>
-    typing.trim() === "" ? (empty ?? "") : (readNumber(typing).value ?? typing);
+    typing.trim() === "" ? (empty ?? "") : (readNumber(typing, whole).value ?? typing);
   const shown = meant(text) === value ? text : written;
-  const wrong = shown.trim() === "" && !required ? undefined : readNumber(shown).reason;
+  const wrong = shown.trim() === "" && !required ? undefined : readNumber(shown, whole).reason;
   return (
     <TextInput
       inputMode="decimal"

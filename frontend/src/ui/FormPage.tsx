@@ -54,6 +54,11 @@ export function FoldedSection({ title, forcedOpen, children }: FoldedSectionProp
   );
 }
 
+function outOfRange(value: NumberEntry | undefined, lower: number, upper: number): string | undefined {
+  const isInside = typeof value !== "number" || (lower <= value && value <= upper);
+  return isInside ? undefined : `Enter a number from ${lower} to ${upper}.`;
+}
+
 interface GainFieldsProps {
   legend: string;
   gains: readonly GainInfo[];
@@ -69,7 +74,7 @@ export function GainFields({ legend, gains, values, reasons, prefix, onChange }:
   return (
     <fieldset className={classes["gains"]}>
       <legend>{legend}</legend>
-      {gains.map(({ name, lower, upper, unit }) => (
+      {gains.map(({ name, lower, upper, unit, integer }) => (
         <NumberField
           key={name}
           required
@@ -77,7 +82,8 @@ export function GainFields({ legend, gains, values, reasons, prefix, onChange }:
           label={name}
           description={`${lower} … ${upper} ${unit}`}
           value={values[name] ?? ""}
-          error={reasons[`${prefix}.${name}`]}
+          whole={integer}
+          error={reasons[`${prefix}.${name}`] ?? outOfRange(values[name], lower, upper)}
           onChange={(value) => onChange({ ...values, [name]: value })}
         />
       ))}

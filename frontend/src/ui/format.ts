@@ -95,14 +95,16 @@ export type Reading = { value: number; reason?: undefined } | { value?: undefine
 
 const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 
-/** Parse `text`, or return the reason why it is not a number. No exponents, commas or spaces. */
-export function readNumber(text: string): Reading {
+/** Parse `text`, or return the reason why it is not a number, or not a whole one. No exponents, commas or spaces. */
+export function readNumber(text: string, isWhole = false): Reading {
   const trimmed = text.trim().replace(/^−/, "-");
   if (trimmed === "") return { reason: "Enter a number." };
+  if (isWhole && PLAIN.test(trimmed) && !Number.isInteger(Number(trimmed))) return { reason: "Enter a whole number." };
   if (trimmed.includes(",")) return { reason: "Use a decimal point, not a comma: 1.5." };
   const value = Number(trimmed);
   if (!PLAIN.test(trimmed) || !Number.isFinite(value)) {
-    return { reason: `“${trimmed}” is not a number. Enter a decimal number such as 400 or 12.5.` };
+    const example = isWhole ? "a whole number such as 400" : "a decimal number such as 400 or 12.5";
+    return { reason: `“${trimmed}” is not a number. Enter ${example}.` };
   }
   return { value: value === 0 ? 0 : value };
 }

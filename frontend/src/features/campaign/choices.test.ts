@@ -4,6 +4,7 @@ import {
   changeText,
   type GainRow,
   gainRows,
+  isOutside,
   placeIn,
   preselected,
   readGains,
@@ -102,7 +103,7 @@ test.each([
 
 describe("typed gains", () => {
   test("are flown as they are read", () => {
-    expect(readGains({ kp: "400", ki: "−1.5" })).toEqual({
+    expect(readGains({ kp: "400", ki: "−1.5" }, [])).toEqual({
       values: { kp: 400, ki: -1.5 },
       reasons: {},
       gains: { kp: 400, ki: -1.5 },
@@ -110,7 +111,7 @@ describe("typed gains", () => {
   });
 
   test("are none while one of them is no number", () => {
-    const { values, reasons, gains } = readGains({ kp: "4,5", ki: "20" });
+    const { values, reasons, gains } = readGains({ kp: "4,5", ki: "20" }, []);
     expect([values, Object.keys(reasons), gains]).toEqual([{ kp: null, ki: 20 }, ["kp"], null]);
   });
 });
@@ -124,5 +125,22 @@ test("a refusal names the gains, the reasons, and what would pass", () => {
   expect(refusalOf({ passed: false, checks } as Gate).problems).toEqual([
     { field: "gains.kp", reason: "kp must be between 0 and 4000.", offer: { kp: 4000 } },
     { field: "gains", reason: "It rises to 9 m." },
+  ]);
+});
+
+test("a gain in counts is read as a whole number only", () => {
+  const known = [{ name: "kp", integer: true }];
+  const { values, reasons, gains } = readGains({ kp: "82.5" }, known);
+  expect([values, reasons, gains]).toEqual([{ kp: null }, { kp: "Enter a whole number." }, null]);
+  expect(readGains({ kp: "x" }, known).reasons["kp"]).toContain("a whole number such as 400");
+});
+
+test("a gain beyond a bound is outside, one at it is not", () => {
+  expect([-5, 0, 4000, 99999, null].map((next) => isOutside({ next, bounds: [0, 4000] }))).toEqual([
+    true,
+    false,
+    false,
+    true,
+    false,
   ]);
 });

@@ -76,6 +76,11 @@ export function placeIn([lower, upper]: readonly [number, number], value: number
   return 100 * Math.min(1, Math.max(0, (value - lower) / (upper - lower)));
 }
 
+/** Whether a gain lies outside its bounds, where no prediction means anything. */
+export function isOutside({ next, bounds }: Pick<GainRow, "next" | "bounds">): boolean {
+  return next !== null && bounds !== null && (next < bounds[0] || next > bounds[1]);
+}
+
 /** Step of a slider: a count, or about a five-hundredth of the range. */
 export function sliderStep({ integer, bounds }: GainRow): number {
   if (integer || bounds === null || bounds[1] === bounds[0]) return 1;
@@ -83,12 +88,16 @@ export function sliderStep({ integer, bounds }: GainRow): number {
 }
 
 /** Typed gains: the numbers, null for what is none, and the reasons. */
-export function readGains(texts: Readonly<Record<string, string>>): {
+export function readGains(
+  texts: Readonly<Record<string, string>>,
+  known: readonly Pick<GainInfo, "name" | "integer">[],
+): {
   values: Record<string, number | null>;
   reasons: Record<string, string>;
   gains: GainSet | null;
 } {
-  const readings = Object.entries(texts).map(([name, text]) => [name, readNumber(text)] as const);
+  const isWhole = (name: string) => known.some((gain) => gain.name === name && gain.integer);
+  const readings = Object.entries(texts).map(([name, text]) => [name, readNumber(text, isWhole(name))] as const);
   const values = Object.fromEntries(readings.map(([name, { value }]) => [name, value ?? null]));
   const reasons = Object.fromEntries(readings.flatMap(([name, { reason }]) => (reason ? [[name, reason]] : [])));
   const isRead = Object.keys(reasons).length === 0;

@@ -2,9 +2,9 @@ import { useEffect, useMemo, useState } from "react";
 import { type GainSet, useEvaluation } from "../../api/evaluation";
 import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
-import type { Campaign, FlightChoice, GainsPrediction, Gate, Interval, Proposal } from "../../api/types";
+import type { Campaign, FlightChoice, GainInfo, GainsPrediction, Gate, Interval, Proposal } from "../../api/types";
 import { typed, typedGain } from "../../ui/format";
-import { type ChoiceName, type GainRow, gainRows, preselected, readGains } from "./choices";
+import { type ChoiceName, type GainRow, gainRows, isOutside, preselected, readGains } from "./choices";
 import type { GainEntry } from "./GainTable";
 
 /** The prediction that the chart draws in place of the proposal's. */
@@ -40,6 +40,9 @@ export interface ChosenFlight {
   use: (gains: GainSet) => void;
 }
 
+const NOTHING_PREDICTED = { predicted_error: null, interval: null, curve: null, lower: null, upper: null };
+const NO_GAINS: readonly GainInfo[] = [];
+
 function typedGains(gains: GainSet): Record<string, string> {
   return Object.fromEntries(Object.entries(gains).map(([name, value]) => [name, typedGain(value)]));
 }
@@ -56,13 +59,25 @@ export function useNextFlight(
   const [texts, setTexts] = useState(() => typedGains(proposal.gains));
   const experiment = useCatalogue().data?.experiments.find((one) => one.name === campaign.definition.experiment);
   const choice = proposal.choices.find(({ kind }) => kind === name);
-  const own = useMemo(() => readGains(texts), [texts]);
+  const known = experiment?.gains ?? NO_GAINS;
+  const own = useMemo(() => readGains(texts, known), [texts, known]);
   const gains = choice === undefined ? own.gains : choice.gains;
   const isProposal = choice?.proposed === true;
   const { prediction, gate } = useEvaluation(campaign.id, proposal.id, isProposal || isReadOnly ? null : gains);
+  const rows = gainRows(
+    proposal,
+    choice === undefined ? own.values : choice.gains,
+    known,
+    campaign.definition.bounds ?? {},
+  );
+  const isUnpredicted = rows.some(isOutside);
+  const predicted = useMemo(
+    () => (isUnpredicted && prediction.result ? { ...prediction.result, ...NOTHING_PREDICTED } : prediction.result),
+    [isUnpredicted, prediction.result],
+  );
   const preview = useMemo(
-    () => (isProposal ? null : { prediction: prediction.result, isCurrent: prediction.isCurrent }),
-    [isProposal, prediction.result, prediction.isCurrent],
+    () => (isProposal ? null : { prediction: predicted, isCurrent: prediction.isCurrent }),
+    [isProposal, predicted, prediction.isCurrent],
   );
   useEffect(() => onPreview(preview), [onPreview, preview]);
   useEffect(() => () => onPreview(null), [onPreview]);
@@ -79,18 +94,13 @@ export function useNextFlight(
       if (next === "own" && choice !== undefined) setTexts(typedGains(choice.gains));
       setName(next);
     },
-    rows: gainRows(
-      proposal,
-      choice === undefined ? own.values : choice.gains,
-      experiment?.gains ?? [],
-      campaign.definition.bounds ?? {},
-    ),
+    rows,
     entry:
       choice === undefined
         ? { texts, reasons, refused, onText: (gain, text) => setTexts({ ...texts, [gain]: text }) }
         : undefined,
     gains,
-    predicted: isProposal ? proposal : prediction.result,
+    predicted: isProposal ? proposal : predicted,
     isPredicted: isProposal || prediction.isCurrent,
     gate: isProposal ? proposal.gate : gate.result,
     isChecked: isProposal || gate.isCurrent,
