@@ -43,7 +43,7 @@ _NO_GAINS: Final = (
     "Gains: ",
 )
 _BY_HAND: Final = (
-    "took over manual control",
+    "took manual control",
     "may have been interrupted",
     "entered mode",
     "did not arm",
@@ -118,6 +118,6 @@ EXPECTED: Final[Mapping[str, Expected]] = {
         may_abort=True,
         may_quarantine=True,
     ),
-    "carried away": Expected(reasons=("away from its start", "began to land by itself"), ends_in=AIR, may_abort=True),
+    "carried away": Expected(reasons=("m from its start", "began to land by itself"), ends_in=AIR, may_abort=True),
 }
 """By the name of the hazard; every hazard has an entry."""

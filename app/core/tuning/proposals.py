@@ -106,12 +106,12 @@ def _start(
         explanation=Explanation(summary="", lesson=lesson),
     )
     start = with_interval(experiment, space, flights, start, pool_scatter((), experiment.scatter), base=None)
-    told = (
+    outlook = (
         f"predicts {short(error)} {experiment.error_unit}"
         if is_informative(None if start.interval is None else start.interval.lower, corrected=False)
         else "is too uncertain to predict its error"
     )
-    summary = f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {source} {told}."
+    summary = f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {source} {outlook}."
     return replace(start, explanation=replace(start.explanation, summary=summary))
 
 

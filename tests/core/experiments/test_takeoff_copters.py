@@ -141,7 +141,7 @@ def test_the_rule_that_tells_from_noise_flies_the_winner_again_with_what_its_fli
     assert (again.kind, again.gains) == ("repeat", FIRMER)
     assert again.predicted_error == pytest.approx(0.2)
     assert again.interval is None, "nobody knows yet how much flights scatter"
-    assert "Not known yet" in again.explanation.summary
+    assert "scatter under this autopilot is unknown" in again.explanation.summary
 
 
 def test_once_a_set_was_flown_twice_its_own_repeats_say_what_to_expect_of_a_third_flight() -> None:

@@ -11,7 +11,7 @@ from app.core.tuning.calibration import MAX_FLIGHTS
 from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.strategy import Proposal
-from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
+from tests.core.tuning.flying import TAKEOFF, TWIN, compiled_only, fly
 
 pytestmark = compiled_only
 
@@ -93,14 +93,23 @@ def test_a_repeat_is_predicted_by_the_mean_of_its_flights() -> None:
     assert predicted is not None
     assert predicted.predicted is not None
     assert predicted.predicted_error == pytest.approx(flights[1].error)
-    assert predicted.interval is not None
-    middle = (predicted.interval.lower + predicted.interval.upper) / 2.0
-    assert middle == pytest.approx(flights[1].error)
+    assert predicted.interval is None, "two flights with the same error show no scatter"
     np.testing.assert_allclose(
         predicted.predicted["altitude_m"][::512],
         np.interp(TAKEOFF.grid_s[::512], flights[1].trajectory.time_s, flights[1].trajectory["altitude_m"]),
         atol=1e-6,
     )
+
+
+def test_the_interval_of_a_repeat_is_that_of_its_flights() -> None:
+    flights = [fly(1, START), fly(2, BETTER), fly(3, BETTER, [1.02 * each for each in TWIN])]
+    predicted = predict_repeat(Definition(), flights, BETTER)
+    assert predicted is not None
+    mean = (flights[1].error + flights[2].error) / 2.0
+    assert predicted.predicted_error == pytest.approx(mean)
+    assert predicted.interval is not None
+    assert (predicted.interval.lower + predicted.interval.upper) / 2.0 == pytest.approx(mean)
+    assert predicted.interval.lower < min(flights[1].error, flights[2].error)
 
 
 def test_gains_that_were_not_flown_are_no_repeat() -> None:
