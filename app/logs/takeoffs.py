@@ -109,9 +109,10 @@ class Takeoff:
     def summary(self) -> str:
         """Description for a list to choose from."""
         held = format_gains(self.gains) or "gains not in the log"
+        highest = f"{self.trajectory['altitude_m'].max():.2f}".replace("-", "−")
         return (
-            f"{self.start_s:.1f} s into the log, from {self.begins_with}, {self.trajectory.time_s[-1]:.1f} s long, "
-            f"up to {self.trajectory['altitude_m'].max():.2f} m, {held}"
+            f"{self.start_s:.1f} s into the log, at {self.begins_with}: {self.trajectory.time_s[-1]:.1f} s recorded, "
+            f"highest {highest} m, {held}"
         )
 
 

@@ -137,25 +137,28 @@ def problem_response(error: GainlineError) -> Response:
     )
 
 
-async def _invalid_request(_request: Request, error: Exception) -> Response:
+async def _invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    problems = [_refused(found) for found in error.errors()]
+    body = getattr(request.scope.get("route"), "body_field", None)
+    schema = None if body is None else body.field_info.annotation
+    problems = [_refused(found, schema) for found in error.errors()]
     return _problem(
         HTTPStatus.UNPROCESSABLE_ENTITY,
-        "The request has invalid fields; nothing was changed.",
+        "Some values cannot be used; nothing was changed.",
         "Correct the fields listed, then try again.",
         problems,
         title="Unusable input",
+        script_hint="The fields of every request are described in /api/openapi.json.",
     )
 
 
-def _refused(found: Mapping[str, Any]) -> ProblemField:
+def _refused(found: Mapping[str, Any], schema: object) -> ProblemField:
     """The refused field, dotted as the caller wrote it: without the part of the request, unless there is nothing
     else."""
     part, *inner = found["loc"]
     if found["type"] == "json_invalid":
         return ProblemField(field="body", reason=f"is not JSON: {found['ctx']['error']}, at character {inner[0]}")
-    return ProblemField(field=".".join(map(str, inner or [part])), reason=reason_of(found))
+    return ProblemField(field=".".join(map(str, inner or [part])), reason=reason_of(found, schema))
 
 
 async def _http_error(request: Request, error: Exception) -> Response:

@@ -42,7 +42,7 @@ def test_the_trial_that_waits_takes_the_log(client: TestClient, settings: Settin
     result = run(settings, LOG, "--campaign", campaign["id"])
     assert result.exit_code == 0, result.stderr
     assert "Trial 1 of campaign" in result.stdout
-    assert "from the block Takeoff" in result.stdout
+    assert "at the block Takeoff" in result.stdout
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "valid"
 
 
@@ -134,6 +134,18 @@ def test_a_log_for_a_campaign_that_flies_by_itself_is_refused(
     result = run(settings, LOG, "--campaign", "Twin")
     assert result.exit_code == 1
     assert "is flown from here" in result.stderr
+    assert "Flown elsewhere" in result.stderr
+
+
+def test_a_log_for_a_campaign_that_has_ended_is_refused_with_the_way_to_import_it(
+    client: TestClient, settings: Settings, campaign: Json
+) -> None:
+    assert run(settings, LOG, "--campaign", "Garage").exit_code == 0
+    assert client.post(f"/api/campaigns/{campaign['id']}/finish", json={}).status_code == 200
+    result = run(settings, LOG, "--campaign", "Garage")
+    assert result.exit_code == 1
+    assert "has ended" in result.stderr
+    assert "Reopen it" in result.stderr
 
 
 def test_without_a_database_the_command_to_make_one_is_told(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def test_two_flights_in_one_log_are_listed_to_choose_from() -> None:
     with pytest.raises(TrajectoryError) as refusal:
         read_takeoff(io.BytesIO(both))
     assert [problem.field for problem in refusal.value.problems] == ["takeoff", "takeoff"]
-    assert "1: 18.4 s into the log, from the block Takeoff" in refusal.value.problems[0].reason
+    assert "1: 18.4 s into the log, at the block Takeoff" in refusal.value.problems[0].reason
     assert "kp 1624, ki 1356, kd 195" in refusal.value.problems[1].reason
     assert read_takeoff(io.BytesIO(both), number=2).gains["kp"] == 1624.0
     with pytest.raises(TrajectoryError, match="there is no takeoff 3"):

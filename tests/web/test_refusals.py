@@ -3,6 +3,7 @@
 from typing import Annotated, Any, Literal
 
 import pytest
+from fastapi.testclient import TestClient
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from app.common.schemas import Name
@@ -36,11 +37,20 @@ class Body(BaseModel):
         ({"share": 1.01}, "must be below 1, got 1.01"),
         ({"real": "perhaps"}, "must be true or false, got 'perhaps'"),
         ({"inner": {"rule": "luck"}}, "must be 'noise' or 'paper', got 'luck'"),
-        ({"inner": "noise"}, "must be an object, got 'noise'"),
-        ({"vehicl": {}}, "is not a known field"),
+        ({"inner": "noise"}, "must be an object with fields (rule)"),
+        ({"vehicl": {}}, "is not a known field (name, flights, share, real, inner)"),
+        ({"inner": {"rul": "paper"}}, "is not a known field (rule)"),
     ],
 )
 def test_a_refused_value_has_a_reason_in_plain_words(body: dict[str, Any], reason: str) -> None:
     with pytest.raises(ValidationError) as refused:
         Body.model_validate(body)
-    assert [reason_of(found) for found in refused.value.errors()] == [reason]
+    assert [reason_of(found, Body) for found in refused.value.errors()] == [reason]
+
+
+def test_a_request_with_an_unknown_field_is_told_the_known_ones(client: TestClient) -> None:
+    answer = client.post("/api/campaigns", json={"name": "A", "vehicl": {}, "vehicle": "twin"})
+    reasons = {problem["field"]: problem["reason"] for problem in answer.json()["problems"]}
+    assert reasons["vehicl"] == "is not a known field (name, vehicle, definition)"
+    assert reasons["vehicle"].startswith("must be an object with fields (kind, ")
+    assert "/api/openapi.json" in answer.json()["script_hint"]

@@ -24,7 +24,7 @@ from app.campaigns.trials.views import trajectory_view, trial_view
 from app.common.conflict_checks import check_action
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import ConflictError, InputError, NotFoundError, Problem, UnconfirmedError
-from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, Ending, TrialState
+from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, CampaignState, Ending, TrialState
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains
@@ -233,7 +233,7 @@ def import_record(
     if fleet.can_fly(campaign.vehicle):
         raise ConflictError(
             f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
-            hint="Fly it. Records can be uploaded only to campaigns with the vehicle `import`.",
+            hint="Fly it, or choose a campaign whose vehicle is “Flown elsewhere”.",
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)
     settle_gains(session, campaign, row, flown, confirmed=confirmed)
@@ -270,6 +270,10 @@ def import_into_campaign(
         )
     if chosen:
         return import_record(session, chosen[0].id, flown, confirmed=confirmed)
+    if row.state == CampaignState.FINISHED:
+        raise ConflictError(
+            f"Campaign {campaign_id} has ended.", hint="Reopen it on its page to import another flight, then try again."
+        )
     proposal = proposals.require_fresh_proposal(session, row)
     planned = create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
     return import_record(session, planned.id, flown, confirmed=confirmed)

@@ -44,19 +44,11 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
   );
 }
 
-/** A form's refusal: all that is left to say, where the reasons are written at their fields. */
+/** A form's refusal: its heading says what to do, where the reasons are written at their fields. */
 export function FormErrorNotice({ error, shown }: Required<Props>) {
   const problem = problemOf(error);
   const isMarked = problem !== null && problem.problems.length > 0 && otherProblems(problem, shown).length === 0;
-  if (!isMarked) return <ErrorNotice error={error} shown={shown} />;
-  return (
-    <div className={classes["trouble"]} role="alert">
-      <IconAlertTriangle size={20} aria-hidden />
-      <div>
-        <strong>Correct the marked fields, then try again.</strong>
-      </div>
-    </div>
-  );
+  return <ErrorNotice error={isMarked ? { ...problem, title: "Correct the marked fields." } : error} shown={shown} />;
 }
 
 /** Explains why this browser has read-only access; renders nothing without a reason. */
