@@ -101,7 +101,7 @@ def create(dashboard: Dashboard, vehicle_id: int) -> int:
 def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
     """Begun and ended on the page; its flights are written."""
     page = dashboard.page
-    expect(dashboard.panel("Rehearse first")).to_contain_text("Not rehearsed yet")
+    expect(dashboard.panel("Rehearse first")).to_contain_text("Not passed yet")
     expect(page.get_by_role("button", name=STAGE)).to_have_count(0)
     picture(dashboard, "rehearse")
     dashboard.button("Rehearse on a simulation").click()

@@ -26,7 +26,7 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     expect(page.get_by_text("the campaign must pass a rehearsal on a simulation")).to_be_visible()
     dashboard.button("Create campaign").click()
     asks = dashboard.panel("Rehearse first")
-    expect(asks).to_contain_text("Not rehearsed yet: it has not been flown on a simulation.")
+    expect(asks).to_contain_text("Not passed yet: it has not been flown on a simulation.")
     real = dashboard.when_ready(dashboard.campaign_id)
     expect(page.get_by_role("button", name=re.compile("^Stage"))).to_have_count(0)
     trial = dashboard.post(f"/campaigns/{real}/trials", {"gains": {"kp": 300, "ki": 13, "kd": 82}})

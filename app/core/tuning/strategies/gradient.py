@@ -239,7 +239,7 @@ GRADIENT: Final = Strategy(
         ),
         Option(
             name="bias",
-            title="Place of the correction: outside the control loop, or inside if the command was recorded",
+            title="Correction added outside or inside the control loop",
             default="outside",
             choices=("outside", "inside"),
         ),

@@ -51,7 +51,7 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
 const WRAPPED = { h: "auto", mih: 56, py: 8, styles: { label: { whiteSpace: "normal" } } } as const;
 
 const STANDING: Partial<Record<Campaign["rehearsal"]["state"], string>> = {
-  missing: "Not rehearsed yet:",
+  missing: "Not passed yet:",
   "under way": "In progress:",
   failed: "Failed:",
 };

@@ -88,3 +88,19 @@ test("a draft is not frozen yet", () => {
     "Definition digest",
   );
 });
+
+test("settings of the vehicle that are at their defaults are left out", () => {
+  const options = [
+    { name: "gust", title: "Gusts", unit: "m/s", default: 0 },
+    { name: "mass", title: "Mass", unit: "kg", default: 0.4 },
+  ];
+  const campaign = {
+    definition: { stop: {}, start: { kind: "default" } },
+    vehicle: { kind: "jsbsim", title: "Simulated", options: { gust: 0, mass: 0.5, other: 1 } },
+  } as unknown as Campaign;
+  const catalogue = { experiments: [], strategies: [], vehicle_kinds: [{ name: "jsbsim", options }] };
+  const names = settingsOf(campaign, catalogue as unknown as Catalogue).map(([name]) => name);
+  expect(names).toContain("Mass");
+  expect(names).toContain("other");
+  expect(names).not.toContain("Gusts");
+});

@@ -1,6 +1,6 @@
 /** A campaign's settings as titles and values. */
 
-import type { Campaign, Catalogue, Definition } from "../../api/types";
+import type { Campaign, Catalogue, Definition, OptionInfo } from "../../api/types";
 import { percentText } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 
@@ -37,6 +37,13 @@ function optionRows(options: Record<string, unknown>, known: readonly Described[
     const found = known.find((one) => one.name === name);
     return [found?.title ?? name, valueText(value, found?.unit)];
   });
+}
+
+/** Options that differ from the vehicle's defaults, and those that are not known. */
+function changedOptions(options: Record<string, unknown>, known: readonly OptionInfo[] = []): Record<string, unknown> {
+  const isDefault = (name: string, value: unknown) =>
+    known.some((option) => option.name === name && option.default === value);
+  return Object.fromEntries(Object.entries(options).filter(([name, value]) => !isDefault(name, value)));
 }
 
 function named(things: readonly Described[] | undefined, name: string): string {
@@ -90,7 +97,7 @@ export function settingsOf({ definition, vehicle, definition_digest }: Campaign,
   const unitOf = (name: string): string => experiment?.gains?.find((gain) => gain.name === name)?.unit ?? "";
   const rows: Row[] = [
     ["Vehicle", vehicle.title],
-    ...optionRows(vehicle.options, kind?.options),
+    ...optionRows(changedOptions(vehicle.options, kind?.options), kind?.options),
     ["Experiment", named(catalogue?.experiments, definition.experiment)],
     ...optionRows(experimentOptions(definition, catalogue), experiment?.options),
     ["Strategy", named(catalogue?.strategies, definition.strategy)],

@@ -82,7 +82,7 @@ const STOPS: Record<StopKind, { label: string; line: string }> = {
   budget: { label: "Flight budget", line: "Ends after the maximum number of flights." },
 };
 
-function StopFields({ form, reasons, set }: Props) {
+function StopFields({ form, catalogue, reasons, set }: Props) {
   const narrow = useMediaQuery("(max-width: 620px)", false, { getInitialValueInEffect: false });
   return (
     <Group title="Stop rule">
@@ -120,14 +120,16 @@ function StopFields({ form, reasons, set }: Props) {
           onChange={(confidencePercent) => set({ confidencePercent })}
         />
       )}
-      <NumberField
-        label="Minimum battery voltage"
-        placeholder="No limit"
-        suffix=" V"
-        value={form.minBatteryV}
-        error={reasons["stop.min_battery_v"]}
-        onChange={(minBatteryV) => set({ minBatteryV })}
-      />
+      {unitsOf(catalogue, form.experiment).output === "m" && (
+        <NumberField
+          label="Minimum battery voltage"
+          placeholder="No limit"
+          suffix=" V"
+          value={form.minBatteryV}
+          error={reasons["stop.min_battery_v"]}
+          onChange={(minBatteryV) => set({ minBatteryV })}
+        />
+      )}
     </Group>
   );
 }
@@ -170,6 +172,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
           <div key={gain.name} className={classes["bounds"]}>
             <NumberField
               label={`${gain.name} minimum`}
+              description={[gain.title, gain.unit].filter((part) => part !== "").join(", ")}
               value={low}
               error={lowReason}
               onChange={(value) => change([value, high])}

@@ -10,7 +10,7 @@ import classes from "./FirstCampaign.module.css";
 import { firstPreset } from "./newCampaign";
 
 const STEPS = [
-  ["Fly", "The vehicle takes off with its current gains. The score is the mean altitude error over 32.6 s."],
+  ["Fly", "The vehicle takes off with its current gains. The score is the mean altitude error over 32.6\u00a0s."],
   ["Learn", "The flight is compared with a simple model, and the difference corrects the next prediction."],
   ["Step", "The model evaluates many gain sets in about a second and proposes the best. You see why, and decide."],
 ] as const;

@@ -54,7 +54,7 @@ export function VehiclePicker({ kinds, registered, others, kind, vehicleId, erro
         </div>
       </Radio.Group>
       <div className={classes["more"]}>
-        {others.length > 0 && <span>For another experiment:</span>}
+        {others.length > 0 && <span>Vehicles that fly another experiment (choosing one changes it):</span>}
         {others.map((vehicle) => (
           <Button key={vehicle.id} variant="default" onClick={() => onVehicle(vehicle)}>
             {vehicle.name}

@@ -63,8 +63,9 @@ function NoVehicles() {
         page shows its battery, gains and operator.
       </p>
       <p>
-        To try it without a drone, run <code>gainline sim-drone</code> in a terminal and register it at{" "}
-        <code>udp:127.0.0.1:4245@4244</code> as simulated.
+        To try it without a drone, run <code>gainline sim-drone</code> in a terminal (from a checkout{" "}
+        <code>./dev exec gainline sim-drone</code>) and register it at <code>udp:127.0.0.1:4245@4244</code> as
+        simulated.
       </p>
     </div>
   );
