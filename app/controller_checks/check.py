@@ -13,10 +13,11 @@ from typing import BinaryIO, Final
 from app.controller_checks.ardupilot import ARDUPILOT
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.paparazzi import PAPARAZZI
+from app.controller_checks.px4 import PX4
 from app.controller_checks.results import Result
 from app.core.errors import InputError, Problem
 
-AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType({each.name: each for each in (ARDUPILOT, PAPARAZZI)})
+AUTOPILOTS: Final[Mapping[str, Autopilot]] = MappingProxyType({each.name: each for each in (ARDUPILOT, PX4, PAPARAZZI)})
 """Every autopilot with a replica, by name. The first one that recognises a recording examines it; Paparazzi, to which
 any gzipped file may belong, is last."""
 

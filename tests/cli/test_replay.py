@@ -89,3 +89,30 @@ def test_the_log_of_an_arducopter_is_compared_beside_a_trace_with_more_signals(t
     assert flown["largest_difference"]["throttle"] < 1e-7
     assert "160 rows" in flown["notes"][1]
     assert len(trace["largest_difference"]) == 8
+
+
+def test_the_loop_of_px4_alone_agrees_in_every_row_and_a_flight_in_its_medians(tmp_path: Path) -> None:
+    out = tmp_path / "replay.json"
+    folder = DATA / "px4_loop"
+    result = replay(folder / "wild_inputs.csv.gz", folder / "default_steps_push.csv.gz", "--json", out)
+    assert result.exit_code == 0
+    assert "PX4: largest difference" in result.stdout
+    wild, flight = json.loads(out.read_text())["files"]
+    assert (wild["autopilot"], wild["rows"], wild["passed"]) == ("px4", 3000, True)
+    assert max(wild["largest_difference"].values()) < 2e-7
+    assert (flight["rows"], flight["passed"], flight["first_different_row"]) == (10672, True, None)
+    assert flight["largest_difference"]["out_thrust"] < 0.5
+    assert flight["tolerance"]["out_thrust"] == 1e-3
+    assert flight["notes"][3].startswith("out_thrust: median difference")
+
+
+def test_a_flight_of_px4_with_other_gains_differs_in_its_medians(tmp_path: Path) -> None:
+    with gzip.open(DATA / "px4_loop" / "default_steps_push.csv.gz", "rt") as recorded:
+        first, rest = recorded.readline(), recorded.read()
+    path, out = tmp_path / "other.csv", tmp_path / "replay.json"
+    path.write_text(first.replace('"MPC_Z_P": 1.0', '"MPC_Z_P": 1.2') + rest)
+    result = replay(path, "--json", out)
+    (file,) = json.loads(out.read_text())["files"]
+    assert result.exit_code == 1
+    assert not file["passed"]
+    assert file["first_different_row"] is not None

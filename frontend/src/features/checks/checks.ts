@@ -17,6 +17,11 @@ export const RECORDINGS = [
     types: [".bin", ".csv", ".gz"],
     text: "the .bin log of a flight in GUIDED, or a trace with a row for every control step, .csv or .csv.gz",
   },
+  {
+    autopilot: "PX4",
+    types: [".csv", ".gz"],
+    text: "a trace with a row for every estimate of position, .csv or .csv.gz",
+  },
 ] as const;
 
 export const KINDS: Record<ControllerCheckSummary["kind"], string> = {

@@ -1,0 +1,188 @@
+"""Parameters of PX4's vertical loop, with the firmware's names, and their layout for the compiled step."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, fields
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.errors import InputError, Problem
+
+STEP_S: Final = 1 / 125
+"""Interval of the estimates of position in PX4's own simulation."""
+
+# Indices in the packed parameters.
+POSITION_P: Final = 0
+VELOCITY_P: Final = 1
+VELOCITY_I: Final = 2
+VELOCITY_D: Final = 3
+CLIMB: Final = 4
+DESCENT: Final = 5
+THRUST_MIN: Final = 6
+THRUST_MAX: Final = 7
+HOVER: Final = 8
+RAMP_S: Final = 9
+SPOOL_S: Final = 10
+VELOCITY_GAIN: Final = 11
+DERIVATIVE_GAIN: Final = 12
+LAND_SPEED: Final = 13
+PACKED_SIZE: Final = 14
+
+Packed = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """What the loop depends on; the defaults are the firmware's.
+
+    Gains and limits of PX4's Parameter Reference in SI units; thrust is a share of full thrust. The velocity
+    controller's P, the jerk, the speeds of the trajectory, its accelerations and those of takeoff and landing are
+    positive, all others at least 0. A filter of 0 Hz is none; a ramp of 0 s ends at once.
+    """
+
+    position_p_1_s: float = 1.0
+    velocity_p_1_s: float = 4.0
+    velocity_i_1_s2: float = 2.0
+    velocity_d: float = 0.0
+    climb_m_s: float = 3.0
+    descent_m_s: float = 1.5
+    thrust_min: float = 0.12
+    thrust_max: float = 1.0
+    hover_thrust: float = 0.5
+    ramp_s: float = 3.0
+    spool_s: float = 1.0
+    velocity_filter_hz: float = 0.0
+    derivative_filter_hz: float = 5.0
+    land_speed_m_s: float = 0.7
+    takeoff_speed_m_s: float = 1.5
+    auto_climb_m_s: float = 3.0
+    auto_descent_m_s: float = 1.5
+    upward_acceleration_m_s2: float = 4.0
+    downward_acceleration_m_s2: float = 3.0
+    jerk_m_s3: float = 4.0
+    slow_takeoff_below_m: float = 10.0
+    estimator_noise_1_s: float = 0.0036
+    estimator_gate: float = 3.0
+    estimator_initial_error: float = 0.1
+    estimator_vertical_speed_m_s: float = 2.0
+    estimator_horizontal_speed_m_s: float = 10.0
+    estimator_range: float = 0.2
+
+    def __post_init__(self) -> None:
+        problems = [
+            Problem(each.name, "must be positive" if each.name in _POSITIVE else "must be at least 0")
+            for each, value in zip(fields(self), astuple(self), strict=True)
+            if not (0.0 <= value < math.inf) or (each.name in _POSITIVE and not value)
+        ]
+        if problems:
+            raise InputError(
+                "The loop is not defined for these parameters.",
+                hint="Give the vehicle's own.",
+                problems=tuple(problems),
+            )
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """The tuned gains by the firmware's names."""
+        return {name: getattr(self, FIRMWARE_NAMES[name]) for name in GAINS}
+
+    def packed(self, filter_sample_s: float = STEP_S) -> Packed:
+        """Constants for the kernels, shape (PACKED_SIZE,).
+
+        `filter_sample_s` is the mean interval of the estimates until the filters were set up, s, positive.
+        """
+        packed = np.empty(PACKED_SIZE, dtype=np.float32)
+        packed[POSITION_P] = self.position_p_1_s
+        packed[VELOCITY_P] = self.velocity_p_1_s
+        packed[VELOCITY_I] = self.velocity_i_1_s2
+        packed[VELOCITY_D] = self.velocity_d
+        packed[CLIMB], packed[DESCENT] = self.climb_m_s, self.descent_m_s
+        packed[THRUST_MIN], packed[THRUST_MAX] = self.thrust_min, self.thrust_max
+        packed[HOVER] = self.hover_thrust
+        packed[RAMP_S] = self.ramp_s
+        packed[SPOOL_S] = self.spool_s
+        packed[VELOCITY_GAIN] = low_pass_gain(self.velocity_filter_hz, filter_sample_s)
+        packed[DERIVATIVE_GAIN] = low_pass_gain(self.derivative_filter_hz, filter_sample_s)
+        packed[LAND_SPEED] = self.land_speed_m_s
+        return packed
+
+
+_POSITIVE: Final = frozenset(
+    {
+        "velocity_p_1_s",
+        "land_speed_m_s",
+        "takeoff_speed_m_s",
+        "auto_climb_m_s",
+        "auto_descent_m_s",
+        "upward_acceleration_m_s2",
+        "downward_acceleration_m_s2",
+        "jerk_m_s3",
+        "hover_thrust",
+    }
+)
+
+FIRMWARE_NAMES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "MPC_Z_P": "position_p_1_s",
+        "MPC_Z_VEL_P_ACC": "velocity_p_1_s",
+        "MPC_Z_VEL_I_ACC": "velocity_i_1_s2",
+        "MPC_Z_VEL_D_ACC": "velocity_d",
+        "MPC_Z_VEL_MAX_UP": "climb_m_s",
+        "MPC_Z_VEL_MAX_DN": "descent_m_s",
+        "MPC_THR_MIN": "thrust_min",
+        "MPC_THR_MAX": "thrust_max",
+        "MPC_THR_HOVER": "hover_thrust",
+        "MPC_TKO_RAMP_T": "ramp_s",
+        "COM_SPOOLUP_TIME": "spool_s",
+        "MPC_VEL_LP": "velocity_filter_hz",
+        "MPC_VELD_LP": "derivative_filter_hz",
+        "MPC_LAND_SPEED": "land_speed_m_s",
+        "MPC_TKO_SPEED": "takeoff_speed_m_s",
+        "MPC_Z_V_AUTO_UP": "auto_climb_m_s",
+        "MPC_Z_V_AUTO_DN": "auto_descent_m_s",
+        "MPC_ACC_UP_MAX": "upward_acceleration_m_s2",
+        "MPC_ACC_DOWN_MAX": "downward_acceleration_m_s2",
+        "MPC_JERK_AUTO": "jerk_m_s3",
+        "MPC_LAND_ALT1": "slow_takeoff_below_m",
+        "HTE_HT_NOISE": "estimator_noise_1_s",
+        "HTE_ACC_GATE": "estimator_gate",
+        "HTE_HT_ERR_INIT": "estimator_initial_error",
+        "HTE_VZ_THR": "estimator_vertical_speed_m_s",
+        "HTE_VXY_THR": "estimator_horizontal_speed_m_s",
+        "HTE_THR_RANGE": "estimator_range",
+    }
+)
+"""Field of each parameter of the firmware."""
+
+GAINS: Final = ("MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC")
+
+UNSUPPORTED: Final = ("MPC_VEL_NF_FRQ",)
+"""The notch filter of the measured velocity, which the replica lacks: it must be off, as it is by default."""
+
+
+def low_pass_gain(cutoff_hz: float, sample_s: float) -> float:
+    """Share of the input that a first-order low-pass adopts per sample, 0 … 1; 1 for a cut-off of 0.
+
+    In single precision: the filtered velocity depends on its last bit.
+    """
+    if cutoff_hz == 0.0:
+        return 1.0
+    sample = np.float32(sample_s)
+    return float(sample / (sample + np.float32(1.0) / (np.float32(2.0 * math.pi) * np.float32(cutoff_hz))))
+
+
+def parameters_from(values: Mapping[str, float]) -> Parameters:
+    """Parameters from the firmware's values by name; those missing have their default, other names are ignored.
+
+    Raises InputError that names a value outside its range, or one that the replica lacks.
+    """
+    if problems := tuple(Problem(name, "must be 0") for name in UNSUPPORTED if values.get(name, 0.0) > 0.0):
+        raise InputError(
+            "The replica has no notch filter of the velocity.",
+            hint="Record the loop with the filter off, its default.",
+            problems=problems,
+        )
+    return Parameters(**{field: values[name] for name, field in FIRMWARE_NAMES.items() if name in values})

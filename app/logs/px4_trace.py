@@ -1,0 +1,98 @@
+"""Reader of recorded runs of PX4's vertical loop: described CSV, one row per estimate of position (`trace_table`)."""
+
+from collections.abc import Mapping
+from typing import BinaryIO, Final
+
+import numpy as np
+
+from app.core.control.px4 import INPUTS, OUTPUTS
+from app.core.control.px4_parameters import STEP_S, parameters_from
+from app.core.control.px4_replay import LoopTrace
+from app.core.errors import InputError, Problem
+from app.core.records.trajectory import Samples
+from app.logs.trace_table import TraceTable, has_columns, read_trace_table
+
+_DERIVATIVE: Final = "z_derivative_m_s"
+_NEW: Final = "set_new"
+_MODE: Final = "offboard"
+_SETPOINTS: Final = ("set_z_m", "set_vz_m_s", "set_az_m_s2")
+_ALWAYS: Final = ("takeoff_state", "out_vz_m_s", "out_az_m_s2", "out_thrust")
+_GIVEN: Final = tuple(each for each in INPUTS if each not in (_DERIVATIVE, _NEW))
+_FLAGS: Final = ("armed", "landed", "ground_contact", "want_takeoff")
+_MAY_BE_EMPTY: Final = (
+    *_SETPOINTS, "hover_estimate", "out_vz_m_s", "out_az_m_s2", "out_thrust",
+    "az_m_s2", "true_z_m", *OUTPUTS[len(_ALWAYS):], _DERIVATIVE,
+)  # fmt: skip
+COLUMNS: Final = ("time_s", *_GIVEN, *_ALWAYS)
+
+
+def is_px4_trace(beginning: bytes) -> bool:
+    """Whether text with this beginning is such a run."""
+    return has_columns(beginning, COLUMNS)
+
+
+def read_px4_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
+    """Read a run, plain or gzipped. Where they were not recorded, the derivative of z is the difference of z, and
+    set-points count as new in a row where they change, under offboard control and outside of a flight in every row.
+
+    Raises InputError naming the line and the column or key of the first error.
+    """
+    table = read_trace_table(stream, name=name, columns=COLUMNS, may_be_empty=_MAY_BE_EMPTY)
+    for flag in _FLAGS:
+        if not np.isin(table[flag], (0.0, 1.0)).all():
+            line = int(np.flatnonzero(~np.isin(table[flag], (0.0, 1.0)))[0]) + 3
+            raise _malformed(name, f"line {line}, {flag}", "must be 0 or 1")
+    if (table["dt_s"] <= 0.0).any():
+        line = int(np.flatnonzero(table["dt_s"] <= 0.0)[0]) + 3
+        raise _malformed(name, f"line {line}, dt_s", "must be positive")
+    described = table.description
+    sample_s = _number(name, described, "filter_sample_s") if "filter_sample_s" in described else STEP_S
+    if sample_s <= 0.0:
+        raise _malformed(name, "line 1, filter_sample_s", "must be positive")
+    derived = {_DERIVATIVE: np.diff(table["z_m"], prepend=table["z_m"][0]) / table["dt_s"], _NEW: _new(table)}
+    known = derived | dict(table.columns)
+    return LoopTrace(
+        parameters=parameters_from(_values(name, described)),
+        filter_sample_s=sample_s,
+        flown=_MODE in known,
+        time_s=table["time_s"],
+        inputs=np.ascontiguousarray(np.column_stack([known[each] for each in INPUTS])),
+        outputs=_outputs(table),
+    )
+
+
+def _new(table: TraceTable) -> Samples:
+    """1 in rows with set-points that arrived since the row before, shape (n,)."""
+    given = np.column_stack([table[each] for each in _SETPOINTS])
+    same = (given[1:] == given[:-1]) | (np.isnan(given[1:]) & np.isnan(given[:-1]))
+    changed = np.append(True, ~same.all(axis=1))
+    return np.where(table[_MODE] > 0.0, 1.0, changed) if _MODE in table.columns else np.ones(len(table))
+
+
+def _outputs(table: TraceTable) -> Samples:
+    unknown = np.full(len(table), np.nan)
+    return np.ascontiguousarray(np.column_stack([table.columns.get(each, unknown) for each in OUTPUTS]))
+
+
+def _values(name: str, described: Mapping[str, object]) -> dict[str, float]:
+    """The firmware's parameters by name."""
+    given = described.get("parameters")
+    if not isinstance(given, dict):
+        raise _malformed(name, "line 1, parameters", "must be a JSON object")
+    return {each: _number(name, given, each) for each in given}
+
+
+def _number(name: str, described: Mapping[str, object], key: str) -> float:
+    found = described.get(key)
+    if isinstance(found, bool) or not isinstance(found, int | float) or not np.isfinite(found):
+        raise _malformed(name, f"line 1, {key}", "must be a finite number")
+    return float(found)
+
+
+def _malformed(name: str, field: str, reason: str) -> InputError:
+    return InputError(
+        f"{name} cannot be replayed.",
+        hint="A trace of PX4's loop has # and a JSON object with parameters, a header, and one row per estimate of "
+        f"position with the columns {','.join(COLUMNS)}.",
+        problems=(Problem(field, reason),),
+    )

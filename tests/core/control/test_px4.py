@@ -1,0 +1,295 @@
+"""The replica of PX4's loop against recorded runs of the original (origin: tests/data/px4_loop/README.md), and branch
+by branch against its formulas, evaluated by hand. Velocities and accelerations are positive down."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.core.control.px4 import (
+    ACCELERATION_TARGET,
+    DISARMED,
+    FLIGHT,
+    GRAVITY,
+    HOVER_THRUST,
+    INPUTS,
+    INTEGRAL,
+    OUTPUTS,
+    RAMP_SPEED,
+    RAMP_UP,
+    READY,
+    SPOOL_UP,
+    STATE_SIZE,
+    TAKEOFF,
+    THRUST,
+    VELOCITY,
+    VELOCITY_TARGET,
+    State,
+    reset_velocity,
+    rollout,
+    start,
+    start_hover,
+    step,
+    wants_takeoff,
+)
+from app.core.control.px4_parameters import Packed, Parameters
+from app.core.control.px4_replay import LoopTrace, replayed
+from app.core.records.trajectory import Samples
+from app.logs.px4_trace import read_px4_trace
+
+DATA = Path(__file__).parents[2] / "data" / "px4_loop"
+FLIGHTS = ("default_steps_push.csv.gz", "stiff_steps_push.csv.gz")
+NAN = math.nan
+G = 9.80665
+
+
+def read(name: str, rows: slice = slice(None)) -> LoopTrace:
+    with (DATA / name).open("rb") as stream:
+        trace = read_px4_trace(stream, name=name)
+    return replace(trace, time_s=trace.time_s[rows], inputs=trace.inputs[rows], outputs=trace.outputs[rows])
+
+
+def differences(trace: LoopTrace) -> Samples:
+    """|replica − recording|, shape (n, 6): 0 where neither has a value, infinite where one has."""
+    computed = replayed(trace)
+    apart = np.abs(computed - trace.outputs)
+    apart[np.isnan(computed) & np.isnan(trace.outputs)] = 0.0
+    apart[np.isnan(apart)] = np.inf
+    return apart
+
+
+def flying(parameters: Parameters, *, thrust: float = 0.5, vz: float = 0.0) -> tuple[State, Packed]:
+    """A loop in hover with a hover thrust of 0.5."""
+    state, packed = np.empty(STATE_SIZE, dtype=np.float32), parameters.packed()
+    start_hover(state, packed, 0.5, thrust, vz)
+    return state, packed
+
+
+def disarmed(parameters: Parameters) -> tuple[State, Packed]:
+    state, packed = np.empty(STATE_SIZE, dtype=np.float32), parameters.packed()
+    start(state, packed)
+    return state, packed
+
+
+def run(state: State, packed: Packed, steps: int = 1, **given: float) -> None:
+    """Steps at 0 m and at rest, armed, with a new set-point of nothing but what is `given` by column."""
+    usual = dict.fromkeys(INPUTS, 0.0) | {
+        "dt_s": 0.008, "set_z_m": NAN, "set_vz_m_s": NAN, "set_az_m_s2": NAN, "set_new": 1.0, "hover_estimate": NAN,
+        "armed": 1.0, "limit_up_m_s": 3.0, "limit_down_m_s": 1.5,
+    }  # fmt: skip
+    row = np.array([(usual | given)[name] for name in INPUTS], dtype=np.float32)
+    for _ in range(steps):
+        step(state, packed, row)
+
+
+def test_random_inputs_give_what_the_original_gave() -> None:
+    """Rows 0 to 1200 pass through every state of the takeoff."""
+    trace = read("wild_inputs.csv.gz", slice(1200))
+    assert set(trace.outputs[:, 0]) == {SPOOL_UP, READY, RAMP_UP, FLIGHT}
+    assert differences(trace).max() < 2e-7
+
+
+@pytest.mark.complete
+def test_all_random_inputs_give_what_the_original_gave() -> None:
+    trace = read("wild_inputs.csv.gz")
+    assert len(trace.time_s) == 3000
+    assert differences(trace).max() < 2e-7
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_a_takeoff_follows_the_recorded_flight(name: str) -> None:
+    """Until the first offboard step every row agrees: takeoff, climb and hold with a hover estimate."""
+    trace = read(name, slice(1400))
+    assert np.isfinite(trace.inputs[:, INPUTS.index("hover_estimate")]).sum() > 300
+    assert differences(trace)[:, :4].max() < 1e-5
+
+
+@pytest.mark.complete
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_a_whole_recorded_flight_is_followed(name: str) -> None:
+    """The medians: single rows differ where two messages share a time stamp."""
+    medians = np.median(differences(read(name)), axis=0)
+    assert medians[OUTPUTS.index("out_vz_m_s")] < 1e-6
+    assert medians[OUTPUTS.index("out_thrust")] < 1e-3
+
+
+def test_velocity_and_thrust_of_a_position_error() -> None:
+    """v = 1.5·(−2 + 1) + 0.1 = −1.4; a = −0.3 + 8·(−1.4) = −11.5; T = 0.5·(1 + 11.5/g), above 1: 1."""
+    state, packed = flying(Parameters(position_p_1_s=1.5, velocity_p_1_s=8.0))
+    run(state, packed, z_m=-1.0, set_z_m=-2.0, set_vz_m_s=0.1, set_az_m_s2=-0.3)
+    assert state[VELOCITY_TARGET] == pytest.approx(-1.4)
+    assert state[ACCELERATION_TARGET] == pytest.approx(-11.5)
+    assert state[THRUST] == 1.0
+
+
+def test_derivative_acts_on_the_filtered_measurement() -> None:
+    """d = 0.200849·0.08/0.008 = 2.00849; a = 4·(0 − 0.08) − 0.5·d."""
+    state, packed = flying(Parameters(velocity_d=0.5))
+    run(state, packed, vz_m_s=0.08, set_z_m=0.0)
+    assert state[ACCELERATION_TARGET] == pytest.approx(-0.32 - 0.5 * 2.0084864, rel=1e-5)
+
+
+@pytest.mark.parametrize(("z", "target"), [(-9.0, -2.0), (9.0, 1.5)])
+def test_limits_of_the_mode_bound_the_velocity(z: float, target: float) -> None:
+    state, packed = flying(Parameters())
+    run(state, packed, set_z_m=z, limit_up_m_s=2.0)
+    assert state[VELOCITY_TARGET] == target
+
+
+def test_a_negative_limit_downwards_is_none_at_all() -> None:
+    state, packed = flying(Parameters())
+    run(state, packed, set_z_m=1.0, limit_down_m_s=-1.0)
+    assert state[VELOCITY_TARGET] == 0.0
+
+
+def test_integral_of_the_velocity_error() -> None:
+    """After a step: I = 2·(−0.5)·0.008."""
+    state, packed = flying(Parameters())
+    run(state, packed, set_z_m=-0.5)
+    assert state[INTEGRAL] == pytest.approx(-0.008)
+
+
+@pytest.mark.parametrize(
+    ("thrust", "z", "moves"), [(0.12, 1.0, False), (0.12, -0.3, True), (1.0, -3.0, False), (1.0, 0.3, True)]
+)
+def test_the_integral_waits_at_a_limit_of_thrust_unless_it_leads_away(thrust: float, z: float, moves: bool) -> None:
+    state, packed = flying(Parameters(velocity_p_1_s=0.001), thrust=thrust - 1e-6 if thrust < 0.5 else thrust + 1e-6)
+    before = float(state[INTEGRAL])
+    run(state, packed, set_z_m=z)
+    assert (abs(state[INTEGRAL] - before) > 1e-4) == moves
+
+
+def test_the_integral_is_bounded_by_gravity() -> None:
+    state, packed = flying(Parameters())
+    state[INTEGRAL] = -30.0
+    run(state, packed, set_z_m=1.0)
+    assert state[ACCELERATION_TARGET] == pytest.approx(4.0 - G)
+
+
+def test_a_new_hover_thrust_leaves_the_thrust_as_it_is() -> None:
+    """a' solves 0.6·(1 − a'/g) = 0.5·(1 − a/g); without an error a = I."""
+    state, packed = flying(Parameters(), thrust=0.55)
+    run(state, packed, set_z_m=0.0, hover_estimate=0.6)
+    assert state[HOVER_THRUST] == np.float32(0.6)
+    assert state[THRUST] == pytest.approx(0.55)
+    assert state[ACCELERATION_TARGET] == pytest.approx(G * (1.0 - 0.55 / 0.6), rel=1e-5)
+
+
+@pytest.mark.parametrize(("estimate", "adopted"), [(0.01, 0.05), (0.99, 0.9)])
+def test_bounds_of_the_hover_thrust(estimate: float, adopted: float) -> None:
+    state, packed = flying(Parameters())
+    run(state, packed, set_z_m=0.0, hover_estimate=estimate)
+    assert state[HOVER_THRUST] == np.float32(adopted)
+
+
+@pytest.mark.parametrize(("dt", "counted"), [(0.0001, 0.002), (0.2, 0.04)])
+def test_intervals_are_bounded(dt: float, counted: float) -> None:
+    state, packed = flying(Parameters())
+    run(state, packed, dt_s=dt, set_z_m=-0.5)
+    assert state[INTEGRAL] == pytest.approx(2.0 * -0.5 * counted)
+
+
+@pytest.mark.parametrize(("speed", "velocity"), [(0.35, 0.15), (-0.7, 0.3), (2.0, 0.3), (0.0, 0.0)])
+def test_without_a_target_of_altitude_the_velocity_is_blended_with_the_slope_of_altitude(
+    speed: float, velocity: float
+) -> None:
+    state, packed = flying(Parameters())
+    run(state, packed, z_derivative_m_s=0.3, set_vz_m_s=speed)
+    assert state[VELOCITY] == pytest.approx(velocity)
+    assert state[VELOCITY_TARGET] == pytest.approx(min(speed, 1.5))
+
+
+def test_an_acceleration_alone_is_followed_without_feedback() -> None:
+    state, packed = flying(Parameters(), thrust=0.6)
+    run(state, packed, set_az_m_s2=1.0)
+    assert math.isnan(state[VELOCITY_TARGET])
+    assert state[THRUST] == pytest.approx(0.5 * (1.0 - 1.0 / G))
+
+
+def test_a_jump_of_the_estimated_velocity_is_no_acceleration() -> None:
+    state, packed = flying(Parameters(velocity_d=1.0))
+    reset_velocity(state, 0.5)
+    run(state, packed, vz_m_s=0.5, set_vz_m_s=0.5, set_z_m=0.0)
+    assert state[ACCELERATION_TARGET] == 0.0
+
+
+def test_ground_contact_in_flight_withdraws_the_set_points_until_new_ones_arrive() -> None:
+    state, packed = flying(Parameters(), thrust=0.6)
+    run(state, packed, set_z_m=-1.0, ground_contact=1.0)
+    assert (state[THRUST], state[ACCELERATION_TARGET], state[INTEGRAL]) == (np.float32(0.12), 100.0, 0.0)
+    run(state, packed, set_z_m=-1.0, set_new=0.0)
+    assert state[ACCELERATION_TARGET] == 100.0
+    run(state, packed, set_z_m=-1.0)
+    assert state[VELOCITY_TARGET] == -1.0
+
+
+def test_states_of_a_takeoff_in_their_order() -> None:
+    state, packed = disarmed(Parameters(ramp_s=0.08))
+    run(state, packed, armed=0.0)
+    assert (state[TAKEOFF], state[THRUST]) == (DISARMED, np.float32(0.001))
+    run(state, packed, 125)
+    assert state[TAKEOFF] == SPOOL_UP
+    run(state, packed)
+    assert state[TAKEOFF] == READY
+    assert state[RAMP_SPEED] == pytest.approx(-G / 4.0)
+    run(state, packed, want_takeoff=1.0, set_z_m=-1.0)
+    assert state[TAKEOFF] == RAMP_UP
+    assert state[RAMP_SPEED] == pytest.approx(-G / 4.0 + 0.1 * (3.0 + G / 4.0))
+    assert state[VELOCITY_TARGET] == -state[RAMP_SPEED]
+    run(state, packed, 10, set_z_m=-1.0)
+    assert state[TAKEOFF] == FLIGHT
+    run(state, packed, landed=1.0, want_takeoff=1.0)
+    assert state[TAKEOFF] == READY
+    run(state, packed, armed=0.0)
+    assert state[TAKEOFF] == DISARMED
+
+
+def test_several_states_pass_in_one_step() -> None:
+    state, packed = disarmed(Parameters(spool_s=0.0, ramp_s=0.0))
+    run(state, packed, want_takeoff=1.0, set_z_m=-1.0)
+    assert (state[TAKEOFF], state[RAMP_SPEED]) == (RAMP_UP, 3.0)
+    run(state, packed, set_z_m=-1.0)
+    assert state[TAKEOFF] == FLIGHT
+
+
+def test_during_the_ramp_hover_thrust_is_the_parameter_and_accelerations_beside_a_velocity_are_dropped() -> None:
+    state, packed = disarmed(Parameters(spool_s=0.0, ramp_s=1e9, velocity_p_1_s=4.0))
+    run(state, packed, want_takeoff=1.0, set_vz_m_s=G / 4.0, set_z_m=0.0, limit_down_m_s=9.0)
+    dropped = float(state[ACCELERATION_TARGET])
+    run(state, packed, set_vz_m_s=G / 4.0, set_z_m=0.0, set_az_m_s2=-3.0, limit_down_m_s=9.0, hover_estimate=0.6)
+    assert dropped == pytest.approx(G)
+    assert state[HOVER_THRUST] == 0.5
+    before = float(state[ACCELERATION_TARGET])
+    run(state, packed, set_z_m=9.0, set_az_m_s2=-3.0, limit_down_m_s=G / 4.0)
+    assert state[ACCELERATION_TARGET] < before - 2.9
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "auto", "offboard"),
+    [
+        ((-5.1, NAN, NAN), False, True),
+        ((-5.3, NAN, NAN), True, True),
+        ((NAN, -0.2, NAN), False, True),
+        ((NAN, -0.4, NAN), True, True),
+        ((NAN, NAN, -0.1), False, True),
+        ((-4.9, 0.1, 0.1), False, False),
+    ],
+)
+def test_set_points_that_ask_for_a_takeoff(setpoint: tuple[float, float, float], auto: bool, offboard: bool) -> None:
+    assert wants_takeoff(-5.0, *setpoint, False) == auto
+    assert wants_takeoff(-5.0, *setpoint, True) == offboard
+
+
+def test_a_rollout_is_its_steps() -> None:
+    trace = read(FLIGHTS[0], slice(200, 203))
+    inputs = trace.inputs.astype(np.float32)
+    together, packed = flying(trace.parameters)
+    outputs = np.empty((3, len(OUTPUTS)), dtype=np.float32)
+    rollout(together, packed, inputs, outputs)
+    apart, _ = flying(trace.parameters)
+    for row, expected in zip(inputs, outputs, strict=True):
+        step(apart, packed, row)
+        np.testing.assert_array_equal(apart[: len(OUTPUTS)], expected)
+    assert np.float32(G) == GRAVITY
