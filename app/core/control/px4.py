@@ -4,7 +4,8 @@ and the ramp of a takeoff.
 A step runs once per estimate of position (125 Hz in PX4's own simulation), in single precision like the firmware.
 Altitude, velocity and acceleration are positive DOWN inside the replica, in m, m/s and m/s²; thrust is a share of full
 thrust, positive up. A set-point or an estimate that is not given is NaN, as in PX4. The state is an array that the
-caller owns. docs/models.md has the formulas.
+caller owns. A rollout is one kernel, whose parts take and return scalars, because compiled code with a call that takes
+arrays counts references. docs/models.md has the formulas.
 """
 
 import math
@@ -33,11 +34,11 @@ from app.core.kernels import kernel
 
 GRAVITY: Final = np.float32(9.80665)
 
-DISARMED: Final = 1.0
-SPOOL_UP: Final = 2.0
-READY: Final = 3.0
-RAMP_UP: Final = 4.0
-FLIGHT: Final = 5.0
+DISARMED: Final = np.float32(1.0)
+SPOOL_UP: Final = np.float32(2.0)
+READY: Final = np.float32(3.0)
+RAMP_UP: Final = np.float32(4.0)
+FLIGHT: Final = np.float32(5.0)
 """States of a takeoff, numbered as PX4's."""
 
 # Indices in the state array.
@@ -58,6 +59,7 @@ SET_ACCELERATION: Final = 13
 STATE_SIZE: Final = 14
 
 State = NDArray[np.float32]
+Single = np.float32
 
 INPUTS: Final = (
     "dt_s", "z_m", "vz_m_s", "z_derivative_m_s", "set_z_m", "set_vz_m_s", "set_az_m_s2", "set_new",
@@ -118,136 +120,123 @@ def reset_velocity(state: State, change: float) -> None:
 
 
 @kernel
-def advance_takeoff(state: State, p: Packed, dt: np.float32, armed: bool, landed: bool, wanted: bool) -> None:
-    """The first part of a step: state of the takeoff, then its ramp. Several states may pass in one step."""
-    takeoff = state[TAKEOFF]
-    state[ARMED_S] = state[ARMED_S] + dt if armed and takeoff != DISARMED else 0.0
-    if takeoff == DISARMED and armed:
-        takeoff = SPOOL_UP
-    if takeoff == SPOOL_UP and state[ARMED_S] >= p[SPOOL_S] - _SUM_ERROR_S:
-        takeoff = READY
+def blended(vz: Single, z_derivative: Single, set_z: Single, set_vz: Single, land_speed: Single) -> Single:
+    """The velocity to be filtered: without a target of altitude, partly or wholly the derivative of z."""
+    speed = abs(set_vz)
+    if not math.isnan(set_z) or not speed > 0.0:
+        return vz
+    return vz + min(speed / land_speed, _WHOLE) * (z_derivative - vz)
+
+
+@kernel
+def advanced_takeoff(
+    takeoff: Single, armed_s: Single, spool_s: Single, ramp: Single, armed: bool, landed: bool, wanted: bool
+) -> Single:
+    """The state that follows `takeoff`; several may pass in one step."""
+    if not armed:
+        return DISARMED
+    if takeoff <= SPOOL_UP:
+        takeoff = READY if armed_s >= spool_s - _SUM_ERROR_S else SPOOL_UP
     if takeoff == READY and wanted:
         takeoff = RAMP_UP
-        state[RAMP] = 0.0
-    if takeoff == RAMP_UP and state[RAMP] >= 1.0:
+    elif takeoff == RAMP_UP and ramp >= 1.0:
         takeoff = FLIGHT
-    if takeoff == FLIGHT and landed:
-        takeoff = READY
-    if not armed:
-        takeoff = DISARMED
-    state[TAKEOFF] = takeoff
-    lowest = -GRAVITY / p[VELOCITY_P]
+    return READY if takeoff == FLIGHT and landed else takeoff
+
+
+@kernel
+def advanced_ramp(takeoff: Single, ramp: Single, dt: Single, ramp_s: Single) -> Single:
+    """Progress of the ramp, 0 before a takeoff, done at 1."""
     if takeoff < RAMP_UP:
-        state[RAMP_SPEED] = lowest
-    elif takeoff == RAMP_UP:
-        ramp = state[RAMP] + dt / p[RAMP_S] if p[RAMP_S] > 0.0 else _WHOLE
-        state[RAMP] = ramp
-        state[RAMP_SPEED] = lowest + ramp * (p[CLIMB] - lowest) if ramp < 1.0 else p[CLIMB]
-    else:
-        state[RAMP_SPEED] = p[CLIMB]
+        return _NONE
+    if takeoff == FLIGHT or ramp_s == 0.0:
+        return _WHOLE
+    return ramp + dt / ramp_s
 
 
 @kernel
-def adopt_hover_thrust(state: State, estimate: np.float32) -> None:
-    """Replace the hover thrust by a new valid `estimate`, 0.05 … 0.9, and adapt the integral: thrust does not jump."""
-    new = min(max(estimate, _HOVER_MIN), _HOVER_MAX)
-    a = state[ACCELERATION_TARGET]
-    state[INTEGRAL] += (a - GRAVITY) * state[HOVER_THRUST] / new + GRAVITY - a
-    state[HOVER_THRUST] = new
+def ramp_speed(ramp: Single, lowest: Single, climb: Single) -> Single:
+    """Limit of the climb rate, m/s up, at this progress of the ramp: from `lowest`, which is negative, to `climb`."""
+    if ramp == 0.0:
+        return lowest
+    return lowest + ramp * (climb - lowest) if ramp < 1.0 else climb
 
 
 @kernel
-def filter_velocity(state: State, p: Packed, vz: np.float32, dt: np.float32) -> None:
-    """Low-pass of the measured velocity, m/s down, and of its derivative."""
-    before = state[VELOCITY]
-    state[VELOCITY] = before + p[VELOCITY_GAIN] * (vz - before)
-    state[DERIVATIVE] += p[DERIVATIVE_GAIN] * ((state[VELOCITY] - before) / dt - state[DERIVATIVE])
+def waits(error: Single, thrust: Single, least: Single, most: Single) -> bool:
+    """Whether the integral waits: the error points beyond the limit that the thrust is at, or is not known."""
+    return bool((thrust <= least and error >= 0.0) or (thrust >= most and error <= 0.0) or math.isnan(error))
 
 
 @kernel
-def choose_setpoints(state: State, ground_contact: bool) -> None:
-    """Withdraw what must not act in this state of the takeoff, until new set-points replace those in force."""
-    flying = state[TAKEOFF] == FLIGHT
-    if state[TAKEOFF] < RAMP_UP or (flying and ground_contact):
-        state[INTEGRAL] = 0.0
-        state[SET_Z] = state[SET_VELOCITY] = np.nan
-        state[SET_ACCELERATION] = _HELD_DOWN_M_S2
-    elif not (flying or math.isnan(state[SET_VELOCITY])):
-        state[SET_ACCELERATION] = np.nan
-
-
-@kernel
-def control(state: State, p: Packed, dt: np.float32, z: np.float32, up: np.float32, down: np.float32) -> None:
-    """The last part of a step: targets of velocity and acceleration, thrust, and the integral for the next step.
-
-    `up` and `down` limit the target of velocity, m/s; with `up` below 0 the vehicle is held down.
-    """
-    set_velocity, set_acceleration = state[SET_VELOCITY], state[SET_ACCELERATION]
-    target = p[POSITION_P] * (state[SET_Z] - z)
-    if math.isnan(target):
-        target = set_velocity
-    elif not math.isnan(set_velocity):
-        target += set_velocity
+def limited_velocity(target: Single, up: Single, down: Single) -> Single:
+    """`target`, m/s down, limited to −`up` … `down`; with `up` below 0 it is −`up`, and NaN stays NaN."""
     if target < -up:
-        target = -up
-    elif target > down:
-        target = down
-    integral = min(max(state[INTEGRAL], -GRAVITY), GRAVITY)
-    error = target - state[VELOCITY]
-    a = p[VELOCITY_P] * error + integral - p[VELOCITY_D] * state[DERIVATIVE]
-    if math.isnan(a):
-        a = set_acceleration
-    elif not math.isnan(set_acceleration):
-        a += set_acceleration
-    hover = state[HOVER_THRUST]
-    thrust = hover - a * hover / GRAVITY
-    least = p[THRUST_MIN] if state[TAKEOFF] == FLIGHT else _THRUST_ON_THE_GROUND
-    thrust = max(thrust, least)
-    held = (thrust <= least and error >= 0.0) or (thrust >= p[THRUST_MAX] and error <= 0.0)
-    if not (held or math.isnan(error)):
-        integral += p[VELOCITY_I] * error * dt
-    state[INTEGRAL] = integral
-    state[VELOCITY_TARGET], state[ACCELERATION_TARGET] = target, a
-    state[THRUST] = p[THRUST_MAX] if thrust > p[THRUST_MAX] else thrust
+        return -up
+    return down if target > down else target
 
 
 @kernel
-def step(state: State, p: Packed, inputs: NDArray[np.float32]) -> None:
-    """One run of position control from `inputs`, shape (15,) as `INPUTS`, single precision.
-
-    The set-points are those in force, `set_new` tells that they arrived since the last step; `hover_estimate` is a new
-    valid one, else NaN; the limits are the mode's, m/s, at least 0; conditions are 0 or 1. The results are the first
-    elements of `state`, in the order of `OUTPUTS`.
-    """
-    dt, z, vz = min(max(inputs[0], _DT_MIN_S), _DT_MAX_S), inputs[1], inputs[2]
-    if inputs[7] > 0.0:
-        state[SET_Z], state[SET_VELOCITY], state[SET_ACCELERATION] = inputs[4], inputs[5], inputs[6]
-    filter_velocity(state, p, _blended(state, p, vz, inputs[3]), dt)
-    advance_takeoff(state, p, dt, inputs[9] > 0.0, inputs[10] > 0.0, inputs[12] > 0.0)
-    if not math.isnan(inputs[8]):
-        adopt_hover_thrust(state, inputs[8])
-    flying = state[TAKEOFF] == FLIGHT
-    if not flying:
-        state[HOVER_THRUST] = p[HOVER]
-    choose_setpoints(state, inputs[11] > 0.0)
-    up = min(inputs[13], p[CLIMB]) if flying else state[RAMP_SPEED]
-    control(state, p, dt, z, up, inputs[14] if inputs[14] > 0.0 else _NONE)
-
-
-@kernel
-def _blended(state: State, p: Packed, vz: np.float32, z_derivative: np.float32) -> np.float32:
-    """The velocity to be filtered: without a target of altitude, partly or wholly the derivative of z."""
-    speed = abs(state[SET_VELOCITY])
-    if not math.isnan(state[SET_Z]) or not speed > 0.0:
-        return vz
-    blended: np.float32 = vz + min(speed / p[LAND_SPEED], _WHOLE) * (z_derivative - vz)
-    return blended
+def sum_of_given(one: Single, other: Single) -> Single:
+    """Sum of two terms; a term that is NaN is left out."""
+    if math.isnan(one):
+        return other
+    return one if math.isnan(other) else one + other
 
 
 @kernel
 def rollout(state: State, p: Packed, inputs: NDArray[np.float32], outputs: NDArray[np.float32]) -> None:
-    """One step per row of `inputs`, shape (n, 15) as `INPUTS`; fills `outputs`, shape (n, 6) as `OUTPUTS`."""
+    """One step per row of `inputs`, shape (n, 15) as `INPUTS`; fills `outputs`, shape (n, 6) as `OUTPUTS`.
+
+    The set-points are those in force, `set_new` tells that they arrived since the last step; `hover_estimate` is a new
+    valid one, else NaN; the limits are the mode's, m/s, at least 0; conditions are 0 or 1.
+    """
+    lowest = -GRAVITY / p[VELOCITY_P]
     for row in range(len(inputs)):
-        step(state, p, inputs[row])
+        dt, z, vz = min(max(inputs[row, 0], _DT_MIN_S), _DT_MAX_S), inputs[row, 1], inputs[row, 2]
+        armed, landed, ground_contact = inputs[row, 9] > 0.0, inputs[row, 10] > 0.0, inputs[row, 11] > 0.0
+        if inputs[row, 7] > 0.0:
+            state[SET_Z], state[SET_VELOCITY], state[SET_ACCELERATION] = inputs[row, 4], inputs[row, 5], inputs[row, 6]
+        vz = blended(vz, inputs[row, 3], state[SET_Z], state[SET_VELOCITY], p[LAND_SPEED])
+        before = state[VELOCITY]
+        state[VELOCITY] = before + p[VELOCITY_GAIN] * (vz - before)
+        state[DERIVATIVE] += p[DERIVATIVE_GAIN] * ((state[VELOCITY] - before) / dt - state[DERIVATIVE])
+
+        state[ARMED_S] = state[ARMED_S] + dt if armed and state[TAKEOFF] != DISARMED else _NONE
+        takeoff = advanced_takeoff(
+            state[TAKEOFF], state[ARMED_S], p[SPOOL_S], state[RAMP], armed, landed, inputs[row, 12] > 0.0
+        )
+        flying = takeoff == FLIGHT
+        state[TAKEOFF], state[RAMP] = takeoff, advanced_ramp(takeoff, state[RAMP], dt, p[RAMP_S])
+        state[RAMP_SPEED] = ramp_speed(state[RAMP], lowest, p[CLIMB])
+
+        if not math.isnan(inputs[row, 8]):
+            new, a = min(max(inputs[row, 8], _HOVER_MIN), _HOVER_MAX), state[ACCELERATION_TARGET]
+            state[INTEGRAL] += (a - GRAVITY) * state[HOVER_THRUST] / new + GRAVITY - a
+            state[HOVER_THRUST] = new
+        if not flying:
+            state[HOVER_THRUST] = p[HOVER]
+
+        if takeoff < RAMP_UP or (flying and ground_contact):
+            state[INTEGRAL] = 0.0
+            state[SET_Z] = state[SET_VELOCITY] = np.nan
+            state[SET_ACCELERATION] = _HELD_DOWN_M_S2
+        elif not (flying or math.isnan(state[SET_VELOCITY])):
+            state[SET_ACCELERATION] = np.nan
+
+        target = sum_of_given(p[POSITION_P] * (state[SET_Z] - z), state[SET_VELOCITY])
+        up = min(inputs[row, 13], p[CLIMB]) if flying else state[RAMP_SPEED]
+        target = limited_velocity(target, up, max(inputs[row, 14], _NONE))
+        error = target - state[VELOCITY]
+        integral = min(max(state[INTEGRAL], -GRAVITY), GRAVITY)
+        feedback = p[VELOCITY_P] * error + integral - p[VELOCITY_D] * state[DERIVATIVE]
+        a = sum_of_given(feedback, state[SET_ACCELERATION])
+        hover = state[HOVER_THRUST]
+        least = p[THRUST_MIN] if flying else _THRUST_ON_THE_GROUND
+        thrust = max(hover - a * hover / GRAVITY, least)
+        wait = waits(error, thrust, least, p[THRUST_MAX])
+        state[INTEGRAL] = integral if wait else integral + p[VELOCITY_I] * error * dt
+        state[VELOCITY_TARGET], state[ACCELERATION_TARGET] = target, a
+        state[THRUST] = min(thrust, p[THRUST_MAX])
         for place in range(len(OUTPUTS)):
             outputs[row, place] = state[place]

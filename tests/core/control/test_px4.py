@@ -12,7 +12,6 @@ from app.core.control.px4 import (
     ACCELERATION_TARGET,
     DISARMED,
     FLIGHT,
-    GRAVITY,
     HOVER_THRUST,
     INPUTS,
     INTEGRAL,
@@ -31,7 +30,6 @@ from app.core.control.px4 import (
     rollout,
     start,
     start_hover,
-    step,
     wants_takeoff,
 )
 from app.core.control.px4_parameters import Packed, Parameters
@@ -79,9 +77,8 @@ def run(state: State, packed: Packed, steps: int = 1, **given: float) -> None:
         "dt_s": 0.008, "set_z_m": NAN, "set_vz_m_s": NAN, "set_az_m_s2": NAN, "set_new": 1.0, "hover_estimate": NAN,
         "armed": 1.0, "limit_up_m_s": 3.0, "limit_down_m_s": 1.5,
     }  # fmt: skip
-    row = np.array([(usual | given)[name] for name in INPUTS], dtype=np.float32)
-    for _ in range(steps):
-        step(state, packed, row)
+    rows = np.array([[(usual | given)[name] for name in INPUTS]] * steps, dtype=np.float32)
+    rollout(state, packed, rows, np.empty((steps, len(OUTPUTS)), dtype=np.float32))
 
 
 def test_random_inputs_give_what_the_original_gave() -> None:
@@ -282,14 +279,13 @@ def test_set_points_that_ask_for_a_takeoff(setpoint: tuple[float, float, float],
     assert wants_takeoff(-5.0, *setpoint, True) == offboard
 
 
-def test_a_rollout_is_its_steps() -> None:
+def test_a_rollout_continues_where_the_one_before_ended() -> None:
     trace = read(FLIGHTS[0], slice(200, 203))
-    inputs = trace.inputs.astype(np.float32)
-    together, packed = flying(trace.parameters)
-    outputs = np.empty((3, len(OUTPUTS)), dtype=np.float32)
-    rollout(together, packed, inputs, outputs)
-    apart, _ = flying(trace.parameters)
-    for row, expected in zip(inputs, outputs, strict=True):
-        step(apart, packed, row)
-        np.testing.assert_array_equal(apart[: len(OUTPUTS)], expected)
-    assert np.float32(G) == GRAVITY
+    inputs, outputs = trace.inputs.astype(np.float32), np.empty((3, len(OUTPUTS)), dtype=np.float32)
+    state, packed = flying(trace.parameters)
+    rollout(state, packed, inputs, outputs)
+    interrupted, one = np.empty_like(state), np.empty((1, len(OUTPUTS)), dtype=np.float32)
+    start_hover(interrupted, packed, 0.5, 0.5, 0.0)
+    for row, expected in enumerate(outputs):
+        rollout(interrupted, packed, inputs[row : row + 1], one)
+        np.testing.assert_array_equal(one[0], expected)
