@@ -38,8 +38,7 @@ Packed = NDArray[np.float32]
 class Parameters:
     """What the loop depends on; the defaults are the firmware's.
 
-    Gains and limits of PX4's Parameter Reference in SI units; thrust is a share of full thrust. The velocity
-    controller's P, the jerk, the speeds of the trajectory, its accelerations and those of takeoff and landing are
+    Thrust is a share of full thrust. The velocity controller's P, the hover thrust and the speed of a landing are
     positive, all others at least 0. A filter of 0 Hz is none; a ramp of 0 s ends at once.
     """
 
@@ -57,19 +56,6 @@ class Parameters:
     velocity_filter_hz: float = 0.0
     derivative_filter_hz: float = 5.0
     land_speed_m_s: float = 0.7
-    takeoff_speed_m_s: float = 1.5
-    auto_climb_m_s: float = 3.0
-    auto_descent_m_s: float = 1.5
-    upward_acceleration_m_s2: float = 4.0
-    downward_acceleration_m_s2: float = 3.0
-    jerk_m_s3: float = 4.0
-    slow_takeoff_below_m: float = 10.0
-    estimator_noise_1_s: float = 0.0036
-    estimator_gate: float = 3.0
-    estimator_initial_error: float = 0.1
-    estimator_vertical_speed_m_s: float = 2.0
-    estimator_horizontal_speed_m_s: float = 10.0
-    estimator_range: float = 0.2
 
     def __post_init__(self) -> None:
         problems = [
@@ -114,12 +100,6 @@ _POSITIVE: Final = frozenset(
     {
         "velocity_p_1_s",
         "land_speed_m_s",
-        "takeoff_speed_m_s",
-        "auto_climb_m_s",
-        "auto_descent_m_s",
-        "upward_acceleration_m_s2",
-        "downward_acceleration_m_s2",
-        "jerk_m_s3",
         "hover_thrust",
     }
 )
@@ -140,19 +120,6 @@ FIRMWARE_NAMES: Final[Mapping[str, str]] = MappingProxyType(
         "MPC_VEL_LP": "velocity_filter_hz",
         "MPC_VELD_LP": "derivative_filter_hz",
         "MPC_LAND_SPEED": "land_speed_m_s",
-        "MPC_TKO_SPEED": "takeoff_speed_m_s",
-        "MPC_Z_V_AUTO_UP": "auto_climb_m_s",
-        "MPC_Z_V_AUTO_DN": "auto_descent_m_s",
-        "MPC_ACC_UP_MAX": "upward_acceleration_m_s2",
-        "MPC_ACC_DOWN_MAX": "downward_acceleration_m_s2",
-        "MPC_JERK_AUTO": "jerk_m_s3",
-        "MPC_LAND_ALT1": "slow_takeoff_below_m",
-        "HTE_HT_NOISE": "estimator_noise_1_s",
-        "HTE_ACC_GATE": "estimator_gate",
-        "HTE_HT_ERR_INIT": "estimator_initial_error",
-        "HTE_VZ_THR": "estimator_vertical_speed_m_s",
-        "HTE_VXY_THR": "estimator_horizontal_speed_m_s",
-        "HTE_THR_RANGE": "estimator_range",
     }
 )
 """Field of each parameter of the firmware."""
