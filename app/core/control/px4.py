@@ -106,20 +106,6 @@ def start_hover(state: State, p: Packed, hover_estimate: float, thrust: float, v
 
 
 @kernel
-def wants_takeoff(z: float, set_z: float, set_vz: float, set_az: float, offboard: bool) -> bool:
-    """Whether set-points ask for a takeoff; those of offboard control must be younger than 1 s."""
-    if offboard:
-        return set_z < z or set_vz < 0.0 or set_az < 0.0
-    return set_z < z - 0.2 or set_vz < -0.3
-
-
-@kernel
-def reset_velocity(state: State, change: float) -> None:
-    """The estimator has shifted its velocity by `change`, m/s down: so does the filter, which sees no acceleration."""
-    state[VELOCITY] += change
-
-
-@kernel
 def blended(vz: Single, z_derivative: Single, set_z: Single, set_vz: Single, land_speed: Single) -> Single:
     """The velocity to be filtered: without a target of altitude, partly or wholly the derivative of z."""
     speed = abs(set_vz)

@@ -26,11 +26,9 @@ from app.core.control.px4 import (
     VELOCITY,
     VELOCITY_TARGET,
     State,
-    reset_velocity,
     rollout,
     start,
     start_hover,
-    wants_takeoff,
 )
 from app.core.control.px4_parameters import Packed, Parameters
 from app.core.control.px4_replay import LoopTrace, replayed
@@ -205,13 +203,6 @@ def test_an_acceleration_alone_is_followed_without_feedback() -> None:
     assert state[THRUST] == pytest.approx(0.5 * (1.0 - 1.0 / G))
 
 
-def test_a_jump_of_the_estimated_velocity_is_no_acceleration() -> None:
-    state, packed = flying(Parameters(velocity_d=1.0))
-    reset_velocity(state, 0.5)
-    run(state, packed, vz_m_s=0.5, set_vz_m_s=0.5, set_z_m=0.0)
-    assert state[ACCELERATION_TARGET] == 0.0
-
-
 def test_ground_contact_in_flight_withdraws_the_set_points_until_new_ones_arrive() -> None:
     state, packed = flying(Parameters(), thrust=0.6)
     run(state, packed, set_z_m=-1.0, ground_contact=1.0)
@@ -261,22 +252,6 @@ def test_during_the_ramp_hover_thrust_is_the_parameter_and_accelerations_beside_
     before = float(state[ACCELERATION_TARGET])
     run(state, packed, set_z_m=9.0, set_az_m_s2=-3.0, limit_down_m_s=G / 4.0)
     assert state[ACCELERATION_TARGET] < before - 2.9
-
-
-@pytest.mark.parametrize(
-    ("setpoint", "auto", "offboard"),
-    [
-        ((-5.1, NAN, NAN), False, True),
-        ((-5.3, NAN, NAN), True, True),
-        ((NAN, -0.2, NAN), False, True),
-        ((NAN, -0.4, NAN), True, True),
-        ((NAN, NAN, -0.1), False, True),
-        ((-4.9, 0.1, 0.1), False, False),
-    ],
-)
-def test_set_points_that_ask_for_a_takeoff(setpoint: tuple[float, float, float], auto: bool, offboard: bool) -> None:
-    assert wants_takeoff(-5.0, *setpoint, False) == auto
-    assert wants_takeoff(-5.0, *setpoint, True) == offboard
 
 
 def test_a_rollout_continues_where_the_one_before_ended() -> None:
