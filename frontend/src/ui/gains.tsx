@@ -1,5 +1,5 @@
 import { Fragment } from "react";
-import { gainText } from "./format";
+import { gainText, NOTHING } from "./format";
 import { useGainTitles } from "./units";
 
 interface Props {
@@ -24,12 +24,12 @@ export function GainList({ gains, experiment }: Props) {
   );
 }
 
-/** A gain set as in the paper: `[400 20 100]`, in the experiment's order. */
-export function gainsInBrackets(gains: Readonly<Record<string, number>>): string {
-  return `[${Object.values(gains).map(gainText).join(" ")}]`;
-}
-
 type Gains = Readonly<Record<string, number>>;
+
+/** A gain set as in the paper: `[400 20 100]`, in the order of `names`, with a dash for an unknown gain. */
+export function gainsInBrackets(gains: Gains, names: readonly string[] = Object.keys(gains)): string {
+  return `[${names.map((name) => (gains[name] === undefined ? NOTHING : gainText(gains[name]))).join(" ")}]`;
+}
 
 /** The known gains, in the order of `names`. */
 export function inOrder(gains: Gains, names: readonly string[]): Gains {

@@ -18,7 +18,8 @@ import classes from "./VehicleCard.module.css";
 export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const status = useVehicleStatus(vehicle.registered ? vehicle.id : null);
   const ask = useVehicleRequest(vehicle.id);
-  const held = Object.keys(vehicle.held ?? {}).length > 0 ? gainsInBrackets(vehicle.held ?? {}) : "";
+  const names = Object.keys(vehicle.safe_gains);
+  const held = Object.keys(vehicle.held ?? {}).length > 0 ? gainsInBrackets(vehicle.held ?? {}, names) : "";
   const isLinked = vehicle.registered && vehicle.state !== "disconnected";
   return (
     <li className={`${row["card"]} ${classes["card"]}`} data-state={vehicle.state}>
@@ -35,7 +36,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
           {held !== "" && <Fact title="Current gains" value={held} />}
           <Fact
-            title={`Safe ${Object.keys(vehicle.safe_gains).join(", ")}`}
+            title={`Safe ${names.join(", ")}`}
             value={gainsInBrackets(vehicle.safe_gains)}
           />
           {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "no operator"} />}

@@ -71,7 +71,7 @@ function Line({ line }: { line: GivenGains }) {
       </td>
       <td className="numbers">{gainsInBrackets(line.asked)}</td>
       <td className={`numbers ${differs ? classes["differs"] : ""}`}>
-        {read_back === null ? NOTHING : gainsInBrackets(read_back)}
+        {read_back === null ? NOTHING : gainsInBrackets(read_back, Object.keys(line.asked))}
       </td>
       <td>{line.outcome}</td>
     </tr>
