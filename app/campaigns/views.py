@@ -264,7 +264,7 @@ def _next_action(row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehear
     if not is_rehearsal_satisfied(rehearsal):
         return "Continue the rehearsal" if rehearsal.state == "under way" else "Rehearse on a simulation"
     which = "first" if row.state == CampaignState.READY else "next"
-    return f"Fly the {which} trial" if fleet.can_fly(row.vehicle) else f"Upload the record of the {which} flight"
+    return f"Fly the {which} flight" if fleet.can_fly(row.vehicle) else f"Upload the record of the {which} flight"
 
 
 def _actions(session: Session, row: CampaignRow, flight: FlightRow | None) -> list[str]:

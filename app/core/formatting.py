@@ -60,6 +60,11 @@ def count(amount: int, noun: str) -> str:
     return f"{amount} {noun}{'' if amount == 1 else 's'}"
 
 
+def times(amount: int) -> str:
+    """`once`, `twice`, `3 times`."""
+    return {1: "once", 2: "twice"}.get(amount, f"{amount} times")
+
+
 def signed(value: float) -> str:
     """`-0.012`, `+0.0000073`: two significant digits without an exponent."""
     power = math.floor(math.log10(abs(value))) if value else 0

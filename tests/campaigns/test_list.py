@@ -58,7 +58,7 @@ def test_a_card_shows_what_matters(client: TestClient, database: Database) -> No
     for settling_s in (2.0, 0.5, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6):
         create_flown_trial(client, database, campaign["id"], settling_s)
     (card,) = get(client, "/api/campaigns")["items"]
-    assert (card["flights"], card["best"]["trial_number"], card["next_action"]) == (9, 2, "Fly the next trial")
+    assert (card["flights"], card["best"]["trial_number"], card["next_action"]) == (9, 2, "Fly the next flight")
     assert card["first_error"] > card["best"]["error"]
     assert [curve["trial_number"] for curve in card["spark"]] == [1, 2, 5, 6, 7, 8, 9]
     assert [curve["trial_number"] for curve in card["spark"] if curve["best"]] == [2]

@@ -227,7 +227,7 @@ def mark_the_third_invalid(dashboard: Dashboard, campaign_id: int, best: Json) -
     assert (marked["state"], marked["reason"]) == ("invalid", "Wind gust")
     verdict = dashboard.panel("Flight 3").first
     expect(verdict).to_contain_text("Wind gust")
-    expect(verdict).to_contain_text(f"Flight {best['number']} is the best now")
+    expect(verdict).to_contain_text(f"Flight {best['number']} is the best.")
     assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_id"] == best["id"]
 
 

@@ -44,7 +44,7 @@ def test_marking_the_best_invalid_says_what_it_changes_before_and_after_and_is_u
     verdict.get_by_text("Wind gust").click()
     verdict.get_by_role("button", name="Mark invalid").click()
     expect(verdict).to_contain_text(
-        f"Flight {second['number']} is the best now. The next gains are computed without flight {best['number']}."
+        f"Flight {second['number']} is the best. The next gains are computed without flight {best['number']}."
     )
     expect(verdict).to_contain_text("Wind gust")
     assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_number"] == second["number"]

@@ -130,7 +130,7 @@ def test_a_campaign_names_the_registered_vehicle_that_flies_it(client: TestClien
     shown = campaign["vehicle"]
     assert (shown["id"], shown["name"], shown["registered"], shown["needs_staging"]) == (two["id"], "Two", True, True)
     assert shown["options"] == two["options"]
-    assert campaign["next_action"] == "Fly the first trial"
+    assert campaign["next_action"] == "Fly the first flight"
     clone = client.post(f"/api/campaigns/{campaign['id']}/clone").json()
     assert clone["vehicle"]["id"] == two["id"]
     moved = client.patch(

@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, format_gains, percent, plus_minus, short
+from app.core.formatting import count, format_gains, percent, plus_minus, short, times
 from app.core.statistics.comparisons import (
     Comparison,
     Group,
@@ -183,8 +183,8 @@ def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
         why = f"The best gains are flown again{_only_once(now)}."
         return Confirmation(phase="repeat", why=f"{why}{_missing(comparison)}")
     why = (
-        f"The first flight's gains are flown again: they were flown {count(now.baseline.size, 'time')}, the best gains "
-        f"{count(now.winner.size, 'time')}. A vehicle that has changed meanwhile would look like better gains."
+        f"The first flight's gains are flown again: they were flown {times(now.baseline.size)}, the best gains "
+        f"{times(now.winner.size)}. A vehicle that has changed meanwhile would look like better gains."
     )
     return Confirmation(phase="baseline", why=f"{why}{_missing(comparison)}")
 

@@ -231,4 +231,4 @@ def test_gains_that_look_certainly_better_are_flown_again_for_a_reason_that_is_g
     assert "because each gain set was flown only once, and the confidence assumes a prior estimate" in first.why
     then = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.2), (2, 0.2)), confirmed)
     assert then.phase == "baseline"
-    assert "they were flown 1 time, the best gains 2 times" in then.why
+    assert "they were flown once, the best gains twice" in then.why

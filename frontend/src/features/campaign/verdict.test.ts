@@ -101,7 +101,7 @@ test("what a class would change is said before: which flight is the best then, a
     "No other flight is valid. Without flight 1, the campaign restarts from its start gains.",
   );
   expect(consequenceOf(glitch, all, "valid")).toContain("is scored from its record");
-  expect(standingWithout(glitch, all)).toBe("Flight 3 is the best now. The next gains are computed without flight 2.");
+  expect(standingWithout(glitch, all)).toBe("Flight 3 is the best. The next gains are computed without flight 2.");
   expect(standingWithout(third, all)).toBe("");
 });
 

@@ -143,7 +143,7 @@ export function standingWithout(trial: Trial, trials: readonly Trial[]): string 
   if (trial.state !== "invalid") return "";
   const best = bestOfCounted(trials);
   if (best === null) return "No flight is valid now. The next gains are the start gains.";
-  return `Flight ${best.number} is the best now. The next gains are computed without flight ${trial.number}.`;
+  return `Flight ${best.number} is the best. The next gains are computed without flight ${trial.number}.`;
 }
 
 /** Whether the best gains may become the vehicle's safe gains; if not, the reason and the action. */
