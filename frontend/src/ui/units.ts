@@ -33,6 +33,11 @@ export function gainTitles(catalogue: Catalogue | undefined, experiment: string)
   return Object.fromEntries((found?.gains ?? []).map(({ name, title }) => [name, title]));
 }
 
+/** Whether errors can be predicted: there is a model of the controller. True until the catalogue is loaded. */
+export function useHasModel(experiment: string): boolean {
+  return useCatalogue().data?.experiments.find(({ name }) => name === experiment)?.has_model ?? true;
+}
+
 export function useUnits(experiment: string): Units {
   return unitsOf(useCatalogue().data, experiment);
 }

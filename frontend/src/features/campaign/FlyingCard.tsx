@@ -1,7 +1,7 @@
 import { Button, Stack } from "@mantine/core";
 import { Link } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
-import { useLiveFlight } from "../../live/store";
+import { useIsCurrent, useLiveFlight } from "../../live/store";
 import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
@@ -34,6 +34,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const reading = readingOf(live?.channel ?? "altitude_m");
   const { registered } = campaign.vehicle;
   const stage = stageWord(trial, live);
+  const isStale = !useIsCurrent(live) && live !== null && live.timeS.length > 0;
   return (
     <Panel
       title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
@@ -41,11 +42,11 @@ export function FlyingCard({ campaign, trial, step }: Props) {
     >
       <Stack gap={14}>
         <dl className={`${classes["big"]} numbers`}>
-          <div className={classes["reading"]} data-wide>
-            <dt>{reading.title}</dt>
+          <div className={classes["reading"]} data-wide data-stale={isStale || undefined}>
+            <dt>{isStale ? `${reading.title}, last known` : reading.title}</dt>
             <dd>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</dd>
           </div>
-          <div className={classes["reading"]}>
+          <div className={classes["reading"]} data-stale={isStale || undefined}>
             <dt>Error so far</dt>
             <dd>{withUnit(live?.errorSoFar, unit)}</dd>
           </div>
@@ -53,12 +54,12 @@ export function FlyingCard({ campaign, trial, step }: Props) {
             <dt>Predicted error</dt>
             <dd>{predictedText(trial?.predicted_error, trial?.predicted_interval, unit)}</dd>
           </div>
-          <div className={classes["reading"]}>
+          <div className={classes["reading"]} data-stale={isStale || undefined}>
             <dt>Time</dt>
             <dd>{withUnit(live?.timeS.at(-1), "s", 1)}</dd>
           </div>
           {live !== null && live.throttle !== null && (
-            <div className={classes["reading"]}>
+            <div className={classes["reading"]} data-stale={isStale || undefined}>
               <dt>{isSaturated(live) ? "Throttle, saturated" : "Throttle"}</dt>
               <dd>{percent(live.throttle)}</dd>
             </div>

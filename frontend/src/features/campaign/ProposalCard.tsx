@@ -9,7 +9,7 @@ import { useConnection } from "../../live/store";
 import { Note } from "../../ui/Note";
 import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { useGainTitles, useUnits } from "../../ui/units";
+import { useGainTitles, useHasModel, useUnits } from "../../ui/units";
 import { isRepeat, refusalOf, trialOf } from "./choices";
 import { FlightChoices } from "./FlightChoices";
 import { FlightWindow } from "./FlightWindow";
@@ -40,6 +40,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const chosen = useNextFlight(campaign, proposal, onPreview, isReadOnly);
   const experiment = campaign.definition.experiment ?? "";
   const units = useUnits(experiment);
+  const hasModel = useHasModel(experiment);
   const titles = useGainTitles(experiment);
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
   const isEvaluated = chosen.gains !== null && chosen.error === null;
@@ -56,6 +57,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             isCurrent={chosen.isPredicted}
             best={campaign.best?.error ?? null}
             unit={units.error}
+            hasModel={hasModel}
           />
         )}
         {isEvaluated && isRepeat(chosen.name) && <PriorScatter campaignId={campaign.id} />}

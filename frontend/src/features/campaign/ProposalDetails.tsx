@@ -16,16 +16,20 @@ interface PredictedErrorProps {
   isCurrent: boolean;
   best: number | null;
   unit: string;
+  /** Whether there is a model of the controller. */
+  hasModel: boolean;
+}
+
+function unpredicted(best: number | null, hasModel: boolean): string {
+  if (!hasModel) return "No predicted error: Gainline has no model of this controller.";
+  return best === null ? "No predicted error before the first valid flight." : "No prediction for these gains.";
 }
 
 /** Predicted error with its interval; grey while it belongs to other gains. */
-export function PredictedError({ predicted, isCurrent, best, unit }: PredictedErrorProps) {
+export function PredictedError({ predicted, isCurrent, best, unit, hasModel }: PredictedErrorProps) {
   const { predicted_error: error = null, interval = null } = predicted ?? {};
   const change = percentChange(error, best);
-  if (error === null && isCurrent) {
-    const none = best === null ? "No predicted error before the first valid flight." : "No prediction for these gains.";
-    return <Note fz="body">{none}</Note>;
-  }
+  if (error === null && isCurrent) return <Note fz="body">{unpredicted(best, hasModel)}</Note>;
   return (
     <div className={`${classes["predicted"]} numbers`} data-stale={!isCurrent || undefined} aria-busy={!isCurrent}>
       <span>

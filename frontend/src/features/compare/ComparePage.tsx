@@ -10,14 +10,14 @@ import {
   useComparison,
   useComparisonFigure,
 } from "../../api/compare";
-import { problemOf } from "../../api/problems";
+import { type Problem, problemOf } from "../../api/problems";
 import { useTrial } from "../../api/queries";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { loadPlotly } from "../../charts/plotly";
 import type { PlotlyFigure } from "../../charts/traces";
 import { Aside, toneOf } from "../../ui/Aside";
 import { count } from "../../ui/format";
-import { ErrorNotice } from "../../ui/Notices";
+import { ErrorNotice, FailureNotice } from "../../ui/Notices";
 import work from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
 import { useTitle } from "../../ui/useTitle";
@@ -72,7 +72,11 @@ export function ComparePage() {
           {chosen.length === 1 && <OnlyOne trialId={chosen[0] ?? 0} />}
           {problem !== null && chosen.length > 1 && (
             <div>
-              <ErrorNotice error={comparison.error} />
+              {kept.length < chosen.length ? (
+                <FailureNotice reason={refusalText(problem)} />
+              ) : (
+                <ErrorNotice error={comparison.error} />
+              )}
               {kept.length < chosen.length && (
                 <Button variant="default" mt={10} onClick={() => choose(kept)}>
                   Remove {count(chosen.length - kept.length, "flight")}
@@ -93,6 +97,10 @@ export function ComparePage() {
       </div>
     </>
   );
+}
+
+function refusalText({ problems }: Problem): string {
+  return `These flights cannot be compared: ${problems.map(({ reason }) => reason).join("; ")}.`;
 }
 
 function Introduction() {
