@@ -46,7 +46,8 @@ interface CurvesProps {
 export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen, preview, onChoose }: CurvesProps) {
   const theme = useComputedColorScheme("light");
   const [picked, setPicked] = useState<Span>("first");
-  const span = useDeferredValue(campaign.flying === null ? picked : "whole");
+  const chosenSpan = campaign.flying === null ? picked : "whole";
+  const span = useDeferredValue(chosenSpan);
   const [zoom, setZoom] = useState<TimeRange | null>(null);
   const [whole, setWhole] = useState<TimeRange | null>(null);
   const takeoffs = useCampaignFigure(campaign.id, "takeoffs", theme, {
@@ -80,7 +81,8 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
         <SegmentedControl
           aria-label="Time range"
           size="sm"
-          value={picked}
+          value={chosenSpan}
+          disabled={campaign.flying !== null}
           onChange={pick}
           data={[
             { value: "first", label: "First 8 s" },
