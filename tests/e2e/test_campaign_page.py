@@ -100,7 +100,7 @@ def test_a_flight_under_way_keeps_the_layout(dashboard: Dashboard, states: State
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("1×")
     dashboard.fly()
-    expect(dashboard.page.get_by_role("heading", name="Flight 3: flying")).to_be_visible()
+    expect(dashboard.page.get_by_role("heading", name="Flight 3: in flight")).to_be_visible()
     check_layout(dashboard)
     dashboard.page.keyboard.press("Space")
     dashboard.until(lambda: dashboard.get(f"/campaigns/{campaign_id}")["flying"] is None)
