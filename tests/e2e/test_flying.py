@@ -73,12 +73,12 @@ def test_a_flight_that_is_down_is_not_shown_flying_while_what_comes_next_is_awai
 ) -> None:
     dashboard.choose_speed("1×")
     dashboard.fly()
-    expect(dashboard.panel("Flight 1: flying")).to_be_visible()
+    expect(dashboard.panel("Flight 1: in flight")).to_be_visible()
     proposal = f"**/api/campaigns/{campaign_id}/proposal"
     dashboard.page.route(proposal, lambda _: None)
     dashboard.page.get_by_role("button", name=re.compile("^ABORT")).click()
     expect(dashboard.panel("Flight 1").get_by_text("Aborted", exact=True)).to_be_visible()
-    expect(dashboard.panel("Flight 1: flying")).to_have_count(0)
+    expect(dashboard.panel("Flight 1: in flight")).to_have_count(0)
     expect(dashboard.page.get_by_text("Computing the next gains")).to_be_visible()
     dashboard.page.unroute(proposal)
     expect(dashboard.fly_button).to_be_visible()
