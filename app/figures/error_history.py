@@ -60,7 +60,7 @@ class ErrorsFigure:
             palette,
             xaxis=theme.titled(palette, "Flight", **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]}),
             yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, 1.08 * span.high], nticks=6),
-            margin={**theme.MARGIN_PX, "l": 60},
+            margin={**theme.MARGIN_PX, "l": 60, "r": 22},
             annotations=self._labels(palette, span.high),
             uirevision="errors",
         )

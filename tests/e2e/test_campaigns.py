@@ -146,7 +146,7 @@ def test_a_campaign_flown_elsewhere_takes_records_as_csv(dashboard: Dashboard, s
     expect(refusal).to_contain_text("altitude_m")
     expect(refusal).to_contain_text("3")
     upload(record)
-    expect(dashboard.panel("Flight 1 · best so far")).to_contain_text(f"{flown['error']:.3f} m")
+    expect(dashboard.panel("Flight 1 · best so far")).to_contain_text(f"{flown['error']:.3f} ± ")
     [trial] = dashboard.trials(campaign_id)
     assert trial["error"] == pytest.approx(flown["error"], abs=1e-6)
     dashboard.wait_for_flight(1)

@@ -155,7 +155,7 @@ def test_the_address_can_be_sent_and_another_flight_made_the_first(
     dashboard.button("Remove flight 1 of Compared in the morning").click()
     expect(page.get_by_text("Flight 1 is selected.")).to_be_visible()
     dashboard.button("Clear selection").click()
-    expect(page.get_by_text("Select two or more flights below.")).to_be_visible()
+    expect(page.get_by_text("Select two or more flights.")).to_be_visible()
     assert chosen(page) == []
     elsewhere = open_dashboard(shared_server.url, theme="dark", viewport=PHONE)
     compare(elsewhere, [other, one])

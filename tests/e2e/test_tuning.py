@@ -181,7 +181,7 @@ def test_another_experiment_has_its_own_vehicles_gains_and_units(dashboard: Dash
     states.fly(campaign_id)
     [trial] = dashboard.trials(campaign_id)
     unit = experiment["error_unit"]
-    expect(dashboard.panel("Flight 1")).to_contain_text(f"{trial['error']:.3f} {unit}")
+    expect(dashboard.panel("Flight 1")).to_contain_text(re.compile(rf"Error ?{trial['error']:.4f} ± [\d.]+ {unit}"))
     expect(page.get_by_role("heading", name="Pitch error curves")).to_be_visible()
     dashboard.until(lambda: dashboard.trace("Pitch error curves", "flight") is not None)
     drawn = dashboard.trace("Pitch error curves", "flight")

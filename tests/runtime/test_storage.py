@@ -72,7 +72,7 @@ def land_in_the_spool(serving: Serving, trial_id: int) -> None:
     with stream(serving.url) as events:
         assert serving.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
         for name, _, data in events:
-            if name == "phase" and "not stored yet" in data["note"]:
+            if name == "phase" and "could not be stored yet" in data["note"]:
                 break
     assert [path.suffix for path in (serving.data_dir / "spool").iterdir()] == [".flight"]
     assert serving.trial(trial_id, "flying")["record"] is None
