@@ -60,7 +60,7 @@ class ErrorsFigure:
             palette,
             xaxis=theme.titled(palette, "Flight", **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]}),
             yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, 1.08 * span.high], nticks=6),
-            margin={**theme.MARGIN_PX, "l": 60, "r": 22},
+            margin={**theme.MARGIN_PX, "l": 60, "r": 30},
             annotations=self._labels(palette, span.high),
             uirevision="errors",
         )
@@ -124,7 +124,7 @@ class ErrorsFigure:
         right = last + 0.95
         return [
             scatter(
-                "Scatter of the best" if noise.repeats else "Scatter of the best, prior estimate",
+                "Scatter of best" if noise.repeats else "Scatter (prior)",
                 ([0.5, right, right, 0.5, 0.5], [low, low, high, high, low]),
                 role="noise",
                 line=theme.line(theme.with_opacity(palette.best, 0.3), 0.75),

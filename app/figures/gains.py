@@ -41,7 +41,7 @@ class GainsFigure:
             palette,
             showlegend=False,
             uirevision="gains",
-            margin={**theme.MARGIN_PX, "t": 24, "r": 22},
+            margin={**theme.MARGIN_PX, "t": 24, "r": 30},
             annotations=self._names(palette),
             **axes,
         )

@@ -55,7 +55,7 @@ class CalibrationFigure:
             palette,
             showlegend=False,
             uirevision="calibration",
-            margin={**theme.MARGIN_PX, "t": 24, "r": 22},
+            margin={**theme.MARGIN_PX, "t": 24, "r": 30},
             annotations=[self._title(palette, index, name, len(names)) for index, name in enumerate(names, start=1)],
             shapes=self._tuned(palette, len(names)),
             **axes,
