@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, fields
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core.control.parameter_checks import require_defined
 from app.core.errors import InputError, Problem
 
 STEP_S: Final = 1 / 400
@@ -89,17 +90,7 @@ class Parameters:
     takeoff_throttle: float = 0.9
 
     def __post_init__(self) -> None:
-        problems = [
-            Problem(each.name, "must be positive" if each.name in _POSITIVE else "must be at least 0")
-            for each, value in zip(fields(self), astuple(self), strict=True)
-            if not (0.0 <= value < math.inf) or (each.name in _POSITIVE and not value)
-        ]
-        if problems:
-            raise InputError(
-                "The loop is not defined for these parameters.",
-                hint="Give the vehicle's own.",
-                problems=tuple(problems),
-            )
+        require_defined(asdict(self), _POSITIVE)
 
     @property
     def shaping_jerk_m_s3(self) -> float:
