@@ -115,16 +115,20 @@ def check_flights(
     """
     aborts_at = abort_steps(len(models), steps)
     runs = fly_runs(gains, safe_gains, models, aborts_at, target, steps)
-    own = runs
     limits = np.array([ceiling_m, LARGEST_TOUCH_DOWN_M_S])
-    if (runs.aborts > limits).any() and not np.array_equal(gains, safe_gains):
-        own = fly_runs(safe_gains, safe_gains, models, aborts_at, target, steps)
+    allowed = np.tile(limits, (len(models), 1))
+    beyond = (runs.aborts > limits).any(axis=(1, 2))
+    if beyond.any():
+        own = fly_runs(safe_gains, safe_gains, models[beyond], aborts_at[beyond], target, steps)
+        highest_m = np.maximum(own.aborts[:, :, HIGHEST_M].max(axis=1), own.reports[:, HIGHEST_M])
+        fastest_m_s = own.aborts[:, :, TOUCH_DOWN_M_S].max(axis=1)
+        allowed[beyond] = np.maximum(limits, np.column_stack([highest_m, fastest_m_s]))
     return (
         _altitude(runs, parameters, ceiling_m, baseline),
         _divergence(runs, parameters, target / (1 << POSITION_BITS)),
         _oscillation(runs, parameters),
-        _abort("abort altitude", "m", HIGHEST_M, runs, own, parameters, ceiling_m),
-        _abort("abort touch-down", "m/s", TOUCH_DOWN_M_S, runs, own, parameters, LARGEST_TOUCH_DOWN_M_S),
+        _abort(HIGHEST_M, runs, allowed, limits, parameters),
+        _abort(TOUCH_DOWN_M_S, runs, allowed, limits, parameters),
     )
 
 
@@ -192,25 +196,27 @@ def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
     return Check("oscillation", False, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S, case=case)
 
 
-def _abort(
-    name: str, unit: str, place: int, runs: Runs, own: Runs, parameters: Sequence["ModelParameter"], limit: float
-) -> Check:
-    """Check the abort that exceeds `limit`, or the safe gains' own result on the same vehicle, the most."""
-    of_safe_gains = own.aborts[:, :, place].max(axis=1)
-    if place == HIGHEST_M:
-        of_safe_gains = np.maximum(of_safe_gains, own.reports[:, HIGHEST_M])
-    limits = np.maximum(limit, of_safe_gains)[:, np.newaxis]
+_ABORTS: Final = {
+    HIGHEST_M: ("abort altitude", "m", "rises to"),
+    TOUCH_DOWN_M_S: ("abort touch-down", "m/s", "hits the ground at"),
+}
+"""Name and unit of the check, and what the vehicle does, of each reported value of an abort."""
+
+
+def _abort(place: int, runs: Runs, allowed: "Matrix", limits: Vector, parameters: Sequence["ModelParameter"]) -> Check:
+    """Check the abort that exceeds the most what is `allowed` for its vehicle, shape (k, 2): the limit, or beyond it
+    what the safe gains do."""
+    name, unit, what = _ABORTS[place]
     values = runs.aborts[:, :, place]
-    excess = values - limits
+    excess = values - allowed[:, [place]]
     run, instant = divmod(int(np.argmax(excess)), excess.shape[1])
-    value, allowed = float(values[run, instant]), float(limits[run, 0])
-    passed = bool(value <= allowed)
+    value, limit = float(values[run, instant]), float(allowed[run, place])
+    passed = value <= limit
     case = _case(parameters, runs.models[run], float(runs.abort_steps[run, instant]), "aborted")
-    what = "rises to" if place == HIGHEST_M else "hits the ground at"
-    why = "" if allowed == limit else ", as with the safe gains"
-    sentence = f"After an abort the vehicle {what} {value:.2f} {unit} in the worst case; {allowed:.2f} {unit} is "
+    why = "" if limit == limits[place] else ", as with the safe gains"
+    sentence = f"After an abort the vehicle {what} {value:.2f} {unit} in the worst case; {limit:.2f} {unit} is "
     sentence += f"allowed{why}." if passed else f"allowed{why}: {case}."
-    return Check(name, passed, sentence, worst=value, limit=allowed, case=case)
+    return Check(name, passed, sentence, worst=value, limit=limit, case=case)
 
 
 def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | None = None, event: str = "") -> str:
