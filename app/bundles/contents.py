@@ -9,11 +9,11 @@ versions below 4 lack rise time, settling time and steady-state error.
 from functools import cache
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field, TypeAdapter, model_validator
 
 from app.campaigns.schemas import Definition
 from app.campaigns.trials.schemas import Glitch
-from app.common.schemas import Gate, Interval, Name, OptionValue
+from app.common.schemas import Gate, Interval, Name, OptionValue, Schema
 from app.common.states import AbortCause, CampaignState, Ending, Outcome, TrialKind, TrialState
 from app.core.experiments.base import ParameterDistribution
 from app.core.tuning.proposals import Advice
@@ -63,7 +63,7 @@ def _spread_of(given: JsonObject) -> JsonObject:
     return given
 
 
-class _Strict(BaseModel):
+class _Strict(Schema):
     model_config = ConfigDict(extra="forbid", from_attributes=True)
 
 

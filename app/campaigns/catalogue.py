@@ -3,12 +3,12 @@
 from typing import Literal
 
 from fastapi import APIRouter
-from pydantic import BaseModel
+from pydantic import Field
 
 from app import __version__
 from app.campaigns.campaign_files import preset_names, read_preset
 from app.campaigns.schemas import NewCampaign
-from app.common.schemas import OptionValue
+from app.common.schemas import OptionValue, Schema
 from app.core.experiments import EXPERIMENTS
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.core.tuning.strategies import STRATEGIES
@@ -21,12 +21,12 @@ from app.web.dependencies import Live
 router = APIRouter(prefix="/api", tags=["catalogue"])
 
 
-class VehicleTrouble(BaseModel):
+class VehicleTrouble(Schema):
     vehicle_id: int
     trouble: str
 
 
-class Health(BaseModel):
+class Health(Schema):
     """Health of the server. `vehicles_not_answering`: vehicles that commands do not reach, because the process that has
     their link does not answer."""
 
@@ -36,7 +36,7 @@ class Health(BaseModel):
     vehicles_not_answering: list[VehicleTrouble]
 
 
-class GainInfo(BaseModel):
+class GainInfo(Schema):
     name: str
     title: str
     unit: str
@@ -47,7 +47,7 @@ class GainInfo(BaseModel):
     integer: bool
 
 
-class OptionInfo(BaseModel):
+class OptionInfo(Schema):
     """A setting of an experiment, a strategy or a vehicle: one of `choices`, or any value of the default's type within
     `lower` … `upper` where `choices` is empty."""
 
@@ -55,12 +55,12 @@ class OptionInfo(BaseModel):
     title: str
     unit: str = ""
     default: OptionValue
-    choices: list[OptionValue] = []
+    choices: list[OptionValue] = Field(default=[])
     lower: float | None = None
     upper: float | None = None
 
 
-class ExperimentInfo(BaseModel):
+class ExperimentInfo(Schema):
     """An experiment. `output` is the channel that is scored. Without a model there are no predictions, and gains are
     chosen by hand."""
 
@@ -74,7 +74,7 @@ class ExperimentInfo(BaseModel):
     options: list[OptionInfo]
 
 
-class StrategyInfo(BaseModel):
+class StrategyInfo(Schema):
     """A strategy. `experiments` names those that it works with."""
 
     name: str
@@ -84,7 +84,7 @@ class StrategyInfo(BaseModel):
     experiments: list[str]
 
 
-class VehicleKindInfo(BaseModel):
+class VehicleKindInfo(Schema):
     """A kind of vehicle. `can_fly` is false when flights are flown elsewhere and uploaded; `experiments` names those
     that it can fly. Vehicles of a kind that is `registered` are registered one by one and chosen by their id."""
 
@@ -98,7 +98,7 @@ class VehicleKindInfo(BaseModel):
     options: list[OptionInfo]
 
 
-class PresetInfo(BaseModel):
+class PresetInfo(Schema):
     """A campaign that is ready to be created."""
 
     name: str
@@ -107,7 +107,7 @@ class PresetInfo(BaseModel):
     campaign: NewCampaign
 
 
-class Catalogue(BaseModel):
+class Catalogue(Schema):
     experiments: list[ExperimentInfo]
     strategies: list[StrategyInfo]
     vehicle_kinds: list[VehicleKindInfo]

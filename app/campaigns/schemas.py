@@ -4,9 +4,22 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from app.common.schemas import Gains, Gate, Interval, Name, Number, OptionValue, Reason, Request, Text, Trouble, Version
+from app.common.schemas import (
+    Gains,
+    Gate,
+    Interval,
+    Name,
+    Number,
+    OptionValue,
+    Reason,
+    Request,
+    Schema,
+    Text,
+    Trouble,
+    Version,
+)
 from app.common.states import CampaignState, Outcome
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.proposals import AdviceKind
@@ -129,7 +142,7 @@ class Promotion(Request):
     statement: Reason
 
 
-class BestTrial(BaseModel):
+class BestTrial(Schema):
     """The valid trial with the lowest error, and the mean of all flights of its gains with its standard error, null
     while the scatter is not known."""
 
@@ -142,14 +155,14 @@ class BestTrial(BaseModel):
     flights: int
 
 
-class FlyingTrial(BaseModel):
+class FlyingTrial(Schema):
     """The trial whose flight is requested or under way."""
 
     trial_id: int
     trial_number: int
 
 
-class TrialCounts(BaseModel):
+class TrialCounts(Schema):
     """Number of trials by their state; `flown` are those that left the ground."""
 
     total: int
@@ -163,7 +176,7 @@ class TrialCounts(BaseModel):
 RehearsalState = Literal["not needed", "missing", "under way", "passed", "failed"]
 
 
-class Rehearsal(BaseModel):
+class Rehearsal(Schema):
     """Whether a campaign on a real vehicle was first flown on a simulation, which has to be `passed` before a trial can
     be staged. `campaign_id` is the rehearsal's own campaign; `reason` explains the state."""
 
@@ -172,7 +185,7 @@ class Rehearsal(BaseModel):
     reason: str
 
 
-class Winner(BaseModel):
+class Winner(Schema):
     """The gains with the lowest mean error plus its standard error, which are repeated, confirmed and promoted. After
     repeats these may be others than those of the flight with the lowest error."""
 
@@ -184,7 +197,7 @@ class Winner(BaseModel):
 Standing = Literal["candidate", "confirmed", "not confirmed"]
 
 
-class Campaign(BaseModel):
+class Campaign(Schema):
     """One vehicle, one experiment, one strategy, and the results."""
 
     id: int
@@ -222,7 +235,7 @@ class Campaign(BaseModel):
     updated_at: datetime
 
 
-class SparkCurve(BaseModel):
+class SparkCurve(Schema):
     """One flight's scored output in a few points."""
 
     trial_number: int
@@ -231,7 +244,7 @@ class SparkCurve(BaseModel):
     values: list[float]
 
 
-class CampaignSummary(BaseModel):
+class CampaignSummary(Schema):
     """A campaign as one card of the list. `spark` holds the first flight, the best and the latest, at most 7."""
 
     id: int
@@ -251,7 +264,7 @@ class CampaignSummary(BaseModel):
     updated_at: datetime
 
 
-class GainChange(BaseModel):
+class GainChange(Schema):
     """One gain now (of the best flight, else of the vehicle's safe gains) and next."""
 
     now: int | float
@@ -259,7 +272,7 @@ class GainChange(BaseModel):
     delta: int | float
 
 
-class StopVerdict(BaseModel):
+class StopVerdict(Schema):
     """Whether the campaign's stop rule ends it, and why."""
 
     stop: bool
@@ -268,7 +281,7 @@ class StopVerdict(BaseModel):
     threshold: Annotated[float | None, Field(description="error below which the next flight counts as better")]
 
 
-class Advice(BaseModel):
+class Advice(Schema):
     """The one recommended next action. Under the stop rule `noise` the proposal follows it already; `baseline` is the
     first flight, or its gains again."""
 
@@ -281,7 +294,7 @@ Variant = Literal["smaller step", "repeat", "baseline"]
 ChoiceKind = Literal["step", "smaller step", "repeat", "baseline"]
 
 
-class FlightChoice(BaseModel):
+class FlightChoice(Schema):
     """A gain set that the next flight may use. `proposed`: it is the proposal's own, otherwise a variant of that kind;
     `recommended`: it is the advice's."""
 
@@ -291,7 +304,7 @@ class FlightChoice(BaseModel):
     recommended: bool
 
 
-class Proposal(BaseModel):
+class Proposal(Schema):
     """The next gain set, computed from one history; stale as soon as that history has changed. `recommended` is the
     advice's kind; the campaign's own rule has ended it only when `stop_verdict.stop` is true. `choices` are the
     proposal and its variants, no gain set twice; none is recommended when the advice is to stop."""
@@ -314,7 +327,7 @@ class Proposal(BaseModel):
     computed_at: datetime
 
 
-class NextFlight(BaseModel):
+class NextFlight(Schema):
     """State of the next proposal. While a new one is computed, `proposal` may be the stale one before it."""
 
     state: Literal["computing", "ready", "failed", "none"]
@@ -328,14 +341,14 @@ class ConsideredGains(Request):
     gains: Annotated[dict[str, Number], Field(max_length=50, examples=[{"kp": 283, "ki": 13, "kd": 82}])]
 
 
-class PredictedCurve(BaseModel):
+class PredictedCurve(Schema):
     """The scored output of a predicted flight over time, thinned for drawing."""
 
     time_s: list[float]
     values: list[float]
 
 
-class GainsPrediction(BaseModel):
+class GainsPrediction(Schema):
     """What is predicted for gains: their error with its interval, the curve, and the edges of its band. From the
     flights of these gains if there were any, otherwise from the model of the next proposal; null without a model."""
 
@@ -347,7 +360,7 @@ class GainsPrediction(BaseModel):
     upper: PredictedCurve | None
 
 
-class RepeatGroup(BaseModel):
+class RepeatGroup(Schema):
     """The valid flights of one gain set."""
 
     gains: Gains
@@ -359,14 +372,14 @@ class RepeatGroup(BaseModel):
     is_best: bool
 
 
-class FlightsToDecide(BaseModel):
+class FlightsToDecide(Schema):
     """Further flights of each gain set after which an unchanged difference would be decided."""
 
     best: int
     baseline: int
 
 
-class Comparison(BaseModel):
+class Comparison(Schema):
     """The best gains compared with the first flight's. `difference` is best − baseline; `confidence` that of the
     likelier direction, with the allowance for having chosen the best among several. While the scatter of flights is
     unknown, the verdict is `not known yet`, without confidence and standard error."""
@@ -379,7 +392,7 @@ class Comparison(BaseModel):
     sentence: str
 
 
-class Drift(BaseModel):
+class Drift(Schema):
     """The first gains' last flight compared with their first: `confidence` that anything has changed."""
 
     first_trial: int
@@ -390,7 +403,7 @@ class Drift(BaseModel):
     sentence: str
 
 
-class Trend(BaseModel):
+class Trend(Schema):
     """Slope of the error of the gains flown most often, with its 90 % interval."""
 
     against: Literal["flight number", "battery voltage"]
@@ -401,7 +414,7 @@ class Trend(BaseModel):
     sentence: str
 
 
-class TrackRecord(BaseModel):
+class TrackRecord(Schema):
     """How well the predictions held."""
 
     inside: int
@@ -413,7 +426,7 @@ class TrackRecord(BaseModel):
     sentence: str
 
 
-class CampaignStatistics(BaseModel):
+class CampaignStatistics(Schema):
     """Statistics of the campaign's flights. `sigma` is the flight-to-flight scatter, pooled over all repeats and the
     experiment's prior; null while unknown, that is before the first repeat under an autopilot whose scatter was never
     measured, and zero if all repeats gave the same error. `scatter_source` states its source. `optimism` is how

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import Final
 
-from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
+from app.common.schemas import Schema
 from app.core.statistics.drift import MONITORED_PARAMETERS, Drift, Fitted, drift
 from app.db.models import CampaignRow, ProposalRow
 from app.figures.base import Card, card_of
@@ -18,7 +18,7 @@ from app.fleet import service as fleet
 _STRATEGY: Final = "calibrated"
 
 
-class FittedNumber(BaseModel):
+class FittedNumber(Schema):
     """A fitted parameter of the model with its standard error."""
 
     name: str
@@ -28,7 +28,7 @@ class FittedNumber(BaseModel):
     standard_error: float
 
 
-class Estimate(BaseModel):
+class Estimate(Schema):
     """One calibration. `flight` counts the vehicle's flights over all its campaigns."""
 
     flight: int
@@ -39,7 +39,7 @@ class Estimate(BaseModel):
     fitted: list[FittedNumber]
 
 
-class Retune(BaseModel):
+class Retune(Schema):
     """Whether the vehicle should be tuned again; `since` is the flight after which it was last tuned."""
 
     due: bool
@@ -48,7 +48,7 @@ class Retune(BaseModel):
     sentence: str
 
 
-class VehicleCalibration(BaseModel):
+class VehicleCalibration(Schema):
     """The vehicle's calibrations, oldest first, and whether the vehicle has changed since it was tuned."""
 
     estimates: list[Estimate]

@@ -66,13 +66,19 @@ Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, m
 Version = Annotated[int, Field(ge=1, strict=True, description="the version on which the edit is based, as last read")]
 
 
-class Request(BaseModel):
+class Schema(BaseModel):
+    """A part of the API; pydantic builds its validation when it is first needed, not as the program starts."""
+
+    model_config = ConfigDict(defer_build=True)
+
+
+class Request(Schema):
     """A request body; unknown fields are errors."""
 
     model_config = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)
 
 
-class ProblemField(BaseModel):
+class ProblemField(Schema):
     """One refused field, dotted as the caller wrote it, and why it was refused; `offer` holds gain values that would
     pass, by name, where any are known."""
 
@@ -81,7 +87,7 @@ class ProblemField(BaseModel):
     offer: Gains = {}
 
 
-class Problem(BaseModel):
+class Problem(Schema):
     """An error (RFC 9457): what happened, what to do about it, and the fields concerned. `script_hint` is what a script
     does about it, where that differs from what a person does; empty otherwise."""
 
@@ -94,7 +100,7 @@ class Problem(BaseModel):
     problems: list[ProblemField]
 
 
-class Trouble(BaseModel):
+class Trouble(Schema):
     """Why something is not available at present, and what to do about it."""
 
     title: str
@@ -102,7 +108,7 @@ class Trouble(BaseModel):
     hint: str
 
 
-class Page(BaseModel, Generic[T]):
+class Page(Schema, Generic[T]):
     """A part of a list. `next_cursor` requests the part after it; null at the end. `total` counts the whole list."""
 
     items: list[T]
@@ -110,7 +116,7 @@ class Page(BaseModel, Generic[T]):
     next_cursor: str | None
 
 
-class Interval(BaseModel):
+class Interval(Schema):
     """Interval that contains an error with probability `confidence`."""
 
     lower: float
@@ -118,7 +124,7 @@ class Interval(BaseModel):
     confidence: float
 
 
-class Check(BaseModel):
+class Check(Schema):
     """One check of the gate: its worst number and the limit, where it has them, and the gain and the case that gave it.
     `offer` holds the nearest values of refused gains that would pass."""
 
@@ -132,7 +138,7 @@ class Check(BaseModel):
     offer: Gains = {}
 
 
-class Gate(BaseModel):
+class Gate(Schema):
     """The gate's result for a gain set before its flight."""
 
     passed: bool
@@ -184,7 +190,7 @@ def _refused(reason: str) -> InputError:
     )
 
 
-class FigureColumn(BaseModel):
+class FigureColumn(Schema):
     """One column of a figure's table; `digits` after the decimal point, null for text."""
 
     name: str
@@ -193,14 +199,14 @@ class FigureColumn(BaseModel):
     digits: int | None
 
 
-class FigureTable(BaseModel):
+class FigureTable(Schema):
     """The figure's data as a table."""
 
     columns: list[FigureColumn]
     rows: list[list[str | int | float | None]]
 
 
-class FigureCard(BaseModel):
+class FigureCard(Schema):
     """A figure, or why there is none: `waiting` for data, or `failed`. `summary` describes it in a sentence."""
 
     name: str

@@ -3,10 +3,10 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from app.campaigns.trials.schemas import GroupBrief
-from app.common.schemas import Gains, OptionValue
+from app.common.schemas import Gains, OptionValue, Schema
 from app.common.states import TrialState
 from app.core.statistics.comparisons import Verdict
 
@@ -17,7 +17,7 @@ _BASIS = (
 )
 
 
-class FlightSetting(BaseModel):
+class FlightSetting(Schema):
     """A setting with which a flight was flown."""
 
     title: str
@@ -25,7 +25,7 @@ class FlightSetting(BaseModel):
     value: OptionValue
 
 
-class ComparedFlight(BaseModel):
+class ComparedFlight(Schema):
     """One of the flights.
 
     `label` is its letter in the figure, `name` its name in sentences; `group` is the mean of all valid flights with its
@@ -54,7 +54,7 @@ class ComparedFlight(BaseModel):
     settings: list[FlightSetting]
 
 
-class FlightDifference(BaseModel):
+class FlightDifference(Schema):
     """A gain or setting that is not the same in all flights.
 
     `values` are in the order of the flights, null if a flight does not have it; `changes` are relative to the first
@@ -67,14 +67,14 @@ class FlightDifference(BaseModel):
     changes: list[int | float | None]
 
 
-class FurtherFlights(BaseModel):
+class FurtherFlights(Schema):
     """Further flights with the gains of each that would decide the comparison, if the difference stays the same."""
 
     trial: int
     against: int
 
 
-class FlightPair(BaseModel):
+class FlightPair(Schema):
     """One flight's gains compared with another's, each with all their flights.
 
     `difference` is trial − against; `confidence` is that of the likelier direction, or, for `repeats` in one campaign,
@@ -92,7 +92,7 @@ class FlightPair(BaseModel):
     sentence: str
 
 
-class FlightComparison(BaseModel):
+class FlightComparison(Schema):
     """A comparison of flights, in the order in which they were named.
 
     In each pair the later flight is compared with the earlier. `sentence` is the overall verdict: the lowest compared

@@ -5,12 +5,12 @@ from datetime import datetime
 from pathlib import PurePath
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, undefer
 
 from app.common.errors import NotFoundError, StorageError
-from app.common.schemas import Gains, Page, decode_cursor, encode_cursor, without_control_characters
+from app.common.schemas import Gains, Page, Schema, decode_cursor, encode_cursor, without_control_characters
 from app.controller_checks.autopilot import Autopilot
 from app.controller_checks.check import AUTOPILOTS, examine_content, examine_file
 from app.controller_checks.paparazzi import parse_gains
@@ -40,7 +40,7 @@ def page(session: Session, *, before_id: int | None, limit: int) -> tuple[Sequen
     return session.scalars(wanted.order_by(ControllerCheckRow.id.desc()).limit(limit + 1)).all(), total
 
 
-class ControllerCheckSummary(BaseModel):
+class ControllerCheckSummary(Schema):
     """A recording that was compared with the replica of its autopilot's loop: `log`, of a flight, or `trace`, with
     every step."""
 
@@ -51,7 +51,7 @@ class ControllerCheckSummary(BaseModel):
     checked_at: datetime
 
 
-class CheckedSignal(BaseModel):
+class CheckedSignal(Schema):
     """One signal of the loop. `exact`: no difference at all; `agrees`: within the tolerance; `differs`."""
 
     name: str
@@ -65,7 +65,7 @@ class CheckedSignal(BaseModel):
     first_different_s: float | None
 
 
-class CheckFigure(BaseModel):
+class CheckFigure(Schema):
     """An available figure of the check."""
 
     name: FigureName

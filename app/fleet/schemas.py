@@ -3,9 +3,9 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from app.common.schemas import Gains, Name, Number, OptionValue, Reason, Request, Shown, Version
+from app.common.schemas import Gains, Name, Number, OptionValue, Reason, Request, Schema, Shown, Version
 from app.common.states import ActKind, ActState, VehicleState
 
 OrderReason = Annotated[str, Field(max_length=500)]
@@ -21,7 +21,7 @@ class VehicleChoice(Request):
     id: Annotated[int | None, Field(ge=1, le=2**63 - 1, strict=True)] = None
 
 
-class CampaignVehicle(BaseModel):
+class CampaignVehicle(Schema):
     """A campaign's vehicle with its settings: the campaign's own, or those that it is registered with."""
 
     id: int
@@ -63,7 +63,7 @@ class VehicleEdit(Request):
     statement: Reason | None = None
 
 
-class Identity(BaseModel):
+class Identity(Schema):
     """Identity that the vehicle reports over its link; pinned at the first connection without a concern."""
 
     system_id: int
@@ -72,7 +72,7 @@ class Identity(BaseModel):
     uid: Annotated[str, Field(description="hardware id in hexadecimal digits; empty if it is not reported")] = ""
 
 
-class VehicleCheck(BaseModel):
+class VehicleCheck(Schema):
     """One item of the preflight check."""
 
     name: str
@@ -83,7 +83,7 @@ class VehicleCheck(BaseModel):
     hint: str = ""
 
 
-class Control(BaseModel):
+class Control(Schema):
     """The operator in control. Renewals are not published as events: load it again after `until` to see whether it has
     ended."""
 
@@ -91,7 +91,7 @@ class Control(BaseModel):
     until: datetime
 
 
-class Lease(BaseModel):
+class Lease(Schema):
     """Control of a vehicle until then. Requests that need it send the token in the header X-Gainline-Control."""
 
     operator: str
@@ -107,7 +107,7 @@ class LeaseRequest(Request):
     token: Annotated[str, Field(max_length=100)] | None = None
 
 
-class Vehicle(BaseModel):
+class Vehicle(Schema):
     """Something that can fly a trial. `concern` states why it is quarantined; `held` are the gains that it reported at
     `held_at`. A simulation that is shared by campaigns is not `registered` and has no link."""
 
@@ -134,7 +134,7 @@ class Vehicle(BaseModel):
     actions: Annotated[list[str], Field(description="allowed actions: fly, stage, connect, release, …")]
 
 
-class VehicleAct(BaseModel):
+class VehicleAct(Schema):
     """A request to a vehicle outside its flights: its operator, reason and outcome. `result` holds the items of a
     check, or all parameters of the vehicle for `parameters`."""
 
@@ -155,7 +155,7 @@ class VehicleAct(BaseModel):
 Purpose = Literal["flight", "restore after flight", "connect", "restore", "release"]
 
 
-class GivenGains(BaseModel):
+class GivenGains(Schema):
     """One line of a vehicle's ledger: the gains that were sent to it, for what purpose, and those that it read back."""
 
     purpose: Purpose
@@ -181,7 +181,7 @@ class VehicleOrder(Request):
     reason: OrderReason = "requested by the operator"
 
 
-class OrderAnswer(BaseModel):
+class OrderAnswer(Schema):
     """`accepted` is true once the process that has the vehicle's link has forwarded the command; the effect appears in
     the vehicle's status. When it is false, `sentence` states why, and the command is not executed later."""
 

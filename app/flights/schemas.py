@@ -2,12 +2,13 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
+from app.common.schemas import Schema
 from app.flights.readiness import LossKind, ReadinessStep
 
 
-class ReadinessLoss(BaseModel):
+class ReadinessLoss(Schema):
     """Something that takes readiness back: what it means now, and what to do."""
 
     kind: LossKind
@@ -15,7 +16,7 @@ class ReadinessLoss(BaseModel):
     way_on: str
 
 
-class TrialReadiness(BaseModel):
+class TrialReadiness(Schema):
     """How far a flight has come, for this client: steps that hold, in order, and steps that were reached and lost."""
 
     steps: list[ReadinessStep]

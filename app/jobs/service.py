@@ -10,13 +10,13 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Final
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed, check_action, check_transition
 from app.common.logging import lines_of_job
-from app.common.schemas import Page, Trouble, decode_cursor, encode_cursor
+from app.common.schemas import Page, Schema, Trouble, decode_cursor, encode_cursor
 from app.common.states import JOB_ACTIONS, JOB_TRANSITIONS, JobState
 from app.core.errors import GainlineError
 from app.db.models import JobRow, JsonObject
@@ -24,7 +24,7 @@ from app.db.types import utc_now
 from app.jobs import repository
 
 
-class Job(BaseModel):
+class Job(Schema):
     """Numeric work, such as a proposal or a reproduction."""
 
     id: int
@@ -44,7 +44,7 @@ class Job(BaseModel):
     actions: Annotated[list[str], Field(description="allowed actions: cancel, retry")]
 
 
-class JobLogLine(BaseModel):
+class JobLogLine(Schema):
     """A line of the worker's log about a job. `exception` is a traceback, empty without one."""
 
     at: datetime
@@ -54,7 +54,7 @@ class JobLogLine(BaseModel):
     exception: str
 
 
-class JobLog(BaseModel):
+class JobLog(Schema):
     """The last lines about a job, oldest first; `total` counts all that are kept."""
 
     lines: list[JobLogLine]

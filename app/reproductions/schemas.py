@@ -3,9 +3,9 @@
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from app.common.schemas import Gains, Request
+from app.common.schemas import Gains, Request, Schema
 from app.jobs.service import Job
 
 
@@ -15,14 +15,14 @@ class Run(Request):
     full: Annotated[bool, Field(description="the long version, if there is one")] = False
 
 
-class ReproductionFigure(BaseModel):
+class ReproductionFigure(Schema):
     """A figure of a reproduction, and its title in the paper."""
 
     name: str
     title: str
 
 
-class LatestRun(BaseModel):
+class LatestRun(Schema):
     """The newest finished run; its job records when it was started."""
 
     job_id: int
@@ -31,7 +31,7 @@ class LatestRun(BaseModel):
     seconds: float
 
 
-class ReproductionSummary(BaseModel):
+class ReproductionSummary(Schema):
     """One experiment, table or figure of the paper. `line` describes what is done here, `paper` what the paper shows.
 
     `job` is the newest run that is queued or running, or that failed or was cancelled after the `latest` one.
@@ -47,7 +47,7 @@ class ReproductionSummary(BaseModel):
     latest: LatestRun | None
 
 
-class ReproductionRow(BaseModel):
+class ReproductionRow(Schema):
     """One number of a result.
 
     `measured` is the value here, `paper` the published one, `ratio` their ratio; `reference` is the target value of

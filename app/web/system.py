@@ -7,11 +7,11 @@ from typing import Annotated, BinaryIO, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
-from pydantic import BaseModel
 
 from app import __version__
 from app.common.data_folder import folder_bytes
 from app.common.errors import InputError, Problem
+from app.common.schemas import Schema
 from app.db.backup import database_bytes, take_backup
 from app.db.migrate import revision_of
 from app.db.trajectories import require_intact
@@ -24,14 +24,14 @@ _SQLITE: Final = "application/vnd.sqlite3"
 _CHUNK_BYTES: Final = 2**20
 
 
-class AddressInfo(BaseModel):
+class AddressInfo(Schema):
     """An address of this server. `interface` is empty where the server listens on a name or on one address."""
 
     url: str
     interface: str
 
 
-class System(BaseModel):
+class System(Schema):
     """This server. `addresses` are those under which other devices reach it, the likeliest first: none on loopback, and
     with `in_container` the container's own, which need not be the host's. `exposes` ends the sentence "It listens on …,
     so"."""

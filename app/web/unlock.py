@@ -4,11 +4,11 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
-from pydantic import BaseModel
 from starlette.responses import Response
 
 from app.accounts.keys_and_links import LINK_VALID_S, Keyring
 from app.accounts.permissions import UNLOCK_HINT, Caller, Key, Permission, RequestOrigin, is_allowed
+from app.common.schemas import Schema
 from app.web.origin import caller_of
 
 unlock_router = APIRouter(tags=["system"])
@@ -39,7 +39,7 @@ that runs Gainline, and open the link that it prints.</p>
 """
 
 
-class Access(BaseModel):
+class Access(Schema):
     """What the client may do: `may_change` campaigns and simulated flights, `may_link` vehicles with a link,
     `may_command` real ones. `elsewhere`: the client is not on this computer. `hint` describes how to unlock a browser;
     empty if a link would change nothing."""

@@ -3,10 +3,10 @@
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field, model_validator
 
 from app.campaigns.schemas import Variant
-from app.common.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Text, Version
+from app.common.schemas import Gains, Gate, Interval, Number, OptionValue, Reason, Request, Schema, Text, Version
 from app.common.states import AbortCause, Ending, FlightMode, FlightState, TrialKind, TrialState
 from app.core.statistics.comparisons import Verdict
 
@@ -43,7 +43,7 @@ class TrialEdit(Request):
     note: Text
 
 
-class TrialPhoto(BaseModel):
+class TrialPhoto(Schema):
     """A photo of a flight; the picture itself is at `/api/trials/{trial_id}/photos/{id}`."""
 
     id: int
@@ -87,7 +87,7 @@ class Abort(Request):
     reason: Annotated[str, Field(max_length=500)] = "aborted by the operator"
 
 
-class AbortAnswer(BaseModel):
+class AbortAnswer(Schema):
     """Answer to an abort. `accepted` is true when the worker has accepted the abort, or the flight is over already; the
     flight's end is reported by its events."""
 
@@ -96,7 +96,7 @@ class AbortAnswer(BaseModel):
     sentence: str
 
 
-class RecordBrief(BaseModel):
+class RecordBrief(Schema):
     """The stored record of a flight, without its samples. `ending`: whether the flight was completed, was aborted, or
     has an invalid measurement."""
 
@@ -110,7 +110,7 @@ class RecordBrief(BaseModel):
     checksum: Annotated[str, Field(description="SHA-256 of the stored samples; see docs/api.md for its verification")]
 
 
-class FlightBrief(BaseModel):
+class FlightBrief(Schema):
     """The last flight requested for this trial. `problem` states why it failed. A flight of mode `stage` waits with its
     gains on the vehicle until its operator requests the takeoff."""
 
@@ -129,7 +129,7 @@ class FlightBrief(BaseModel):
     ]
 
 
-class GroupBrief(BaseModel):
+class GroupBrief(Schema):
     """The valid flights of one gain set: their mean and its standard error, from the scatter pooled over the campaign;
     null while that is not known."""
 
@@ -138,7 +138,7 @@ class GroupBrief(BaseModel):
     n: int
 
 
-class TrialComparison(BaseModel):
+class TrialComparison(Schema):
     """The flight's gains compared with those of another one, each with all their flights. `difference` is this − other.
     `confidence` is that of the likelier direction; 90 % or more decides. `confidence` and `standard_error` are null
     while the scatter of flights is not known."""
@@ -151,7 +151,7 @@ class TrialComparison(BaseModel):
     standard_error: float | None
 
 
-class Glitch(BaseModel):
+class Glitch(Schema):
     """A part of the record that cannot be real, between the last good sample before it and the first good one after."""
 
     kind: Literal["acceleration", "frozen", "gap", "disagreement"]
@@ -160,7 +160,7 @@ class Glitch(BaseModel):
     sentence: str
 
 
-class Trial(BaseModel):
+class Trial(Schema):
     """One flight of one policy. `error` is the performance measure; lower is better."""
 
     id: int
@@ -220,7 +220,7 @@ class Trial(BaseModel):
     actions: Annotated[list[str], Field(description="allowed actions: fly, cancel, abort, upload, …")]
 
 
-class Trajectory(BaseModel):
+class Trajectory(Schema):
     """A flight's record, thinned to the requested number of points; every channel has as many values as `time_s`."""
 
     trial_id: int
