@@ -101,17 +101,22 @@ def create_flown_trial(client: httpx2.Client, database: Database, campaign_id: i
     return flown
 
 
-def create_imported_trial(client: httpx2.Client, campaign_id: int, content: bytes | None = None) -> Json:
-    """A trial of the proposal with an uploaded record."""
+def create_imported_trial(
+    client: httpx2.Client, campaign_id: int, content: bytes | None = None, *, invalid: bool = False
+) -> Json:
+    """A trial of the proposal with an uploaded record; `invalid` accepts one that cannot be scored."""
     trial = create_trial(client, campaign_id)
-    answer = upload(client, trial["id"], create_csv() if content is None else content)
+    answer = upload(client, trial["id"], create_csv() if content is None else content, invalid=invalid)
     assert answer.status_code == 201, answer.text
     imported: Json = answer.json()
     return imported
 
 
-def upload(client: httpx2.Client, trial_id: int, content: bytes, kind: str = "text/csv") -> httpx2.Response:
-    return client.post(f"/api/trials/{trial_id}/trajectory", content=content, headers={"Content-Type": kind})
+def upload(
+    client: httpx2.Client, trial_id: int, content: bytes, kind: str = "text/csv", *, invalid: bool = False
+) -> httpx2.Response:
+    path = f"/api/trials/{trial_id}/trajectory{'?invalid=true' if invalid else ''}"
+    return client.post(path, content=content, headers={"Content-Type": kind})
 
 
 def get(client: httpx2.Client, path: str) -> Any:

@@ -89,19 +89,28 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
 
 
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
-    def attempt(confirmed: bool) -> Trial:
+    def attempt(accepted: frozenset[str]) -> Trial:
         with database.write() as session:
-            return records.import_into_campaign(session, campaign, flown, number=trial, confirmed=confirmed)
+            return records.import_into_campaign(
+                session,
+                campaign,
+                flown,
+                number=trial,
+                confirmed=yes or "confirm" in accepted,
+                invalid=yes or "invalid" in accepted,
+            )
 
-    try:
-        return attempt(yes)
-    except UnconfirmedError as needed:
-        if not can_ask():
-            raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
-        Console(stderr=True, highlight=False).print(f"{escape(needed.message)} {escape(needed.hint)}")
-        if not typer.confirm("Import it?"):
-            raise
-        return attempt(True)
+    accepted: frozenset[str] = frozenset()
+    while True:
+        try:
+            return attempt(accepted)
+        except UnconfirmedError as needed:
+            if not can_ask():
+                raise UnconfirmedError(needed.message, hint=f"{needed.hint} --yes confirms it.") from needed
+            Console(stderr=True, highlight=False).print(f"{escape(needed.message)} {escape(needed.hint)}")
+            if not typer.confirm("Import it?"):
+                raise
+            accepted |= {problem.field for problem in needed.problems}
 
 
 def _print(out: Console, trial: Trial) -> None:

@@ -191,18 +191,34 @@ class Client:
             "Check that a worker is running (GET /api/health), then ask again.",
         )
 
-    def tell(self, campaign_id: int, flown: Proposal | Mapping[str, float], record: Record, *, note: str = "") -> Trial:
-        """Upload a flight flown elsewhere, with the gains it was flown with; returns it scored and classified."""
-        trial = self._plan(campaign_id, flown, note=note, fly=None)
-        return self.upload(trial.id, record)
+    def tell(
+        self,
+        campaign_id: int,
+        flown: Proposal | Mapping[str, float],
+        record: Record,
+        *,
+        note: str = "",
+        invalid: bool = False,
+    ) -> Trial:
+        """Upload a flight flown elsewhere, with the gains it was flown with; returns it scored and classified.
 
-    def upload(self, trial_id: int, record: Record, *, takeoff: int | None = None, confirm: bool = False) -> Trial:
+        `invalid` accepts a record that cannot be scored. Without it the trial stays planned, and ConflictError is
+        raised.
+        """
+        trial = self._plan(campaign_id, flown, note=note, fly=None)
+        return self.upload(trial.id, record, invalid=invalid)
+
+    def upload(
+        self, trial_id: int, record: Record, *, takeoff: int | None = None, confirm: bool = False, invalid: bool = False
+    ) -> Trial:
         """Upload the record of a planned trial, or the recovered record of a lost flight.
 
         `takeoff` chooses one of a log with several takeoffs. `confirm` accepts a log that was flown with other gains;
-        the trial then has those. Raises InvalidError that lists the takeoffs, ConflictError that names both gain sets.
+        the trial then has those. `invalid` accepts a record that cannot be scored, as an invalid flight. Raises
+        InvalidError that lists the takeoffs, ConflictError that names both gain sets or why the record has no score.
         """
-        query = ({} if takeoff is None else {"takeoff": str(takeoff)}) | ({"confirm": "true"} if confirm else {})
+        query = {} if takeoff is None else {"takeoff": str(takeoff)}
+        query |= {name: "true" for name, accepted in (("confirm", confirm), ("invalid", invalid)) if accepted}
         return self._request(
             "POST",
             f"/api/trials/{trial_id}/trajectory",

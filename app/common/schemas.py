@@ -73,9 +73,9 @@ class Schema(BaseModel):
 
 
 class Request(Schema):
-    """A request body; unknown fields are errors."""
+    """A request body; unknown fields are errors. Built at once: of a deferred body, pydantic warns about its alias."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)
+    model_config = ConfigDict(defer_build=False, extra="forbid", json_schema_serialization_defaults_required=True)
 
 
 class ProblemField(Schema):

@@ -34,6 +34,6 @@ def test_a_record_is_scored_drawn_and_judged_over_the_window(client: TestClient,
 
 def test_a_log_shorter_than_the_window_does_not_count_and_says_why(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import", definition=SHORT)
-    flown = create_imported_trial(client, campaign["id"], create_csv(until_s=10.0))
+    flown = create_imported_trial(client, campaign["id"], create_csv(until_s=10.0), invalid=True)
     assert (flown["state"], flown["error"]) == ("invalid", None)
     assert flown["reason"] == "time_s must cover 0 … 12 s from the command on, got 0 … 10 s"

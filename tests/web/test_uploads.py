@@ -60,8 +60,15 @@ def test_a_malformed_record_is_refused_in_words_and_stores_nothing(
         assert session.query(TrajectoryRow).filter_by(source="csv").count() == 0
 
 
-def test_a_record_that_ends_too_early_is_kept_and_does_not_count(client: TestClient, trial: Json) -> None:
-    answer = send(client, trial["id"], create_csv(until_s=20.0))
+def test_a_record_that_ends_too_early_is_kept_only_when_somebody_says_so(client: TestClient, trial: Json) -> None:
+    """Seen: a log of 12 s became an invalid flight, and the trial could not take the right log any more."""
+    short = create_csv(until_s=20.0)
+    asked = send(client, trial["id"], short)
+    assert (asked.status_code, asked.json()["title"]) == (409, "Confirmation needed")
+    assert set(problems_of(asked)) == {"invalid"}
+    assert "must cover 0 … 32.6 s from the command on, got 0 … 20 s" in asked.json()["detail"]
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
+    answer = send(client, trial["id"], short, invalid=True)
     assert (answer.status_code, answer.json()["state"], answer.json()["error"]) == (201, "invalid", None)
     assert "must cover 0 … 32.6 s" in answer.json()["reason"]
     assert answer.json()["record"]["samples"] == 1001

@@ -46,12 +46,11 @@ _SINGLE_PRECISION: Final = 1e-6
 
 
 def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, confirmed: bool) -> None:
-    """Set the trial's gains to those in the log.
+    """Set the trial's gains to those in the log; a CSV file, which contains none, leaves them as planned.
 
-    A log without gains leaves them as planned. Where the values differ and that is `confirmed`, the trial takes the
-    gains that were flown and loses the prediction for the planned ones. Raises InputError for a log with other gains
-    than those of the experiment, UnconfirmedError that names both sets, GainsError when the flown gains are outside the
-    campaign's bounds.
+    Where the values differ and that is `confirmed`, the trial takes the gains that were flown and loses the prediction
+    for the planned ones. Raises InputError for a log with other gains than those of the experiment or without their
+    values, UnconfirmedError that names both sets, GainsError when the flown gains are outside the campaign's bounds.
     """
     if flown.gain_names and row.gains.keys() != set(flown.gain_names):
         raise InputError(
@@ -59,8 +58,16 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
             hint="It is a log of another autopilot. Upload it to a campaign whose experiment has these gains.",
             problems=(Problem("file", f"does not contain the gains {', '.join(row.gains)}"),),
         )
-    if not flown.gains:
+    if not flown.gain_names:
         return
+    if not flown.gains:
+        raise InputError(
+            f"The log does not contain the gains {', '.join(row.gains)} that the vehicle used.",
+            hint="Choose a log with the vehicle's parameters: for Paparazzi's .data file add the .log file of the same "
+            "name; start a telemetry log before the ground station connects. Or upload the record as a CSV file, which "
+            "takes the planned gains as flown.",
+            problems=(Problem("file", f"does not contain values of {', '.join(row.gains)}"),),
+        )
     if _same(row.gains, flown.gains):
         row.read_back = row.read_back or dict(row.gains)
         return
@@ -211,14 +218,31 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
+def _require_scorable(campaign: CampaignRow, trajectory: Trajectory) -> None:
+    """Raise UnconfirmedError for a record that nobody's judgement can make valid, such as one that ends too early."""
+    refusal = score(experiment_of_campaign(campaign), trajectory, accept_gaps=True).refusal
+    if refusal:
+        raise UnconfirmedError(
+            f"The record cannot be scored: {refusal}.",
+            hint="Choose the complete log of this flight, or confirm that it is stored as an invalid flight.",
+            problems=(Problem("invalid", f"the flight would be invalid: {refusal}"),),
+        )
+
+
 def import_record(
-    session: Session, trial_id: int, flown: Takeoff, context: RequestContext = LOCAL_CLI, *, confirmed: bool = False
+    session: Session,
+    trial_id: int,
+    flown: Takeoff,
+    context: RequestContext = LOCAL_CLI,
+    *,
+    confirmed: bool = False,
+    invalid: bool = False,
 ) -> Trial:
     """Import the record of a flight flown elsewhere, or the recovered record of a lost flight; score and classify it.
 
     Raises ConflictError when the trial takes no record, UnconfirmedError when the log was flown with other gains and
-    that is not `confirmed`, TrajectoryError when the record cannot be stored, NotAllowedError when the client may not
-    command a real vehicle.
+    that is not `confirmed`, or when it cannot be scored and nobody has asked to store it as `invalid`, TrajectoryError
+    when the record cannot be stored, NotAllowedError when the client may not command a real vehicle.
     """
     row = repository.get_trial(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
@@ -227,6 +251,8 @@ def import_record(
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
         settle_gains(session, campaign, row, flown, confirmed=confirmed)
+        if not invalid:
+            _require_scorable(campaign, flown.trajectory)
         capture(session, campaign, row, flown.trajectory)
         proposals.history_changed(session, campaign)
         return trial_view(session, campaign, row)
@@ -237,6 +263,8 @@ def import_record(
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)
     settle_gains(session, campaign, row, flown, confirmed=confirmed)
+    if not invalid:
+        _require_scorable(campaign, flown.trajectory)
     proposals.start_flying(campaign)
     row.flown_at = utc_now()
     capture(session, campaign, row, flown.trajectory)
@@ -245,7 +273,7 @@ def import_record(
 
 
 def import_into_campaign(
-    session: Session, campaign: str, flown: Takeoff, *, number: int | None, confirmed: bool
+    session: Session, campaign: str, flown: Takeoff, *, number: int | None, confirmed: bool, invalid: bool
 ) -> Trial:
     """Import a record for the trial of the given number, else for the one that waits for a record.
 
@@ -269,14 +297,14 @@ def import_into_campaign(
             problems=tuple(Problem("trial", f"{trial.number}: {trial.state}") for trial in chosen),
         )
     if chosen:
-        return import_record(session, chosen[0].id, flown, confirmed=confirmed)
+        return import_record(session, chosen[0].id, flown, confirmed=confirmed, invalid=invalid)
     if row.state == CampaignState.FINISHED:
         raise ConflictError(
             f"Campaign {campaign_id} has ended.", hint="Reopen it on its page to import another flight, then try again."
         )
     proposal = proposals.require_fresh_proposal(session, row)
     planned = create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
-    return import_record(session, planned.id, flown, confirmed=confirmed)
+    return import_record(session, planned.id, flown, confirmed=confirmed, invalid=invalid)
 
 
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:

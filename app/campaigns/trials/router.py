@@ -173,6 +173,9 @@ def upload_trajectory(
     confirm: Annotated[
         bool, Query(description="accept a log that was flown with other gains; the trial takes the gains in the log")
     ] = False,
+    invalid: Annotated[
+        bool, Query(description="accept a record that cannot be scored, for instance because it ends too early")
+    ] = False,
 ) -> Trial:
     """Upload the record of a flight flown elsewhere, or the recovered record of a lost flight.
 
@@ -182,7 +185,8 @@ def upload_trajectory(
     """
     flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
     return record.once(
-        Trial, lambda session: records.import_record(session, trial_id, flown, asking, confirmed=confirm)
+        Trial,
+        lambda session: records.import_record(session, trial_id, flown, asking, confirmed=confirm, invalid=invalid),
     )
 
 

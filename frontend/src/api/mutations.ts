@@ -125,19 +125,21 @@ export interface RecordOrder extends RecordFiles {
   takeoff?: number;
   /** Accept the log's gains although they differ from the planned ones. */
   confirm?: boolean;
+  /** Store a record that cannot be scored, as an invalid flight. */
+  invalid?: boolean;
 }
 
 /** Upload the record of a flight made elsewhere; without a planned trial, one is planned first. */
 export function useUploadRecord(campaignId: number) {
   const settled = useSettled();
   return useMutation({
-    mutationFn: async ({ file, companion, trialId, plan, takeoff, confirm }: RecordOrder) => {
+    mutationFn: async ({ file, companion, trialId, plan, ...query }: RecordOrder) => {
       const planned =
         trialId ?? (await answer(createTrial({ path: { campaign_id: campaignId }, body: plan ?? {} }))).id;
       return answer(
         uploadTrajectory({
           path: { trial_id: planned },
-          query: { ...(takeoff === undefined ? {} : { takeoff }), ...(confirm === undefined ? {} : { confirm }) },
+          query,
           body: { file, ...(companion === undefined ? {} : { companion }) },
         }),
       );

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { type Problem, problemFrom } from "./problems";
-import { recordOf, takeoffsIn, wantsConfirmation } from "./records";
+import { confirmationIn, recordOf, takeoffsIn } from "./records";
 
 const named = (name: string): File => new File(["content"], name);
 const refusal = (problems: { field: string; reason: string }[]): Problem => problemFrom(422, { title: "No", problems });
@@ -33,17 +33,21 @@ describe("what the server asks", () => {
       { number: 1, summary: "18.4 s into the log, kp 283" },
       { number: 2, summary: "95.9 s into the log, kp 1624" },
     ]);
-    expect(wantsConfirmation(problem)).toBe(false);
+    expect(confirmationIn(problem)).toBeNull();
   });
 
   it("is whether gains that were not planned shall be taken", () => {
-    expect(wantsConfirmation(refusal([{ field: "confirm", reason: "not the trial's" }]))).toBe(true);
+    expect(confirmationIn(refusal([{ field: "confirm", reason: "not the trial's" }]))).toBe("confirm");
+  });
+
+  it("is whether a record that cannot be scored shall be stored", () => {
+    expect(confirmationIn(refusal([{ field: "invalid", reason: "ends too early" }]))).toBe("invalid");
   });
 
   it("is nothing when something else was refused", () => {
     const problem = refusal([{ field: "file", reason: "1: is empty" }]);
     expect(takeoffsIn(problem)).toEqual([]);
-    expect(wantsConfirmation(problem)).toBe(false);
+    expect(confirmationIn(problem)).toBeNull();
     expect(takeoffsIn(null)).toEqual([]);
   });
 });

@@ -37,9 +37,10 @@ export function takeoffsIn(problem: Problem | null): Takeoff[] {
   });
 }
 
-/** Whether the log has other gains than planned, which needs a confirmation. */
-export function wantsConfirmation(problem: Problem | null): boolean {
-  return (problem?.problems ?? []).some(({ field }) => field === "confirm");
+/** What a person may accept all the same: other gains than planned, or a record that cannot be scored. */
+export function confirmationIn(problem: Problem | null): "confirm" | "invalid" | null {
+  const fields = (problem?.problems ?? []).map(({ field }) => field);
+  return (["confirm", "invalid"] as const).find((field) => fields.includes(field)) ?? null;
 }
 
 export const photoAddress = (trialId: number, photoId: number): string => `/api/trials/${trialId}/photos/${photoId}`;

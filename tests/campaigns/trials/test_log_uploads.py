@@ -84,7 +84,7 @@ def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
     definition = {"experiment": experiment, "strategy": "manual"}
     campaign = create_ready_campaign(client, database, vehicle="import", definition=definition)
     trial = create_trial(client, campaign["id"])
-    path = f"{path_of(trial)}?confirm=true&takeoff=1"
+    path = f"{path_of(trial)}?confirm=true&invalid=true&takeoff=1"
     answer = client.post(path, content=recorded(log), headers=ANY)
     if log in EXPERIMENTS[experiment]:
         assert answer.status_code == 201, answer.text
@@ -186,10 +186,13 @@ def test_a_paparazzi_log_comes_with_its_companion_in_a_form(client: TestClient, 
     assert answer.json()["read_back"] == TLOGS[DEFAULT]
 
 
-def test_a_log_without_gains_leaves_them_as_planned(client: TestClient, trial: Json) -> None:
+def test_a_log_without_gains_is_refused_and_says_where_they_can_be_found(client: TestClient, trial: Json) -> None:
+    """Nobody knows what was flown: taken with the planned gains, a flight of others would train the model."""
     data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False)).encode()
-    flown = client.post(path_of(trial), content=data, headers=ANY).json()
-    assert (flown["state"], flown["gains"], flown["read_back"]) == ("valid", TLOGS[DEFAULT], None)
+    answer = client.post(f"{path_of(trial)}?confirm=true&invalid=true", content=data, headers=ANY)
+    assert (answer.status_code, problems_of(answer)) == (422, {"file": "does not contain values of kp, ki, kd"})
+    assert ".log file of the same name" in answer.json()["hint"]
+    assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
 
 
 def test_a_file_of_the_wrong_kind_is_refused_by_its_name(client: TestClient, trial: Json) -> None:

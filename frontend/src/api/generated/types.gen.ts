@@ -5223,6 +5223,12 @@ export type UploadTrajectoryData = {
          * accept a log that was flown with other gains; the trial takes the gains in the log
          */
         confirm?: boolean;
+        /**
+         * Invalid
+         *
+         * accept a record that cannot be scored, for instance because it ends too early
+         */
+        invalid?: boolean;
     };
     url: '/api/trials/{trial_id}/trajectory';
 };

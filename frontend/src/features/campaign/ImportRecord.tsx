@@ -2,7 +2,7 @@ import { Button, FileButton, Stack } from "@mantine/core";
 import { IconFileUpload } from "@tabler/icons-react";
 import type { RecordOrder, RecordUpload } from "../../api/mutations";
 import { problemOf } from "../../api/problems";
-import { RECORD_FILES, recordOf, takeoffsIn, wantsConfirmation } from "../../api/records";
+import { confirmationIn, RECORD_FILES, recordOf, takeoffsIn } from "../../api/records";
 import type { NewTrial } from "../../api/types";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
@@ -14,6 +14,8 @@ interface Props {
   plan?: NewTrial;
 }
 
+const ACCEPT = { confirm: "Import with the gains in the log", invalid: "Store as an invalid flight" };
+
 /** Upload of the record of a flight made elsewhere with these gains. */
 export function ImportRecord({ upload, trialId, plan }: Props) {
   const target = {
@@ -21,6 +23,7 @@ export function ImportRecord({ upload, trialId, plan }: Props) {
     ...(plan === undefined ? {} : { plan }),
   };
   const problem = problemOf(upload.error);
+  const accepting = confirmationIn(problem);
   const again = (answer: Partial<RecordOrder>) =>
     upload.variables !== undefined && upload.mutate({ ...upload.variables, ...target, ...answer });
   return (
@@ -51,7 +54,7 @@ export function ImportRecord({ upload, trialId, plan }: Props) {
           </Button>
         )}
       </FileButton>
-      <ErrorNotice error={upload.error} shown={["takeoff"]} />
+      <ErrorNotice error={upload.error} shown={["takeoff", "confirm", "invalid"]} />
       {takeoffsIn(problem).map(({ number, summary }) => (
         <Button key={number} variant="default" h="auto" py="xs" onClick={() => again({ takeoff: number })}>
           <span style={{ whiteSpace: "normal" }}>
@@ -59,9 +62,9 @@ export function ImportRecord({ upload, trialId, plan }: Props) {
           </span>
         </Button>
       ))}
-      {wantsConfirmation(problem) && (
-        <Button variant="default" onClick={() => again({ confirm: true })}>
-          Import with the gains in the log
+      {accepting !== null && (
+        <Button variant="default" onClick={() => again({ [accepting]: true })}>
+          {ACCEPT[accepting]}
         </Button>
       )}
     </Stack>
