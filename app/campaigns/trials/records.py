@@ -76,9 +76,7 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
             f"The log was flown with {format_gains(flown.gains)}; trial {row.number} was planned with "
             f"{format_gains(row.gains)}.",
             hint="Choose the log of this trial, or confirm that the trial takes the gains in the log.",
-            problems=(
-                Problem("confirm", f"the gains in the log, {format_gains(flown.gains)}, differ from the trial's"),
-            ),
+            problems=(Problem("confirm", f"the log was flown with {format_gains(flown.gains)}"),),
         )
     row.read_back = dict(flown.gains)
     judged = check_flown_gains(session, campaign, flown.gains)
@@ -225,7 +223,7 @@ def _require_scorable(campaign: CampaignRow, trajectory: Trajectory) -> None:
         raise UnconfirmedError(
             f"The record cannot be scored: {refusal}.",
             hint="Choose the complete log of this flight, or confirm that it is stored as an invalid flight.",
-            problems=(Problem("invalid", f"the flight would be invalid: {refusal}"),),
+            problems=(Problem("invalid", refusal),),
         )
 
 
