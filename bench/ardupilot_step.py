@@ -8,11 +8,7 @@ checks that both results agree to 1e-9, then times both in turns and prints the 
 """
 
 import ctypes
-import shutil
-import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -22,11 +18,9 @@ from numpy.typing import NDArray
 
 from app.core.control import ardupilot as loop
 from app.core.control.ardupilot_parameters import STEP_S, Parameters
+from bench.timing.c_comparison import compiled, is_within_limit
 
 STEPS: Final = 8000
-ROUNDS: Final = 300
-PAUSE_S: Final = 0.015
-LIMIT: Final = 1.3
 HOVER: Final = (0.39, 6.0, 0.0, 0.0)
 PARAMETERS: Final = Parameters(
     position_p_1_s=2.2,
@@ -62,8 +56,8 @@ def flown() -> Array:
     )
 
 
-def in_c(library: Path, inputs: Array) -> Run:
-    function = ctypes.CDLL(str(library)).rollout
+def in_c(library: ctypes.CDLL, inputs: Array) -> Run:
+    function = library.rollout
     function.restype = None
     packed, outputs, state = PARAMETERS.packed(), np.empty((STEPS, len(loop.OUTPUTS))), np.empty(loop.STATE_SIZE)
     arrays = [ctypes.c_void_p(array.ctypes.data) for array in (state, packed, inputs, outputs)]
@@ -88,33 +82,12 @@ def in_python(inputs: Array) -> Run:
     return run
 
 
-def seconds(run: Run) -> float:
-    time.sleep(PAUSE_S)
-    start = time.perf_counter()
-    run()
-    return time.perf_counter() - start
-
-
 def main() -> int:
-    compiler = shutil.which("gcc")
-    if compiler is None:
-        print("bench.ardupilot_step: no gcc found; install one to compare against C.")
-        return 2
     inputs = flown()
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder) / "step.so"
-        subprocess.run(
-            [compiler, "-O2", "-shared", "-fPIC", "-o", library, Path(__file__).with_suffix(".c"), "-lm"], check=True
-        )
+    with compiled(Path(__file__).with_suffix(".c")) as library:
         c, python = in_c(library, inputs), in_python(inputs)
         assert np.abs(c() - python()).max() < 1e-9, "the outputs differ"
-        times = np.array([(seconds(c), seconds(python)) for _ in range(ROUNDS)]).min(axis=0)
-    ratio = times[1] / times[0]
-    print(
-        f"{STEPS} steps of ArduCopter's loop, best of {ROUNDS}: C -O2 {times[0] / STEPS * 1e9:.1f} ns a step, compiled "
-        f"Python {times[1] / STEPS * 1e9:.1f} ns a step, ratio {ratio:.2f} (limit {LIMIT})"
-    )
-    return 0 if ratio <= LIMIT else 1
+        return 0 if is_within_limit("ArduCopter's loop", c, python, STEPS) else 1
 
 
 if __name__ == "__main__":

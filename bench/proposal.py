@@ -31,7 +31,7 @@ from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
 from app.vehicles.base import FlightOptions as Order
 from app.vehicles.registry import open_vehicle
-from bench.machine import measured_slowness
+from bench.timing.machine import measured_slowness
 
 LIMIT_S: Final = 1.0
 WORKER: Final = "bench"

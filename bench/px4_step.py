@@ -8,11 +8,7 @@ the ratio is above 1.3.
 """
 
 import ctypes
-import shutil
-import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -22,11 +18,9 @@ from numpy.typing import NDArray
 
 from app.core.control import px4 as loop
 from app.core.control.px4_parameters import STEP_S, Parameters
+from bench.timing.c_comparison import compiled, is_within_limit
 
 STEPS: Final = 8000
-ROUNDS: Final = 300
-PAUSE_S: Final = 0.015
-LIMIT: Final = 1.3
 PARAMETERS: Final = Parameters(velocity_d=0.1, velocity_filter_hz=8.0)
 
 Array = NDArray[np.float32]
@@ -59,8 +53,8 @@ def flown() -> Array:
     return np.ascontiguousarray(np.column_stack([columns[name] for name in loop.INPUTS]), dtype=np.float32)
 
 
-def in_c(library: Path, inputs: Array) -> Run:
-    function = ctypes.CDLL(str(library)).rollout
+def in_c(library: ctypes.CDLL, inputs: Array) -> Run:
+    function = library.rollout
     function.restype = None
     packed, outputs, state = _arrays()
     arrays = [ctypes.c_void_p(array.ctypes.data) for array in (state, packed, inputs, outputs)]
@@ -89,32 +83,12 @@ def _arrays() -> tuple[Array, Array, Array]:
     return PARAMETERS.packed(), outputs, np.empty(loop.STATE_SIZE, dtype=np.float32)
 
 
-def seconds(run: Run) -> float:
-    time.sleep(PAUSE_S)
-    start = time.perf_counter()
-    run()
-    return time.perf_counter() - start
-
-
 def main() -> int:
-    compiler = shutil.which("gcc")
-    if compiler is None:
-        print("bench.px4_step: no gcc found; install one to compare against C.")
-        return 2
     inputs = flown()
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder) / "step.so"
-        source = Path(__file__).with_suffix(".c")
-        subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", library, source, "-lm"], check=True)
+    with compiled(Path(__file__).with_suffix(".c")) as library:
         c, python = in_c(library, inputs), in_python(inputs)
         np.testing.assert_allclose(c(), python(), rtol=0.0, atol=1e-6, err_msg="the outputs differ")
-        times = np.array([(seconds(c), seconds(python)) for _ in range(ROUNDS)]).min(axis=0)
-    ratio = times[1] / times[0]
-    print(
-        f"{STEPS} steps of PX4's loop, best of {ROUNDS}: C -O2 {times[0] / STEPS * 1e9:.1f} ns a step, compiled "
-        f"Python {times[1] / STEPS * 1e9:.1f} ns a step, ratio {ratio:.2f} (limit {LIMIT})"
-    )
-    return 0 if ratio <= LIMIT else 1
+        return 0 if is_within_limit("PX4's loop", c, python, STEPS) else 1
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ from app.vehicles.mavlink.transports import Peer, Transport, open_transport
 from app.vehicles.mavlink.trial import TrialResult
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
-from bench.machine import slowness
+from bench.timing.machine import slowness
 
 CORE_SHARE_LIMIT: Final = 0.1
 DEFAULT_S: Final = 30.0

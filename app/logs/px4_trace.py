@@ -8,9 +8,8 @@ import numpy as np
 from app.core.control.px4 import INPUTS, OUTPUTS
 from app.core.control.px4_parameters import STEP_S, parameters_from
 from app.core.control.px4_replay import LoopTrace
-from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
-from app.logs.trace_table import TraceTable, has_columns, read_trace_table
+from app.logs.trace_table import TraceChecks, TraceTable, has_columns, read_trace_table
 
 _DERIVATIVE: Final = "z_derivative_m_s"
 _NEW: Final = "set_new"
@@ -24,6 +23,10 @@ _MAY_BE_EMPTY: Final = (
     "az_m_s2", "true_z_m", *OUTPUTS[len(_ALWAYS):], _DERIVATIVE,
 )  # fmt: skip
 COLUMNS: Final = ("time_s", *_GIVEN, *_ALWAYS)
+_HINT: Final = (
+    "A trace of PX4's loop has # and a JSON object with parameters, a header, and one row per estimate of position "
+    f"with the columns {','.join(COLUMNS)}."
+)
 
 
 def is_px4_trace(beginning: bytes) -> bool:
@@ -38,22 +41,14 @@ def read_px4_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
     Raises InputError naming the line and the column or key of the first error.
     """
     table = read_trace_table(stream, name=name, columns=COLUMNS, may_be_empty=_MAY_BE_EMPTY)
-    for flag in _FLAGS:
-        if not np.isin(table[flag], (0.0, 1.0)).all():
-            line = int(np.flatnonzero(~np.isin(table[flag], (0.0, 1.0)))[0]) + 3
-            raise _malformed(name, f"line {line}, {flag}", "must be 0 or 1")
-    if (table["dt_s"] <= 0.0).any():
-        line = int(np.flatnonzero(table["dt_s"] <= 0.0)[0]) + 3
-        raise _malformed(name, f"line {line}, dt_s", "must be positive")
-    described = table.description
-    sample_s = _number(name, described, "filter_sample_s") if "filter_sample_s" in described else STEP_S
-    if sample_s <= 0.0:
-        raise _malformed(name, "line 1, filter_sample_s", "must be positive")
+    checks, described = TraceChecks(name, _HINT), table.description
+    checks.require_flags(table, _FLAGS)
+    checks.require_positive(table, "dt_s")
     derived = {_DERIVATIVE: np.diff(table["z_m"], prepend=table["z_m"][0]) / table["dt_s"], _NEW: _new(table)}
     known = derived | dict(table.columns)
     return LoopTrace(
-        parameters=parameters_from(_values(name, described)),
-        filter_sample_s=sample_s,
+        parameters=parameters_from(_values(checks, described)),
+        filter_sample_s=checks.positive_in({"filter_sample_s": STEP_S} | dict(described), "filter_sample_s"),
         flown=_MODE in known,
         time_s=table["time_s"],
         inputs=np.ascontiguousarray(np.column_stack([known[each] for each in INPUTS])),
@@ -74,25 +69,7 @@ def _outputs(table: TraceTable) -> Samples:
     return np.ascontiguousarray(np.column_stack([table.columns.get(each, unknown) for each in OUTPUTS]))
 
 
-def _values(name: str, described: Mapping[str, object]) -> dict[str, float]:
+def _values(checks: TraceChecks, described: Mapping[str, object]) -> dict[str, float]:
     """The firmware's parameters by name."""
-    given = described.get("parameters")
-    if not isinstance(given, dict):
-        raise _malformed(name, "line 1, parameters", "must be a JSON object")
-    return {each: _number(name, given, each) for each in given}
-
-
-def _number(name: str, described: Mapping[str, object], key: str) -> float:
-    found = described.get(key)
-    if isinstance(found, bool) or not isinstance(found, int | float) or not np.isfinite(found):
-        raise _malformed(name, f"line 1, {key}", "must be a finite number")
-    return float(found)
-
-
-def _malformed(name: str, field: str, reason: str) -> InputError:
-    return InputError(
-        f"{name} cannot be replayed.",
-        hint="A trace of PX4's loop has # and a JSON object with parameters, a header, and one row per estimate of "
-        f"position with the columns {','.join(COLUMNS)}.",
-        problems=(Problem(field, reason),),
-    )
+    given = checks.object_in(described, "parameters")
+    return {each: checks.number_in(given, each) for each in given}

@@ -16,12 +16,15 @@ from dataclasses import dataclass
 from typing import BinaryIO, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.loop_trace import GZIP, IN_MEMORY_BYTES, MAX_ROWS, unpack
 
 _DESCRIPTION_CHARACTERS: Final = 2**16
+_FIRST_ROW: Final = 3
+"""Line of the first row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,47 @@ class TraceTable:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
+
+
+@dataclass(frozen=True, slots=True)
+class TraceChecks:
+    """Checks of a run in the file `name`, with the `hint` of its kind. Each raises InputError naming the line and the
+    column or key."""
+
+    name: str
+    hint: str
+
+    def malformed(self, field: str, reason: str) -> InputError:
+        return InputError(f"{self.name} cannot be replayed.", hint=self.hint, problems=(Problem(field, reason),))
+
+    def require_flags(self, table: TraceTable, columns: Collection[str]) -> None:
+        for column in columns:
+            self._require(np.isin(table[column], (0.0, 1.0)), column, "must be 0 or 1")
+
+    def require_positive(self, table: TraceTable, column: str) -> None:
+        self._require(table[column] > 0.0, column, "must be positive")
+
+    def _require(self, holds: NDArray[np.bool_], column: str, reason: str) -> None:
+        if not holds.all():
+            raise self.malformed(f"line {int(np.argmin(holds)) + _FIRST_ROW}, {column}", reason)
+
+    def object_in(self, described: Mapping[str, object], key: str) -> Mapping[str, object]:
+        found = described.get(key)
+        if not isinstance(found, dict):
+            raise self.malformed(f"line 1, {key}", "must be a JSON object")
+        return found
+
+    def number_in(self, described: Mapping[str, object], key: str) -> float:
+        found = described.get(key)
+        if isinstance(found, bool) or not isinstance(found, int | float) or not np.isfinite(found):
+            raise self.malformed(f"line 1, {key}", "must be a finite number")
+        return float(found)
+
+    def positive_in(self, described: Mapping[str, object], key: str) -> float:
+        found = self.number_in(described, key)
+        if found <= 0.0:
+            raise self.malformed(f"line 1, {key}", "must be positive")
+        return found
 
 
 def has_columns(beginning: bytes, columns: Collection[str]) -> bool:
@@ -77,7 +121,7 @@ def _read(name: str, text: io.TextIOWrapper, columns: Collection[str], may_be_em
     if twice := next((each for each in header if header.count(each) > 1), None):
         raise _malformed(name, 2, twice, "column appears twice", columns)
     values = array("d")
-    for line, row in enumerate(reader, start=3):
+    for line, row in enumerate(reader, start=_FIRST_ROW):
         values.extend(_row(name, line, header, row, may_be_empty, columns))
     if not values:
         raise InputError(
