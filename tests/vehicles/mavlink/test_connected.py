@@ -559,3 +559,18 @@ def test_a_log_that_cannot_be_written_is_reported_and_the_previous_one_continues
         vehicle.attend(0.5)
         assert vehicle.condition().trouble == ""
     assert (tmp_path / "first.tlog").stat().st_size > 0
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "paparazzi", "px4"])
+@pytest.mark.parametrize("away_s", [0.2, 2.2, 30.0])
+def test_a_release_after_a_restart_leaves_no_doubt_about_the_gains(autopilot: str, away_s: float) -> None:
+    """While it boots, as it answers again, and long after."""
+    system = 31 if autopilot == "paparazzi" else 1
+    earlier = Identity(system_id=system, autopilot=autopilot, version="0.1")
+    with LockstepRig(autopilot) as rig, connected(rig, earlier) as vehicle:
+        vehicle.attend(1.0)
+        rig.drone.reboot()
+        vehicle.attend(away_s)
+        vehicle.release()
+        vehicle.attend(3.0)
+        assert (vehicle.condition().trouble, vehicle.condition().held) == ("", OWN_SAFE[autopilot])
