@@ -37,11 +37,6 @@ def measured(value: float, standard_error: float | None, unit: str) -> str:
     return plus_minus(value, standard_error, unit) if standard_error else f"{value:.3f} {unit}"
 
 
-def percent(confidence: float) -> str:
-    """A confidence as a percentage; `more than 99 %` instead of a value that rounds to certainty."""
-    return "more than 99 %" if confidence > 0.995 else f"{100.0 * confidence:.0f} %"
-
-
 def named(group: Group, name: str) -> str:
     """`flight 3 (kp 400, ki 20, kd 100; 2 flights)`: a flight with its gains and their number of flights."""
     return f"{name} ({format_gains(group.gains)}; {count(group.size, 'flight')})"

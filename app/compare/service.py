@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -19,7 +18,7 @@ from app.compare.compared_flights import (
     sides_of,
 )
 from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
-from app.compare.verdicts import compare_pair, list_notes, overall_verdict
+from app.compare.verdicts import compare_pairs, find_leading_pair, list_notes, overall_verdict
 from app.core.records.trajectory import CHANNEL_UNITS, Samples
 from app.db import trajectories
 from app.figures.base import Card, card_of
@@ -43,7 +42,8 @@ def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightCompari
     sides = sides_of(session, trial_ids)
     flown = history.latest_flights(session, trial_ids)
     settings = [settings_of(side, flown[side.row.id].battery if side.row.id in flown else "") for side in sides]
-    verdict, sentence = overall_verdict(sides)
+    leading = find_leading_pair(sides)
+    verdict, sentence = overall_verdict(leading)
     return FlightComparison(
         error_unit=sides[0].experiment.error_unit,
         verdict=verdict,
@@ -52,7 +52,7 @@ def compare_flights(session: Session, trial_ids: Sequence[int]) -> FlightCompari
         flights=[_flight(side, own) for side, own in zip(sides, settings, strict=True)],
         gains=gain_differences(sides),
         settings=setting_differences(settings),
-        pairs=[compare_pair(later, earlier) for earlier, later in combinations(sides, 2)],
+        pairs=compare_pairs(sides, leading),
         file_stem=file_stem([side.row for side in sides]),
     )
 

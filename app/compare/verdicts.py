@@ -7,11 +7,13 @@ vehicle and gains differ together; only the errors are reported.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 from app.campaigns.trials.views import CONFIDENCE
-from app.compare.compared_flights import ComparisonFlight, capitalised, measured, named, percent
+from app.compare.compared_flights import ComparisonFlight, capitalised, measured, named
 from app.compare.schemas import Basis, FlightPair, FurtherFlights
-from app.core.formatting import count, format_gains
+from app.core.formatting import confidence_text, count, format_gains
 from app.core.statistics.comparisons import Comparison, Group, Verdict, compare, drift_of
 from app.core.tuning.confirmation import SCATTER_NOT_KNOWN
 from app.fleet import service as fleet
@@ -48,23 +50,56 @@ def compare_pair(side: ComparisonFlight, against: ComparisonFlight, *, candidate
     )
 
 
-def overall_verdict(sides: Sequence[ComparisonFlight]) -> tuple[Verdict | None, str]:
-    """Compare the gains with the lowest mean plus its standard error, as in a campaign, with the first flight's.
+@dataclass(frozen=True, slots=True)
+class LeadingPair:
+    """The flight with the lowest mean plus its standard error among the `policies` that were flown, and the one that it
+    is compared with: the first flight, or the next lowest if it has the first flight's gains."""
 
-    If they are the first flight's, they are compared with the next lowest.
-    """
+    best: ComparisonFlight
+    other: ComparisonFlight
+    policies: int
+
+    @property
+    def candidates(self) -> int:
+        return max(1, self.policies - 1)
+
+    def is_of(self, side: ComparisonFlight, against: ComparisonFlight) -> bool:
+        return {side.row.id, against.row.id} == {self.best.row.id, self.other.row.id}
+
+
+def find_leading_pair(sides: Sequence[ComparisonFlight]) -> LeadingPair | None:
+    """None if fewer than two flights have an error that counts."""
     ranked = sorted((side for side in sides if side.group is not None), key=_rank)
     if len(ranked) < 2:
-        return None, "No verdict: fewer than two of these flights have an error that counts."
+        return None
     best, first = ranked[0], sides[0]
-    policies = len({id(side.group) for side in ranked})
     other = (
         first
         if first.group not in (None, best.group)
         else next((side for side in ranked if side.group is not best.group), ranked[1])
     )
-    pair = compare_pair(best, other, candidates=max(1, policies - 1))
-    return pair.verdict, f"{_among(best, policies)}{pair.sentence}"
+    return LeadingPair(best, other, policies=len({id(side.group) for side in ranked}))
+
+
+def overall_verdict(leading: LeadingPair | None) -> tuple[Verdict | None, str]:
+    """Compare the best gains with the first flight's, as in a campaign."""
+    if leading is None:
+        return None, "No verdict: fewer than two of these flights have an error that counts."
+    pair = compare_pair(leading.best, leading.other, candidates=leading.candidates)
+    return pair.verdict, f"{_among(leading.best, leading.policies)}{pair.sentence}"
+
+
+def compare_pairs(sides: Sequence[ComparisonFlight], leading: LeadingPair | None) -> list[FlightPair]:
+    """Compare each flight with every earlier one of the list; the leading pair has the confidence of the overall
+    verdict, which allows for its choice."""
+    return [
+        compare_pair(
+            later,
+            earlier,
+            candidates=leading.candidates if leading is not None and leading.is_of(later, earlier) else 1,
+        )
+        for earlier, later in combinations(sides, 2)
+    ]
 
 
 def list_notes(sides: Sequence[ComparisonFlight]) -> list[str]:
@@ -164,7 +199,7 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
     )
     sentence = (
         f"The same gains ({format_gains(group.gains)}): {side.name} and {against.name} are {amount} apart, {relation} "
-        f"({percent(found.confidence)} confidence that something has changed)."
+        f"({confidence_text(found.confidence)} confidence that something has changed)."
     )
     return _pair(
         side,
@@ -192,7 +227,7 @@ def _changed(side: ComparisonFlight, against: ComparisonFlight, comparison: Comp
     )
     return (
         f"The same gains in two campaigns: {side.name} is {amount} {_direction(comparison)} than {against.name}, "
-        f"{relation} ({percent(comparison.confidence)} confidence)."
+        f"{relation} ({confidence_text(comparison.confidence)} confidence)."
     )
 
 
@@ -203,7 +238,7 @@ def _comparison_sentence(
     pair = f"{named(own, side.name)} against {named(other, against.name)}"
     if comparison.confidence is None:
         return f"Not known yet: {pair}, {amount} {_direction(comparison)}. {SCATTER_NOT_KNOWN}"
-    both = f"{amount} {_direction(comparison)}, {percent(comparison.confidence)} confidence"
+    both = f"{amount} {_direction(comparison)}, {confidence_text(comparison.confidence)} confidence"
     if comparison.verdict == "unresolved":
         return f"Unresolved: {pair}, {both}. {_deciding(side, against, comparison)}"
     return f"{capitalised(named(own, side.name))} is {comparison.verdict} than {named(other, against.name)}: {both}."

@@ -43,6 +43,13 @@ def percent(share: float, digits: int = 0) -> str:
     return f"{100.0 * share:.{digits}f}\u00a0%"
 
 
+def confidence_text(confidence: float) -> str:
+    """`93 %`, `99.7 %` or `more than 99.9 %`, never certainty; as on the pages."""
+    return (
+        f"more than {percent(0.999, 1)}" if confidence > 0.999 else percent(confidence, 1 if confidence > 0.99 else 0)
+    )
+
+
 def short_percent(share: float) -> str:
     """`12.5 %`, with up to three significant digits and a plain space."""
     return f"{100 * share:.3g} %"

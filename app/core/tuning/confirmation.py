@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, format_gains, percent, plus_minus, short, times
+from app.core.formatting import confidence_text, count, format_gains, percent, plus_minus, short, times
 from app.core.statistics.comparisons import (
     Comparison,
     Group,
@@ -153,11 +153,11 @@ def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
     amount = plus_minus(abs(comparison.difference), comparison.standard_error, unit)
     if comparison.verdict == "unresolved":
         return (
-            f"Unresolved: {pair}, {amount} {_direction(comparison)}, {percent(comparison.confidence)} confidence. "
-            f"{_deciding(comparison)}"
+            f"Unresolved: {pair}, {amount} {_direction(comparison)}, {confidence_text(comparison.confidence)} "
+            f"confidence. {_deciding(comparison)}"
         )
     return (
-        f"{comparison.verdict.capitalize()} with {_percent(comparison.confidence)} confidence: {pair}, {amount} "
+        f"{comparison.verdict.capitalize()} with {confidence_text(comparison.confidence)} confidence: {pair}, {amount} "
         f"{_direction(comparison)}."
     )
 
@@ -231,10 +231,6 @@ def _describe_improvement(
 
 def _direction(comparison: Comparison) -> str:
     return "lower" if comparison.difference < 0.0 else "higher"
-
-
-def _percent(confidence: float) -> str:
-    return f"more than {percent(0.999, 1)}" if confidence > 0.999 else percent(confidence, 1)
 
 
 def _missing(comparison: Comparison) -> str:
