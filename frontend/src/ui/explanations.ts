@@ -102,7 +102,7 @@ export const EXPLANATIONS = explained({
   difference: {
     question: "When is a difference significant?",
     answer: [
-      "Flights with the same gains differ too. The verdict is better or worse only if chance is an unlikely explanation. The best of many flights is tested more strictly, because being the best is partly chance.",
+      "Flights with the same gains differ too; ± is the standard error of the difference. The verdict is better or worse only if chance is an unlikely explanation. The best of many flights is tested more strictly, because being the best is partly chance.",
     ],
   },
   record: {

@@ -38,29 +38,31 @@ function Results(all: CampaignStatistics) {
   const { comparison, drift, track_record: record, notes, trends } = all;
   const shown = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
   return (
-    <Stack gap={14}>
+    <div className={classes["results"]}>
       <div className={classes["facts"]}>
         <Verdict comparison={comparison} unit={all.error_unit} />
         <Scatter {...all} />
         <Predictions record={record} />
       </div>
-      <Groups {...all} />
-      <ul className={classes["notes"]}>
-        {drift && (
-          <li>
-            {drift.sentence} <HelpTip topic="drift" />
-          </li>
-        )}
-        {trends.map(({ against, sentence }) => (
-          <li key={against}>{sentence}</li>
-        ))}
-        {notes
-          .filter((note) => !shown.includes(note))
-          .map((note) => (
-            <li key={note}>{note}</li>
+      <Stack gap={14}>
+        <Groups {...all} />
+        <ul className={classes["notes"]}>
+          {drift && (
+            <li>
+              {drift.sentence} <HelpTip topic="drift" />
+            </li>
+          )}
+          {trends.map(({ against, sentence }) => (
+            <li key={against}>{sentence}</li>
           ))}
-      </ul>
-    </Stack>
+          {notes
+            .filter((note) => !shown.includes(note))
+            .map((note) => (
+              <li key={note}>{note}</li>
+            ))}
+        </ul>
+      </Stack>
+    </div>
   );
 }
 
@@ -87,8 +89,7 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
         {confidence !== null && <small>{confidenceText(confidence)} confidence</small>}
       </p>
       <p className="numbers">
-        {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
-        {standard_error !== null && <small className={classes["meaning"]}>(± standard error of the difference)</small>}
+        {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}
         {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>
