@@ -72,7 +72,7 @@ def _campaign(session: Session, where: str, source: Campaign, new_ids: Mapping[i
     definition = _definition(where, source.definition, new_ids)
     vehicle, options = _vehicle(session, where, source)
     row = CampaignRow(
-        name=source.name,
+        name=campaigns.unused_name(session, source.name),
         state=source.state,
         outcome=source.outcome,
         stop_reason=source.stop_reason,

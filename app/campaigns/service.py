@@ -32,7 +32,7 @@ from app.campaigns.statistics import standing_within_bounds_of
 from app.campaigns.views import campaign_view, next_flight_view, summaries
 from app.common.conflict_checks import check_action, check_version
 from app.common.errors import BusyError, ConflictError, InputError, NotFoundError, Problem
-from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
+from app.common.schemas import LONGEST_NAME, OptionValue, Page, decode_cursor, encode_cursor
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
@@ -89,6 +89,13 @@ def find_by_id_or_name(session: Session, wanted: str) -> int:
             problems=(Problem("campaign", f"matches {', '.join(map(str, found))}"),),
         )
     return found[0]
+
+
+def unused_name(session: Session, name: str) -> str:
+    """The name, or where a campaign has it already, the name with "(imported)" or "(imported 2)" and so on."""
+    suffixes = ("", " (imported)", *(f" (imported {number})" for number in range(2, 1000)))
+    shortened = (name[: LONGEST_NAME - len(suffix)] + suffix for suffix in suffixes)
+    return next((each for each in shortened if not repository.ids_of_name(session, each)), name)
 
 
 def get_campaign(session: Session, campaign_id: int) -> Campaign:

@@ -61,7 +61,8 @@ def _shown_as_it_is(name: str) -> str:
 
 
 Shown = AfterValidator(_shown_as_it_is)
-Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=120), Shown]
+LONGEST_NAME: Final = 120
+Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=LONGEST_NAME), Shown]
 Reason = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
 Version = Annotated[int, Field(ge=1, strict=True, description="the version on which the edit is based, as last read")]
 

@@ -116,11 +116,18 @@ def test_a_warm_start_brings_the_campaign_that_it_came_from(
     run_jobs(their_database)
     donor = arrived["definition"]["start"]["donor"]
     assert donor["campaign_id"] != warm["definition"]["start"]["donor"]["campaign_id"]
-    assert get(there, f"/api/campaigns/{donor['campaign_id']}")["name"] == campaign["name"]
+    assert get(there, f"/api/campaigns/{donor['campaign_id']}")["name"] == f"{campaign['name']} (imported)"
     ours = get(client, f"/api/campaigns/{warm['id']}/proposal")["proposal"]
     theirs = get(there, f"/api/campaigns/{arrived['id']}/proposal")["proposal"]
     for name in ("kind", "gains", "predicted_error", "interval", "advice", "gate"):
         assert theirs[name] == ours[name], name
+
+
+def test_a_campaign_whose_name_is_taken_says_that_it_was_imported(client: TestClient, campaign: Json) -> None:
+    """Under one name nobody could tell which of them is flown on."""
+    bundle = download_bundle(client, campaign["id"])
+    names = [brought(client, bundle)["name"] for _ in range(2)]
+    assert names == [f"{campaign['name']} (imported)", f"{campaign['name']} (imported 2)"]
 
 
 def test_a_simulated_campaign_flies_on_where_it_arrives(
