@@ -145,8 +145,23 @@ def test_a_killed_worker_is_shown_until_it_is_back(dashboard: Dashboard, shared_
     dashboard.open("/")
     with killed_worker(shared_server):
         expect(dashboard.page.get_by_text("No worker is running.")).to_be_visible()
+        expect(dashboard.page.get_by_text("Nothing can be flown or computed until it is back.")).to_be_visible()
     is_live(dashboard)
     expect(dashboard.page.get_by_text("No worker is running.")).to_have_count(0)
+
+
+def test_without_a_worker_a_flight_in_the_air_is_not_called_paused(
+    dashboard: Dashboard, shared_server: Server, states: States
+) -> None:
+    campaign_id = states.campaign()
+    dashboard.open_campaign(campaign_id)
+    dashboard.choose_speed("1×")
+    dashboard.fly()
+    expect(dashboard.page.get_by_role("region", name=re.compile("^Flight in progress: "))).to_be_visible()
+    with killed_worker(shared_server):
+        notice = dashboard.page.get_by_role("status").filter(has_text="No worker is running.")
+        expect(notice).to_contain_text("If it has ended, the simulated flight is lost.")
+    is_live(dashboard)
 
 
 def test_after_a_lost_wifi_the_page_catches_up(open_dashboard: Opener, shared_server: Server) -> None:

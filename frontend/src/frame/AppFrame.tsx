@@ -122,7 +122,7 @@ export function AppFrame() {
           </p>
         )}
         <VehicleStrip />
-        <ConnectionNotice />
+        <ConnectionNotice flying={flying} />
       </header>
       <SpokenAnnouncements />
       <main id="main" className={classes["main"]} tabIndex={-1} data-stale={state === "away" || undefined}>

@@ -9,7 +9,7 @@ import {
 } from "@tabler/icons-react";
 import { Link } from "react-router";
 import type { FlyingCampaign, useAbort } from "../live/flights";
-import { type Connection, useConnection, useIsCurrent, useLiveFlight } from "../live/store";
+import { type Connection, liveNow, useConnection, useIsCurrent, useLiveFlight } from "../live/store";
 import { readingOf } from "../live/telemetry";
 import { withUnit } from "../ui/format";
 import { Time } from "../ui/Time";
@@ -33,7 +33,7 @@ export function ConnectionState() {
 }
 
 /** Banner that explains a lost connection until it is restored. */
-export function ConnectionNotice() {
+export function ConnectionNotice({ flying }: { flying: readonly FlyingCampaign[] }) {
   const { state, worker, heardAt } = useConnection();
   if (state === "away") {
     return (
@@ -47,12 +47,25 @@ export function ConnectionNotice() {
   if (state === "live" && !worker) {
     return (
       <p className={classes["notice"]} role="status">
-        <strong>No worker is running.</strong> Flights and computations are paused until it is back. The server restarts
-        its own worker within seconds; start a separate one with <code>gainline worker</code>.
+        <strong>No worker is running.</strong> {withoutWorker(flying)} The server restarts its own worker within
+        seconds; start a separate one with <code>gainline worker</code>.
       </p>
     );
   }
   return null;
+}
+
+/** Phases of a flight that has not left the ground. */
+const ON_GROUND: ReadonlySet<string> = new Set(["staging", "staged"]);
+
+/** What the loss of the worker means, as the fly screen says it; a vehicle in the air is not paused. */
+function withoutWorker(flying: readonly FlyingCampaign[]): string {
+  const inTheAir = flying.filter(({ trialId }) => !ON_GROUND.has(liveNow(trialId)?.phase ?? ""));
+  if (inTheAir.some(({ hasLink }) => hasLink)) {
+    return "If it has ended, the vehicle is landing now; otherwise the flight continues. If in doubt, use the vehicle's own remote control.";
+  }
+  if (inTheAir.length > 0) return "If it has ended, the simulated flight is lost.";
+  return "Nothing can be flown or computed until it is back.";
 }
 
 /** Live readings of one flight and its abort button, which acts without confirmation. */

@@ -13,6 +13,8 @@ export interface FlyingCampaign {
   trialNumber: number;
   name: string;
   isReal: boolean;
+  /** Whether the vehicle is registered, with a process that keeps its link. */
+  hasLink: boolean;
 }
 
 async function readFlying(): Promise<FlyingCampaign[]> {
@@ -28,6 +30,7 @@ async function readFlying(): Promise<FlyingCampaign[]> {
             trialNumber: flying.trial_number,
             name,
             isReal: vehicle.is_real,
+            hasLink: vehicle.registered,
           },
         ],
   );
