@@ -73,7 +73,7 @@ export function RehearsalNote({ real }: { real: Campaign }) {
       <p>
         <strong>This is a rehearsal</strong>
         <span>
-          It must pass before this campaign can fly:{" "}
+          It must pass before the real vehicle can fly:{" "}
           <Anchor component={Link} to={`/campaigns/${real.id}`}>
             {name}
           </Anchor>

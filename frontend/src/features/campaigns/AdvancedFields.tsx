@@ -170,15 +170,20 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
         const [lowReason, highReason] = boundReasons(gain, [low, high], reasons[`bounds.${gain.name}`]);
         return (
           <div key={gain.name} className={classes["bounds"]}>
+            <span className={classes["gain"]}>
+              <strong>{gain.name}</strong>
+              <small>{[gain.title, gain.unit].filter((part) => part !== "" && part !== "1").join(", ")}</small>
+            </span>
             <NumberField
-              label={`${gain.name} minimum`}
-              description={[gain.title, gain.unit].filter((part) => part !== "").join(", ")}
+              label="Minimum"
+              aria-label={`${gain.name} minimum`}
               value={low}
               error={lowReason}
               onChange={(value) => change([value, high])}
             />
             <NumberField
-              label={`${gain.name} maximum`}
+              label="Maximum"
+              aria-label={`${gain.name} maximum`}
               value={high}
               error={highReason}
               onChange={(value) => change([low, value])}
