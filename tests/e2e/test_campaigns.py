@@ -226,6 +226,7 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     page.get_by_label("Scored window").fill("5")
     dashboard.button("Create campaign").click()
     expect(page.get_by_label("Maximum flights")).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_label("Maximum flights")).to_be_focused()
     page.get_by_label("Maximum flights").fill("7")
     dashboard.button("Create campaign").click()
     expect(page.get_by_label("kp maximum")).to_have_attribute("aria-invalid", "true")

@@ -1,6 +1,6 @@
 import { Button, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
-import { useState } from "react";
+import { useEffect, useState } from "react";
 import { useNavigate, useSearchParams } from "react-router";
 import { useCreateCampaign } from "../../api/mutations";
 import { reasonsByField, standingProblem } from "../../api/problems";
@@ -83,6 +83,9 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   const request = requestFrom(form, catalogue);
   const problem = standingProblem(create.error, create.variables, request);
   const reasons = inUnitsOfForm(reasonsByField(problem, [...plain, ...advanced]));
+  useEffect(() => {
+    if (create.error) document.querySelector<HTMLElement>('main [aria-invalid="true"]')?.focus();
+  }, [create.error]);
 
   const refusedBelow = advanced.some((field) => reasons[field] !== undefined);
   const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
@@ -142,7 +145,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         />
         <SelectField
           label="Strategy"
-          description={`${form.strategy === recommended ? "Recommended. " : ""}${strategy?.line ?? ""}`}
+          description={`${strategies.length > 1 && form.strategy === recommended ? "Recommended. " : ""}${strategy?.line ?? ""}`}
           data={strategies.map(({ name, title }) => ({ value: name, label: title }))}
           value={form.strategy}
           error={reasons["strategy"]}
@@ -167,7 +170,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
           onChange={(startGains) => set({ startGains })}
         />
       )}
-      <FoldedSection title="Advanced: stop rule, window, bounds, vehicle settings, seed" forcedOpen={refusedBelow}>
+      <FoldedSection title="Advanced: stop rule, window, bounds, seed" forcedOpen={refusedBelow}>
         <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
       </FoldedSection>
       <FormErrorNotice error={problem} shown={[...plain, ...advanced]} />
