@@ -118,7 +118,8 @@ export function AppFrame() {
         </div>
         {abort.trouble !== null && (
           <p className={classes["trouble"]} role="alert">
-            <strong>The abort has not reached the worker. Retrying.</strong> {abort.trouble}
+            <strong>The abort could not be sent.</strong> {abort.trouble} It is retried until the worker confirms it. If
+            a vehicle is in the air, use its own remote control now.
           </p>
         )}
         <VehicleStrip />

@@ -8,7 +8,7 @@ import {
   IconSun,
 } from "@tabler/icons-react";
 import { Link } from "react-router";
-import type { FlyingCampaign, useAbort } from "../live/flights";
+import { ABORT_LABELS, type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
 import { type Connection, liveNow, useConnection, useIsCurrent, useLiveFlight } from "../live/store";
 import { readingOf } from "../live/telemetry";
 import { withUnit } from "../ui/format";
@@ -69,10 +69,10 @@ function withoutWorker(flying: readonly FlyingCampaign[]): string {
 }
 
 /** Live readings of one flight and its abort button, which acts without confirmation. */
-export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: ReturnType<typeof useAbort> }) {
+export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: AbortControl }) {
   const live = useLiveFlight(flying.trialId);
   const isCurrent = useIsCurrent(live);
-  const asked = abort.asked.has(flying.trialId);
+  const stage = abortStage(flying.trialId, abort);
   const time = live?.timeS.at(-1);
   const reading = readingOf(live?.channel ?? "");
   return (
@@ -99,8 +99,8 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Re
       </Link>
       <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
         <IconOctagonFilled size={20} aria-hidden />
-        {asked ? "ABORTING" : "ABORT"}
-        {!asked && <kbd>Space</kbd>}
+        {ABORT_LABELS[stage]}
+        {stage === "none" && <kbd>Space</kbd>}
       </button>
     </section>
   );

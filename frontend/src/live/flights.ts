@@ -42,23 +42,23 @@ export function useFlying(): FlyingCampaign[] {
 
 const AGAIN_MS = 400;
 
-/** Why the worker did not accept the abort; null if it did. */
+/** Why the worker did not accept the abort; null if it did. Without the hint, because the page repeats it itself. */
 async function askToAbort(trialId: number): Promise<string | null> {
   try {
     const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
     return accepted ? null : sentence;
   } catch (error) {
-    const problem = problemOf(error);
-    return [problem?.detail, problem?.hint].join(" ");
+    return problemOf(error)?.detail.replace(/^Trial (?=\d)/, "Flight ") ?? "";
   }
 }
 
 /**
- * Abort by trial id. The request is repeated until the worker accepts it or the flight is over. `trouble` is the reason
- * why it has not been accepted yet.
+ * Abort by trial id. The request is repeated until the worker accepts it or the flight is over. `accepted` are the
+ * flights whose abort it has accepted; `trouble` is the reason why one has not been accepted yet.
  */
 export function useAbort(flying: readonly FlyingCampaign[]) {
   const [asked, setAsked] = useState<ReadonlySet<number>>(new Set());
+  const [accepted, setAccepted] = useState<ReadonlySet<number>>(new Set());
   const [trouble, setTrouble] = useState<string | null>(null);
   const inTheAir = useRef<ReadonlySet<number>>(new Set());
   inTheAir.current = new Set(flying.map(({ trialId }) => trialId));
@@ -67,6 +67,7 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
     const refusal = await askToAbort(trialId);
     const over = !inTheAir.current.has(trialId) && !liveFlightsNow().some((flight) => flight.trialId === trialId);
     setTrouble(over ? null : refusal);
+    if (refusal === null) setAccepted((before) => new Set([...before, trialId]));
     if (refusal !== null && !over) setTimeout(() => void tell(trialId), AGAIN_MS);
   }, []);
 
@@ -82,7 +83,23 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
     if (flying.length === 0) setTrouble(null);
   }, [flying.length]);
 
-  return { asked, trouble, press };
+  return { asked, accepted, trouble, press };
 }
 
 export type AbortControl = ReturnType<typeof useAbort>;
+
+/** How far an abort has come. not sent: it was refused or not received, and is repeated. */
+export type AbortStage = "none" | "sending" | "not sent" | "accepted";
+
+export function abortStage(trialId: number, { asked, accepted, trouble }: Omit<AbortControl, "press">): AbortStage {
+  if (!asked.has(trialId)) return "none";
+  if (accepted.has(trialId)) return "accepted";
+  return trouble === null ? "sending" : "not sent";
+}
+
+export const ABORT_LABELS: Record<AbortStage, string> = {
+  none: "ABORT",
+  sending: "ABORTING",
+  "not sent": "NOT SENT",
+  accepted: "ABORTING",
+};

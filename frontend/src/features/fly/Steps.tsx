@@ -6,7 +6,8 @@ import { useFlyTrial } from "../../api/mutations";
 import { useTrials } from "../../api/queries";
 import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
-import type { AbortControl } from "../../live/flights";
+import { ABORT_LABELS, type AbortControl, type AbortStage, abortStage } from "../../live/flights";
+import { useConnection } from "../../live/store";
 import { StateBadge } from "../../ui/Badges";
 import { HoldButton } from "../../ui/HoldButton";
 import { ErrorNotice, FailureNotice } from "../../ui/Notices";
@@ -218,21 +219,30 @@ function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; 
   );
 }
 
+const ABORT_SAYS: Record<AbortStage, string> = {
+  none: "Ends the flight immediately: sends safe gains and Land until the vehicle confirms.",
+  sending: "Sending the abort to the worker.",
+  "not sent": "The abort could not be sent. It is retried until the worker confirms it.",
+  accepted: "Sending safe gains and Land until the vehicle confirms.",
+};
+
+function abortText(stage: AbortStage, isReached: boolean): string {
+  if (stage !== "accepted" || isReached) return ABORT_SAYS[stage];
+  return "The worker has confirmed the abort, but is not reachable now.";
+}
+
 /** Aborts without confirmation. */
 function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
-  const asked = abort.asked.has(trial.id);
+  const stage = abortStage(trial.id, abort);
+  const { state, worker } = useConnection();
   return (
     <Stack gap={12}>
       <button type="button" className={classes["abort"]} onClick={() => abort.press([trial.id])}>
         <IconOctagonFilled size={40} aria-hidden />
-        {asked ? "ABORTING" : "ABORT"}
-        {!asked && <kbd>Space</kbd>}
+        {ABORT_LABELS[stage]}
+        {stage === "none" && <kbd>Space</kbd>}
       </button>
-      <p className={classes["quiet"]}>
-        {asked
-          ? "Sending safe gains and Land until the vehicle confirms."
-          : "Ends the flight immediately: sends safe gains and Land until the vehicle confirms."}
-      </p>
+      <p className={classes["quiet"]}>{abortText(stage, state === "live" && worker)}</p>
     </Stack>
   );
 }

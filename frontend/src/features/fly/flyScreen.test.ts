@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Trial } from "../../api/types";
-import type { Loss } from "../../live/readiness";
+import type { Loss, Readiness } from "../../live/readiness";
 import { aged, statusFrom } from "../../live/vehicleStatus";
 import { flyStateLabel, flyStep, gainTicks, secondsLeft } from "./flyScreen";
 
@@ -60,6 +60,15 @@ test("the word in flight is the vehicle's own step, and a silent vehicle is neve
   expect(flyStateLabel({ state: "lost", flight }, "judge", null, { quarantined: false, readiness: null }).word).toBe(
     "Lost",
   );
+});
+
+test("without the worker it is not known whether the link is lost", () => {
+  const readiness = { steps: [], lost: [], losses: [{ kind: "worker away", what: "", way_on: "" }], is_ready: false };
+  const said = { quarantined: false, readiness: readiness as Readiness };
+  expect(flyStateLabel({ state: "flying", flight }, "flying", statusAt("record", 4), said)).toEqual({
+    word: "Worker unreachable",
+    tone: "bad",
+  });
 });
 
 test("a staged vehicle is ready only while its readiness holds", () => {

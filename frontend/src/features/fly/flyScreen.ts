@@ -1,7 +1,7 @@
 /** State of the fly screen: step, label, gains, remaining time. */
 
 import type { Trial, TrialState } from "../../api/types";
-import type { Readiness } from "../../live/readiness";
+import type { Loss, Readiness } from "../../live/readiness";
 import { type Aged, stepWord } from "../../live/vehicleStatus";
 import { type StateLabel, trialStateLabel } from "../../ui/states";
 
@@ -58,6 +58,12 @@ const IN_FLIGHT: ReadonlySet<string> = new Set([
   "restore",
 ]);
 
+/** What is lost between this page and the vehicle's link: whether the link itself is, cannot be known then. */
+const AWAY: Readonly<Partial<Record<Loss["kind"], string>>> = {
+  "server away": "Server unreachable",
+  "worker away": "Worker unreachable",
+};
+
 function stagedLabel(readiness: Readiness | null): StateLabel {
   if (readiness === null) return { word: "Checking readiness", tone: "busy" };
   if (readiness.is_ready) return WORDS.staged;
@@ -73,6 +79,8 @@ export function flyStateLabel(
   { quarantined, readiness }: { quarantined: boolean; readiness: Readiness | null },
 ): StateLabel {
   if (step === "flying" && status !== null) {
+    const away = readiness?.losses.map(({ kind }) => AWAY[kind]).find((word) => word !== undefined);
+    if (away !== undefined) return { word: away, tone: "bad" };
     if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
     if (IN_FLIGHT.has(status.status.step)) {
       const isBad = status.status.step === "link lost" || status.status.step === "abort-land";
