@@ -136,6 +136,8 @@ def test_glitches_of_an_uploaded_record_are_marked_and_told_with_both_errors(
         dashboard.button("Upload flight record").click()
     chooser.value.set_files({"name": "flight.csv", "mimeType": "text/csv", "buffer": content.encode()})
     expect(dashboard.page.get_by_text("The record has a glitch")).to_be_visible()
+    dashboard.button("Review flight 1").click()
+    expect(dashboard.button("Mark valid")).to_be_in_viewport()
     [trial] = dashboard.trials(campaign_id)
     assert trial["glitches"]
     assert trial["repaired_error"] < trial["error"]

@@ -1,5 +1,6 @@
 import { SimpleGrid, Skeleton, Tabs, useComputedColorScheme } from "@mantine/core";
-import { memo, startTransition, useCallback, useEffect, useState } from "react";
+import { memo, startTransition, useCallback, useEffect, useRef, useState } from "react";
+import { flushSync } from "react-dom";
 import { useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useCampaign, useCampaignFigure, useCatalogue, useProposal, useTrials } from "../../api/queries";
@@ -83,6 +84,13 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
     (number: number) => startTransition(() => setChosen((before) => (before === number ? null : number))),
     [],
   );
+  const results = useRef<HTMLDivElement>(null);
+  const review = useCallback((number: number) => {
+    flushSync(() => setChosen(number));
+    const button = results.current?.querySelector<HTMLElement>("[data-review] button");
+    button?.scrollIntoView({ block: "center" });
+    button?.focus({ preventScroll: true });
+  }, []);
   useFlightKeys(trials, shown?.id, ({ number }) => choose(number));
   useEffect(() => () => pointAt(null), []);
   return (
@@ -93,7 +101,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <CampaignHeader campaign={campaign} />
       <ReadOnlyNotice why={watching} />
       <div className={classes["columns"]} data-flying={campaign.flying !== null || undefined}>
-        <div className={classes["column"]}>
+        <div className={classes["column"]} ref={results}>
           <CurvesPanel campaign={campaign} trials={trials} chosen={chosen} preview={preview} onChoose={choose} />
           {shown !== null && (
             <Verdict
@@ -106,7 +114,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
           )}
         </div>
         <div className={`${classes["column"]} ${classes["next"]}`}>
-          {standing !== null && <Next {...standing} onChoose={setChosen} onPreview={setPreview} />}
+          {standing !== null && <Next {...standing} onChoose={setChosen} onPreview={setPreview} onReview={review} />}
           {standing === null &&
             (unproposed || trouble ? (
               <ErrorNotice error={unproposed ?? trouble} />

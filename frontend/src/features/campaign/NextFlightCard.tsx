@@ -17,6 +17,8 @@ import type { ShowPreview } from "./useNextFlight";
 interface Props extends CampaignStatus {
   onChoose: (trialNumber: number) => void;
   onPreview: ShowPreview;
+  /** Shows the review of a flight. */
+  onReview: (trialNumber: number) => void;
 }
 
 /** The next action of the campaign, in every state. */
@@ -36,7 +38,8 @@ function RehearsalStep({ rehearses, ...props }: Props & { rehearses: number }) {
   );
 }
 
-function Step({ campaign, next, trials, onChoose, onPreview, isSecondary = false }: Props & { isSecondary?: boolean }) {
+function Step(props: Props & { isSecondary?: boolean }) {
+  const { campaign, next, trials, onChoose, onPreview, onReview, isSecondary = false } = props;
   const step = nextStep(campaign, next, trials);
   // Kept here, so that the error of a refused record is still shown when its trial becomes a planned one.
   const upload = useUploadRecord(campaign.id);
@@ -70,7 +73,7 @@ function Step({ campaign, next, trials, onChoose, onPreview, isSecondary = false
               ? "How this flight ended is unknown. The next gains are proposed after you review it."
               : "The next gains are proposed after you review this flight."}
           </Text>
-          <Button fullWidth onClick={() => onChoose(step.trial.number)}>
+          <Button fullWidth onClick={() => onReview(step.trial.number)}>
             Review flight {step.trial.number}
           </Button>
         </Panel>

@@ -155,7 +155,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {without}
         </Text>
       )}
-      <Group gap="10px 14px">
+      <Group gap="10px 14px" data-review>
         <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
         {campaign && <RetryGains campaign={campaign} trial={trial} />}
         {trial.record !== null && (
