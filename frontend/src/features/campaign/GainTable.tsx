@@ -13,21 +13,23 @@ export interface GainEntry {
 
 interface Props {
   rows: readonly GainRow[];
+  /** Whose gains the first column shows. */
+  from: "Best" | "Safe";
   unit: string;
   titles: Readonly<Record<string, string>>;
   /** Makes the next gains inputs. */
   entry?: GainEntry | undefined;
 }
 
-/** Gains now and next, with the change of each as a factor and within the bounds. */
-export function GainTable({ rows, unit, titles, entry }: Props) {
+/** Gains of the best flight, else the vehicle's safe ones, and next, with the change of each as a factor and within the bounds. */
+export function GainTable({ rows, from, unit, titles, entry }: Props) {
   return (
     <table className={classes["gains"]}>
-      <caption className="visually-hidden">Gains now and next</caption>
+      <caption className="visually-hidden">{from} gains and next</caption>
       <thead>
         <tr>
           <th scope="col">Gain{unit && ` (${unit})`}</th>
-          <th scope="col">Now</th>
+          <th scope="col">{from}</th>
           <th scope="col">Next</th>
           <th scope="col" className={classes["delta"]}>
             Change

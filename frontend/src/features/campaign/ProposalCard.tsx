@@ -50,7 +50,13 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
       <Stack gap={14}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
-        <GainTable rows={chosen.rows} unit={units.gains} titles={titles} entry={chosen.entry} />
+        <GainTable
+          rows={chosen.rows}
+          from={campaign.best === null ? "Safe" : "Best"}
+          unit={units.gains}
+          titles={titles}
+          entry={chosen.entry}
+        />
         {isEvaluated && (
           <PredictedError
             predicted={chosen.predicted}

@@ -34,6 +34,7 @@ export function trialOf(proposal: Proposal, choice: FlightChoice | undefined, ga
 
 export interface GainRow {
   name: string;
+  /** Of the best flight, else of the vehicle's safe gains. */
   now: number;
   /** Null while what is typed is no number. */
   next: number | null;
