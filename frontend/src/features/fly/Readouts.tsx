@@ -5,7 +5,7 @@ import { useIsCurrent } from "../../live/store";
 import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
 import { type Aged, ageText, linkText } from "../../live/vehicleStatus";
 import type { Topic } from "../../ui/explanations";
-import { gainText, withUnit } from "../../ui/format";
+import { gainText, NOTHING, withUnit } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import { percent } from "../../ui/uncertainty";
 import classes from "./Fly.module.css";
@@ -69,6 +69,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
   const lastOutput = useLastKnown(output);
   const error = isFlying ? live?.errorSoFar : trial.error;
   const errorTitle = isFlying ? "Error so far" : "Error";
+  const hasFlown = !isFlying && trial.flown_at !== null;
   const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
     <div className={`${classes["readouts"]} numbers`}>
@@ -90,10 +91,10 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
       <dl className={classes["row"]}>
         {live !== null && live.throttle !== null && (
           <Reading
-            title={isSaturated(live) ? "Throttle, saturated" : "Throttle"}
+            title={isFlying && isSaturated(live) ? "Throttle, saturated" : "Throttle"}
             topic="throttle"
-            value={percent(live.throttle)}
-            bad={isSaturated(live)}
+            value={isFlying ? percent(live.throttle) : NOTHING}
+            bad={isFlying && isSaturated(live)}
             stale={stale}
           />
         )}
@@ -102,7 +103,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
         {isFlying ? (
           <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />
         ) : (
-          <Reading title="Record length" value={withUnit(endS, "s", 0)} />
+          <Reading title="Record length" value={hasFlown && trial.record === null ? NOTHING : withUnit(endS, "s", 0)} />
         )}
       </dl>
     </div>

@@ -20,7 +20,7 @@ import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
 import { sentenceOf } from "../campaign/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
-import type { FlyStep } from "./flyScreen";
+import { areReadBackSince, type FlyStep } from "./flyScreen";
 
 interface Props {
   campaign: Campaign;
@@ -63,7 +63,7 @@ export function LinkedSteps({
     case "over":
       return (
         <>
-          <SafeGainsResult trial={trial} />
+          <SafeGainsResult trial={trial} vehicle={vehicle} />
           <FlightReviewCard campaign={campaign} trial={trial} />
         </>
       );
@@ -71,10 +71,18 @@ export function LinkedSteps({
 }
 
 /** Whether the vehicle was left with its safe gains. */
-function SafeGainsResult({ trial: { flight, flown_at } }: { trial: Trial }) {
+function SafeGainsResult({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
+  const { flight, flown_at } = trial;
   if (flight === null || flown_at === null) return null;
   if (flight.safe_gains_restored === true)
     return <p className={classes["quiet"]}>Safe gains restored and read back.</p>;
+  if (areReadBackSince(trial, vehicle)) {
+    return (
+      <p className={classes["quiet"]}>
+        The safe gains were not confirmed at the end of the flight. They have been read back since.
+      </p>
+    );
+  }
   return (
     <p role="alert" className={classes["checks"]}>
       {flight.safe_gains_restored === null

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type { Trial } from "../../api/types";
 import type { Loss, Readiness } from "../../live/readiness";
 import { aged, statusFrom } from "../../live/vehicleStatus";
-import { flyStateLabel, flyStep, gainTicks, secondsLeft } from "./flyScreen";
+import { areReadBackSince, flyStateLabel, flyStep, gainTicks, secondsLeft } from "./flyScreen";
 
 type Flight = NonNullable<Trial["flight"]>;
 
@@ -92,6 +92,15 @@ test("a gain is ticked only when the vehicle holds exactly what it was asked to"
   expect([kp?.confirmed, ki?.confirmed, kd?.confirmed]).toEqual([true, false, false]);
   expect([ki?.held, kd?.held]).toEqual([20, null]);
   expect(gainTicks({ kp: 283 }, { kp: 283 }, { kp: 1 })[0]?.confirmed).toBe(true);
+});
+
+test("safe gains count as read back only after the lift-off", () => {
+  const trial = { flown_at: "2026-05-04T10:00:00Z" };
+  const vehicle = { held: { kp: 4 }, held_at: "2026-05-04T10:02:00Z", safe_gains: { kp: 4 } };
+  expect(areReadBackSince(trial, vehicle)).toBe(true);
+  expect(areReadBackSince(trial, { ...vehicle, held_at: "2026-05-04T09:59:00Z" })).toBe(false);
+  expect(areReadBackSince(trial, { ...vehicle, held: { kp: 5 } })).toBe(false);
+  expect(areReadBackSince(trial, { ...vehicle, held: null })).toBe(false);
 });
 
 test("the countdown ends with the record", () => {

@@ -1,8 +1,9 @@
 /** State of the fly screen: step, label, gains, remaining time. */
 
-import type { Trial, TrialState } from "../../api/types";
+import type { Trial, TrialState, Vehicle } from "../../api/types";
 import type { Loss, Readiness } from "../../live/readiness";
 import { type Aged, stepWord } from "../../live/vehicleStatus";
+import { sameHeld } from "../../ui/gains";
 import { type StateLabel, trialStateLabel } from "../../ui/states";
 
 /**
@@ -109,6 +110,15 @@ export function gainTicks(asked: Gains, readBack: Gains | null, held: Gains): Ga
     const onVehicle = readBack?.[name] ?? held[name] ?? null;
     return { name, asked: value, held: onVehicle, confirmed: onVehicle === value };
   });
+}
+
+/** Whether the vehicle's safe gains have been read back after the lift-off of this flight, as at a reconnection. */
+export function areReadBackSince(
+  { flown_at }: Pick<Trial, "flown_at">,
+  { held, held_at, safe_gains }: Pick<Vehicle, "held" | "held_at" | "safe_gains">,
+): boolean {
+  if (flown_at === null || held === null || held_at === null) return false;
+  return Date.parse(held_at) > Date.parse(flown_at) && sameHeld(held, safe_gains);
 }
 
 /** Seconds until the end of the record; null before its begin or if its length is unknown. */
