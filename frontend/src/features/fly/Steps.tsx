@@ -189,6 +189,11 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
   );
 }
 
+/** The name without line breaks after its hyphens. */
+function unbroken(name: string): string {
+  return name.replaceAll("-", "-\u2060");
+}
+
 function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; isReady: boolean }) {
   const { takeOff, unstage } = useFlyActions(vehicle.id);
   const isInControl = useIsInControl(vehicle);
@@ -199,7 +204,7 @@ function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; 
       {(vehicle.is_real || isOthers) && !isInControl && <OperatorControl vehicle={vehicle} />}
       {vehicle.is_real ? (
         <HoldButton
-          label={`Hold to fly ${vehicle.name}`}
+          label={`Hold to fly ${unbroken(vehicle.name)}`}
           disabled={!may || takeOff.isPending}
           onHeld={() => takeOff.mutate(trial)}
         />
