@@ -19,6 +19,7 @@ import { NextFlightCard, useCampaignStatus } from "./NextFlightCard";
 import { StatisticsPanel } from "./StatisticsPanel";
 import { useFlightKeys } from "./useFlightKeys";
 import type { Preview } from "./useNextFlight";
+import { useSelectedFlights } from "./useSelectedFlights";
 import { VerdictPanel } from "./VerdictPanel";
 import { selectedTrial } from "./verdict";
 
@@ -91,6 +92,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
     button?.scrollIntoView({ block: "center" });
     button?.focus({ preventScroll: true });
   }, []);
+  const selection = useSelectedFlights(campaign.id, shown);
   useFlightKeys(trials, shown?.id, ({ number }) => choose(number));
   useEffect(() => () => pointAt(null), []);
   return (
@@ -126,7 +128,9 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
       <Tabs defaultValue="trends" mt="var(--gap)" keepMounted={false} classNames={{ tab: classes["tab"] ?? "" }}>
         <Tabs.List>
           <Tabs.Tab value="trends">Error and gains</Tabs.Tab>
-          <Tabs.Tab value="flights">Flights</Tabs.Tab>
+          <Tabs.Tab value="flights">
+            Flights{selection.selected.length > 0 && ` (${selection.selected.length} selected)`}
+          </Tabs.Tab>
           <Tabs.Tab value="statistics">Statistics</Tabs.Tab>
           <Tabs.Tab value="landscape">Error landscape</Tabs.Tab>
         </Tabs.List>
@@ -136,7 +140,14 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
           </SimpleGrid>
         </Tabs.Panel>
         <Tabs.Panel value="flights" keepMounted>
-          <FlightsPanel campaign={campaign} trials={read} shown={shown?.number ?? null} unit={unit} onChoose={choose} />
+          <FlightsPanel
+            campaign={campaign}
+            trials={read}
+            shown={shown?.number ?? null}
+            unit={unit}
+            onChoose={choose}
+            {...selection}
+          />
         </Tabs.Panel>
         <Tabs.Panel value="statistics" pt="var(--gap)">
           {read !== null && <Statistics campaignId={campaign.id} />}

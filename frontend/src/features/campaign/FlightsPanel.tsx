@@ -2,10 +2,9 @@ import { Anchor, Button, Checkbox, Group, Skeleton } from "@mantine/core";
 import { useLocalStorage } from "@mantine/hooks";
 import { IconArrowDown, IconArrowUp, IconStarFilled } from "@tabler/icons-react";
 import { memo, useEffect, useMemo, useRef, useState } from "react";
-import { Link, useNavigate } from "react-router";
+import { Link } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
 import { onPointed, pointAt } from "../../charts/pointing";
-import { useKeys } from "../../frame/useKeys";
 import { count } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
@@ -17,8 +16,9 @@ import { useGainTitles } from "../../ui/units";
 import classes from "./FlightsPanel.module.css";
 import { type RunColumn, runColumns } from "./runColumns";
 import { nextOrder, type Order, sortedBy, toggled } from "./runs";
+import { comparison, type SelectedFlights } from "./useSelectedFlights";
 
-interface Props {
+interface Props extends SelectedFlights {
   campaign: Campaign;
   /** Null while loading. */
   trials: readonly Trial[] | null;
@@ -30,15 +30,8 @@ interface Props {
 const NO_TITLES: Readonly<Record<string, string>> = {};
 
 /** The table of all flights: columns to choose, sorted by any of them, and rows to compare. */
-export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown, unit, onChoose }: Props) {
-  const [selected, setSelected] = useState<readonly number[]>([]);
-  const navigate = useNavigate();
-  const select = (trial: number) => setSelected(toggled(selected, trial));
-  const chosen = trials?.find(({ number, state }) => number === shown && wasFlown(state));
-  useKeys({
-    select: () => chosen && select(chosen.id),
-    compare: () => void navigate(comparison(campaign.id, selected)),
-  });
+export const FlightsPanel = memo(function FlightsPanel({ trials, ...props }: Props) {
+  const { campaign, selected } = props;
   return (
     <Panel
       title="All flights"
@@ -47,26 +40,10 @@ export const FlightsPanel = memo(function FlightsPanel({ campaign, trials, shown
     >
       {trials === null && <Skeleton height={320} radius="md" />}
       {trials?.length === 0 && <Note>No flights yet. Flights appear here with their gains and errors.</Note>}
-      {trials !== null && trials.length > 0 && (
-        <TrialsTable
-          campaign={campaign}
-          trials={trials}
-          shown={shown}
-          unit={unit}
-          onChoose={onChoose}
-          selected={selected}
-          onSelect={select}
-        />
-      )}
+      {trials !== null && trials.length > 0 && <TrialsTable trials={trials} {...props} />}
     </Panel>
   );
 });
-
-/** Address of the comparison of the selected flights, in the order of selection: the first is the reference. */
-function comparison(campaign: number, selected: readonly number[]): string {
-  const trials = selected.map((trial): [string, string] => ["trial", String(trial)]);
-  return `/compare?${new URLSearchParams([["campaign", String(campaign)], ...trials])}`;
-}
 
 function CompareLink({ campaign, selected }: { campaign: number; selected: readonly number[] }) {
   const address = comparison(campaign, selected);
@@ -102,8 +79,6 @@ function useChosenColumns(columns: readonly RunColumn[]) {
 
 interface TrialsTableProps extends Props {
   trials: readonly Trial[];
-  selected: readonly number[];
-  onSelect: (trialId: number) => void;
 }
 
 function TrialsTable({ campaign, trials, shown, unit, onChoose, selected, onSelect }: TrialsTableProps) {
