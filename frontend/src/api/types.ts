@@ -34,6 +34,7 @@ export type {
   TrialState,
   Trouble,
   Vehicle,
+  VehicleAct,
   VehicleCheck,
   VehicleKindInfo,
   VehicleState,

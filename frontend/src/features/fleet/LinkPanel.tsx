@@ -1,7 +1,9 @@
-import { Button, Stack, TextInput } from "@mantine/core";
+import { Anchor, Button, Stack, TextInput } from "@mantine/core";
 import { useState } from "react";
-import { useEditVehicle } from "../../api/fleet";
+import { Link } from "react-router";
+import { useActs, useEditVehicle } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
+import { useVehicles } from "../../api/vehicles";
 import { useVehicleStatus } from "../../live/store";
 import { linkText, stepWord } from "../../live/vehicleStatus";
 import { NOTHING, withUnit } from "../../ui/format";
@@ -11,7 +13,7 @@ import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { percent } from "../../ui/uncertainty";
 import classes from "./Fleet.module.css";
-import { autopilotTitle } from "./fleet";
+import { autopilotTitle, connectFailure, vehicleAtSameAddress } from "./fleet";
 
 function armedText(armed: boolean | null | undefined): string {
   if (armed === null || armed === undefined) return NOTHING;
@@ -47,12 +49,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
             />
           </dl>
         ) : (
-          <Note>
-            {vehicle.actions.includes("disconnect") ? "Connecting: no vehicle has answered yet. " : "Not connected. "}
-            {identity === null
-              ? "Connecting compares the vehicle's gains with the safe gains and changes nothing."
-              : "Connecting writes the safe gains and reads them back. The vehicle does not move."}
-          </Note>
+          <NotConnected vehicle={vehicle} />
         )}
         {status?.said && <Note>Vehicle message: {status.said}</Note>}
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
@@ -63,6 +60,33 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
         </Note>
       </Stack>
     </Panel>
+  );
+}
+
+/** What connecting does, and why it has not succeeded yet. */
+function NotConnected({ vehicle }: { vehicle: Vehicle }) {
+  const acts = useActs(vehicle.id).data?.pages[0]?.items ?? [];
+  const isWanted = vehicle.actions.includes("disconnect");
+  const other = vehicleAtSameAddress(vehicle, useVehicles().data ?? []);
+  const failure = connectFailure(acts);
+  return (
+    <>
+      {other !== null && (
+        <p className={classes["bad"]}>
+          <Anchor component={Link} to={`/vehicles/${other.id}`}>
+            {other.name}
+          </Anchor>{" "}
+          uses this address: disconnect it first.
+        </p>
+      )}
+      {failure && <p className={classes["bad"]}>The last request failed. {failure}</p>}
+      <Note>
+        {isWanted ? `Connecting${failure ? "" : ": no vehicle has answered yet"}. ` : "Not connected. "}
+        {vehicle.identity === null
+          ? "Connecting compares the vehicle's gains with the safe gains and changes nothing."
+          : "Connecting writes the safe gains and reads them back. The vehicle does not move."}
+      </Note>
+    </>
   );
 }
 

@@ -1,11 +1,13 @@
 import { expect, test } from "vitest";
-import type { Catalogue, Vehicle } from "../../api/types";
+import type { Catalogue, Vehicle, VehicleAct } from "../../api/types";
 import {
+  connectFailure,
   furtherOptions,
   gainsFor,
   parametersOf,
   startingVehicle,
   unreadGains,
+  vehicleAtSameAddress,
   vehicleRequest,
   vehicleStateLabel,
   withAutopilot,
@@ -75,6 +77,24 @@ test("parameters are read out of an act's result by their names in order, and th
     ["WPNAV_SPEED", 5],
   ]);
   expect(parametersOf(null)).toEqual([]);
+});
+
+test("another vehicle at the same local port is found while it is connected or looked for", () => {
+  const at = (id: number, address: string, actions: string[] = []): Vehicle =>
+    ({ id, registered: true, options: { address }, actions }) as unknown as Vehicle;
+  const here = at(1, "udpin:127.0.0.1:14550", ["disconnect"]);
+  const other = at(2, "udpin:0.0.0.0:14550", ["disconnect"]);
+  expect(vehicleAtSameAddress(here, [here, other])).toBe(other);
+  expect(vehicleAtSameAddress(here, [here, at(2, "udpin:0.0.0.0:14550", ["connect"])])).toBeNull();
+  expect(vehicleAtSameAddress(here, [here, at(2, "udp:127.0.0.1:14550@4244", ["disconnect"])])).toBeNull();
+});
+
+test("a failed connection states its reason until a newer request", () => {
+  const act = (kind: string, problem = ""): VehicleAct => ({ kind, problem }) as unknown as VehicleAct;
+  const failed = act("connect", "The port could not be opened.");
+  expect(connectFailure([act("check"), failed])).toBe("The port could not be opened.");
+  expect(connectFailure([act("disconnect"), failed])).toBe("");
+  expect(connectFailure([act("connect"), failed])).toBe("");
 });
 
 test("a registered vehicle without a link is not connected; what is flown elsewhere never is", () => {

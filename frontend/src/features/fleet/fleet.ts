@@ -1,6 +1,15 @@
 /** Labels of vehicles, requests and gain history, and the form of a new vehicle. */
 
-import type { ActKind, Catalogue, GivenGains, NewVehicle, OptionInfo, Vehicle, VehicleState } from "../../api/types";
+import type {
+  ActKind,
+  Catalogue,
+  GivenGains,
+  NewVehicle,
+  OptionInfo,
+  Vehicle,
+  VehicleAct,
+  VehicleState,
+} from "../../api/types";
 import type { NumberEntry, OptionValue } from "../../ui/Fields";
 import type { StateLabel } from "../../ui/states";
 
@@ -101,6 +110,26 @@ export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot
     safeGains: defaultGains(catalogue, autopilot),
     confirmed: false,
   };
+}
+
+/** The local port that an address needs for itself; the whole address if it names none. */
+function portOf(vehicle: Pick<Vehicle, "options">): string {
+  const address = String(vehicle.options["address"] ?? "");
+  return /^udp:.*@(\d+)$/.exec(address)?.[1] ?? /^udpin:.*:(\d+)$/.exec(address)?.[1] ?? address;
+}
+
+/** Another vehicle of this server that is connected or looked for at the same address; null without one. */
+export function vehicleAtSameAddress(vehicle: Vehicle, all: readonly Vehicle[]): Vehicle | null {
+  const others = all.filter(
+    ({ id, registered, actions }) => registered && id !== vehicle.id && actions.includes("disconnect"),
+  );
+  return others.find((other) => portOf(other) === portOf(vehicle)) ?? null;
+}
+
+/** Why the last request to connect has failed; empty if it has not, or is not the newest one. */
+export function connectFailure(acts: readonly VehicleAct[]): string {
+  const newest = acts.find(({ kind }) => kind === "connect" || kind === "disconnect");
+  return newest?.kind === "connect" ? newest.problem : "";
 }
 
 /** Options of the collapsed section. */
