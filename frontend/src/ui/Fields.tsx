@@ -2,7 +2,7 @@ import { InputBase, type InputBaseProps, Switch, TextInput, type TextInputProps 
 import { IconChevronDown } from "@tabler/icons-react";
 import { useState } from "react";
 import type { OptionInfo } from "../api/types";
-import { readNumber, typed } from "./format";
+import { readNumber, typed, unitAfter } from "./format";
 
 /** A number, or text that is not a number yet. */
 export type NumberEntry = number | string;
@@ -61,8 +61,9 @@ interface OptionFieldProps {
 }
 
 function rangeOf({ lower = null, upper = null, unit = "" }: OptionInfo): string | undefined {
-  if (lower === null && upper === null) return unit === "" ? undefined : unit;
-  return `${lower ?? "…"} … ${upper ?? ""} ${unit}`.trim();
+  const after = unitAfter(unit);
+  if (lower === null && upper === null) return after.trim() || undefined;
+  return `${lower ?? "…"} … ${upper ?? ""}${after}`.trim();
 }
 
 function shown(choice: OptionValue): string {

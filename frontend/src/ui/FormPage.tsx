@@ -3,6 +3,7 @@ import { type ReactNode, useState } from "react";
 import type { GainInfo } from "../api/types";
 import { type NumberEntry, NumberField } from "./Fields";
 import classes from "./Form.module.css";
+import { unitAfter } from "./format";
 import { ErrorNotice } from "./Notices";
 
 interface Props {
@@ -80,7 +81,7 @@ export function GainFields({ legend, gains, values, reasons, prefix, onChange }:
           required
           withAsterisk={false}
           label={name}
-          description={`${lower} … ${upper} ${unit}`}
+          description={`${lower} … ${upper}${unitAfter(unit)}`}
           value={values[name] ?? ""}
           whole={integer}
           error={reasons[`${prefix}.${name}`] ?? outOfRange(values[name], lower, upper)}

@@ -13,6 +13,7 @@ import {
   readNumber,
   typed,
   typedGain,
+  unitAfter,
   utcTime,
   withUnit,
 } from "./format";
@@ -113,4 +114,8 @@ test("what a field is filled with can be read again", () => {
   expect([400, -50.25, 1e-7, 0].map((value) => readNumber(typed(value)).value)).toEqual([400, -50.25, 1e-7, 0]);
   expect(typedGain(-50.123456789)).toBe("-50.1235");
   expect(typedGain(1234567)).toBe("1234567");
+});
+
+test("a number without a unit is printed alone", () => {
+  expect([unitAfter("1"), unitAfter(""), unitAfter("m")]).toEqual(["", "", " m"]);
 });

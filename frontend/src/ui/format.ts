@@ -5,7 +5,12 @@ export const NOTHING = "–";
 /** Errors are known to about a millimetre: three digits after the point. */
 export function withUnit(value: number | null | undefined, unit: string, digits = 3): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
-  return `${value.toFixed(digits)} ${unit}`;
+  return `${value.toFixed(digits)}${unitAfter(unit)}`;
+}
+
+/** A unit as it follows a number; nothing for a number without one, which the catalogue calls 1. */
+export function unitAfter(unit: string): string {
+  return unit === "" || unit === "1" ? "" : ` ${unit}`;
 }
 
 /** Signed change of `value` against `base` in percent; null if one is missing or the base is 0. */

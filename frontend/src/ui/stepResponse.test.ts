@@ -14,6 +14,10 @@ test("each measure prints with its unit, a signed one with its sign, and a missi
   expect(MEASURES.map((measure) => measureText(aborted, measure))).toEqual(["1.34 s", "–", "0.15 m", "–"]);
   const above = { ...flight, steady_state_error_m: 0.2 };
   expect(MEASURES.map((measure) => measureText(above, measure)).at(-1)).toBe("+0.200 m");
+  for (const tiny of [0.0002, -0.0002, 0]) {
+    const exact = { ...flight, steady_state_error_m: tiny };
+    expect(MEASURES.map((measure) => measureText(exact, measure)).at(-1)).toBe("0.000 m");
+  }
 });
 
 test("a flight without a step of its set point has no response", () => {

@@ -36,6 +36,7 @@ export function measureText(flight: StepResponse, { name, unit, digits }: Measur
   if (value === null) {
     return name === "settling_time_s" && flight.steady_state_error_m !== null ? "not settled" : NOTHING;
   }
-  const sign = name === "steady_state_error_m" && value > 0 ? "+" : "";
-  return `${sign}${value.toFixed(digits)} ${unit}`.replace(/^-/, "−");
+  const size = Math.abs(value).toFixed(digits);
+  const isSigned = name === "steady_state_error_m" && Number(size) !== 0;
+  return `${value < 0 && Number(size) !== 0 ? "−" : isSigned ? "+" : ""}${size} ${unit}`;
 }

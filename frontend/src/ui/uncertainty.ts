@@ -1,7 +1,7 @@
 /** Numbers with their uncertainty, rounded to it: 0.105 ± 0.012 m, not 0.10537 ± 0.0123. */
 
 import type { Interval } from "../api/types";
-import { NOTHING, percentText, withUnit } from "./format";
+import { NOTHING, percentText, unitAfter, withUnit } from "./format";
 
 const MOST_DIGITS = 6;
 /** An uncertainty with a smaller leading digit keeps two digits: rounding 0.012 to 0.01 would lose too much. */
@@ -27,7 +27,7 @@ export function plusMinus(
   unit: string,
 ): string {
   if (!isNumber(value)) return NOTHING;
-  const after = unit === "" ? "" : ` ${unit}`;
+  const after = unitAfter(unit);
   if (!isNumber(uncertainty) || uncertainty <= 0) return `${value.toFixed(3)}${after}`;
   const digits = decimalsOf(uncertainty);
   return `${value.toFixed(digits)} ± ${uncertainty.toFixed(digits)}${after}`;

@@ -1,7 +1,7 @@
 /** A campaign's settings as titles and values. */
 
 import type { Campaign, Catalogue, Definition, OptionInfo } from "../../api/types";
-import { percentText } from "../../ui/format";
+import { percentText, unitAfter } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 
 const STARTS = {
@@ -27,8 +27,7 @@ function percent(share: number): string {
 
 function valueText(value: unknown, unit = ""): string {
   if (typeof value === "boolean") return value ? "yes" : "no";
-  const gap = unit === "" || CLOSE_UNITS.includes(unit) ? "" : " ";
-  return `${value}${gap}${unit}`;
+  return `${value}${CLOSE_UNITS.includes(unit) ? unit : unitAfter(unit)}`;
 }
 
 /** Options with the titles and units of the catalogue; with their names until it is loaded. */
