@@ -38,7 +38,7 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
             ))}
           </ul>
         )}
-        {problem.hint && <p className={classes["hint"]}>{problem.hint}</p>}
+        {problem.hint && <p className={classes["hint"]}>{withCode(problem.hint)}</p>}
       </div>
     </div>
   );

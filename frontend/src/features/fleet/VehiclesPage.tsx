@@ -64,8 +64,9 @@ function NoVehicles() {
       </p>
       <p>
         To try it without a drone, run <code>gainline sim-drone</code> in a terminal (from a checkout{" "}
-        <code>./dev exec gainline sim-drone</code>) and register it at <code>udp:127.0.0.1:4245@4244</code> as
-        simulated.
+        <code>./dev exec gainline sim-drone</code>) and register it as simulated, with the autopilot Paparazzi at{" "}
+        <code>udp:127.0.0.1:4245@4244</code>. With <code>--autopilot px4</code> or <code>--autopilot ardupilot</code>,
+        it is at <code>udpin:127.0.0.1:14550</code>.
       </p>
     </div>
   );
