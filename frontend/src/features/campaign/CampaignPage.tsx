@@ -20,6 +20,7 @@ import { StatisticsPanel } from "./StatisticsPanel";
 import { useFlightKeys } from "./useFlightKeys";
 import type { Preview } from "./useNextFlight";
 import { useSelectedFlights } from "./useSelectedFlights";
+import { useTab } from "./useTab";
 import { VerdictPanel } from "./VerdictPanel";
 import { selectedTrial } from "./verdict";
 
@@ -75,6 +76,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
   const trials = read ?? NONE;
   const [chosen, setChosen] = useState<number | null>(null);
   const [preview, setPreview] = useState<Preview | null>(null);
+  const [tab, openTab] = useTab();
   const standing = useCampaignStatus(campaign.id);
   const unproposed = useProposal(campaign.id).error;
   const experiment = campaign.definition.experiment ?? "takeoff";
@@ -125,7 +127,13 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
             ))}
         </div>
       </div>
-      <Tabs defaultValue="trends" mt="var(--gap)" keepMounted={false} classNames={{ tab: classes["tab"] ?? "" }}>
+      <Tabs
+        value={tab}
+        onChange={openTab}
+        mt="var(--gap)"
+        keepMounted={false}
+        classNames={{ tab: classes["tab"] ?? "" }}
+      >
         <Tabs.List>
           <Tabs.Tab value="trends">Error and gains</Tabs.Tab>
           <Tabs.Tab value="flights">
