@@ -23,9 +23,11 @@ import { AbortCause, FlightReview } from "./FlightReview";
 import { speedOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
 import { useSpeed } from "./SpeedSwitch";
+import { comparison } from "./useSelectedFlights";
 import classes from "./Verdict.module.css";
 import {
   bestBeforeOf,
+  comparedWith,
   isScored,
   repeatPurpose,
   scatterMeaning,
@@ -171,7 +173,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         )}
         <Anchor
           component={Link}
-          to={`/compare?add=${trial.id}&campaign=${trial.campaign_id}`}
+          to={comparison(trial.campaign_id, comparedWith(trial, trials, campaign?.best?.trial_id))}
           px={6}
           py={12}
           aria-label={`Compare flight ${trial.number}`}
@@ -184,7 +186,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           </Anchor>
         )}
       </Group>
-      <FlightNotes trial={trial} pin={pin} />
+      <FlightNotes key={trial.id} trial={trial} pin={pin} />
       {campaign && isBest && campaign.state !== "finished" && <PromoteGains campaign={campaign} />}
     </Panel>
   );

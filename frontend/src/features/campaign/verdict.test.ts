@@ -4,6 +4,7 @@ import {
   abortSentence,
   abortWords,
   bestBeforeOf,
+  comparedWith,
   consequenceOf,
   heldGainsNotice,
   marksOf,
@@ -32,6 +33,13 @@ test("a flight is compared with the best valid one before it", () => {
 
 test("the first flight has nothing before it", () => {
   expect(bestBeforeOf(first, all)).toBeNull();
+});
+
+test("the link beside a verdict compares with the best, and the best with the first", () => {
+  expect(comparedWith(glitch, all, 3)).toEqual([3, 2]);
+  expect(comparedWith(third, all, 3)).toEqual([1, 3]);
+  expect(comparedWith(glitch, all, undefined)).toEqual([1, 2]);
+  expect(comparedWith(first, all, 1)).toEqual([1]);
 });
 
 test("an aborted flight says why, and not twice that it was aborted", () => {

@@ -117,6 +117,13 @@ export function selectedTrial(
   return flown.find((trial) => trial.number === chosen) ?? (isFinished ? null : (flown.at(-1) ?? null));
 }
 
+/** The flights of a comparison of this one: the best, or for the best itself the first flown, as the reference. */
+export function comparedWith(trial: Trial, trials: readonly Trial[], bestId: number | undefined): number[] {
+  const first = trials.find(({ state }) => wasFlown(state))?.id;
+  const reference = trial.id === bestId ? first : (bestId ?? first);
+  return [...new Set([reference ?? trial.id, trial.id])];
+}
+
 /** The best valid flight: the lowest error, the earliest of equal ones. */
 function bestOfCounted(trials: readonly Trial[]): Trial | null {
   return bestBeforeOf({ number: Infinity }, trials);

@@ -26,7 +26,7 @@ import { ComparisonTable, lineStylesOf, SettingsTable } from "./ComparisonTable"
 import { againstFirst, chosenIn, paramsOf, remember, remembered, toggled, withoutRefused } from "./chosenFlights";
 import { FlightPicker } from "./FlightPicker";
 
-/** The flights in the URL. `add` adds one to those stored in this tab; a URL without flights restores them. */
+/** The flights in the URL; a URL without flights restores those stored in this tab. */
 function useChosen(): [number[], (trials: readonly number[]) => void] {
   const [params, setParams] = useSearchParams();
   const chosen = chosenIn(params);
@@ -35,14 +35,10 @@ function useChosen(): [number[], (trials: readonly number[]) => void] {
     setParams(paramsOf(trials, params.get("campaign")), { replace: true });
   };
   useEffect(() => {
-    const added = Number(params.get("add"));
     const before = remembered();
     const named = chosenIn(params);
     if (named.length > 0) remember(named);
-    else if (added > 0 || before.length > 0) {
-      const flights = added > 0 && !before.includes(added) ? [...before, added] : before;
-      setParams(paramsOf(flights, params.get("campaign")), { replace: true });
-    }
+    else if (before.length > 0) setParams(paramsOf(before, params.get("campaign")), { replace: true });
   }, [params, setParams]);
   return [chosen, choose];
 }
