@@ -131,6 +131,10 @@ def test_a_note_that_is_being_written_outlives_a_verdict(dashboard: Dashboard, c
     verdict = open_flight(dashboard, trial)
     verdict.get_by_text("Note and photos").click()
     verdict.get_by_label("Note on flight 1").fill("Gust from the north")
+    dashboard.page.get_by_role("link", name="Gainline, all campaigns").click()
+    expect(dashboard.page.get_by_role("heading", name="Campaigns", exact=True)).to_be_visible()
+    dashboard.page.go_back()
+    expect(verdict.get_by_label("Note on flight 1")).to_have_value("Gust from the north")
     verdict.get_by_role("button", name="Mark invalid").click()
     verdict.get_by_text("Wind gust").click()
     verdict.get_by_role("button", name="Mark invalid").click()
@@ -139,6 +143,9 @@ def test_a_note_that_is_being_written_outlives_a_verdict(dashboard: Dashboard, c
     verdict.get_by_role("button", name="Save note").click()
     expect(verdict.get_by_role("button", name="Save note")).to_have_count(0)
     assert dashboard.get(f"/trials/{trial['id']}")["note"] == "Gust from the north"
+    verdict.get_by_label("Note on flight 1").fill("x" * 2001)
+    expect(verdict.get_by_text("2001 of at most 2000 characters")).to_be_visible()
+    expect(verdict.get_by_role("button", name="Save note")).to_be_disabled()
 
 
 def test_it_fits_on_a_phone(open_dashboard: Opener, shared_server: Server, states: States) -> None:

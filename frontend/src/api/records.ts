@@ -67,11 +67,15 @@ export function usePhotoActions(trialId: number) {
   };
 }
 
-export function useNote({ id, campaign_id, version }: Trial) {
+/** `onSaved` is called with the text that was sent, also when its form is gone by then. */
+export function useNote({ id, campaign_id, version }: Trial, onSaved: (sent: string) => void) {
   const queries = useQueryClient();
   return useMutation({
     mutationFn: (note: string) => answer(editTrial({ path: { trial_id: id }, body: { version, note } })),
-    onSuccess: (after) => queries.setQueryData(["trial", id], after),
+    onSuccess: (after, sent) => {
+      onSaved(sent);
+      queries.setQueryData(["trial", id], after);
+    },
     onSettled: () => queries.invalidateQueries({ queryKey: ["campaign", campaign_id] }),
   });
 }

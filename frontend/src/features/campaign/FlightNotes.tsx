@@ -4,9 +4,12 @@ import { useEffect, useRef, useState } from "react";
 import { photoAddress, useNote, usePhotoActions, usePhotos } from "../../api/records";
 import type { Trial } from "../../api/types";
 import { ErrorNotice } from "../../ui/Notices";
+import { draftOf, forgetDraft, keepDraft } from "./noteDraft";
 import classes from "./Verdict.module.css";
 
 const PICTURES = "image/jpeg,image/png,image/webp";
+const LONGEST_NOTE = 2000;
+const COUNTED_FROM = 1800;
 
 /** The time in the record, in seconds since the command, at which a line of the note is to be pinned. */
 export interface NotePin {
@@ -25,7 +28,8 @@ export function FlightNotes({ trial, pin = null }: Props) {
   const { add, remove } = usePhotoActions(trial.id);
   const [asked, setAsked] = useState<number | null>(null);
   const doomed = photos.findIndex(({ id }) => id === asked);
-  const kept = trial.note !== "" || photos.length > 0 || pin !== null;
+  const [hasDraft] = useState(() => draftOf(trial.id, trial.note) !== trial.note);
+  const kept = hasDraft || trial.note !== "" || photos.length > 0 || pin !== null;
   return (
     <details className={classes["notes"]} open={kept || undefined}>
       <summary>Note and photos</summary>
@@ -79,7 +83,7 @@ export function FlightNotes({ trial, pin = null }: Props) {
 }
 
 function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
-  const [note, setNote] = useState(trial.note);
+  const [note, setNote] = useState(() => draftOf(trial.id, trial.note));
   const text = useRef<HTMLTextAreaElement>(null);
   const pinned = useRef(pin);
   useEffect(() => {
@@ -88,7 +92,9 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
     setNote((before) => withPin(before, pin.timeS));
     text.current?.focus();
   }, [pin]);
-  const save = useNote(trial);
+  useEffect(() => keepDraft(trial.id, note, trial.note), [trial.id, trial.note, note]);
+  const save = useNote(trial, (sent) => forgetDraft(trial.id, sent));
+  const isTooLong = note.length > LONGEST_NOTE;
   return (
     <form
       className={classes["note"]}
@@ -104,12 +110,17 @@ function Note({ trial, pin }: { trial: Trial; pin: NotePin | null }) {
         multiline
         label={`Note on flight ${trial.number}`}
         rows={2}
-        maxLength={2000}
+        error={isTooLong}
         value={note}
         onChange={(event) => setNote(event.currentTarget.value)}
       />
+      {note.length >= COUNTED_FROM && (
+        <p role="status" className="numbers">
+          {note.length} of at most {LONGEST_NOTE} characters
+        </p>
+      )}
       {note !== trial.note && (
-        <Button type="submit" loading={save.isPending}>
+        <Button type="submit" loading={save.isPending} disabled={isTooLong}>
           Save note
         </Button>
       )}
