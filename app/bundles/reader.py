@@ -93,7 +93,9 @@ class Bundle:
             self._zip = zipfile.ZipFile(opening)
             opening.is_open = True
         except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
-            _refuse("file", str(error).replace("File is", "is") if "not a zip" in str(error) else f"is damaged: {error}")
+            _refuse(
+                "file", "is not a zip file" if "not a zip" in str(error) else f"cannot be read as a zip file: {error}"
+            )
         self._look_at_directory()
         self.manifest = _parsed(MANIFEST, self._read(MANIFEST, MAX_MANIFEST_BYTES), Manifest, look=_version)
         listed = self.manifest.parts.keys() | {MANIFEST}

@@ -23,8 +23,8 @@ _GAP: Final = 0.035
 _OUTPUT_SHARE: Final = 2.0
 """Height of the output's panel, in heights of the others."""
 
-_NAME_SHARE: Final = 0.09
-"""Length of an event's name, as a share of the figure's height."""
+_NAME_PX: Final = 70
+"""Length of an event's name."""
 _NOTE_LETTERS: Final = 36
 """Longer notes are shortened to fit into the output's panel."""
 
@@ -259,7 +259,7 @@ def _mark(event: FlightEvent, colour: str) -> dict[str, object]:
 
 def _name(palette: Palette, event: FlightEvent, index: int) -> dict[str, object]:
     """The event's name along its line, below that of the one before it, which may be close."""
-    return _along(event.time_s, event.name, palette.dim, y=1 - _NAME_SHARE * index, yanchor="top")
+    return _along(event.time_s, event.name, palette.dim, y=1, yanchor="top", yshift=-_NAME_PX * index)
 
 
 def _note(palette: Palette, note: FlightEvent, bottom: float) -> dict[str, object]:

@@ -51,7 +51,7 @@ def test_a_campaign_goes_out_and_comes_in(
     assert [path.name for path in tmp_path.glob("*.part")] == []
     result = run(settings, "unbundle", out)
     assert result.exit_code == 0, result.stderr
-    assert "Garage: 1 flight" in result.stdout
+    assert "Garage (imported): 1 flight" in result.stdout
     second = get(client, "/api/campaigns")["items"][0]
     assert second["best"]["error"] == campaign["best"]["error"]
 
