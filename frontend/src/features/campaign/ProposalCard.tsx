@@ -66,7 +66,9 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             hasModel={hasModel}
           />
         )}
-        {isEvaluated && isRepeat(chosen.name) && <PriorScatter campaignId={campaign.id} />}
+        {chosen.predicted?.interval && isEvaluated && isRepeat(chosen.name) && (
+          <PriorScatter campaignId={campaign.id} />
+        )}
         <FlightWindow definition={campaign.definition} />
         <FormErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
         {isRefused && chosen.gate !== null && chosen.choice === undefined && (

@@ -17,6 +17,7 @@ import { trialStateLabel } from "../../ui/states";
 import { hasStepResponse, MEASURES, measureText } from "../../ui/stepResponse";
 import { Time } from "../../ui/Time";
 import { confidenceText, intervalText, plusMinus } from "../../ui/uncertainty";
+import { useHasModel } from "../../ui/units";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
 import { FlightNotes, type NotePin } from "./FlightNotes";
 import { AbortCause, FlightReview } from "./FlightReview";
@@ -60,6 +61,10 @@ function Change({ error, other, unit }: { error: number | null; other: number | 
   );
 }
 
+function unpredicted(hasModel: boolean): string {
+  return hasModel ? "None before the first valid flight" : "None: Gainline has no model of this controller";
+}
+
 interface FactProps {
   title: string;
   topic?: Topic;
@@ -83,6 +88,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
   const bestBefore = bestBeforeOf(trial, trials);
   const statistics = useStatistics(trial.campaign_id).data;
   const campaign = useCampaign(trial.campaign_id).data;
+  const hasModel = useHasModel(experiment);
   const group = statistics?.groups.find(({ trial_numbers }) => trial_numbers.includes(trial.number));
   const asked = repeatPurpose(trial);
   const without = standingWithout(trial, trials);
@@ -122,7 +128,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Fact>
         <Fact title="Predicted" topic="predicted">
           {trial.predicted_error === null && bestBefore === null
-            ? "None before the first valid flight"
+            ? unpredicted(hasModel)
             : withUnit(trial.predicted_error, unit)}{" "}
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <PredictionResult trial={trial} />
