@@ -10,9 +10,14 @@ import numpy as np
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
 from app.core.control.px4 import OUTPUTS
+from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_replay import LoopTrace, replayed
+from app.core.records.trajectory import Samples
+from app.logs.px4_log import read_px4_log
 from app.logs.px4_trace import is_px4_trace, read_px4_trace
+from app.logs.ulog_tables import is_ulog
 
+_HEAD_BYTES: Final = 16
 _TOLERANCE: Final = 1e-5
 
 
@@ -37,20 +42,35 @@ _MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
     {"takeoff_state": _TOLERANCE, "out_vz_m_s": 1e-6, "out_az_m_s2": 2e-2, "out_thrust": 1e-3}
 )
 """What the median difference of a signal over a flight may be."""
+_LOG_MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
+    {"out_vz_m_s": 1e-6, "out_az_m_s2": 5e-4, "out_thrust": 1e-3}
+)
+"""The same in a log, whose rows are computed from themselves or the row before, with a hover thrust interpolated."""
 
 _OF_A_FLIGHT: Final = "the median over the flight; single rows are undecided where messages share a time stamp"
 _DOWN: Final = "Altitude, velocity and acceleration are positive down, as in PX4."
+_HOW: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
+    {
+        "out_thrust": ("the acceleration target of the same row", "no hover thrust was logged beside it"),
+        "out_vz_m_s": ("the position and the set-point of the same row", "no set-point was logged beside it"),
+        "out_az_m_s2": ("the row before", "the set-points changed, or not every position was logged"),
+    }
+)
 
 
 def _recognises(beginning: Beginning) -> bool:
-    return is_px4_trace(beginning.unzipped)
+    return is_ulog(beginning.raw) or is_px4_trace(beginning.unzipped)
 
 
 def _examine(recording: Recording) -> Result:
+    recording.stream.seek(0)
+    if is_ulog(recording.stream.read(_HEAD_BYTES)):
+        compared = _compared(read_px4_log(recording.stream, name=recording.name))
+        return _judged_by_medians(result_of_trace(PX4.name, _SIGNALS, compared, kind="log"), compared, _LOG_MEDIANS)
     trace = read_px4_trace(recording.stream, name=recording.name)
     replay = _replayed(trace)
     result = result_of_trace(PX4.name, _SIGNALS, replay)
-    return _judged_by_medians(result, replay) if trace.flown else result
+    return _judged_by_medians(result, replay, _MEDIANS) if trace.flown else result
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -66,8 +86,32 @@ def _replayed(trace: LoopTrace) -> TraceReplay:
     )
 
 
-def _judged_by_medians(result: Result, replay: TraceReplay) -> Result:
-    judged = [_judged(signal, replay) for signal in result.signals if signal.name in _MEDIANS]
+def _compared(log: LoopLog) -> TraceReplay:
+    replica = replica_of(log)
+    recorded = {name: np.where(np.isfinite(replica[name]), getattr(log, name), np.nan) for name in COMPARED}
+    compared = [name for name in COMPARED if np.isfinite(recorded[name]).any()]
+    time_s = log.time_s[log.place]
+    return TraceReplay(
+        time_s=time_s - time_s[0],
+        recorded={name: recorded[name] for name in compared},
+        replica={name: replica[name] for name in compared},
+        gains=log.parameters.gains,
+        notes=(*_log_notes(recorded), _DOWN),
+    )
+
+
+def _log_notes(recorded: Mapping[str, Samples]) -> Iterable[str]:
+    rows = {name: int(np.isfinite(values).sum()) for name, values in recorded.items()}
+    for name, (how, missing) in _HOW.items():
+        title = f"The {_SIGNALS[name].title.lower()}"
+        if rows[name]:
+            yield f"{title} was computed from {how}, in {grouped(rows[name])} rows."
+        else:
+            yield f"{title} was not computed: {missing}."
+
+
+def _judged_by_medians(result: Result, replay: TraceReplay, medians: Mapping[str, float]) -> Result:
+    judged = [_judged(signal, replay, medians) for signal in result.signals if signal.name in medians]
     signals = tuple(signal for signal, _ in judged)
     differing = [signal.name for signal in signals if signal.verdict == "differs"]
     total = grouped(result.rows)
@@ -87,15 +131,15 @@ def _judged_by_medians(result: Result, replay: TraceReplay) -> Result:
     )
 
 
-def _judged(signal: SignalResult, replay: TraceReplay) -> tuple[SignalResult, float]:
-    """The signal judged by its median difference, and the median; rows where only one side has a value are infinitely
-    apart in the median, and left out of the largest difference."""
+def _judged(signal: SignalResult, replay: TraceReplay, medians: Mapping[str, float]) -> tuple[SignalResult, float]:
+    """The signal judged by its median difference, and the median, over the rows with a value; where only one side has
+    one, they are infinitely apart in the median, and left out of the largest difference."""
     recorded, computed = replay.recorded[signal.name], replay.replica[signal.name]
     apart = np.abs(np.asarray(recorded - computed, dtype=np.float64))
     largest = float(np.nanmax(apart, initial=0.0))
-    apart[np.isnan(recorded) & np.isnan(computed)] = 0.0
-    median = float(np.median(np.where(np.isnan(apart), np.inf, apart)))
-    limit = _MEDIANS[signal.name]
+    given = np.isfinite(recorded) | np.isfinite(computed)
+    median = float(np.median(np.where(np.isnan(apart), np.inf, apart)[given]))
+    limit = medians[signal.name]
     verdict = signal.verdict if signal.verdict == "exact" else "agrees" if median <= limit else "differs"
     judged = replace(signal, largest_difference=largest, tolerance=limit, allowance=_OF_A_FLIGHT, verdict=verdict)
     return judged, median
@@ -110,7 +154,8 @@ def _notes(judged: Iterable[tuple[SignalResult, float]]) -> Iterable[str]:
 PX4: Final = Autopilot(
     name="px4",
     title="PX4",
-    recordings="a trace of PX4's vertical loop with one row per estimate of position, .csv or .csv.gz",
+    recordings="PX4's .ulg log of a flight, or a trace of its vertical loop with one row per estimate of position, "
+    ".csv or .csv.gz",
     signals=_SIGNALS,
     figures=MappingProxyType(
         {

@@ -91,6 +91,24 @@ def test_the_log_of_an_arducopter_is_compared_row_by_row(client: TestClient) -> 
     assert "is missing" in problems_of(refused)["PSCD"]
 
 
+def test_the_log_of_a_px4_is_judged_by_medians(client: TestClient) -> None:
+    content = logs.recorded("px4_takeoff.ulg")
+    check = send(client, "flight.ulg", content).json()
+    assert (check["autopilot"], check["kind"], check["passed"]) == ("PX4", "log", True)
+    assert check["sentence"] == (
+        "The replica agrees: over 169 rows the medians of all 2 signals are within the tolerances."
+    )
+    assert check["gains"]["MPC_Z_VEL_P_ACC"] == pytest.approx(4.2)
+    assert (
+        "The velocity target was computed from the position and the set-point of the same row, in 58 rows."
+        in (check["notes"])
+    )
+    assert any(note.startswith("The acceleration target was not computed") for note in check["notes"])
+    assert [card["state"] for card in figures(client, check)] == ["ready", "ready"]
+    refused = send(client, "empty.ulg", content.replace(b"takeoff_status", b"xakeoff_status"))
+    assert problems_of(refused) == {"takeoff_status": "is missing"}
+
+
 def test_a_difference_beyond_the_tolerance_is_found_in_a_run_of_arducopter(client: TestClient) -> None:
     lines = gzip.decompress(ARDUCOPTER.read_bytes()).decode().splitlines()
     row = lines[1002].split(",")
@@ -189,7 +207,7 @@ def test_a_calm_flight_asks_for_its_gains(client: TestClient) -> None:
     ("name", "content", "field", "reason"),
     [
         ("empty.data", b"", "file", "is empty"),
-        ("flight.ulg", b"ULog\x01\x12\x35" + bytes(100), "file", "is neither"),
+        ("flight.ulg", b"ULog\x01\x12\x35" + bytes(100), "vehicle_local_position", "is missing"),
         ("alive.data", b"1.0 31 ALIVE 1\n", "file", "contains no VERT_LOOP"),
         ("cut.csv.gz", TRACES[0].read_bytes()[:5000], "file", "is damaged"),
         ("noise.csv.gz", b"\x1f\x8b" + bytes(range(200)), "file", "is damaged"),

@@ -70,8 +70,8 @@ OUTPUTS: Final = (
 )  # fmt: skip
 """The first elements of the state array."""
 
-_HOVER_MIN: Final = np.float32(0.05)
-_HOVER_MAX: Final = np.float32(0.9)
+HOVER_MIN: Final = np.float32(0.05)
+HOVER_MAX: Final = np.float32(0.9)
 _THRUST_ON_THE_GROUND: Final = np.float32(0.001)
 _HELD_DOWN_M_S2: Final = np.float32(100.0)
 _DT_MIN_S: Final = np.float32(0.002)
@@ -197,7 +197,7 @@ def rollout(state: State, p: Packed, inputs: NDArray[np.float32], outputs: NDArr
         state[RAMP_SPEED] = ramp_speed(state[RAMP], lowest, p[CLIMB])
 
         if not math.isnan(inputs[row, 8]):
-            new, a = min(max(inputs[row, 8], _HOVER_MIN), _HOVER_MAX), state[ACCELERATION_TARGET]
+            new, a = min(max(inputs[row, 8], HOVER_MIN), HOVER_MAX), state[ACCELERATION_TARGET]
             state[INTEGRAL] += (a - GRAVITY) * state[HOVER_THRUST] / new + GRAVITY - a
             state[HOVER_THRUST] = new
         if not flying:

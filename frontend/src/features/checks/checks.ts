@@ -19,8 +19,8 @@ export const RECORDINGS = [
   },
   {
     autopilot: "PX4",
-    types: [".csv", ".gz"],
-    text: "a trace with a row for every estimate of position, .csv or .csv.gz",
+    types: [".ulg", ".csv", ".gz"],
+    text: "the .ulg log of a flight, or a trace with a row for every estimate of position, .csv or .csv.gz",
   },
 ] as const;
 
