@@ -25,7 +25,23 @@ app = typer.Typer(
 controller = typer.Typer(no_args_is_help=True, help="Check the replica of the autopilot's vertical loop.")
 app.add_typer(controller, name="controller")
 
-JsonOut = Annotated[Path | None, typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.")]
+
+def _spare_recording(target: Path | None) -> Path | None:
+    """Refuse to write the result over a file that is no JSON, such as a log that was to be read."""
+    if target is not None and target.is_file():
+        with target.open("rb") as stream:
+            if stream.read(1) not in {b"{", b""}:
+                raise typer.BadParameter(
+                    f"{target} exists and is not a JSON file, so it is not overwritten. Name another file, or - to "
+                    "print the result."
+                )
+    return target
+
+
+JsonOut = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="OUT", help="Write the result as JSON; - prints it.", callback=_spare_recording),
+]
 DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [default: GAINLINE_DATA_DIR]")]
 CampaignSource = Annotated[
     str,

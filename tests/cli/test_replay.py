@@ -51,6 +51,30 @@ def test_a_difference_is_measured_and_fails_the_command(tmp_path: Path) -> None:
     assert file["first_different_row"] == 1000
 
 
+def test_a_recording_named_in_place_of_the_result_is_not_overwritten(tmp_path: Path) -> None:
+    """Observed: `--json LOG LOG` replaced the first log by the result of the second."""
+    log = tmp_path / "flight.csv.gz"
+    log.write_bytes(TRACES[0].read_bytes())
+    result = replay("--json", log, TRACES[1])
+    assert result.exit_code == 2
+    assert "is not overwritten" in " ".join(result.stderr.split())
+    assert log.read_bytes() == TRACES[0].read_bytes()
+    out = tmp_path / "replay.json"
+    for _ in range(2):
+        assert replay(TRACES[1], "--json", out).exit_code == 0
+
+
+def test_a_log_of_px4_is_compared_where_it_suffices(tmp_path: Path) -> None:
+    log = tmp_path / "flight.ulg"
+    log.write_bytes(recorded("px4_takeoff.ulg"))
+    out = tmp_path / "replay.json"
+    assert replay(log, "--json", out).exit_code == 0
+    (file,) = json.loads(out.read_text())["files"]
+    assert file["rows"] == 169
+    assert file["largest_difference"]["out_vz_m_s"] < 1e-6
+    assert file["largest_difference"]["out_thrust"] < 1e-3
+
+
 @pytest.mark.parametrize(("column", "value"), [("z", "1.5"), ("mode", "hover"), ("thrust", ""), ("ki", "99999999999")])
 def test_a_malformed_value_is_named_by_line_and_column(tmp_path: Path, column: str, value: str) -> None:
     result = replay(spoilt(tmp_path, line=17, column=column, value=value))
