@@ -79,11 +79,11 @@ def campaigns(states: States) -> Campaigns:
 def check_layout(dashboard: Dashboard) -> None:
     for size, (viewport, screens) in SCREENS.items():
         dashboard.page.set_viewport_size(viewport)
+        dashboard.until(lambda: all(len(ends) == 2 for ends in dashboard.page.evaluate(ROW_ENDS)))
         dashboard.settled()
         assert dashboard.page.evaluate(HEIGHT) <= screens * viewport["height"], size
-        for ends in dashboard.page.evaluate(ROW_ENDS):
-            assert len(ends) == 2, size
-            assert ends[0] == ends[1], size
+        for left, right in dashboard.page.evaluate(ROW_ENDS):
+            assert left == right, size
 
 
 @pytest.mark.parametrize("state", ["new", "two_flights", "seven_flights", "finished"])
