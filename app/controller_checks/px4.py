@@ -8,10 +8,11 @@ from typing import Final
 import numpy as np
 
 from app.controller_checks.autopilot import Autopilot, Beginning, Recording
-from app.controller_checks.results import Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
+from app.controller_checks.results import Kind, Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
 from app.core.control.px4 import OUTPUTS
 from app.core.control.px4_log import COMPARED, LoopLog, replica_of
 from app.core.control.px4_replay import LoopTrace, replayed
+from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.px4_log import read_px4_log
 from app.logs.px4_trace import is_px4_trace, read_px4_trace
@@ -66,11 +67,20 @@ def _examine(recording: Recording) -> Result:
     recording.stream.seek(0)
     if is_ulog(recording.stream.read(_HEAD_BYTES)):
         compared = _compared(read_px4_log(recording.stream, name=recording.name))
-        return _judged_by_medians(result_of_trace(PX4.name, _SIGNALS, compared, kind="log"), compared, _LOG_MEDIANS)
+        if not compared.recorded:
+            raise InputError(
+                f"{recording.name} cannot be compared with the replica.",
+                hint="Give a .ulg log with hover_thrust_estimate and trajectory_setpoint (bit 0 of SDLOG_PROFILE).",
+                problems=(Problem("file", "has no set-point and no hover thrust beside any row in flight"),),
+            )
+        return _judged_by_medians(compared, _LOG_MEDIANS, kind="log")
     trace = read_px4_trace(recording.stream, name=recording.name)
     replay = _replayed(trace)
-    result = result_of_trace(PX4.name, _SIGNALS, replay)
-    return _judged_by_medians(result, replay, _MEDIANS) if trace.flown else result
+    return (
+        _judged_by_medians(replay, _MEDIANS, kind="trace")
+        if trace.flown
+        else result_of_trace(PX4.name, _SIGNALS, replay)
+    )
 
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
@@ -110,8 +120,11 @@ def _log_notes(recorded: Mapping[str, Samples]) -> Iterable[str]:
             yield f"{title} was not computed: {missing}."
 
 
-def _judged_by_medians(result: Result, replay: TraceReplay, medians: Mapping[str, float]) -> Result:
-    judged = [_judged(signal, replay, medians) for signal in result.signals if signal.name in medians]
+def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kind: Kind) -> Result:
+    """The result of a flight; rows beyond what a median may be are marked, and decide nothing."""
+    limited = {name: replace(each, tolerance=medians.get(name, each.tolerance)) for name, each in _SIGNALS.items()}
+    result = result_of_trace(PX4.name, limited, replay, kind=kind)
+    judged = [_judged(signal, replay) for signal in result.signals if signal.name in medians]
     signals = tuple(signal for signal, _ in judged)
     differing = [signal.name for signal in signals if signal.verdict == "differs"]
     total = grouped(result.rows)
@@ -131,7 +144,7 @@ def _judged_by_medians(result: Result, replay: TraceReplay, medians: Mapping[str
     )
 
 
-def _judged(signal: SignalResult, replay: TraceReplay, medians: Mapping[str, float]) -> tuple[SignalResult, float]:
+def _judged(signal: SignalResult, replay: TraceReplay) -> tuple[SignalResult, float]:
     """The signal judged by its median difference, and the median, over the rows with a value; where only one side has
     one, they are infinitely apart in the median, and left out of the largest difference."""
     recorded, computed = replay.recorded[signal.name], replay.replica[signal.name]
@@ -139,9 +152,8 @@ def _judged(signal: SignalResult, replay: TraceReplay, medians: Mapping[str, flo
     largest = float(np.nanmax(apart, initial=0.0))
     given = np.isfinite(recorded) | np.isfinite(computed)
     median = float(np.median(np.where(np.isnan(apart), np.inf, apart)[given]))
-    limit = medians[signal.name]
-    verdict = signal.verdict if signal.verdict == "exact" else "agrees" if median <= limit else "differs"
-    judged = replace(signal, largest_difference=largest, tolerance=limit, allowance=_OF_A_FLIGHT, verdict=verdict)
+    verdict = signal.verdict if signal.verdict == "exact" else "agrees" if median <= signal.tolerance else "differs"
+    judged = replace(signal, largest_difference=largest, allowance=_OF_A_FLIGHT, verdict=verdict)
     return judged, median
 
 

@@ -104,9 +104,13 @@ def test_the_log_of_a_px4_is_judged_by_medians(client: TestClient) -> None:
         in (check["notes"])
     )
     assert any(note.startswith("The acceleration target was not computed") for note in check["notes"])
+    assert [signal["different"] for signal in check["signals"]] == [0, 0]
     assert [card["state"] for card in figures(client, check)] == ["ready", "ready"]
     refused = send(client, "empty.ulg", content.replace(b"takeoff_status", b"xakeoff_status"))
     assert problems_of(refused) == {"takeoff_status": "is missing"}
+    without = content.replace(b"hover_thrust_estimate", b"hover_thrusx_estimate")
+    refused = send(client, "bare.ulg", without.replace(b"trajectory_setpoint", b"trajectory_sexpoint"))
+    assert "no set-point and no hover thrust" in problems_of(refused)["file"]
 
 
 def test_a_difference_beyond_the_tolerance_is_found_in_a_run_of_arducopter(client: TestClient) -> None:
