@@ -14,7 +14,7 @@ import {
   loadPlotly,
   type PlotlyElement,
 } from "./plotly";
-import { narrowed, type PlotlyFigure, traceWithRole, withLive } from "./traces";
+import { type DrawnPrediction, narrowed, type PlotlyFigure, traceWithRole, withLive, withPrediction } from "./traces";
 
 interface Props {
   figure: PlotlyFigure;
@@ -31,6 +31,8 @@ interface Props {
   /** Called on a double click, which also undoes the zoom. */
   onReset?: (() => void) | undefined;
   curveOf?: CurveOf | undefined;
+  /** Drawn in place of the figure's own prediction; null for that. A change of it alone is drawn at once. */
+  prediction?: DrawnPrediction | null | undefined;
   /** Build of the chart library; constant for the lifetime of the chart. */
   build?: Build | undefined;
 }
@@ -60,12 +62,14 @@ export function Chart({
   onWindow,
   onReset,
   curveOf,
+  prediction,
   build,
 }: Props) {
   const element = useRef<HTMLDivElement & PlotlyElement>(null);
   const [plotly, setPlotly] = useState<Plotly | null>(null); // once it has drawn
   const [broken, setBroken] = useState<string | null>(null);
   const queue = useRef<Promise<unknown>>(Promise.resolve());
+  const drawnFigure = useRef<PlotlyFigure | null>(null);
 
   useEffect(() => {
     const target = element.current;
@@ -74,11 +78,15 @@ export function Chart({
     queue.current = queue.current.then(async () => {
       try {
         const library = await loadPlotly(build);
-        await afterPaint();
+        if (drawnFigure.current !== figure) await afterPaint();
         if (!wanted) return;
+        drawnFigure.current = figure;
         await library.react(
           target,
-          withLive(figure.data, liveNow(liveTrial)),
+          withLive(
+            prediction === undefined ? figure.data : withPrediction(figure.data, prediction),
+            liveNow(liveTrial),
+          ),
           layoutFor(figure, target.clientWidth),
           CONFIG,
         );
@@ -92,7 +100,7 @@ export function Chart({
     return () => {
       wanted = false;
     };
-  }, [figure, liveTrial, onChoose, onPlace, onWindow, onReset, build]);
+  }, [figure, prediction, liveTrial, onChoose, onPlace, onWindow, onReset, build]);
 
   useEffect(() => {
     const target = element.current;

@@ -12,7 +12,7 @@ import { Panel } from "../ui/Panel";
 import classes from "../ui/Panel.module.css";
 import { Chart } from "./Chart";
 import type { Build, CurveOf } from "./plotly";
-import type { PlotlyFigure } from "./traces";
+import type { DrawnPrediction, PlotlyFigure } from "./traces";
 
 interface Props {
   title: string;
@@ -29,6 +29,7 @@ interface Props {
   onWindow?: (window: TimeRange | null) => void;
   onReset?: () => void;
   curveOf?: CurveOf;
+  prediction?: DrawnPrediction | null;
   build?: Build;
   tools?: ReactNode;
   /** Help topic. */
@@ -52,6 +53,7 @@ export function FigurePanel({
   onWindow,
   onReset,
   curveOf,
+  prediction,
   build,
   tools,
   topic,
@@ -107,6 +109,7 @@ export function FigurePanel({
           onWindow={onWindow}
           onReset={onReset}
           curveOf={curveOf}
+          prediction={prediction}
           build={build}
         />
       )}

@@ -73,7 +73,7 @@ export function withLive(traces: readonly Trace[], flight: LiveFlight | null): T
 
 type Points = { time_s: number[]; values: number[] } | null;
 
-interface DrawnPrediction {
+export interface DrawnPrediction {
   curve: Points;
   lower: Points;
   upper: Points;

@@ -4,9 +4,9 @@ import { SegmentedControl, useComputedColorScheme } from "@mantine/core";
 import { useIdle, useMediaQuery } from "@mantine/hooks";
 import { memo, useCallback, useDeferredValue, useEffect, useRef, useState } from "react";
 import { type TimeRange, useCampaignFigure, useCurveOf, useLandscape } from "../../api/queries";
-import type { Campaign, FigureCard, GainsPrediction, Trial } from "../../api/types";
+import type { Campaign, FigureCard, Trial } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
-import { type PlotlyFigure, wholeFlight, withChosen, withPrediction, withTimeRange } from "../../charts/traces";
+import { type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
 import classes from "./CampaignPage.module.css";
 import type { Preview } from "./useNextFlight";
 
@@ -19,17 +19,13 @@ const EACH_DRAWN = 30;
 /** The server's figure opens at the first 8 s. */
 type Span = "first" | "whole";
 
-function useDressed(
-  chosen: number | null,
-  span: Span,
-  prediction: GainsPrediction | null,
-): (figure: PlotlyFigure) => PlotlyFigure {
+function useDressed(chosen: number | null, span: Span): (figure: PlotlyFigure) => PlotlyFigure {
   return useCallback(
     (figure) => ({
-      data: withPrediction(withChosen(figure.data, chosen), prediction),
+      data: withChosen(figure.data, chosen),
       layout: withTimeRange(figure.layout, span === "whole" ? wholeFlight(figure) : null),
     }),
-    [chosen, span, prediction],
+    [chosen, span],
   );
 }
 
@@ -70,7 +66,8 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
       error={takeoffs.error}
       height={440}
       topic="curves"
-      dressed={useDressed(chosen, span, preview?.prediction ?? null)}
+      dressed={useDressed(chosen, span)}
+      prediction={preview?.prediction ?? null}
       className={`${classes["curves"]} ${preview?.isCurrent === false ? classes["outdated"] : ""}`}
       liveTrial={campaign.flying?.trial_id ?? null}
       onChoose={onChoose}
