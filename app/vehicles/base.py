@@ -161,8 +161,8 @@ class Condition:
 
     `step` is the step of the trial ("idle", "arm", "take-off", "record", "land", "abort-land", "link lost", "disarm",
     "restore", "quarantined"), or "observing" for a vehicle that is only observed. Ages are seconds since the last
-    packet and heartbeat; `held` are the gains last read back, `said` is the last status text, `trouble` a fault of the
-    ground station.
+    packet, heartbeat and status text; `held` are the gains last read back, `said` is that text, `trouble` a fault of
+    the ground station.
     """
 
     step: str
@@ -177,6 +177,7 @@ class Condition:
     lost_share: float | None = None
     held: Mapping[str, float] = field(default_factory=dict)
     said: str = ""
+    said_age_s: float | None = None
     trouble: str = ""
 
 

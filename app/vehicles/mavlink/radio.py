@@ -63,6 +63,7 @@ class VehicleMemory:
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
     restart_counter: RestartCounter = field(default_factory=RestartCounter)
     status_texts: deque[str] = field(default_factory=lambda: deque(maxlen=_STATUS_TEXTS))
+    status_text_s: float | None = None
     _piece_of: int = 0
     _pieces: str = ""
 
@@ -101,17 +102,18 @@ class VehicleMemory:
                 self.positions.append((now_s, measurement))
                 self.restart_counter.take(measurement, now_s)
             case StatusText():
-                self._add_chunk(measurement)
+                self._add_chunk(measurement, now_s)
             case _:
                 pass
 
-    def _add_chunk(self, chunk: StatusText) -> None:
+    def _add_chunk(self, chunk: StatusText, now_s: float) -> None:
         """Assemble the chunks of a status text in order; a lost chunk is not waited for."""
         if chunk.number != self._piece_of or chunk.place == 0:
             self._piece_of, self._pieces = chunk.number, ""
         self._pieces += chunk.text
         if chunk.is_last:
             self.status_texts.append(self._pieces)
+            self.status_text_s = now_s
             self._piece_of, self._pieces = 0, ""
 
 
@@ -345,6 +347,7 @@ class StatusReader:
             lost_share=self._lost_share(now_s, health),
             held=dict(held),
             said=radio.seen.status_texts[-1] if radio.seen.status_texts else "",
+            said_age_s=_age(now_s, radio.seen.status_text_s),
             trouble=trouble,
         )
 

@@ -1,5 +1,15 @@
 import { expect, test } from "vitest";
-import { aged, ageText, before, type LastHeard, linkText, secondsBetween, statusFrom, stepWord } from "./vehicleStatus";
+import {
+  aged,
+  ageText,
+  before,
+  type LastHeard,
+  linkText,
+  messageText,
+  secondsBetween,
+  statusFrom,
+  stepWord,
+} from "./vehicleStatus";
 
 const line = JSON.stringify({
   type: "vehicle",
@@ -43,6 +53,13 @@ test("the age counts on while nothing comes, and after two seconds nothing is cu
   const late = aged(heard(), after(2));
   expect([late.isCurrent, linkText(late)]).toEqual([false, "no data for 2.1 s"]);
   expect(linkText(aged(heard(), after(200)))).toBe("no data for 3 min");
+});
+
+test("the vehicle's last message has its age", () => {
+  expect(messageText(aged(heard(), after(0)))).toBeNull();
+  const failed = heard({ said: "Preflight Fail: Compass", said_age_s: 29 });
+  expect(messageText(aged(failed, after(3)))).toBe("Vehicle message, 32 s ago: Preflight Fail: Compass");
+  expect(messageText(aged(heard({ said: "Armed" }), after(3)))).toBe("Vehicle message: Armed");
 });
 
 test("a status that is told once more is as old as it was said, not as it was told", () => {

@@ -23,6 +23,7 @@ export interface VehicleStatus {
   /** Gains as last read back; empty if none were. */
   held: Readonly<Record<string, number>>;
   said: string;
+  saidAgeS: number | null;
   trouble: string;
   /** Reason of the quarantine; empty if it may fly. */
   concern: string;
@@ -75,6 +76,13 @@ export function ageText(ageS: number | null): string {
   if (ageS < 10) return `${ageS.toFixed(1)} s`;
   if (ageS < 120) return `${Math.floor(ageS)} s`;
   return `${Math.floor(ageS / 60)} min`;
+}
+
+/** The vehicle's last status text with its age; null if there is none. */
+export function messageText({ status, statusAgeS }: Aged): string | null {
+  if (status.said === "") return null;
+  const when = status.saidAgeS === null ? "" : `, ${ageText(status.saidAgeS + statusAgeS)} ago`;
+  return `Vehicle message${when}: ${status.said}`;
 }
 
 /** State of the link as a short text: its age, or why there is no data. */
@@ -153,6 +161,7 @@ export function statusFrom(json: string): VehicleStatus | null {
     lostShare: number(found["lost_share"]),
     held: gains(found["held"]),
     said: text(found["said"]),
+    saidAgeS: number(found["said_age_s"]),
     trouble: text(found["trouble"]),
     concern: text(found["concern"]),
   };

@@ -329,6 +329,18 @@ def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events:
             assert own.hint.endswith("QGroundControl shows the reasons in full.")
 
 
+def test_the_last_message_of_a_vehicle_has_its_age() -> None:
+    with LockstepRig("px4") as rig, connected(rig) as vehicle:
+        vehicle.attend(1.0)
+        assert (vehicle.condition().said, vehicle.condition().said_age_s) == ("", None)
+        long = "Preflight Fail: " + "Compass needs calibration, " * 3
+        rig.drone.autopilot.send_text(long)  # type: ignore[attr-defined]
+        for since_s in (2.0, 5.0):
+            vehicle.attend(since_s)
+        assert vehicle.condition().said == long
+        assert vehicle.condition().said_age_s == pytest.approx(7.0, abs=0.5)
+
+
 def test_a_px4_reports_in_which_mode_it_would_arm() -> None:
     with LockstepRig("px4") as rig, connected(rig) as vehicle:
         vehicle.attend(4.0)

@@ -5,7 +5,7 @@ import { useActs, useEditVehicle } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
 import { useVehicleStatus } from "../../live/store";
-import { linkText, stepWord } from "../../live/vehicleStatus";
+import { linkText, messageText, stepWord } from "../../live/vehicleStatus";
 import { NOTHING, withUnit } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
 import { Note } from "../../ui/Note";
@@ -26,6 +26,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
   const isLinked = vehicle.state !== "disconnected";
   const stale = !(aged?.isCurrent ?? false);
   const status = aged?.status;
+  const message = aged === null ? null : messageText(aged);
   const { identity } = vehicle;
   return (
     <Panel title="Connection">
@@ -51,7 +52,7 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
         ) : (
           <NotConnected vehicle={vehicle} />
         )}
-        {status?.said && <Note>Vehicle message: {status.said}</Note>}
+        {message !== null && <Note>{message}</Note>}
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
         <Note>
           {autopilotTitle(vehicle)} at {String(vehicle.options["address"] ?? "")}
