@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from app.core.control.px4 import FLIGHT, HOVER_MAX, HOVER_MIN, RAMP_UP
 from app.core.control.px4_log import LoopLog
-from app.core.control.px4_parameters import FIRMWARE_NAMES, UNSUPPORTED, Parameters, parameters_from
+from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, UNSUPPORTED, Parameters, parameters_from
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
@@ -59,8 +59,13 @@ def read_px4_log(stream: BinaryIO, *, name: str) -> LoopLog:
         raise _refused(name, _TARGET, "has no row in flight beside a position")
     begin_s = float(time_s[rows[0]])
     rows = rows[time_s[rows] < _first_change_s(tables.settings, begin_s)]
-    parameters = parameters_from({each.name: each.value for each in tables.settings if each.time_s <= begin_s})
-    set_z, set_vz, set_az, known = _set_points(topics.get(_SET_POINT, {}), time_s, numbers(target["z"]))
+    values = {each.name: each.value for each in tables.settings if each.time_s <= begin_s}
+    for gain in GAINS:
+        if gain not in values:
+            raise _refused(name, gain, "is missing")
+    parameters = parameters_from(values)
+    set_z = numbers(target["z"])
+    set_vz, set_az, known = _set_points(topics.get(_SET_POINT, {}), time_s, set_z)
     up, down = column(_LIMITS, "speed_up"), column(_LIMITS, "speed_down")
     z_m, vz_m_s = numbers(position["z"])[kept], numbers(position["vz"])[kept]
     return LoopLog(
@@ -108,8 +113,8 @@ def _first_change_s(settings: Sequence[Setting], begin_s: float) -> float:
     return np.inf
 
 
-def _set_points(table: Table, time_s: Samples, set_z: Samples) -> tuple[Samples, Samples, Samples, NDArray[np.bool_]]:
-    """Set-points in force at each time, shape (n,) each, and whether those of velocity and acceleration are known.
+def _set_points(table: Table, time_s: Samples, set_z: Samples) -> tuple[Samples, Samples, NDArray[np.bool_]]:
+    """Set-points of velocity and acceleration in force at each time, shape (n,) each, and whether they are known.
 
     They are if the last message has the altitude in force, and is of the same time or followed by an equal one: most
     are not logged.
@@ -117,14 +122,14 @@ def _set_points(table: Table, time_s: Samples, set_z: Samples) -> tuple[Samples,
     names = ("position[2]", "velocity[2]", "acceleration[2]")
     if not {"timestamp", *names} <= table.keys() or not len(table["timestamp"]):
         unknown = np.full(len(time_s), np.nan)
-        return set_z, unknown, unknown, np.zeros(len(time_s), dtype=np.bool_)
+        return unknown, unknown, np.zeros(len(time_s), dtype=np.bool_)
     at_s = seconds(table)
     z, vz, az = (numbers(table[name]) for name in names)
     last = np.maximum(np.searchsorted(at_s, time_s, side="right") - 1, 0)
     following = np.minimum(last + 1, len(at_s) - 1)
     repeated = (following > last) & _equal(vz[following], vz[last]) & _equal(az[following], az[last])
     known = _equal(z[last], set_z) & (at_s[last] <= time_s) & ((at_s[last] == time_s) | repeated)
-    return set_z, vz[last], az[last], known
+    return vz[last], az[last], known
 
 
 def _equal(one: Samples, other: Samples) -> NDArray[np.bool_]:
