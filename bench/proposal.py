@@ -9,7 +9,6 @@ with the pool ready as in a running worker, and once from a cold start. Prints t
 with 1 if one takes more than a second, or more in proportion on a slower machine.
 """
 
-import statistics
 import sys
 import tempfile
 import time
@@ -88,7 +87,7 @@ def one_campaign(database: Database, runner: JobRunner, fields: dict[str, object
 
 
 def main() -> int:
-    with tempfile.TemporaryDirectory() as folder, measured_slowness() as samples:
+    with tempfile.TemporaryDirectory() as folder, measured_slowness() as slowness:
         file = Path(folder) / "gainline.sqlite3"
         migrate(file)
         database = Database(file)
@@ -108,7 +107,7 @@ def main() -> int:
                 slowest = max(slowest, *times)
                 print(f"{name:32}", " ".join(f"{each * 1e3:4.0f}" for each in times), "ms")
         database.close()
-    slow = max(1.0, statistics.mean(samples))
+    slow = slowness()
     print(f"slowest warm proposal: {slowest * 1e3:.0f} ms (limit {LIMIT_S * 1e3:.0f} ms × {slow:.2f})")
     return 0 if slowest <= LIMIT_S * slow else 1
 

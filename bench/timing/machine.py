@@ -9,7 +9,7 @@ import json
 import statistics
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 REFERENCE_S: Final = 0.015
@@ -28,13 +28,18 @@ def sample() -> float:
 
 
 def slowness() -> float:
-    """Return the mean of several samples; at least 1."""
-    return max(1.0, statistics.mean(sample() for _ in range(SAMPLES)))
+    """Return how many times slower the machine is in several samples at once."""
+    return _factor([sample() for _ in range(SAMPLES)])
+
+
+def _factor(samples: Sequence[float]) -> float:
+    """A machine that is faster does not lower a limit."""
+    return max(1.0, statistics.mean(samples))
 
 
 @contextlib.contextmanager
-def measured_slowness() -> Iterator[list[float]]:
-    """Take a sample again and again until the end of the block."""
+def measured_slowness() -> Iterator[Callable[[], float]]:
+    """Take a sample again and again until the end of the block; gives the slowness over the block, after it."""
     samples: list[float] = []
     ended = threading.Event()
 
@@ -45,7 +50,7 @@ def measured_slowness() -> Iterator[list[float]]:
     measuring = threading.Thread(target=measure)
     measuring.start()
     try:
-        yield samples
+        yield lambda: _factor(samples)
     finally:
         ended.set()
         measuring.join()
