@@ -201,10 +201,15 @@ def test_a_zoom_shows_more_of_each_record_and_a_double_click_the_whole_flight(pa
     centre = box["x"] + 0.5 * box["width"]
 
     def is_whole() -> bool:
-        """After another double click: Plotly takes two clicks for one only if it sees both within 0.3 s."""
+        """After another double click: Plotly takes two clicks for one only if it sees both within 0.3 s. Another one
+        before the page has followed would be one too many."""
         page_of_many.page.mouse.dblclick(centre, middle)
-        seconds = page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range")
-        return bool(seconds == WHOLE_FLIGHT_S)
+        for _ in range(30):
+            seconds = page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range")
+            if seconds == WHOLE_FLIGHT_S:
+                return True
+            page_of_many.page.wait_for_timeout(100)
+        return False
 
     page_of_many.until(is_whole)
     page_of_many.until(lambda: len(drawn()["x"]) == 500)
