@@ -102,7 +102,7 @@ export function useReadiness(trialId: number, vehicleId: number | null): Readine
   return readinessNow(readiness, {
     answerAgeS: secondsBetween(at, now),
     isServerAway: state === "away",
-    stalledS: stallAfter(at, stall, returnedAt),
+    stalledS: stallAfter(at, now, stall, returnedAt),
   });
 }
 
@@ -111,10 +111,14 @@ interface Stall {
   endedAt: Moment;
 }
 
-/** How long the page stood still after `at`, in seconds, by itself or in the background; 0 if it did not. */
-function stallAfter(at: Moment, stall: Stall | null, returnedAt: Moment | null): number {
-  if (stall !== null && stall.endedAt.wallMs > at.wallMs) return stall.seconds;
-  if (returnedAt === null || returnedAt.wallMs <= at.wallMs) return 0;
+/**
+ * How long the page stood still after `at`, in seconds, by itself or in the background; 0 if it did not, and once the
+ * answer to what it has asked since is overdue.
+ */
+function stallAfter(at: Moment, now: Moment, stall: Stall | null, returnedAt: Moment | null): number {
+  const isLast = (end: Moment): boolean => end.wallMs > at.wallMs && secondsBetween(end, now) <= ANSWER_S;
+  if (stall !== null && isLast(stall.endedAt)) return stall.seconds;
+  if (returnedAt === null || !isLast(returnedAt)) return 0;
   const unreadS = secondsBetween(at, returnedAt);
   return unreadS > STALL_S ? unreadS : 0;
 }
