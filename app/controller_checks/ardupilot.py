@@ -15,7 +15,6 @@ from app.logs.ardupilot_log import read_ardupilot_log
 from app.logs.ardupilot_trace import is_ardupilot_trace, read_ardupilot_trace
 from app.logs.dataflash import is_dataflash
 
-_HEAD_BYTES: Final = 4096
 _PRECISION: Final = "the firmware computes in single precision, the replica in double"
 
 
@@ -46,8 +45,7 @@ def _recognises(beginning: Beginning) -> bool:
 
 def _examine(recording: Recording) -> Result:
     stream, name = recording.stream, recording.name
-    stream.seek(0)
-    if is_dataflash(stream.read(_HEAD_BYTES)):
+    if is_dataflash(recording.beginning.raw):
         compared = _compared(read_ardupilot_log(stream, name=name))
         return result_of_trace(ARDUPILOT.name, _SIGNALS, compared, kind="log")
     return result_of_trace(ARDUPILOT.name, _SIGNALS, _replayed(read_ardupilot_trace(stream, name=name)))

@@ -17,9 +17,11 @@ class Beginning:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
-    """A file to examine: its content and name, the file that was written beside it, and gains that a person gave."""
+    """A file to examine: its content, beginning and name, the file that was written beside it, and gains that a person
+    gave."""
 
     stream: BinaryIO
+    beginning: Beginning
     name: str
     companion: BinaryIO | None = None
     given: Mapping[str, float] | None = None

@@ -35,7 +35,9 @@ def examine(
     beginning = Beginning(head, _unzipped(head))
     for autopilot in AUTOPILOTS.values():
         if autopilot.recognises(beginning):
-            return autopilot.examine(Recording(stream=stream, name=name, companion=companion, given=given))
+            return autopilot.examine(
+                Recording(stream=stream, beginning=beginning, name=name, companion=companion, given=given)
+            )
     reason = "is empty" if not head else "is neither a log nor a trace of a loop that Gainline has a replica of"
     raise InputError(
         f"{name} is not a recording of the vertical loop.",

@@ -37,7 +37,6 @@ from app.core.formatting import format_gains
 from app.logs.loop_trace import may_be_loop_trace, read_loop_trace_stream
 from app.logs.paparazzi import is_paparazzi, read_loop_log
 
-_HEAD_BYTES: Final = 4096
 _MAX_DIGITS: Final = 9
 
 _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
@@ -135,8 +134,7 @@ def _recognises(beginning: Beginning) -> bool:
 
 def _examine(recording: Recording) -> Result:
     stream, name = recording.stream, recording.name
-    stream.seek(0)
-    if is_paparazzi(stream.read(_HEAD_BYTES)):
+    if is_paparazzi(recording.beginning.raw):
         return _result_of_log(check_log(stream, name=name, companion=recording.companion, given=recording.given))
     return result_of_trace(PAPARAZZI.name, _SIGNALS, _replayed(read_loop_trace_stream(stream, name=name)))
 

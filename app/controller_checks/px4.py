@@ -18,7 +18,6 @@ from app.logs.px4_log import read_px4_log
 from app.logs.px4_trace import is_px4_trace, read_px4_trace
 from app.logs.ulog_tables import is_ulog
 
-_HEAD_BYTES: Final = 16
 _TOLERANCE: Final = 1e-5
 
 
@@ -64,8 +63,7 @@ def _recognises(beginning: Beginning) -> bool:
 
 
 def _examine(recording: Recording) -> Result:
-    recording.stream.seek(0)
-    if is_ulog(recording.stream.read(_HEAD_BYTES)):
+    if is_ulog(recording.beginning.raw):
         compared = _compared(read_px4_log(recording.stream, name=recording.name))
         if not compared.recorded:
             raise InputError(

@@ -40,10 +40,8 @@ def read_px4_log(stream: BinaryIO, *, name: str) -> LoopLog:
     )
     topics = tables.topics
     for topic, columns in _NEEDED.items():
-        if not {"timestamp", *columns} <= topics.get(topic, {}).keys():
+        if not _has_rows(topics.get(topic, {}), *columns):
             raise _refused(name, topic, "is missing")
-        if not len(topics[topic]["timestamp"]):
-            raise _refused(name, topic, "has no rows")
     position, target = topics[_POSITION], topics[_TARGET]
     position_s, time_s = seconds(position), seconds(target)
     kept = np.flatnonzero(np.diff(np.maximum.accumulate(position_s), prepend=-np.inf) > 0.0)
@@ -90,12 +88,17 @@ def read_px4_log(stream: BinaryIO, *, name: str) -> LoopLog:
     )
 
 
+def _has_rows(table: Table, *names: str) -> bool:
+    """Whether a topic was logged, with these columns."""
+    return {"timestamp", *names} <= table.keys() and len(table["timestamp"]) > 0
+
+
 def _columns(topics: Mapping[str, Table], time_s: Samples) -> Callable[[str, str], Samples]:
     """A function that gives a column of a topic as it was last published at each time; NaN before, and if missing."""
 
     def column(topic: str, name: str) -> Samples:
         table = topics.get(topic, {})
-        if not {"timestamp", name} <= table.keys() or not len(table["timestamp"]):
+        if not _has_rows(table, name):
             return np.full(len(time_s), np.nan)
         last = np.searchsorted(seconds(table), time_s, side="right") - 1
         return np.where(last >= 0, numbers(table[name])[last], np.nan)
@@ -120,7 +123,7 @@ def _set_points(table: Table, time_s: Samples, set_z: Samples) -> tuple[Samples,
     are not logged.
     """
     names = ("position[2]", "velocity[2]", "acceleration[2]")
-    if not {"timestamp", *names} <= table.keys() or not len(table["timestamp"]):
+    if not _has_rows(table, *names):
         unknown = np.full(len(time_s), np.nan)
         return unknown, unknown, np.zeros(len(time_s), dtype=np.bool_)
     at_s = seconds(table)
@@ -143,7 +146,7 @@ def _hover(table: Table, time_s: Samples, takeoff: Samples, parameters: Paramete
     In flight it is between two valid estimates that were logged around it, or before the first valid one the parameter.
     """
     on_ground = np.where(takeoff < FLIGHT, parameters.hover_thrust, np.nan)
-    if not {"timestamp", "hover_thrust", "valid"} <= table.keys() or not len(table["timestamp"]):
+    if not _has_rows(table, "hover_thrust", "valid"):
         return on_ground
     at_s, valid = seconds(table), numbers(table["valid"]) > 0.0
     estimates = np.clip(numbers(table["hover_thrust"]), HOVER_MIN, HOVER_MAX)

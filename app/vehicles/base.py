@@ -24,7 +24,7 @@ Ending = Literal["completed", "aborted", "invalid"]
 
 @dataclass(frozen=True, slots=True)
 class VehicleOption:
-    """One setting of a vehicle kind, with its unit, range and default."""
+    """One setting of a vehicle kind, with its unit, range or choices, and default."""
 
     name: str
     title: str
@@ -32,6 +32,7 @@ class VehicleOption:
     default: OptionValue
     lower: float | None = None
     upper: float | None = None
+    choices: tuple[OptionValue, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

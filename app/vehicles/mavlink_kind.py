@@ -187,7 +187,7 @@ MAVLINK: Final = VehicleKind(
             "",
             "",
         ),
-        VehicleOption("scored_source", "Scored source of altitude: vehicle or mocap", "", "vehicle"),
+        VehicleOption("scored_source", "Scored source of altitude", "", "vehicle", choices=SCORED),
         VehicleOption(
             "signing_key_file",
             "ArduCopter, PX4: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",

@@ -150,14 +150,18 @@ def test_a_killed_worker_is_shown_until_it_is_back(dashboard: Dashboard, shared_
     expect(dashboard.page.get_by_text("No worker is running.")).to_have_count(0)
 
 
-def test_without_a_worker_a_flight_in_the_air_is_not_called_paused(
-    dashboard: Dashboard, shared_server: Server, states: States
-) -> None:
-    campaign_id = states.campaign()
+def bar_of_a_flight(dashboard: Dashboard, campaign_id: int) -> Locator:
+    """The bar of a flight in real time that has just begun."""
     dashboard.open_campaign(campaign_id)
     dashboard.choose_speed("1×")
     dashboard.fly()
-    expect(dashboard.page.get_by_role("region", name=re.compile("^Flight in progress: "))).to_be_visible()
+    return dashboard.page.get_by_role("region", name=re.compile("^Flight in progress: "))
+
+
+def test_without_a_worker_a_flight_in_the_air_is_not_called_paused(
+    dashboard: Dashboard, shared_server: Server, states: States
+) -> None:
+    expect(bar_of_a_flight(dashboard, states.campaign())).to_be_visible()
     with killed_worker(shared_server):
         notice = dashboard.page.get_by_role("status").filter(has_text="No worker is running.")
         expect(notice).to_contain_text("If it has ended, the simulated flight is lost.")
@@ -193,10 +197,7 @@ def test_a_line_that_only_looks_open_is_given_up_and_a_flight_on_it_is_not_shown
     dashboard: Dashboard, shared_server: Server, states: States
 ) -> None:
     campaign_id = states.campaign()
-    dashboard.open_campaign(campaign_id)
-    dashboard.choose_speed("1×")
-    dashboard.fly()
-    bar = dashboard.page.get_by_role("region", name=re.compile("^Flight in progress: "))
+    bar = bar_of_a_flight(dashboard, campaign_id)
     expect(bar).to_contain_text(re.compile(r"\d\.\d\d m"))
     expect(bar).not_to_contain_text("last known")
     with stopped(shared_server.pid):

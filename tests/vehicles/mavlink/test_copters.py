@@ -13,6 +13,7 @@ import pytest
 from app.simdrone import faults
 from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
+from app.simdrone.px4 import Px4
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest, VehicleError
 from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY
 from app.vehicles.mavlink.dialects import Message
@@ -334,7 +335,8 @@ def test_the_last_message_of_a_vehicle_has_its_age() -> None:
         vehicle.attend(1.0)
         assert (vehicle.condition().said, vehicle.condition().said_age_s) == ("", None)
         long = "Preflight Fail: " + "Compass needs calibration, " * 3
-        rig.drone.autopilot.send_text(long)  # type: ignore[attr-defined]
+        assert isinstance(rig.drone.autopilot, Px4)
+        rig.drone.autopilot.send_text(long)
         for since_s in (2.0, 5.0):
             vehicle.attend(since_s)
         assert vehicle.condition().said == long

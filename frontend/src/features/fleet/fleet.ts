@@ -68,11 +68,6 @@ const KIND = "mavlink";
 /** Options with their own fields in the form. */
 const PLAIN: ReadonlySet<string> = new Set(["autopilot", "address", "simulated"]);
 
-/** Options with a few possible words, which the catalogue describes as free text. */
-const CHOICES: Readonly<Record<string, Pick<OptionInfo, "title" | "choices">>> = {
-  scored_source: { title: "Scored source of altitude", choices: ["vehicle", "mocap"] },
-};
-
 export interface VehicleForm {
   name: string;
   options: Record<string, OptionValue>;
@@ -140,7 +135,7 @@ export function connectFailure(acts: readonly VehicleAct[]): string {
 /** Options of the collapsed section. */
 export function furtherOptions(catalogue: Catalogue): OptionInfo[] {
   const options = catalogue.vehicle_kinds.find(({ name }) => name === KIND)?.options ?? [];
-  return options.filter(({ name }) => !PLAIN.has(name)).map((option) => ({ ...option, ...CHOICES[option.name] }));
+  return options.filter(({ name }) => !PLAIN.has(name));
 }
 
 export function isSimulated(form: VehicleForm): boolean {
