@@ -1,6 +1,6 @@
 """The replica against PX4's flights as a log holds them: recorded at every position, with one row in twelve (10 Hz)."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -114,3 +114,13 @@ def test_what_is_not_known_is_not_computed() -> None:
     found = replica_of(replace(log, time_s=time_s))
     assert np.isnan(found["out_az_m_s2"][row])
     assert found["out_az_m_s2"][row + 2] == replica["out_az_m_s2"][row + 2]
+
+
+def test_a_single_row_has_none_before_it() -> None:
+    log = logged("default_steps_push")
+    rows = {each.name: getattr(log, each.name) for each in fields(log)}
+    single = replace(log, **{name: rows[name][:1] for name in rows if np.shape(rows[name]) == log.place.shape})
+    found, of_all = replica_of(single), replica_of(log)
+    assert np.isnan(found["out_az_m_s2"]).all()
+    assert found["out_vz_m_s"].tolist() == of_all["out_vz_m_s"][:1].tolist()
+    assert found["out_thrust"].tolist() == of_all["out_thrust"][:1].tolist()
