@@ -26,15 +26,30 @@ controller = typer.Typer(no_args_is_help=True, help="Check the replica of the au
 app.add_typer(controller, name="controller")
 
 
+def _begins_otherwise(target: Path | None, beginning: bytes) -> bool:
+    """Whether a file exists that is not empty and begins otherwise, such as a log that was to be read."""
+    if target is None or not target.is_file():
+        return False
+    with target.open("rb") as stream:
+        return stream.read(len(beginning)) not in {beginning, b""}
+
+
 def _spare_recording(target: Path | None) -> Path | None:
-    """Refuse to write the result over a file that is no JSON, such as a log that was to be read."""
-    if target is not None and target.is_file():
-        with target.open("rb") as stream:
-            if stream.read(1) not in {b"{", b""}:
-                raise typer.BadParameter(
-                    f"{target} exists and is not a JSON file, so it is not overwritten. Name another file, or - to "
-                    "print the result."
-                )
+    """Refuse to write the result over a file that is no JSON."""
+    if _begins_otherwise(target, b"{"):
+        raise typer.BadParameter(
+            f"{target} exists and is not a JSON file, so it is not overwritten. Name another file, or - to print the "
+            "result."
+        )
+    return target
+
+
+def _spare_other_parameters(target: Path | None) -> Path | None:
+    """Refuse to write gains over a file that does not begin with some."""
+    if _begins_otherwise(target, b"PSC_"):
+        raise typer.BadParameter(
+            f"{target} exists and was not written by this command, so it is not overwritten. Name another file."
+        )
     return target
 
 
@@ -321,6 +336,30 @@ def import_log(
 
     settings = _settings(data_dir=data_dir)
     run(file, settings, campaign=campaign, trial=trial, takeoff=takeoff, yes=yes, json_out=json_out)
+
+
+@app.command()
+@report_errors
+def analyze(
+    log: Annotated[
+        Path,
+        typer.Argument(metavar="LOG", show_default=False, help="ArduCopter's .bin log of a flight."),
+    ],
+    params: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            show_default=False,
+            help="Write the proposed gains as a .param file.",
+            callback=_spare_other_parameters,
+        ),
+    ] = None,
+    json_out: JsonOut = None,
+) -> None:
+    """Find better altitude gains in the log of a flight, and say what the model predicts with them."""
+    from app.cli.analyze import analyze_log
+
+    analyze_log(log, json_out=json_out, params_out=params)
 
 
 @app.command()

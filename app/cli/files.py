@@ -62,7 +62,8 @@ def _open_database(settings: Settings) -> Iterator[Database]:
         yield database
 
 
-def _unreadable_error(file: Path, error: OSError, needed: str) -> InputError:
+def unreadable_error(file: Path, error: OSError, needed: str) -> InputError:
+    """Error for an input file that cannot be opened or read; `needed` names the kind of file."""
     return InputError(
         f"{file} could not be read: {error.strerror or error}.",
         problems=(Problem("FILE", "cannot be read"),),
@@ -85,7 +86,7 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
             )
             return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
     except OSError as error:
-        raise _unreadable_error(file, error, "log") from error
+        raise unreadable_error(file, error, "log") from error
 
 
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
@@ -150,7 +151,7 @@ def unbundle(file: Path, settings: Settings) -> None:
             with database.write() as session:
                 made = store_bundle(session, opened, settings.data_dir)
     except OSError as error:
-        raise _unreadable_error(file, error, "bundle") from error
+        raise unreadable_error(file, error, "bundle") from error
     out = console()
     out.print(
         f"Campaign {made.id}, {escape(made.name)}: {count(made.trials.flown, 'flight')} on {escape(made.vehicle.name)}."

@@ -15,7 +15,7 @@ from app.logs.tlog import is_tlog, read_tlog
 from app.logs.ulog import read_ulog
 from app.logs.ulog_tables import is_ulog
 
-_HEAD_BYTES: Final = 256
+HEAD_BYTES: Final = 256
 _COMPANION: Final = ".log"
 
 
@@ -51,7 +51,7 @@ def read_takeoffs(stream: BinaryIO, *, name: str = "", companion: BinaryIO | Non
     .log file of a .data file. Raises TrajectoryError for anything that cannot be read.
     """
     stream.seek(0)
-    head = stream.read(_HEAD_BYTES)
+    head = stream.read(HEAD_BYTES)
     stream.seek(0)
     reader = next((reader for reader in READERS if reader.recognises(head)), None)
     if reader is not None:

@@ -1,4 +1,4 @@
-"""The recorded logs (tests/data/logs), and telemetry logs put together frame by frame."""
+"""The recorded logs (tests/data/logs), and logs put together message by message."""
 
 import gzip
 import io
@@ -20,6 +20,25 @@ def recorded(name: str) -> bytes:
     """The content of a recorded log, uncompressed."""
     path = LOGS / name
     return path.read_bytes() if path.exists() else gzip.decompress((LOGS / f"{name}.gz").read_bytes())
+
+
+class OnBoardLog:
+    """An on-board log put together by hand."""
+
+    def __init__(self) -> None:
+        self.content = b""
+        self._lengths = {128: 89}
+        self.define(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns", length=89)
+
+    def define(self, kind: int, name: str, letters: str, columns: str, *, length: int | None = None) -> None:
+        sizes = {"Q": 8, "f": 4, "B": 1, "n": 4, "N": 16, "Z": 64, "?": 0, "a": 64}
+        total = 3 + sum(sizes[letter] for letter in letters) if length is None else length
+        self.content += struct.pack(
+            "<3sBB4s16s64s", b"\xa3\x95\x80", kind, total, name.encode(), letters.encode(), columns.encode()
+        )
+
+    def add(self, kind: int, layout: str, *fields: float | bytes) -> None:
+        self.content += b"\xa3\x95" + bytes([kind]) + struct.pack(layout, *fields)
 
 
 class Telemetry:

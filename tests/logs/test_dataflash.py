@@ -1,7 +1,6 @@
 """ArduPilot's logs: read as pymavlink's own reader reads them, and the recorded takeoff found with its gains."""
 
 import io
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from pymavlink import DFReader
 from app.core.errors import TrajectoryError
 from app.logs.dataflash import read_tables
 from app.logs.readers import read_takeoff, read_takeoffs
-from tests.logs.recorded import recorded
+from tests.logs.recorded import OnBoardLog, recorded
 
 LOG = "arducopter_takeoff.bin"
 
@@ -70,7 +69,7 @@ def test_damage_is_passed_over() -> None:
 
 
 def test_an_older_log_without_the_controller_s_message_has_its_altitude_from_the_tuning() -> None:
-    log = Log()
+    log = OnBoardLog()
     log.define(10, "CTUN", "Qff", "TimeUS,Alt,DAlt")
     for step in range(400):
         altitude = 3.0 * (1.0 - np.exp(-max(step - 100, 0) / 30.0))
@@ -82,7 +81,7 @@ def test_an_older_log_without_the_controller_s_message_has_its_altitude_from_the
 
 
 def test_a_log_without_any_altitude_is_refused() -> None:
-    log = Log()
+    log = OnBoardLog()
     log.define(10, "ATT", "Qf", "TimeUS,Roll")
     log.add(10, "<Qf", 1, 2.0)
     with pytest.raises(TrajectoryError, match=r"contains neither PSCD.PD nor CTUN.Alt"):
@@ -94,27 +93,8 @@ def test_a_log_without_any_altitude_is_refused() -> None:
     [("Qf", "TimeUS"), ("Q?", "TimeUS,PD"), ("QQ", "TimeUS,TimeUS"), ("Zf", "TimeUS,PD"), ("fa", "TimeUS,PD")],
 )
 def test_descriptions_that_make_no_sense_are_refused_in_words(letters: str, columns: str) -> None:
-    log = Log()
+    log = OnBoardLog()
     log.define(10, "PSCD", letters, columns, length=3 + 68)
     log.content += b"\xa3\x95\x0a" + bytes(68)
     with pytest.raises(TrajectoryError):
         read_takeoffs(io.BytesIO(log.content))
-
-
-class Log:
-    """An on-board log put together by hand."""
-
-    def __init__(self) -> None:
-        self.content = b""
-        self._lengths = {128: 89}
-        self.define(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns", length=89)
-
-    def define(self, kind: int, name: str, letters: str, columns: str, *, length: int | None = None) -> None:
-        sizes = {"Q": 8, "f": 4, "B": 1, "n": 4, "N": 16, "Z": 64, "?": 0, "a": 64}
-        total = 3 + sum(sizes[letter] for letter in letters) if length is None else length
-        self.content += struct.pack(
-            "<3sBB4s16s64s", b"\xa3\x95\x80", kind, total, name.encode(), letters.encode(), columns.encode()
-        )
-
-    def add(self, kind: int, layout: str, *fields: float) -> None:
-        self.content += b"\xa3\x95" + bytes([kind]) + struct.pack(layout, *fields)

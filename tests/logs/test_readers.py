@@ -16,8 +16,7 @@ from app.logs import base
 from app.logs.readers import READERS, SUFFIXES, read_takeoffs
 from app.logs.takeoffs import MIN_SAMPLES
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
-from tests.logs.recorded import recorded
-from tests.logs.test_dataflash import Log
+from tests.logs.recorded import OnBoardLog, recorded
 from tests.logs.test_ulog import small_log
 
 GAINS = {"kp": 283, "ki": 13, "kd": 82}
@@ -25,7 +24,7 @@ HEADS = (
     b"",
     struct.pack(">Q", 1_795_222_159_000_000) + b"\xfe",
     struct.pack(">Q", 1_795_222_159_000_000) + b"\xfd",
-    Log().content,
+    OnBoardLog().content,
     b"\xa3\x95\x80",
     b"ULog\x01\x12\x35\x01" + bytes(8),
     b"1.0 31 VERT_LOOP ",
@@ -121,7 +120,7 @@ def test_every_reader_has_a_suffix_of_its_own() -> None:
 
 def test_a_log_beyond_half_a_gibibyte_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "huge.bin"
-    path.write_bytes(Log().content)
+    path.write_bytes(OnBoardLog().content)
     with path.open("r+b") as stream:
         stream.truncate(base.MAX_BYTES + 1)
         stream.seek(0)

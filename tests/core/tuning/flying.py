@@ -16,7 +16,7 @@ from app.core.tuning.strategy import Proposal
 TAKEOFF = Takeoff()
 
 compiled_only = pytest.mark.skipif(
-    bool(vars(config)["DISABLE_JIT"]), reason="flies hundreds of takeoffs; the kernels have their own tests uncompiled"
+    bool(vars(config)["DISABLE_JIT"]), reason="flies for minutes; the kernels have their own tests uncompiled"
 )
 ARDRONE = (0.6315, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 0.0)
 """Model close to the simulated AR.Drone: its errors are within 4 % at every gain set of the paper's Table 1."""

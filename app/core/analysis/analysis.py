@@ -1,0 +1,197 @@
+"""The answer to a log: how the altitude loop behaves, the vehicle behind it, and gains for it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.margin import gain_margin
+from app.core.analysis.prediction import FlightModel, Prediction
+from app.core.analysis.proposal import BOUNDS, propose, with_gains
+from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
+from app.core.control.ardupilot_shaping import square_root
+from app.core.errors import Problem, TrajectoryError
+
+_SHORTEST_S: Final = 6.0
+_LEAST_CHANGE_M: Final = 0.3
+_LARGEST_SATURATION: Final = 0.05
+_OTHER_CONTROLLER_M_S: Final = 0.02
+_OTHER_CONTROLLER_SHARE: Final = 0.05
+_LARGEST_RESIDUAL_M_S2: Final = 1.5
+_LARGEST_MISFIT: Final = (0.005, 0.35)
+_LARGEST_SLOPE_DEVIATION: Final = 0.12
+_FLY: Final = (
+    "Fly at a height of 3 m or more in a mode that holds altitude (GUIDED, LOITER, ALT_HOLD, AUTO): hover for 5 s, "
+    "climb 2 m, hover for 5 s, descend 2 m, hover for 5 s; with NTUN and CTUN in LOG_BITMASK."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Behaviour:
+    """The flight itself: analysed time, s; mean and largest distance between reference and altitude, m; range of the
+    reference, m; mean throttle, and share of the rows with the throttle at a limit."""
+
+    duration_s: float
+    error_m: float
+    largest_deviation_m: float
+    reference_range_m: float
+    throttle_mean: float
+    saturated_share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assessment:
+    """A gain set on the copters that the flight allows. `activity` is relative to the gains of the flight; `margin` is
+    the least of those copters, 0 if one rings."""
+
+    name: str
+    gains: Mapping[str, float]
+    prediction: Prediction
+    activity: float
+    margin: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Analysis:
+    """Everything that a log answers. `assessments` begins with the gains of the flight; `proposed` follows, unless the
+    log does not suffice, which `insufficient` then says."""
+
+    behaviour: Behaviour
+    estimate: CopterEstimate
+    assessments: Sequence[Assessment]
+    proposed: Assessment | None
+    insufficient: str | None
+
+
+def analyze(flight: LoggedFlight) -> Analysis:
+    """Analyse a flight; deterministic, takes some seconds.
+
+    Raises TrajectoryError if the flight contains nothing to learn from, or something that no copter of the model does.
+    """
+    behaviour = _behaviour(flight)
+    _require_altitude_changes(behaviour)
+    _require_own_controller(flight)
+    estimate = fit_copter(flight)
+    model = FlightModel(flight, estimate.draws)
+    present = _assess("as flown", _gains_of(flight), flight, model, estimate)
+    _require_likeness(behaviour, estimate, present)
+    compared = [present, *(_assess(name, gains, flight, model, estimate) for name, gains in rules(flight).items())]
+    insufficient = _insufficient(estimate)
+    gains = None if insufficient else propose(flight, estimate.few, [each.gains for each in compared])
+    return Analysis(
+        behaviour=behaviour,
+        estimate=estimate,
+        assessments=tuple(compared),
+        proposed=_assess("proposed", gains, flight, model, estimate) if gains else None,
+        insufficient=insufficient or (None if gains else _NONE_ALLOWED),
+    )
+
+
+_NONE_ALLOWED: Final = (
+    "No gains within the documented ranges keep the margin on this vehicle. Shorten its lags first: the motors', and "
+    "the filters of the accelerometer and the acceleration controller."
+)
+
+
+def rules(flight: LoggedFlight) -> dict[str, dict[str, float]]:
+    """Gains that are set without a model, by name: the firmware's defaults, the rule of its documentation, two fixed
+    sets."""
+    hover = flight.throttle_mean
+    sets = {
+        "ArduCopter's defaults": (1.0, 5.0, 0.5, 1.0),
+        "P = hover throttle, I = 2 P": (1.0, 5.0, float(f"{hover:.2g}"), float(f"{2.0 * hover:.2g}")),
+        "2, 7, 1, 2": (2.0, 7.0, 1.0, 2.0),
+        "3, 8, 0.5, 3": (3.0, 8.0, 0.5, 3.0),
+    }
+    return {name: dict(zip(BOUNDS, values, strict=True)) for name, values in sets.items()}
+
+
+def _gains_of(flight: LoggedFlight) -> dict[str, float]:
+    return {name: value for name, value in flight.parameters.gains.items() if name in BOUNDS}
+
+
+def _behaviour(flight: LoggedFlight) -> Behaviour:
+    deviation = np.concatenate([np.abs(each.z_d_m - each.z_m)[each.scored] for each in flight.segments])
+    reference = [each.z_d_m[each.scored] for each in flight.segments]
+    throttle = np.concatenate([each.throttle[each.scored] for each in flight.segments])
+    return Behaviour(
+        duration_s=sum(each.duration_s for each in flight.segments),
+        error_m=flight.error_m,
+        largest_deviation_m=float(deviation.max()),
+        reference_range_m=max(float(np.ptp(each)) for each in reference),
+        throttle_mean=flight.throttle_mean,
+        saturated_share=float(np.mean((throttle <= 0.0) | (throttle >= 1.0))),
+    )
+
+
+def _require_altitude_changes(behaviour: Behaviour) -> None:
+    if behaviour.duration_s < _SHORTEST_S:
+        raise _unanswered(f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed")
+    if behaviour.reference_range_m < _LEAST_CHANGE_M:
+        raise _unanswered(
+            f"has no altitude changes: the reference moves by {behaviour.reference_range_m:.2f} m, and "
+            f"{_LEAST_CHANGE_M:g} m are needed"
+        )
+    if behaviour.saturated_share > _LARGEST_SATURATION:
+        raise _unanswered(f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows")
+
+
+def _require_own_controller(flight: LoggedFlight) -> None:
+    """Require that the climb rate target is what the replica's position controller computes."""
+    p, acceleration = flight.parameters.position_p_1_s, flight.parameters.acceleration_m_s2
+    differing, rows = 0, 0
+    for each in flight.segments:
+        targets = [square_root(error, p, acceleration, 0.0) for error in (each.z_d_m - each.z_m).tolist()]
+        differing += int(np.sum(np.abs(np.array(targets) + each.v_d_m_s - each.v_t_m_s) > _OTHER_CONTROLLER_M_S))
+        rows += len(targets)
+    if differing > _OTHER_CONTROLLER_SHARE * rows:
+        raise _unanswered(
+            f"has another climb rate target than its own parameters give, in {differing} of {rows} rows: terrain "
+            "following, a failsafe, or a release with another position controller"
+        )
+
+
+def _require_likeness(behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> None:
+    if estimate.residual_m_s2 > _LARGEST_RESIDUAL_M_S2:
+        raise _unanswered(
+            f"has accelerations that throttle and climb rate do not explain, {estimate.residual_m_s2:.1f} m/s² rms: "
+            "gusts too strong, oscillating rate controllers, or vibration compensation"
+        )
+    least, share = _LARGEST_MISFIT
+    misfit_m = abs(present.prediction.error_m - behaviour.error_m)
+    if misfit_m > max(least, share * behaviour.error_m):
+        raise _unanswered(
+            f"has an error of {1e3 * behaviour.error_m:.1f} mm, and the model that fits it best "
+            f"{1e3 * present.prediction.error_m:.1f} mm"
+        )
+
+
+def _insufficient(estimate: CopterEstimate) -> str | None:
+    known_to = estimate.deviation.thrust_slope
+    if known_to <= _LARGEST_SLOPE_DEVIATION:
+        return None
+    return (
+        f"The log does not suffice to propose gains: the thrust slope is known to ±{known_to:.2f} only, "
+        f"and ±{_LARGEST_SLOPE_DEVIATION} is needed. {_FLY}"
+    )
+
+
+def _assess(
+    name: str, gains: Mapping[str, float], flight: LoggedFlight, model: FlightModel, estimate: CopterEstimate
+) -> Assessment:
+    parameters = with_gains(flight.parameters, gains)
+    prediction = model.predict(parameters)
+    margins = [gain_margin(parameters, each, filter_hz=flight.filter_hz, step_s=flight.step_s) for each in estimate.few]
+    return Assessment(
+        name=name,
+        gains=dict(gains),
+        prediction=prediction,
+        activity=prediction.activity / model.fly(flight.parameters)[1],
+        margin=min(margins),
+    )
+
+
+def _unanswered(reason: str) -> TrajectoryError:
+    return TrajectoryError("The log cannot be analysed.", hint=_FLY, problems=(Problem("file", reason),))

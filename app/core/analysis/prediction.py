@@ -1,0 +1,102 @@
+"""Prediction of the same flight with other gains: the model flies the logged reference, with the disturbances found.
+
+Each copter that the flight allows is corrected by what it got wrong in the flight, as in step 4 of the paper's method
+(Junell et al. 2016, section II): the difference of sensed and modelled acceleration, and what the estimated climb rate
+and altitude changed beyond their own derivatives, at the same time of the flight. So with the gains of the flight every
+copter flies nearly what was flown; they differ in what they predict for other gains.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from app.core.analysis.disturbances import disturbances_of, in_other_weather
+from app.core.analysis.flight import LEAD_S, LoggedFlight, Segment, Steps, interpolated
+from app.core.control import ardupilot as loop
+from app.core.control.ardupilot_parameters import Parameters
+from app.core.models.copter import FLOWN, GRAVITY_M_S2, Copter, fly, start_body
+from app.core.records.trajectory import Samples
+
+_SEED: Final = 1
+_QUANTILES: Final = (0.05, 0.95)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction:
+    """Predicted error, m, with its 90 % interval for a single flight, and the throttle activity: the standard
+    deviation of the demanded throttle about its own 2 Hz low-pass, which the motors follow, share of full."""
+
+    error_m: float
+    low_m: float
+    high_m: float
+    activity: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """A segment for one copter, as the kernel takes it, and the start: the altitude of the flight, and the reference's
+    climb rate and acceleration, with the throttle for them."""
+
+    copter: Samples
+    reference: Samples
+    disturbances: Samples
+    start: tuple[float, float, float, float]
+
+
+class FlightModel:
+    """A flight and the copters that it allows; predicts it with other gains."""
+
+    def __init__(self, flight: LoggedFlight, copters: Sequence[Copter]) -> None:
+        self._flight = flight
+        steps = [interpolated(each, flight.step_s) for each in flight.segments]
+        self._runs = [
+            [_run(flight, segment, each, copter) for segment, each in zip(flight.segments, steps, strict=True)]
+            for copter in copters
+        ]
+        random = np.random.default_rng(_SEED)
+        self._elsewhen = [
+            [replace(run, disturbances=in_other_weather(run.disturbances, random)) for run in runs]
+            for runs in self._runs
+        ]
+
+    def fly(self, parameters: Parameters) -> tuple[float, float]:
+        """Error, m, and throttle activity in the weather of the flight, means of the copters."""
+        error_m, activity = np.mean([self._flown(runs, parameters) for runs in self._runs], axis=0).tolist()
+        return error_m, activity
+
+    def predict(self, parameters: Parameters) -> Prediction:
+        """Prediction for a single flight: the disturbances of the interval meet the reference at other times."""
+        error_m, activity = self.fly(parameters)
+        elsewhen = np.array([self._flown(runs, parameters)[0] for runs in self._elsewhen])
+        low_m, high_m = np.quantile(elsewhen + (error_m - elsewhen.mean()), _QUANTILES).tolist()
+        return Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity)
+
+    def _flown(self, runs: Sequence[_Run], parameters: Parameters) -> tuple[float, float]:
+        """Error, m, and throttle activity over all segments."""
+        packed = parameters.packed(self._flight.step_s)
+        lead = round(LEAD_S / self._flight.step_s)
+        deviations, fast = [], []
+        for run in runs:
+            throttle, z_m, v_m_s, a_m_s2 = run.start
+            state, flown = np.empty(loop.STATE_SIZE), np.empty((len(run.reference), len(FLOWN)))
+            loop.start_hover(state, packed, throttle, z_m, v_m_s, a_m_s2)
+            body = start_body(throttle, z_m, v_m_s, a_m_s2, run.copter)
+            fly(state, body, packed, run.copter, run.reference, run.disturbances, flown)
+            deviations.append(np.abs(run.reference[lead:, 0] - flown[lead:, 0]))
+            fast.append(flown[lead:, 3] - flown[lead:, 4])
+        return float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std())
+
+
+def _run(flight: LoggedFlight, segment: Segment, steps: Steps, copter: Copter) -> _Run:
+    disturbances = disturbances_of(flight, segment, steps, copter)
+    _, v_d, a_d = steps.reference[0].tolist()
+    gust = float(disturbances[: round(LEAD_S / flight.step_s), 0].mean())
+    lift = max(1.0 + (a_d + copter.drag_1_s * v_d - gust) / GRAVITY_M_S2, 0.0)
+    return _Run(
+        copter=copter.packed(filter_hz=flight.filter_hz, dt_s=flight.step_s),
+        reference=steps.reference,
+        disturbances=disturbances,
+        start=(copter.hover_throttle * lift ** (1.0 / copter.thrust_slope), float(segment.z_m[0]), v_d, a_d),
+    )

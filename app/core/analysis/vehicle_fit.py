@@ -1,0 +1,164 @@
+"""Fit of the copter model to a flight, by regression of the sensed acceleration on throttle and climb rate.
+
+    log(1 + a/g) = s·log u − s·log h − (drag/g)·v + disturbance
+
+The throttle also answers to disturbances, which would bias an ordinary regression: a gust raises the vehicle, and the
+loop lowers the throttle. The reference does not answer to them, so throttle and climb rate are first projected on its
+climb rate and acceleration (two-stage least squares). The motors' lag is not linear in this equation: each value of a
+grid is weighed by what it leaves that follows the reference, and by what is usual.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from app.core.analysis.flight import LoggedFlight, Segment, interpolated
+from app.core.models.copter import GRAVITY_M_S2, Copter, accelerometer_filter, filtered, motor_filter
+from app.core.records.trajectory import Samples
+
+USUAL_SLOPE: Final = (1.0, 0.25)
+USUAL_DRAG_1_S: Final = (0.3, 0.3)
+USUAL_LAG_S: Final = (0.05, 0.05)
+"""Mean and standard deviation over vehicles."""
+
+_LAGS_S: Final = np.linspace(0.0, 0.25, 26)
+_STRONGEST_CORRELATION: Final = 0.95
+_ROUNDING: Final = np.array([0.0, 0.0, 0.0, 0.01 / math.sqrt(12.0)])
+_FREE_FALL: Final = -0.95
+_LEAST_THROTTLE: Final = 0.01
+_LEAST_SLOPE: Final = 0.2
+_DRAWS_LOG2: Final = 5
+_INSTRUMENT_ROWS: Final = 4
+_FEW: Final = 5
+_SEED: Final = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CopterEstimate:
+    """What a flight tells about the vehicle: means and standard deviations by the names of `Copter`, and equally
+    probable copters. `residual_m_s2` is the standard deviation of what the model leaves of the acceleration."""
+
+    mean: Copter
+    deviation: Copter
+    draws: Sequence[Copter]
+    residual_m_s2: float
+
+    @property
+    def few(self) -> Sequence[Copter]:
+        """The first draws, which are far from each other."""
+        return self.draws[:_FEW]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Scored rows of all segments for one lag: log(1 + a/g), shape (n,), its causes, (n, 3), and their projections on
+    the instruments, orthonormal, (n, m)."""
+
+    lag_s: float
+    sought: Samples
+    causes: Samples
+    projected: Samples
+    instruments: Samples
+
+    @property
+    def left(self) -> Samples:
+        """What two-stage least squares leaves, shape (n,)."""
+        return self.sought - self.causes @ np.linalg.lstsq(self.projected, self.sought, rcond=None)[0]
+
+
+@dataclass(frozen=True, slots=True)
+class _Regression:
+    """Result for one lag: mean, shape (3,), and covariance, (3, 3), of slope, −drag/g and −slope·log h, and the
+    logarithm of the likelihood."""
+
+    lag_s: float
+    mean: Samples
+    covariance: Samples
+    log_likelihood: float
+
+
+def fit_copter(flight: LoggedFlight) -> CopterEstimate:
+    """Estimate the copter from all scored rows of the flight; deterministic."""
+    from scipy.stats import norm
+
+    candidates = [_rows(flight, lag_s) for lag_s in _LAGS_S.tolist()]
+    left = min((each.left for each in candidates), key=np.var)
+    variance = float(np.var(left)) / _independent_share(left)
+    regressions = [_regress(each, variance) for each in candidates]
+    log_weight = np.array([each.log_likelihood + norm.logpdf(each.lag_s, *USUAL_LAG_S) for each in regressions])
+    weight = np.exp(log_weight - log_weight.max())
+    values = _draws(regressions, weight / weight.sum())
+    return CopterEstimate(
+        mean=_copter(values.mean(axis=0)),
+        deviation=_copter(np.hypot(values.std(axis=0), _ROUNDING)),
+        draws=tuple(_copter(row) for row in values),
+        residual_m_s2=float(np.std(left)) * GRAVITY_M_S2,
+    )
+
+
+def _rows(flight: LoggedFlight, lag_s: float) -> _Rows:
+    def rows(signal: Callable[[Segment], Samples]) -> Samples:
+        return np.concatenate([signal(each)[each.scored] for each in flight.segments])
+
+    sought = np.log1p(np.maximum(rows(lambda each: each.a_m_s2) / GRAVITY_M_S2, _FREE_FALL))
+    ones = np.ones(len(sought))
+    throttle = np.log(rows(lambda each: _sensed_throttle(each, flight, lag_s)))
+    causes = np.column_stack([throttle, rows(lambda each: each.v_m_s), ones])
+    accelerations = [rows(partial(_accelerations_before, rows=back)) for back in range(_INSTRUMENT_ROWS)]
+    instruments, _ = np.linalg.qr(np.column_stack([rows(lambda each: each.v_d_m_s), *accelerations, ones]))
+    return _Rows(lag_s, sought, causes, instruments @ (instruments.T @ causes), instruments)
+
+
+def _accelerations_before(segment: Segment, *, rows: int) -> Samples:
+    """Acceleration of the reference some rows before each, shape (n,); the first rows, which are not scored, wrap."""
+    return np.roll(segment.a_d_m_s2, rows)
+
+
+def _regress(rows: _Rows, variance: float) -> _Regression:
+    """Two-stage least squares with the usual slope and drag as further observations; `variance` is that of a row of
+    uncorrelated noise with the effect of the one found."""
+    usual = np.array([USUAL_SLOPE[0], -USUAL_DRAG_1_S[0] / GRAVITY_M_S2, 0.0])
+    certainty = np.diag([USUAL_SLOPE[1] ** -2, (USUAL_DRAG_1_S[1] / GRAVITY_M_S2) ** -2, 0.0])
+    information = rows.projected.T / variance
+    covariance = np.asarray(np.linalg.inv(information @ rows.projected + certainty), dtype=np.float64)
+    mean = covariance @ (information @ rows.sought + certainty @ usual)
+    explained = np.sum((rows.instruments.T @ (rows.sought - rows.causes @ mean)) ** 2)
+    return _Regression(rows.lag_s, mean, covariance, -0.5 * float(explained) / variance)
+
+
+def _sensed_throttle(segment: Segment, flight: LoggedFlight, lag_s: float) -> Samples:
+    """Throttle after the motors' lag and the accelerometer's filter at each row, shape (n,)."""
+    steps = interpolated(segment, flight.step_s)
+    accelerometer = accelerometer_filter(flight.filter_hz, flight.step_s)
+    sensed = filtered(steps.throttle_filtered, motor_filter(lag_s, flight.step_s), accelerometer)
+    return np.maximum(np.interp(segment.time_s, steps.time_s, sensed), _LEAST_THROTTLE)
+
+
+def _independent_share(values: Samples) -> float:
+    """Share of the values that are as good as independent, for noise with the correlation of neighbours found."""
+    correlation = float(np.corrcoef(values[1:], values[:-1])[0, 1])
+    limited = min(max(correlation, 0.0), _STRONGEST_CORRELATION)
+    return (1.0 - limited) / (1.0 + limited)
+
+
+def _draws(regressions: Sequence[_Regression], weight: Samples) -> Samples:
+    """Equally probable copters, shape (2^k, 4): slope, drag, hover throttle, lag."""
+    from scipy.stats import norm, qmc
+
+    quantiles = qmc.Sobol(4, rng=np.random.default_rng(_SEED)).random_base2(_DRAWS_LOG2)
+    rows = []
+    for lag_quantile, *others in quantiles:
+        regression = regressions[int(np.searchsorted(np.cumsum(weight), lag_quantile))]
+        slope, drag, constant = regression.mean + np.linalg.cholesky(regression.covariance) @ norm.ppf(others)
+        slope = max(slope, _LEAST_SLOPE)
+        rows.append((slope, max(-drag * GRAVITY_M_S2, 0.0), math.exp(-constant / slope), regression.lag_s))
+    return np.array(rows)
+
+
+def _copter(values: Samples) -> Copter:
+    slope, drag_1_s, hover_throttle, lag_s = values.tolist()
+    return Copter(hover_throttle=hover_throttle, thrust_slope=slope, motor_lag_s=lag_s, drag_1_s=drag_1_s)

@@ -1,0 +1,167 @@
+"""A multicopter's altitude under ArduCopter's vertical loop, along a given reference.
+
+    u̇ = (u_f − u)/lag,   a = g·((u/h)^s − 1) − drag·v + disturbance,
+
+where u_f is the loop's filtered throttle, u that after the motors' lag, h the throttle in hover and s the slope of
+log thrust over log throttle: a polynomial of the throttle would turn negative at a low hover throttle. The loop senses
+the acceleration through the accelerometer's filter. The climb rate and the altitude are those that the vehicle's
+estimator reports, which need not be the integral of its acceleration: the difference is a disturbance, too. Altitude
+up, SI, explicit Euler at the rate of the loop.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.control.ardupilot import (
+    A_D,
+    THROTTLE,
+    THROTTLE_FILTERED,
+    V_D,
+    Z_D,
+    State,
+    control,
+)
+from app.core.control.ardupilot_parameters import DT, STEP_S, THROTTLE_GAIN, Packed
+from app.core.kernels import kernel
+from app.core.records.trajectory import Samples
+
+GRAVITY_M_S2: Final = 9.80665
+
+# Indices in a packed copter.
+HOVER_THROTTLE: Final = 0
+_SLOPE: Final = 1
+_LAG_GAIN: Final = 2
+_DRAG: Final = 3
+_B0: Final = 4
+_B1: Final = 5
+_B2: Final = 6
+_A1: Final = 7
+_A2: Final = 8
+_PACKED_SIZE: Final = 9
+
+# Indices in the state array of the body.
+LAGGED: Final = 0
+ALTITUDE: Final = 1
+CLIMB_RATE: Final = 2
+SENSED: Final = 3
+_MEMORY_1: Final = 4
+_MEMORY_2: Final = 5
+BODY_SIZE: Final = 6
+"""Throttle after the motors' lag, altitude and climb rate as estimated, acceleration as sensed, and the memory of the
+accelerometer's filter."""
+
+REFERENCE: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
+DISTURBANCES: Final = ("acceleration_m_s2", "climb_rate_m_s2", "altitude_m_s", "sensed_m_s2")
+"""Of the acceleration, of the estimated climb rate and altitude beyond it, and of the sensed acceleration alone."""
+FLOWN: Final = ("z_m", "v_m_s", "a_m_s2", "throttle", "throttle_filtered")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Copter:
+    """What the model has in place of a vehicle: throttle in hover, 0 … 1, slope of log thrust over log throttle, lag of
+    the motors, s, and drag, 1/s. The slope is 1 if the autopilot's thrust curve fits the propellers."""
+
+    hover_throttle: float
+    thrust_slope: float = 1.0
+    motor_lag_s: float = 0.0
+    drag_1_s: float = 0.0
+
+    def packed(self, *, filter_hz: float, dt_s: float = STEP_S) -> Samples:
+        """Constants of a step for the kernels; `filter_hz` is the cut-off of the accelerometer's filter."""
+        numerator, denominator = accelerometer_filter(filter_hz, dt_s)
+        packed = np.empty(_PACKED_SIZE)
+        packed[HOVER_THROTTLE] = self.hover_throttle
+        packed[_SLOPE] = self.thrust_slope
+        packed[_LAG_GAIN] = motor_filter(self.motor_lag_s, dt_s)[0][0]
+        packed[_DRAG] = self.drag_1_s
+        packed[[_B0, _B1, _B2]] = numerator
+        packed[[_A1, _A2]] = denominator[1:]
+        return packed
+
+
+Filter = tuple[Samples, Samples]
+"""Numerator and denominator, shape (k,) each."""
+
+
+def accelerometer_filter(cutoff_hz: float, dt_s: float) -> Filter:
+    """The second-order Butterworth filter of INS_ACCEL_FILTER."""
+    from scipy.signal import butter
+
+    numerator, denominator = butter(2, cutoff_hz, fs=1.0 / dt_s)
+    return np.asarray(numerator), np.asarray(denominator)
+
+
+def motor_filter(lag_s: float, dt_s: float) -> Filter:
+    """The first-order lag of the motors."""
+    gain = dt_s / (dt_s + lag_s)
+    return np.array([gain]), np.array([1.0, gain - 1.0])
+
+
+def filtered(values: Samples, *filters: Filter) -> Samples:
+    """Values behind filters that were at rest at the first one, shape (n,)."""
+    from scipy.signal import lfilter, lfilter_zi
+
+    for numerator, denominator in filters:
+        at_rest = lfilter_zi(numerator, denominator) * values[0]
+        values = np.asarray(lfilter(numerator, denominator, values, zi=at_rest)[0])
+    return values
+
+
+@kernel
+def step(
+    state: State,
+    body: Samples,
+    p: Packed,
+    copter: Samples,
+    reference: Samples,
+    disturbance: Samples,
+) -> None:
+    """One step of loop and body. `reference` has shape (3,) as `REFERENCE`, `disturbance` (4,) as `DISTURBANCES`."""
+    state[Z_D], state[V_D], state[A_D] = reference[0], reference[1], reference[2]
+    filtered = state[THROTTLE_FILTERED]
+    filtered += p[THROTTLE_GAIN] * (state[THROTTLE] - filtered)
+    sensed = body[SENSED] + disturbance[3]
+    control(state, p, body[ALTITUDE], body[CLIMB_RATE], sensed, filtered <= 0.0, filtered >= 1.0)
+    body[LAGGED] += copter[_LAG_GAIN] * (state[THROTTLE_FILTERED] - body[LAGGED])
+    thrust = (body[LAGGED] / copter[HOVER_THROTTLE]) ** copter[_SLOPE]
+    a = GRAVITY_M_S2 * (thrust - 1.0) - copter[_DRAG] * body[CLIMB_RATE] + disturbance[0]
+    body[CLIMB_RATE] += p[DT] * (a + disturbance[1])
+    body[ALTITUDE] += p[DT] * (body[CLIMB_RATE] + disturbance[2])
+    body[SENSED] = copter[_B0] * a + body[_MEMORY_1]
+    body[_MEMORY_1] = copter[_B1] * a - copter[_A1] * body[SENSED] + body[_MEMORY_2]
+    body[_MEMORY_2] = copter[_B2] * a - copter[_A2] * body[SENSED]
+
+
+@kernel
+def fly(
+    state: State,
+    body: Samples,
+    p: Packed,
+    copter: Samples,
+    references: Samples,
+    disturbances: Samples,
+    flown: Samples,
+) -> None:
+    """A step per row of `references`, shape (n, 3), and `disturbances`, (n, 4); fills `flown`, (n, 5) as `FLOWN`.
+
+    A row of `flown` holds the estimates that the loop used, and the throttle that it demanded with them.
+    """
+    for row in range(len(references)):
+        flown[row, 0] = body[ALTITUDE]
+        flown[row, 1] = body[CLIMB_RATE]
+        flown[row, 2] = body[SENSED] + disturbances[row, 3]
+        step(state, body, p, copter, references[row], disturbances[row])
+        flown[row, 3] = state[THROTTLE]
+        flown[row, 4] = state[THROTTLE_FILTERED]
+
+
+def start_body(throttle: float, z_m: float, v_m_s: float, a_m_s2: float, copter: Samples) -> NDArray[np.float64]:
+    """State of the body, shape (BODY_SIZE,), whose motors and filter have come to rest at these values."""
+    body = np.zeros(BODY_SIZE)
+    body[[LAGGED, ALTITUDE, CLIMB_RATE, SENSED]] = throttle, z_m, v_m_s, a_m_s2
+    body[_MEMORY_1] = (1.0 - copter[_B0]) * a_m_s2
+    body[_MEMORY_2] = (copter[_B2] - copter[_A2]) * a_m_s2
+    return body

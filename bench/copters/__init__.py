@@ -1,0 +1,1 @@
+"""Random multicopters under ArduCopter's loop, with more physics than the model that is fitted to their logs."""

@@ -1,0 +1,138 @@
+"""From the log of one flight with ArduCopter's default gains to the second flight, on random vehicles.
+
+    ./dev exec python -m bench.log_to_gains                    a few vehicles, against the limits
+    ./dev exec python -m bench.log_to_gains --vehicles 200     the figures of docs/benchmarks.md
+
+Every vehicle has more physics than the model (bench/copters/simulation.py). An error is the mean of flights of the same
+steps in other weather. The best gains are the best of a grid that keep the limits of a proposal, the margin on the
+vehicle's own linear model. Exits with 1 beyond the limits, which are loose because the vehicles are few.
+"""
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from app.core.analysis.analysis import Assessment, analyze
+from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, least_damping
+from app.core.analysis.proposal import BOUNDS, LARGEST_ACTIVITY, with_gains
+from app.core.control.ardupilot_parameters import STEP_S, Parameters
+from app.core.errors import TrajectoryError
+from bench.copters.simulation import FILTER_HZ, SimulatedCopter, fly_steps, sample
+
+SEED: Final = 20261125
+QUICK_VEHICLES: Final = 6
+FLIGHTS: Final = 6
+FLIGHTS_OF_THE_GRID: Final = 3
+GRID: Final = ((1.0, 1.7, 3.0), (5.0, 6.5, 8.0), (0.2, 0.3, 0.45, 0.65, 1.0, 1.5), (0.4, 0.7, 1.2, 1.7, 2.4, 3.0))
+PROPOSED: Final = "proposed"
+LIMITS: Final[Mapping[str, float]] = {"worse": 0.0, "unsafe": 0.0, "covered": 0.6, "near": 0.6}
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What became of a vehicle: errors, m, by gain set, the least of the grid, whether the proposal's interval
+    contains each of its flights, and the gain sets that rang."""
+
+    errors_m: Mapping[str, float]
+    best_m: float
+    covered: Sequence[bool]
+    predicted: Sequence[tuple[float, float]]
+    rang: frozenset[str]
+    refused: str | None
+
+
+def judge(number: int) -> Result:
+    """Fly, analyse, and fly what is proposed and what people would set."""
+    random = np.random.default_rng((SEED, number))
+    copter = sample(random)
+    flown = Parameters(hover_throttle=copter.assumed_hover_throttle)
+    seeds = random.integers(2**31, size=FLIGHTS + 1).tolist()
+    first = fly_steps(copter, flown, seed=seeds[0])
+    try:
+        analysis = analyze(first.log)
+    except TrajectoryError as error:
+        return Result({}, np.nan, (), (), frozenset(), str(error))
+    best_m = least_error(copter, flown, seeds[1:])
+    errors_m: dict[str, float] = {}
+    covered: list[bool] = []
+    predicted: list[tuple[float, float]] = []
+    rang: set[str] = set()
+    for each in sets(analysis.proposed, analysis.assessments):
+        flights = [fly_steps(copter, with_gains(flown, each.gains), seed=seed) for seed in seeds[1:]]
+        errors_m[each.name] = float(np.mean([flight.error_m for flight in flights]))
+        predicted.append((each.prediction.error_m, errors_m[each.name]))
+        damping = least_damping(with_gains(flown, each.gains), copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S)
+        if damping < RINGING_DAMPING:
+            rang.add(each.name)
+        if each.name == PROPOSED:
+            within = (each.prediction.low_m, each.prediction.high_m)
+            covered = [within[0] <= flight.error_m <= within[1] for flight in flights]
+    return Result(errors_m, best_m, covered, predicted, frozenset(rang), analysis.insufficient)
+
+
+def sets(proposed: Assessment | None, others: Sequence[Assessment]) -> list[Assessment]:
+    """The gain sets to fly: what is proposed, and the others but for the gains of the flight, which are defaults."""
+    return [*([proposed] if proposed else []), *others[1:]]
+
+
+def least_error(copter: SimulatedCopter, flown: Parameters, seeds: Sequence[int]) -> float:
+    """Least error, m, of the gains of the grid that keep the limits of a proposal."""
+    usual = np.mean([fly_steps(copter, flown, seed=seed).activity for seed in seeds])
+    candidates = []
+    for values in product(*GRID):
+        parameters = with_gains(flown, dict(zip(BOUNDS, values, strict=True)))
+        if damping_within_margin(parameters, copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S) < RINGING_DAMPING:
+            continue
+        flights = [fly_steps(copter, parameters, seed=seed) for seed in seeds[:FLIGHTS_OF_THE_GRID]]
+        if np.mean([flight.activity for flight in flights]) <= LARGEST_ACTIVITY * usual:
+            candidates.append((float(np.mean([flight.error_m for flight in flights])), parameters))
+    best = min(candidates, key=lambda each: each[0])[1]
+    return float(np.mean([fly_steps(copter, best, seed=seed).error_m for seed in seeds]))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="bench.log_to_gains")
+    parser.add_argument("--vehicles", type=int, default=QUICK_VEHICLES)
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    with ProcessPoolExecutor(options.processes) as pool:
+        results = list(pool.map(judge, range(options.vehicles)))
+    refused = [each for each in results if each.refused]
+    answered = [each for each in results if PROPOSED in each.errors_m]
+    print(
+        f"{len(results)} vehicles, {len(answered)} with a proposal, {len(refused)} told that the log does not suffice"
+    )
+    for name in answered[0].errors_m if answered else ():
+        ratios = np.array([each.errors_m[name] / each.best_m for each in answered])
+        errors_mm = 1e3 * np.array([each.errors_m[name] for each in answered])
+        print(
+            f"{name:28} error {np.median(errors_mm):5.1f} mm (median), {np.quantile(errors_mm, 0.95):5.1f} (95 %); "
+            f"of the best {np.median(ratios):.2f}; within 10 % {np.mean(ratios <= 1.1):.0%}; "
+            f"ring {sum(name in each.rang for each in answered)}"
+        )
+    pairs = np.array([pair for each in answered for pair in each.predicted])
+    found = {
+        "worse": float(
+            np.mean([each.errors_m[PROPOSED] > each.errors_m["ArduCopter's defaults"] for each in answered])
+        ),
+        "unsafe": float(np.mean([PROPOSED in each.rang for each in answered])),
+        "covered": float(np.mean([inside for each in answered for inside in each.covered])),
+        "near": float(np.mean([each.errors_m[PROPOSED] <= 1.1 * each.best_m for each in answered])),
+    }
+    print(f"predicted over flown: median {np.median(pairs[:, 0] / pairs[:, 1]):.2f}")
+    print(f"worse than the defaults {found['worse']:.1%} (limit {LIMITS['worse']:.0%})")
+    print(f"ringing {found['unsafe']:.1%} (limit {LIMITS['unsafe']:.0%})")
+    print(f"flights inside the 90 % interval {found['covered']:.0%} (at least {LIMITS['covered']:.0%})")
+    print(f"within 10 % of the best {found['near']:.0%} (at least {LIMITS['near']:.0%})")
+    kept = found["covered"] >= LIMITS["covered"] and found["near"] >= LIMITS["near"]
+    return 0 if kept and found["worse"] <= LIMITS["worse"] and found["unsafe"] <= LIMITS["unsafe"] else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,112 @@
+"""`gainline analyze` on recorded and simulated logs."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from app.cli.commands import app
+from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
+from tests.logs.recorded import recorded
+from tests.logs.written import PARAMETERS, ardupilot_log
+
+
+def analyze(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, ["analyze", *map(str, arguments)])
+
+
+@pytest.fixture
+def steps(tmp_path: Path) -> Path:
+    path = tmp_path / "steps.bin"
+    path.write_bytes(recorded("arducopter_steps.bin"))
+    return path
+
+
+def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_path: Path) -> None:
+    """The binary flew 27 mm with its defaults, and 4.2 mm with 3, 8, 0.5, 3."""
+    document, parameters = tmp_path / "steps.json", tmp_path / "gains.param"
+    result = analyze(steps, "--json", document, "--params", parameters)
+    assert result.exit_code == 0, result.output
+    assert "hover throttle 0.365, thrust slope 1.00 ± 0.01, lag of the motors 0 ± 3 ms" in result.output
+    for name in ("as flown", "proposed", "ArduCopter's defaults", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
+        assert name in result.output
+    found = json.loads(document.read_text())
+    gains = found["proposed"]["gains"]
+    assert found["proposed"]["prediction"]["error_m"] < 0.2 * found["assessments"][0]["prediction"]["error_m"]
+    assert found["vehicle"]["mean"]["thrust_slope"] == pytest.approx(1.0, abs=0.01)
+    lines = parameters.read_text().splitlines()
+    assert {line.split(",")[0]: float(line.split(",")[1]) for line in lines} == pytest.approx(gains)
+
+
+def test_the_document_alone_can_be_printed(steps: Path) -> None:
+    result = analyze(steps, "--json", "-")
+    assert json.loads(result.stdout)["file"] == "steps.bin"
+
+
+def test_gains_may_replace_gains_but_nothing_else(steps: Path, tmp_path: Path) -> None:
+    earlier = tmp_path / "gains.param"
+    earlier.write_text("PSC_POSZ_P,1\n")
+    assert analyze(steps, "--params", earlier).exit_code == 0
+    assert earlier.read_text().startswith("PSC_POSZ_P,3")
+    before = steps.read_bytes()
+    refused = analyze(steps, "--params", steps)
+    assert refused.exit_code == 2
+    assert "was not written by this command" in refused.output
+    assert steps.read_bytes() == before
+
+
+def test_a_wrong_hover_throttle_is_told(tmp_path: Path) -> None:
+    """The vehicle hovers at 0.40 of its throttle, and was told 0.30."""
+    path = tmp_path / "hover.bin"
+    flight = simulated_flight(replace(QUIET, assumed_hover_throttle=0.3))
+    path.write_bytes(ardupilot_log(flight, parameters={**PARAMETERS, "MOT_THST_HOVER": 0.3}))
+    result = analyze(path)
+    assert result.exit_code == 0, result.output
+    assert "MOT_THST_HOVER was 0.300 in flight: 0.400 would fit better." in result.output
+
+
+def test_a_flight_with_the_throttle_at_its_limit_for_a_moment_says_so(tmp_path: Path) -> None:
+    flight = simulated_flight(QUIET)
+    flight.segments[0].throttle[60:63] = 1.0
+    path = tmp_path / "limit.bin"
+    path.write_bytes(ardupilot_log(flight))
+    assert "at a limit in 2\u00a0% of the rows." in analyze(path).output
+
+
+def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> None:
+    path, parameters = tmp_path / "gusty.bin", tmp_path / "gains.param"
+    path.write_bytes(ardupilot_log(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3)))
+    result = analyze(path)
+    assert result.exit_code == 0
+    assert "does not suffice to propose gains" in result.output
+    refused = analyze(path, "--params", parameters)
+    assert refused.exit_code == 1
+    assert "No parameter file was written" in refused.output
+    assert not parameters.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("arducopter_takeoff.bin", "holds altitude for 4.8 s only"),
+        ("px4_takeoff.ulg", "another kind of log (PX4's log)"),
+        ("paparazzi_283_13_82.tlog", "another kind of log (MAVLink telemetry log)"),
+    ],
+)
+def test_the_other_recorded_logs_are_refused_with_the_reason(name: str, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_bytes(recorded(name))
+    result = analyze(path)
+    assert result.exit_code == 1
+    assert reason in result.output
+
+
+def test_files_that_cannot_be_read_or_written_are_named(steps: Path, tmp_path: Path) -> None:
+    missing = analyze(tmp_path / "missing.bin")
+    assert missing.exit_code == 1
+    assert "could not be read" in missing.output
+    nowhere = analyze(steps, "--params", tmp_path / "none" / "gains.param")
+    assert nowhere.exit_code == 1
+    assert "could not be written" in nowhere.output

@@ -1,0 +1,117 @@
+"""What a log answers, and what it is refused for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.core.analysis.analysis import analyze, rules
+from app.core.analysis.flight import LoggedFlight, Segment
+from app.core.errors import TrajectoryError
+from app.core.records.trajectory import Samples
+from tests.core.analysis.flights import GUSTY, QUIET, recorded_steps, simulated_flight
+from tests.core.tuning.flying import compiled_only
+
+pytestmark = compiled_only
+
+
+def changed(flight: LoggedFlight, **signals: Samples) -> LoggedFlight:
+    """The flight with signals of its one segment replaced."""
+    (segment,) = flight.segments
+    return replace(flight, segments=[replace(segment, **signals)])
+
+
+def shortened(flight: LoggedFlight, rows: slice) -> LoggedFlight:
+    (segment,) = flight.segments
+    return changed(flight, **{name: getattr(segment, name)[rows] for name in Segment.__slots__})
+
+
+def refusal(flight: LoggedFlight) -> str:
+    with pytest.raises(TrajectoryError) as refused:
+        analyze(flight)
+    (problem,) = refused.value.problems
+    assert "Fly at a height of 3 m or more" in refused.value.hint
+    return problem.reason
+
+
+def test_the_log_of_the_real_binary_gives_gains_six_times_better() -> None:
+    """SITL flew 4.2 mm with its own proposal from such a flight, and 27 mm with the defaults."""
+    found = analyze(recorded_steps())
+    assert found.insufficient is None
+    assert found.proposed is not None
+    present = found.assessments[0]
+    assert present.name == "as flown"
+    assert present.activity == pytest.approx(1.0)
+    assert found.proposed.prediction.error_m < present.prediction.error_m / 5.0
+    assert found.proposed.margin >= 2.0
+    assert found.proposed.activity <= 1.5
+    assert found.behaviour.error_m == pytest.approx(0.0275, abs=2e-4)
+    assert found.behaviour.reference_range_m == pytest.approx(2.0, abs=0.05)
+    assert found.behaviour.saturated_share == 0.0
+    assert {each.name for each in found.assessments[1:]} == set(rules(recorded_steps()))
+
+
+def test_the_documented_rule_follows_the_hover_throttle() -> None:
+    rule = rules(simulated_flight(QUIET))["P = hover throttle, I = 2 P"]
+    assert rule == {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.4, "PSC_ACCZ_I": 0.8}
+
+
+def test_too_much_gust_for_the_slope_says_what_to_fly() -> None:
+    found = analyze(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3))
+    assert found.proposed is None
+    assert found.insufficient is not None
+    assert "does not suffice" in found.insufficient
+    assert "climb 2 m" in found.insufficient
+
+
+def test_a_vehicle_that_no_gains_suit_is_told() -> None:
+    """Motors so strong that they hover at 5 % of the throttle: even the smallest documented gains lack the margin."""
+    strong = replace(QUIET, hover_throttle=0.05, assumed_hover_throttle=0.125)
+    found = analyze(simulated_flight(strong, acceleration_p=0.05, acceleration_i_1_s=0.1))
+    assert found.proposed is None
+    assert found.insufficient is not None
+    assert "No gains within the documented ranges" in found.insufficient
+
+
+def test_hover_alone_is_refused() -> None:
+    flight = simulated_flight(GUSTY)
+    (segment,) = flight.segments
+    level = np.full_like(segment.z_d_m, 5.0)
+    still = np.zeros_like(level)
+    hovering = changed(flight, z_d_m=level, v_d_m_s=still, a_d_m_s2=still, z_m=level, v_m_s=still, a_m_s2=still)
+    assert "no altitude changes: the reference moves by 0.00 m" in refusal(hovering)
+
+
+def test_too_short_a_flight_is_refused() -> None:
+    assert refusal(shortened(simulated_flight(), slice(30, 80))) == "holds altitude for 4.9 s only; 6 s are needed"
+
+
+def test_a_throttle_at_its_limit_is_refused() -> None:
+    flight = simulated_flight()
+    (segment,) = flight.segments
+    throttle = segment.throttle.copy()
+    throttle[::8] = 0.0
+    assert "throttle at a limit in 1" in refusal(changed(flight, throttle=throttle))
+
+
+def test_another_controller_is_refused() -> None:
+    flight = simulated_flight()
+    (segment,) = flight.segments
+    assert "another climb rate target" in refusal(changed(flight, v_t_m_s=segment.v_t_m_s + 0.1))
+
+
+def test_accelerations_that_nothing_explains_are_refused() -> None:
+    """As of oscillating rate controllers: 3 m/s² at 3 Hz beside what the throttle does."""
+    flight = simulated_flight()
+    (segment,) = flight.segments
+    shaken = segment.a_m_s2 + 3.0 * np.sin(2.0 * np.pi * 3.0 * segment.time_s)
+    assert "do not explain" in refusal(changed(flight, a_m_s2=shaken))
+
+
+def test_a_flight_that_the_model_does_not_repeat_is_refused() -> None:
+    """A reference that was another than logged: the altitude beside it is not what the loop would have done."""
+    flight = simulated_flight()
+    (segment,) = flight.segments
+    off = segment.z_d_m + 0.1
+    moved = changed(flight, z_d_m=off, v_t_m_s=segment.v_t_m_s + 0.1 * flight.parameters.position_p_1_s)
+    assert "the model that fits it best" in refusal(moved)

@@ -1,0 +1,53 @@
+"""Disturbances of a flight, and of others in the same weather."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.core.analysis.disturbances import disturbances_of, in_other_weather
+from app.core.analysis.flight import interpolated
+from app.core.records.trajectory import Samples
+from bench.copters.simulation import SimulatedCopter
+from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
+from tests.core.tuning.flying import compiled_only
+
+pytestmark = compiled_only
+
+
+def found(copter: SimulatedCopter) -> Samples:
+    flight = simulated_flight(copter)
+    (segment,) = flight.segments
+    return disturbances_of(flight, segment, interpolated(segment, flight.step_s), copter.linear)
+
+
+def test_a_vehicle_of_the_models_own_kind_in_still_air_has_hardly_any() -> None:
+    assert np.abs(found(QUIET)[:, 0]).max() < 0.06
+
+
+def test_a_gust_is_told_from_noise() -> None:
+    """Gusts of 0.2 m/s² that last half a second, and noise of 0.1 m/s²: each within a quarter."""
+    disturbances = found(replace(GUSTY, wander_m=0.0, wander_m_s=0.0))
+    assert disturbances[:, 0].std() == pytest.approx(0.2, rel=0.25)
+    assert disturbances[:, 3].std() == pytest.approx(0.1, rel=0.25)
+
+
+def test_noise_alone_is_no_gust() -> None:
+    disturbances = found(replace(QUIET, noise_m_s2=0.3))
+    assert disturbances[:, 3].std() == pytest.approx(0.3, rel=0.25)
+    assert disturbances[:, 0].std() < 0.1
+
+
+def test_an_estimator_that_wanders_is_found_beyond_the_acceleration() -> None:
+    disturbances = found(replace(QUIET, wander_m_s=0.02))
+    still = found(QUIET)
+    assert disturbances[:, 1].std() > 3 * still[:, 1].std()
+
+
+def test_other_weather_is_as_strong_on_average_and_has_the_same_mean() -> None:
+    disturbances = found(GUSTY)
+    random = np.random.default_rng(1)
+    others = [in_other_weather(disturbances - disturbances.mean(axis=0), random) for _ in range(300)]
+    strengths = np.mean([each.var(axis=0) for each in others], axis=0)
+    assert strengths == pytest.approx(disturbances.var(axis=0), rel=0.2)
+    assert np.corrcoef(others[0][:, 0], others[1][:, 0])[0, 1] < 0.5

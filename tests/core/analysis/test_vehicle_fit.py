@@ -1,0 +1,63 @@
+"""The fitted vehicle, against the real binary's and against simulated ones."""
+
+import numpy as np
+import pytest
+
+from app.core.analysis.vehicle_fit import fit_copter
+from app.core.control.ardupilot_parameters import Parameters
+from bench.copters.simulation import fly_steps, sample
+from tests.core.analysis.flights import GUSTY, QUIET, recorded_steps, simulated_flight
+from tests.core.tuning.flying import compiled_only
+
+pytestmark = compiled_only
+
+
+def test_the_vehicle_of_the_real_binary_is_found() -> None:
+    """SITL's quadrotor: thrust in proportion to throttle, drag 0.30 1/s, no lag; hover throttle 0.3645 in the log."""
+    estimate = fit_copter(recorded_steps())
+    assert estimate.mean.thrust_slope == pytest.approx(1.0, abs=0.01)
+    assert estimate.mean.drag_1_s == pytest.approx(0.30, abs=0.02)
+    assert estimate.mean.motor_lag_s == pytest.approx(0.0, abs=0.005)
+    assert estimate.mean.hover_throttle == pytest.approx(0.3645, abs=0.001)
+    assert estimate.residual_m_s2 < 0.02
+
+
+def test_a_vehicle_of_the_models_own_kind_is_found_in_still_air() -> None:
+    estimate = fit_copter(simulated_flight(QUIET))
+    assert estimate.mean.thrust_slope == pytest.approx(1.0, abs=0.01)
+    assert estimate.mean.motor_lag_s == pytest.approx(0.05, abs=0.006)
+    assert estimate.mean.drag_1_s == pytest.approx(0.3, abs=0.02)
+    assert estimate.mean.hover_throttle == pytest.approx(0.4, rel=0.002)
+
+
+def test_gusts_widen_the_uncertainty() -> None:
+    quiet, gusty = fit_copter(simulated_flight(QUIET)), fit_copter(simulated_flight(GUSTY))
+    assert gusty.deviation.thrust_slope > 3 * quiet.deviation.thrust_slope
+    assert gusty.deviation.motor_lag_s > 2 * quiet.deviation.motor_lag_s
+
+
+def test_random_vehicles_lie_within_their_uncertainty() -> None:
+    """Of twelve, with more physics than the model has: the slope in hover, with its lag, within three deviations, and
+    without a bias beyond the error of their mean."""
+    apart = []
+    for number in range(12):
+        copter = sample(np.random.default_rng((7, number)))
+        flight = fly_steps(copter, Parameters(hover_throttle=copter.assumed_hover_throttle), seed=number).log
+        estimate = fit_copter(flight)
+        apart.append((estimate.mean.thrust_slope - copter.thrust_slope) / estimate.deviation.thrust_slope)
+        assert estimate.mean.hover_throttle == pytest.approx(copter.hover_throttle, rel=0.06)
+    assert np.abs(apart).max() < 3.0
+    assert abs(np.mean(apart)) < 1.0
+
+
+def test_the_draws_have_the_stated_mean_and_deviation() -> None:
+    estimate = fit_copter(simulated_flight(GUSTY))
+    slopes = [each.thrust_slope for each in estimate.draws]
+    assert (np.mean(slopes), np.std(slopes)) == pytest.approx(
+        (estimate.mean.thrust_slope, estimate.deviation.thrust_slope)
+    )
+    assert list(estimate.few) == list(estimate.draws[:5])
+
+
+def test_the_same_flight_gives_the_same_vehicle() -> None:
+    assert fit_copter(simulated_flight(GUSTY)) == fit_copter(simulated_flight(GUSTY))

@@ -1,0 +1,74 @@
+"""ArduCopter's logs of simulated flights, as the vehicle would write them with its default LOG_BITMASK."""
+
+from collections.abc import Mapping, Sequence
+
+from app.core.analysis.flight import LoggedFlight, Segment
+from app.core.records.trajectory import Samples
+from tests.logs.recorded import OnBoardLog
+
+PARM, MODE, EV, PSCD, CTUN = 1, 2, 3, 4, 5
+GUIDED, LOITER, LAND, STABILIZE = 4, 5, 9, 0
+NOT_LANDED, LANDED = 28, 18
+
+PARAMETERS: Mapping[str, float] = {
+    "PSC_POSZ_P": 1.0,
+    "PSC_VELZ_P": 5.0,
+    "PSC_ACCZ_P": 0.5,
+    "PSC_ACCZ_I": 1.0,
+    "MOT_THST_HOVER": 0.35,
+    "SCHED_LOOP_RATE": 400.0,
+    "INS_ACCEL_FILTER": 20.0,
+}
+
+
+def ardupilot_log(
+    flight: LoggedFlight,
+    *,
+    begin_s: float = 10.0,
+    modes: Sequence[tuple[float, int]] = ((0.0, GUIDED),),
+    events: Sequence[tuple[float, int]] = ((0.0, NOT_LANDED),),
+    parameters: Mapping[str, float] = PARAMETERS,
+    changes: Sequence[tuple[float, str, float]] = (),
+    rows: slice = slice(None),
+) -> bytes:
+    """The first segment of the flight, which begins at `begin_s` after takeoff; times of modes, events and parameter
+    changes count from the takeoff, at 5 s of the vehicle's clock."""
+    log = OnBoardLog()
+    log.define(PARM, "PARM", "QNf", "TimeUS,Name,Value")
+    log.define(MODE, "MODE", "QBBB", "TimeUS,Mode,ModeNum,Rsn")
+    log.define(EV, "EV", "QB", "TimeUS,Id")
+    log.define(PSCD, "PSCD", "Q" + 9 * "f", "TimeUS,DPD,TPD,PD,DVD,TVD,VD,DAD,TAD,AD")
+    log.define(CTUN, "CTUN", "Qfff", "TimeUS,ThI,ThO,ThH")
+    messages: list[tuple[int, int, str, tuple[float | bytes, ...]]] = []
+    messages += [(0, PARM, "<Q16sf", (name.encode(), value)) for name, value in parameters.items()]
+    messages += [(_us(at_s), MODE, "<QBBB", (mode, mode, 1)) for at_s, mode in modes]
+    messages += [(_us(at_s), EV, "<QB", (event,)) for at_s, event in events]
+    messages += [(_us(at_s), PARM, "<Q16sf", (name.encode(), value)) for at_s, name, value in changes]
+    segment = flight.segments[0]
+    for row in range(*rows.indices(len(segment.time_s))):
+        at_us = _us(begin_s + float(segment.time_s[row] - segment.time_s[0]))
+        messages.append((at_us, PSCD, "<Q9f", tuple(-float(values[row]) for values in _loop(segment))))
+        throttle = (float(segment.throttle[row]), float(segment.throttle_filtered[row]))
+        messages.append((at_us, CTUN, "<Q3f", (*throttle, parameters.get("MOT_THST_HOVER", 0.35))))
+    for at_us, kind, layout, fields in sorted(messages, key=lambda message: message[0]):
+        log.add(kind, layout, at_us, *fields)
+    return log.content
+
+
+def _loop(segment: Segment) -> tuple[Samples, ...]:
+    """Columns of PSCD, up."""
+    return (
+        segment.z_d_m,
+        segment.z_d_m,
+        segment.z_m,
+        segment.v_d_m_s,
+        segment.v_t_m_s,
+        segment.v_m_s,
+        segment.a_d_m_s2,
+        segment.a_d_m_s2,
+        segment.a_m_s2,
+    )
+
+
+def _us(at_s: float) -> int:
+    return round(1e6 * (5.0 + at_s))
