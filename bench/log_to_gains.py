@@ -30,7 +30,7 @@ QUICK_VEHICLES: Final = 6
 FLIGHTS: Final = 6
 FLIGHTS_OF_THE_GRID: Final = 3
 GRID: Final = ((1.0, 1.7, 3.0), (5.0, 6.5, 8.0), (0.2, 0.3, 0.45, 0.65, 1.0, 1.5), (0.4, 0.7, 1.2, 1.7, 2.4, 3.0))
-PROPOSED: Final = "proposed"
+PROPOSED: Final = "Proposed"
 LIMITS: Final[Mapping[str, float]] = {"worse": 0.0, "unsafe": 0.0, "covered": 0.6, "near": 0.6}
 
 

@@ -122,6 +122,7 @@ class BodyLimitMiddleware:
         self._uploads = {
             "/trajectory": _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs"),
             "/controller-checks": _Limit("file", upload_bytes, "`gainline controller check` reads larger logs"),
+            "/log-analyses": _Limit("file", upload_bytes, "`gainline analyze` reads larger logs"),
             "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),
             "/api/bundles": _Limit("file", BUNDLE_BYTES, "`gainline unbundle` imports larger ones"),
         }

@@ -10,6 +10,7 @@ import { NotFoundPage } from "./ui/NotFound";
 
 const ComparePage = lazyPage("ComparePage");
 const ControllerPage = lazyPage("ControllerPage");
+const LogAnalysisPage = lazyPage("LogAnalysisPage");
 const FlightPage = lazyPage("FlightPage");
 const FlyPage = lazyPage("FlyPage");
 const JobsPage = lazyPage("JobsPage");
@@ -36,6 +37,7 @@ export function App() {
         <Route path="vehicles/:vehicleId" element={<VehiclePage />} />
         <Route path="reproductions" element={<ReproductionsPage />} />
         <Route path="controller/:checkId?" element={<ControllerPage />} />
+        <Route path="log-analysis" element={<LogAnalysisPage />} />
         <Route path="jobs" element={<JobsPage />} />
         <Route path="settings" element={<SettingsPage />} />
         <Route path="*" element={<NotFoundPage />} />

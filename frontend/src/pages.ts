@@ -3,6 +3,7 @@
 export { FlightPage } from "./features/campaign/FlightPage";
 export { NewCampaignPage } from "./features/campaigns/NewCampaignPage";
 export { ControllerPage } from "./features/checks/ControllerPage";
+export { LogAnalysisPage } from "./features/checks/LogAnalysisPage";
 export { ComparePage } from "./features/compare/ComparePage";
 export { NewVehiclePage } from "./features/fleet/NewVehiclePage";
 export { VehiclePage } from "./features/fleet/VehiclePage";

@@ -30,7 +30,7 @@ def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_pa
     result = analyze(steps, "--json", document, "--params", parameters)
     assert result.exit_code == 0, result.output
     assert "hover throttle 0.365, thrust slope 1.00 ± 0.01, lag of the motors 0 ± 3 ms" in result.output
-    for name in ("as flown", "proposed", "ArduCopter's defaults", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
+    for name in ("As flown", "Proposed", "ArduCopter's defaults", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
         assert name in result.output
     found = json.loads(document.read_text())
     gains = found["proposed"]["gains"]

@@ -155,11 +155,17 @@ class Pages:
         return "/jobs"
 
 
-FIXED = {"new": "/new", "new-vehicle": "/vehicles/new", "settings": "/settings", "missing": "/no/such/page"}
+FIXED = {
+    "new": "/new",
+    "log-analysis": "/log-analysis",
+    "new-vehicle": "/vehicles/new",
+    "settings": "/settings",
+    "missing": "/no/such/page",
+}
 NAMES = (
     "list", "new", "ready", "under-way", "finished", "elsewhere", "overruled", "pitch", "flight", "vehicles",
-    "new-vehicle", "vehicle", "shared-vehicle", "fly", "controller", "controller-check", "reproductions", "compare",
-    "jobs", "settings", "missing",
+    "new-vehicle", "vehicle", "shared-vehicle", "fly", "controller", "controller-check", "log-analysis",
+    "reproductions", "compare", "jobs", "settings", "missing",
 )  # fmt: skip
 WITH_TABS = ("ready", "under-way", "finished", "elsewhere", "overruled", "pitch")
 

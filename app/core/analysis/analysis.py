@@ -1,7 +1,7 @@
 """The answer to a log: how the altitude loop behaves, the vehicle behind it, and gains for it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,8 @@ from app.core.analysis.proposal import BOUNDS, propose, with_gains
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
 from app.core.control.ardupilot_shaping import square_root
 from app.core.errors import Problem, TrajectoryError
+from app.core.models.copter import FLOWN
+from app.core.records.trajectory import Samples
 
 _SHORTEST_S: Final = 6.0
 _LEAST_CHANGE_M: Final = 0.3
@@ -54,15 +56,29 @@ class Assessment:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Response:
+    """The segment with the largest altitude change as it was flown, and as it is predicted with the proposed gains, at
+    its rows, shape (n,) each; without a proposal, with the gains of the flight. Time counts from the first segment."""
+
+    time_s: Samples
+    reference_m: Samples
+    flown_m: Samples
+    flown_throttle: Samples
+    predicted_m: Samples
+    predicted_throttle: Samples
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
-    """Everything that a log answers. `assessments` begins with the gains of the flight; `proposed` follows, unless the
-    log does not suffice, which `insufficient` then says."""
+    """Everything that a log answers. `assessments` begins with the gains of the flight; `proposed` is None if the log
+    does not suffice, or no gains do, which `insufficient` then says."""
 
     behaviour: Behaviour
     estimate: CopterEstimate
     assessments: Sequence[Assessment]
     proposed: Assessment | None
     insufficient: str | None
+    response: Response
 
 
 def analyze(flight: LoggedFlight) -> Analysis:
@@ -75,7 +91,7 @@ def analyze(flight: LoggedFlight) -> Analysis:
     _require_own_controller(flight)
     estimate = fit_copter(flight)
     model = FlightModel(flight, estimate.draws)
-    present = _assess("as flown", _gains_of(flight), flight, model, estimate)
+    present = _assess("As flown", _gains_of(flight), flight, model, estimate)
     _require_likeness(behaviour, estimate, present)
     compared = [present, *(_assess(name, gains, flight, model, estimate) for name, gains in rules(flight).items())]
     insufficient = _insufficient(estimate)
@@ -84,8 +100,9 @@ def analyze(flight: LoggedFlight) -> Analysis:
         behaviour=behaviour,
         estimate=estimate,
         assessments=tuple(compared),
-        proposed=_assess("proposed", gains, flight, model, estimate) if gains else None,
+        proposed=_assess("Proposed", gains, flight, model, estimate) if gains else None,
         insufficient=insufficient or (None if gains else _NONE_ALLOWED),
+        response=_response(flight, estimate, gains or present.gains),
     )
 
 
@@ -93,6 +110,20 @@ _NONE_ALLOWED: Final = (
     "No gains within the documented ranges keep the margin on this vehicle. Shorten its lags first: the motors', and "
     "the filters of the accelerometer and the acceleration controller."
 )
+
+
+def _response(flight: LoggedFlight, estimate: CopterEstimate, gains: Mapping[str, float]) -> Response:
+    segment = max(flight.segments, key=lambda each: float(np.ptp(each.z_d_m)))
+    alone = replace(flight, segments=[segment])
+    rows = FlightModel(alone, [estimate.mean]).rows(with_gains(flight.parameters, gains))
+    return Response(
+        time_s=segment.time_s - flight.segments[0].time_s[0],
+        reference_m=segment.z_d_m,
+        flown_m=segment.z_m,
+        flown_throttle=segment.throttle_filtered,
+        predicted_m=rows[:, FLOWN.index("z_m")],
+        predicted_throttle=rows[:, FLOWN.index("throttle_filtered")],
+    )
 
 
 def rules(flight: LoggedFlight) -> dict[str, dict[str, float]]:

@@ -12,7 +12,7 @@ from app.core.records.trajectory import Samples
 _SEED: Final = 1
 _CORRELATIONS: Final = (0.5, 0.98)
 _LEAST_VARIANCE: Final = 1e-12
-_STRENGTH_DEVIATION: Final = 0.28
+_STRENGTH_DEVIATION: Final = 0.25
 """How well one flight tells the strength of its disturbances, as a deviation of its logarithm: most of the error comes
 from what lasts for seconds, of which a flight has few. With this value nine of ten flights of random vehicles lie
 within a 90 % interval."""

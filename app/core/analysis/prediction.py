@@ -73,20 +73,33 @@ class FlightModel:
         low_m, high_m = np.quantile(elsewhen + (error_m - elsewhen.mean()), _QUANTILES).tolist()
         return Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity)
 
+    def rows(self, parameters: Parameters) -> Samples:
+        """What the first copter flies in the weather of the flight, at the rows of the first segment, shape (n, 5) as
+        `FLOWN`."""
+        time_s = self._flight.segments[0].time_s
+        flown = self._trajectory(self._runs[0][0], parameters)
+        place = np.round((time_s - time_s[0]) / self._flight.step_s).astype(np.int64)
+        return np.asarray(flown[np.minimum(place, len(flown) - 1)])
+
     def _flown(self, runs: Sequence[_Run], parameters: Parameters) -> tuple[float, float]:
         """Error, m, and throttle activity over all segments."""
-        packed = parameters.packed(self._flight.step_s)
         lead = round(LEAD_S / self._flight.step_s)
         deviations, fast = [], []
         for run in runs:
-            throttle, z_m, v_m_s, a_m_s2 = run.start
-            state, flown = np.empty(loop.STATE_SIZE), np.empty((len(run.reference), len(FLOWN)))
-            loop.start_hover(state, packed, throttle, z_m, v_m_s, a_m_s2)
-            body = start_body(throttle, z_m, v_m_s, a_m_s2, run.copter)
-            fly(state, body, packed, run.copter, run.reference, run.disturbances, flown)
-            deviations.append(np.abs(run.reference[lead:, 0] - flown[lead:, 0]))
-            fast.append(flown[lead:, 3] - flown[lead:, 4])
+            flown = self._trajectory(run, parameters)[lead:]
+            deviations.append(np.abs(run.reference[lead:, 0] - flown[:, 0]))
+            fast.append(flown[:, 3] - flown[:, 4])
         return float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std())
+
+    def _trajectory(self, run: _Run, parameters: Parameters) -> Samples:
+        """The segment flown with these gains, shape (m, 5) as `FLOWN`."""
+        packed = parameters.packed(self._flight.step_s)
+        throttle, z_m, v_m_s, a_m_s2 = run.start
+        state, flown = np.empty(loop.STATE_SIZE), np.empty((len(run.reference), len(FLOWN)))
+        loop.start_hover(state, packed, throttle, z_m, v_m_s, a_m_s2)
+        body = start_body(throttle, z_m, v_m_s, a_m_s2, run.copter)
+        fly(state, body, packed, run.copter, run.reference, run.disturbances, flown)
+        return flown
 
 
 def _run(flight: LoggedFlight, segment: Segment, steps: Steps, copter: Copter) -> _Run:

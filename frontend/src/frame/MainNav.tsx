@@ -10,6 +10,7 @@ const PAGES = [
   { to: "/vehicles", title: "Vehicles", inRow: true },
   { to: "/compare", title: "Compare", inRow: false },
   { to: "/reproductions", title: "Reproductions", inRow: false },
+  { to: "/log-analysis", title: "Log analysis", inRow: false },
   { to: "/controller", title: "Controller check", inRow: false },
   { to: "/jobs", title: "Jobs", inRow: false },
   { to: "/settings", title: "Settings", inRow: false },

@@ -40,7 +40,7 @@ def test_the_log_of_the_real_binary_gives_gains_six_times_better() -> None:
     assert found.insufficient is None
     assert found.proposed is not None
     present = found.assessments[0]
-    assert present.name == "as flown"
+    assert present.name == "As flown"
     assert present.activity == pytest.approx(1.0)
     assert found.proposed.prediction.error_m < present.prediction.error_m / 5.0
     assert found.proposed.margin >= 2.0

@@ -142,6 +142,50 @@ export type Advice = {
 };
 
 /**
+ * AssessedGains
+ *
+ * What the model predicts for a gain set in the same manoeuvre and weather.
+ */
+export type AssessedGains = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Error M
+     */
+    error_m: number;
+    /**
+     * Low M
+     *
+     * lower end of the 90 % interval of a single flight
+     */
+    low_m: number;
+    /**
+     * High M
+     */
+    high_m: number;
+    /**
+     * Activity
+     *
+     * throttle activity relative to the gains flown
+     */
+    activity: number;
+    /**
+     * Margin
+     *
+     * factor on the acceleration gains at which the loop rings with 30 ms more lag; 0: it rings
+     */
+    margin: number;
+};
+
+/**
  * BestTrial
  *
  * The valid trial with the lowest error, and the mean of all flights of its gains with its standard error, null
@@ -1115,6 +1159,48 @@ export type Estimate = {
      * Fitted
      */
     fitted: Array<FittedNumber>;
+};
+
+/**
+ * EstimatedValue
+ *
+ * A fitted quantity and its standard deviation.
+ */
+export type EstimatedValue = {
+    /**
+     * Mean
+     */
+    mean: number;
+    /**
+     * Deviation
+     *
+     * standard deviation
+     */
+    deviation: number;
+};
+
+/**
+ * EstimatedVehicle
+ *
+ * The vehicle behind the log.
+ */
+export type EstimatedVehicle = {
+    hover_throttle: EstimatedValue;
+    /**
+     * Assumed Hover Throttle
+     *
+     * MOT_THST_HOVER in flight
+     */
+    assumed_hover_throttle: number;
+    thrust_slope: EstimatedValue;
+    motor_lag_s: EstimatedValue;
+    drag_1_s: EstimatedValue;
+    /**
+     * Residual M S2
+     *
+     * acceleration that throttle and climb rate do not explain, rms
+     */
+    residual_m_s2: number;
 };
 
 /**
@@ -2148,6 +2234,70 @@ export type LeaseRequest = {
      * Token
      */
     token?: string | null;
+};
+
+/**
+ * LogAnalysis
+ *
+ * What a log tells about the altitude control of its vehicle. `assessments` begins with the gains flown.
+ */
+export type LogAnalysis = {
+    /**
+     * File Name
+     */
+    file_name: string;
+    behaviour: LoggedBehaviour;
+    vehicle: EstimatedVehicle;
+    proposed: AssessedGains | null;
+    /**
+     * Insufficient
+     *
+     * why nothing is proposed
+     */
+    insufficient: string | null;
+    /**
+     * Assessments
+     */
+    assessments: Array<AssessedGains>;
+    figure: FigureCard;
+};
+
+/**
+ * LoggedBehaviour
+ *
+ * How the altitude loop behaved in the flight.
+ */
+export type LoggedBehaviour = {
+    /**
+     * Duration S
+     *
+     * time analysed
+     */
+    duration_s: number;
+    /**
+     * Error M
+     *
+     * mean distance between reference and altitude
+     */
+    error_m: number;
+    /**
+     * Largest Deviation M
+     */
+    largest_deviation_m: number;
+    /**
+     * Reference Range M
+     */
+    reference_range_m: number;
+    /**
+     * Throttle Mean
+     */
+    throttle_mean: number;
+    /**
+     * Saturated Share
+     *
+     * share of the rows with the throttle at a limit
+     */
+    saturated_share: number;
 };
 
 /**
@@ -6883,6 +7033,52 @@ export type GetControllerCheckFigureResponses = {
 };
 
 export type GetControllerCheckFigureResponse = GetControllerCheckFigureResponses[keyof GetControllerCheckFigureResponses];
+
+export type AnalyzeLogData = {
+    body: {
+        file: Blob | File;
+        /**
+         * the .log file that Paparazzi writes next to a .data file
+         */
+        companion?: Blob | File;
+    };
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
+         */
+        'Idempotency-Key'?: string | null;
+    };
+    path?: never;
+    query?: {
+        /**
+         * Theme
+         *
+         * colours for a light or a dark page
+         */
+        theme?: 'light' | 'dark';
+    };
+    url: '/api/log-analyses';
+};
+
+export type AnalyzeLogErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type AnalyzeLogError = AnalyzeLogErrors[keyof AnalyzeLogErrors];
+
+export type AnalyzeLogResponses = {
+    /**
+     * Successful Response
+     */
+    200: LogAnalysis;
+};
+
+export type AnalyzeLogResponse = AnalyzeLogResponses[keyof AnalyzeLogResponses];
 
 export type CompareFlightsData = {
     body?: never;

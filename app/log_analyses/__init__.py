@@ -1,0 +1,1 @@
+"""Analyses of flight logs: gains for a vehicle without a campaign."""

@@ -1,0 +1,122 @@
+import { Anchor, Button, FileButton, Group, Skeleton, Text, Title, useComputedColorScheme } from "@mantine/core";
+import { IconDownload, IconFileUpload } from "@tabler/icons-react";
+import { type DragEvent, useState } from "react";
+import { Link } from "react-router";
+import { type LogAnalysis, useLogAnalysis } from "../../api/logAnalyses";
+import { FigurePanel } from "../../charts/FigurePanel";
+import { DataTable } from "../../ui/DataTable";
+import { ErrorNotice } from "../../ui/Notices";
+import page from "../../ui/Page.module.css";
+import { Panel } from "../../ui/Panel";
+import row from "../../ui/RowCard.module.css";
+import { useTitle } from "../../ui/useTitle";
+import classes from "./Checks.module.css";
+import { answerOf, behaviourOf, gainsTable, parameterFile, vehicleOf } from "./logAnalysis";
+
+const FIGURE_HEIGHT_PX = 560;
+const ROW_PX = 37;
+
+/** Better altitude gains from the log of a flight, without a campaign. */
+export function LogAnalysisPage() {
+  useTitle("Log analysis");
+  const theme = useComputedColorScheme("light");
+  const [file, setFile] = useState<File | null>(null);
+  const [over, setOver] = useState(false);
+  const analysis = useLogAnalysis(file, theme);
+  const drop = (event: DragEvent) => {
+    event.preventDefault();
+    setOver(false);
+    setFile(event.dataTransfer.files[0] ?? null);
+  };
+  return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: dropping a file is a shortcut for the button below
+    <div
+      className={page["stack"]}
+      onDragOver={(event) => {
+        event.preventDefault();
+        setOver(true);
+      }}
+      onDragLeave={() => setOver(false)}
+      onDrop={drop}
+    >
+      <Title order={1}>Log analysis</Title>
+      {analysis.data && <Result analysis={analysis.data} />}
+      {analysis.isLoading && <Skeleton height={320} radius="md" aria-busy="true" />}
+      <Panel
+        title={analysis.data ? "Analyse another log" : "Better altitude gains from one log"}
+        className={over ? classes["over"] : ""}
+      >
+        <Text maw="90ch" lh={1.45} mb={10}>
+          Drop ArduCopter's .bin log of a flight here or choose it. In GUIDED, LOITER, ALT_HOLD or AUTO the vehicle
+          should climb and descend by about 2 m with a few seconds of hover between. The file is not stored.
+        </Text>
+        <Group gap={10} mt={12} mb={10}>
+          <FileButton accept=".bin" onChange={setFile}>
+            {(props) => (
+              <Button {...props} loading={analysis.isFetching} leftSection={<IconFileUpload size={20} aria-hidden />}>
+                Choose log
+              </Button>
+            )}
+          </FileButton>
+        </Group>
+        <ErrorNotice error={analysis.error} />
+        <Text size="sm" c="dimmed">
+          To compare a log with the replica of its controller, use the{" "}
+          <Anchor component={Link} to="/controller" inherit underline="always">
+            controller check
+          </Anchor>
+          .
+        </Text>
+      </Panel>
+    </div>
+  );
+}
+
+function Result({ analysis }: { analysis: LogAnalysis }) {
+  const { file_name, proposed, figure } = analysis;
+  const table = gainsTable(analysis);
+  return (
+    <article className={classes["check"]} aria-label={`Analysis of ${file_name}`}>
+      <Panel title={file_name}>
+        <p className={classes["sentence"]} data-passed={proposed !== null || undefined}>
+          {answerOf(analysis)}
+        </p>
+        <Facts title="Flight" facts={behaviourOf(analysis)} />
+        <Facts title="Vehicle" facts={vehicleOf(analysis)} />
+        <DataTable table={table} label="Gains compared" height={ROW_PX * (table.rows.length + 1)} />
+        <ul className={page["notes"]}>
+          <li>Deviations are predicted for the same manoeuvre in the same weather.</li>
+          <li>Activity is that of the throttle, relative to the gains flown; a proposal has at most 1.5.</li>
+          <li>
+            The margin is the factor on PSC_ACCZ_P and PSC_ACCZ_I at which the loop rings with 30 ms more lag; a
+            proposal has at least 2.
+          </li>
+        </ul>
+        {proposed && (
+          <Button
+            component="a"
+            mt="sm"
+            variant="default"
+            href={`data:text/plain;charset=utf-8,${encodeURIComponent(parameterFile(proposed))}`}
+            download={`${file_name.replace(/\.bin$/i, "")}.param`}
+            leftSection={<IconDownload size={18} aria-hidden />}
+          >
+            Download parameter file
+          </Button>
+        )}
+      </Panel>
+      <FigurePanel title={figure.title} card={figure} error={null} height={FIGURE_HEIGHT_PX} />
+    </article>
+  );
+}
+
+function Facts({ title, facts }: { title: string; facts: readonly string[] }) {
+  return (
+    <p className={`${row["facts"]} numbers`}>
+      <b>{title}</b>
+      {facts.map((fact) => (
+        <span key={fact}>{fact}</span>
+      ))}
+    </p>
+  );
+}

@@ -1,0 +1,67 @@
+"""The page of a log analysis: a log dropped and chosen, its answer, the parameter file, and logs that are refused."""
+
+from base64 import b64encode
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import FilePayload, expect
+
+from tests.core.analysis.flights import GUSTY, simulated_flight
+from tests.e2e.conftest import Opener, Server
+from tests.e2e.dashboard import Dashboard
+from tests.logs.recorded import recorded
+from tests.logs.written import ardupilot_log
+
+DROP = """([name, content]) => {
+  const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0));
+  const data = new DataTransfer();
+  data.items.add(new File([bytes], name));
+  return data;
+}"""
+
+
+@pytest.fixture
+def page_of_analysis(open_dashboard: Opener, empty_server: Server) -> Dashboard:
+    dashboard = open_dashboard(empty_server.url)
+    dashboard.open("/log-analysis")
+    return dashboard
+
+
+def choose(dashboard: Dashboard, name: str, content: bytes) -> None:
+    with dashboard.page.expect_file_chooser() as chooser:
+        dashboard.button("Choose log").click()
+    chooser.value.set_files([FilePayload(name=name, mimeType="application/octet-stream", buffer=content)])
+
+
+def test_a_log_that_is_dropped_gives_gains_to_load(page_of_analysis: Dashboard, tmp_path: Path) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    content = b64encode(recorded("arducopter_steps.bin")).decode()
+    dropped = page.evaluate_handle(DROP, ["steps.bin", content])
+    page.get_by_role("heading", name="Log analysis").dispatch_event("drop", {"dataTransfer": dropped})
+    article = page.get_by_role("article", name="Analysis of steps.bin")
+    expect(article).to_contain_text("The proposed gains are predicted to deviate by", timeout=60_000)
+    expect(article).to_contain_text("thrust slope 1.00 ± 0.01")
+    rows = article.get_by_role("region", name="Gains compared").locator("tbody tr")
+    expect(rows).to_have_count(6)
+    expect(rows.nth(1)).to_contain_text("Proposed")
+    assert {one["meta"]["line"] for one in dashboard.traces("The flight and its prediction")} == {
+        "Reference",
+        "Flown",
+        "Predicted with the proposed gains",
+    }
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download parameter file").click()
+    assert download.value.suggested_filename == "steps.param"
+    lines = Path(download.value.path()).read_text().splitlines()
+    assert [line.split(",")[0] for line in lines] == ["PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I"]
+    proposed = rows.nth(1).locator("td").all_inner_texts()
+    assert [line.split(",")[1] for line in lines] == proposed[1:5]
+
+
+def test_a_log_that_cannot_be_analysed_is_refused_and_the_next_one_is_not(page_of_analysis: Dashboard) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    choose(dashboard, "takeoff.tlog.bin", recorded("paparazzi_283_13_82.tlog"))
+    expect(page.get_by_role("alert")).to_contain_text("only ArduPilot's .bin logs can be analysed")
+    choose(dashboard, "flight.bin", ardupilot_log(simulated_flight(GUSTY)))
+    expect(page.get_by_role("article", name="Analysis of flight.bin")).to_be_visible(timeout=60_000)
+    expect(page.get_by_role("alert")).to_have_count(0)
