@@ -19,6 +19,7 @@ from app.core.records.trajectory import Samples
 _SHORTEST_S: Final = 6.0
 _LEAST_CHANGE_M: Final = 0.3
 _LARGEST_SATURATION: Final = 0.05
+_LEAST_VARIATION: Final = 1e-6
 _OTHER_CONTROLLER_M_S: Final = 0.02
 _OTHER_CONTROLLER_SHARE: Final = 0.05
 _LARGEST_RESIDUAL_M_S2: Final = 1.5
@@ -88,6 +89,7 @@ def analyze(flight: LoggedFlight) -> Analysis:
     """
     behaviour = _behaviour(flight)
     _require_altitude_changes(behaviour)
+    _require_signals(flight)
     _require_own_controller(flight)
     estimate = fit_copter(flight)
     model = FlightModel(flight, estimate.draws)
@@ -167,6 +169,18 @@ def _require_altitude_changes(behaviour: Behaviour) -> None:
         )
     if behaviour.saturated_share > _LARGEST_SATURATION:
         raise _unanswered(f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows")
+
+
+def _require_signals(flight: LoggedFlight) -> None:
+    """Require that acceleration and throttle were measured: a constant is a message that nobody filled in."""
+    for each in flight.segments:
+        constant = [
+            name
+            for name, values in (("acceleration", each.a_m_s2), ("throttle", each.throttle_filtered))
+            if np.ptp(values) < _LEAST_VARIATION
+        ]
+        if constant:
+            raise _unanswered(f"has a constant {' and '.join(constant)}: nothing can be learned from it")
 
 
 def _require_own_controller(flight: LoggedFlight) -> None:

@@ -94,6 +94,14 @@ def test_a_throttle_at_its_limit_is_refused() -> None:
     assert "throttle at a limit in 1" in refusal(changed(flight, throttle=throttle))
 
 
+@pytest.mark.parametrize(("signal", "named"), [("a_m_s2", "acceleration"), ("throttle_filtered", "throttle")])
+def test_a_signal_that_nobody_recorded_is_refused(signal: str, named: str) -> None:
+    flight = simulated_flight()
+    (segment,) = flight.segments
+    constant = np.full(len(segment.time_s), 0.4)
+    assert refusal(changed(flight, **{signal: constant})) == f"has a constant {named}: nothing can be learned from it"
+
+
 def test_another_controller_is_refused() -> None:
     flight = simulated_flight()
     (segment,) = flight.segments
