@@ -175,6 +175,7 @@ def test_gains_that_have_flown_may_fly_again_although_simulated_takeoffs_go_astr
     assert {"bounds", "wrapping"} <= {one.name for one in wrapping.refusals}
 
 
+@compiled_only
 def test_the_step_of_a_gain_outside_its_bounds_is_that_to_the_bound() -> None:
     """Its distance in percent of the range says nothing: the bound is what refuses it."""
     result = check_policy(Definition(step_fraction=1.0), TAKEOFF, SPACE, DEFAULT | {"kp": 99999}, [fly(1, DEFAULT)])
