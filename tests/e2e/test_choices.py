@@ -92,3 +92,15 @@ def test_an_answer_about_earlier_gains_never_stands_beside_newer_ones(dashboard:
     expect(dashboard.page.get_by_text(re.compile("^Predicted error"))).to_be_visible()
     expect(dashboard.fly_button).to_be_enabled()
     assert dashboard.trials(campaign_id)[1:] == []
+
+
+def test_gains_without_a_prediction_take_its_curve_away_and_no_other(dashboard: Dashboard, states: States) -> None:
+    dashboard.open_campaign(states.campaign(strategy="calibrated", stop=PATIENT, flights=2))
+    chart = dashboard.panel("Takeoff curves")
+    predicted, flown = (chart.locator(f"[class*=trace{role}] path.js-line") for role in ("prediction", "flight-"))
+    expect(flown).to_have_count(2)
+    dashboard.choose("Custom gains")
+    for gain, is_predicted in (("701", True), ("99999", False), ("702", True), ("88888", False)):
+        dashboard.page.get_by_role("textbox", name="kp").fill(gain)
+        expect(predicted).to_have_count(int(is_predicted))
+        expect(flown).to_have_count(2)

@@ -28,7 +28,7 @@ from app.core.experiments.takeoff_hazards import MODELS, check_flights, check_wr
 from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, observe
 from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
-from app.core.records.metrics import mean_absolute_error, require_scorable
+from app.core.records.metrics import mean_absolute_error, mean_absolute_errors, require_scorable
 from app.core.records.trajectory import Samples, Trajectory
 
 TARGET_M: Final = 3.0
@@ -235,8 +235,7 @@ class Takeoff:
 
     def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute altitude error, m, over the window: (k, n) → (k,)."""
-        time_s = self.grid_s
-        return np.array([mean_absolute_error(time_s, row, self.set_point, 0.0, self.window_s) for row in outputs])
+        return mean_absolute_errors(self.grid_s, outputs, self.set_point, 0.0, self.window_s)
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same for a recorded flight. Raises TrajectoryError if it has gaps or does not cover the window."""

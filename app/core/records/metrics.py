@@ -20,11 +20,18 @@ def mean_absolute_error(time_s: Samples, values: Samples, set_point: SetPoint, s
 
     The ends are interpolated; outside the samples the nearest value holds.
     """
+    return float(mean_absolute_errors(time_s, values[np.newaxis], set_point, start_s, stop_s)[0])
+
+
+def mean_absolute_errors(
+    time_s: Samples, values: Samples, set_point: SetPoint, start_s: float, stop_s: float
+) -> Samples:
+    """The same for many records on the same time stamps: (k, n) → (k,)."""
     inside = (time_s > start_s) & (time_s < stop_s)
     instants = np.concatenate(([start_s], time_s[inside], [stop_s]))
-    first, last = np.interp((start_s, stop_s), time_s, values)
-    deviations = np.abs(set_point(instants) - np.concatenate(([first], values[inside], [last])))
-    return float(np.trapezoid(deviations, instants)) / (stop_s - start_s)
+    ends = np.array([np.interp((start_s, stop_s), time_s, row) for row in values]).reshape(-1, 2)
+    found = np.concatenate((ends[:, :1], np.compress(inside, values, axis=1), ends[:, 1:]), axis=1)
+    return np.asarray(np.trapezoid(np.abs(set_point(instants) - found), instants) / (stop_s - start_s))
 
 
 def overshoot(time_s: Samples, values: Samples, set_point: SetPoint) -> float | None:

@@ -9,6 +9,7 @@ import {
   CONFIG,
   type CurveOf,
   drawLive,
+  drawPrediction,
   followPointing,
   listen,
   loadPlotly,
@@ -31,7 +32,7 @@ interface Props {
   /** Called on a double click, which also undoes the zoom. */
   onReset?: (() => void) | undefined;
   curveOf?: CurveOf | undefined;
-  /** Drawn in place of the figure's own prediction; null for that. A change of it alone is drawn at once. */
+  /** Drawn in place of the figure's own prediction; null for that. A change of it alone redraws no other curve. */
   prediction?: DrawnPrediction | null | undefined;
   /** Build of the chart library; constant for the lifetime of the chart. */
   build?: Build | undefined;
@@ -70,6 +71,8 @@ export function Chart({
   const [broken, setBroken] = useState<string | null>(null);
   const queue = useRef<Promise<unknown>>(Promise.resolve());
   const drawnFigure = useRef<PlotlyFigure | null>(null);
+  const latestPrediction = useRef(prediction);
+  latestPrediction.current = prediction;
 
   useEffect(() => {
     const target = element.current;
@@ -81,10 +84,11 @@ export function Chart({
         if (drawnFigure.current !== figure) await afterPaint();
         if (!wanted) return;
         drawnFigure.current = figure;
+        const predicted = latestPrediction.current;
         await library.react(
           target,
           withLive(
-            prediction === undefined ? figure.data : withPrediction(figure.data, prediction),
+            predicted === undefined ? figure.data : withPrediction(figure.data, predicted),
             liveNow(liveTrial),
           ),
           layoutFor(figure, target.clientWidth),
@@ -100,7 +104,19 @@ export function Chart({
     return () => {
       wanted = false;
     };
-  }, [figure, prediction, liveTrial, onChoose, onPlace, onWindow, onReset, build]);
+  }, [figure, liveTrial, onChoose, onPlace, onWindow, onReset, build]);
+
+  useEffect(() => {
+    const target = element.current;
+    if (target === null || plotly === null || prediction === undefined) return;
+    let wanted = true;
+    queue.current = queue.current.then(async () => {
+      if (wanted && drawnFigure.current === figure) await drawPrediction(plotly, target, figure.data, prediction);
+    });
+    return () => {
+      wanted = false;
+    };
+  }, [plotly, figure, prediction]);
 
   useEffect(() => {
     const target = element.current;

@@ -6,7 +6,17 @@ import { onLive } from "../live/store";
 import type { LiveFlight } from "../live/telemetry";
 import { throttled } from "../ui/throttle";
 import { onPointed, pointAt } from "./pointing";
-import { flightAt, liveCurves, marksOver, roomFor, type Trace, traceWithRole, windowFrom } from "./traces";
+import {
+  type DrawnPrediction,
+  flightAt,
+  liveCurves,
+  marksOver,
+  predictedCurves,
+  roomFor,
+  type Trace,
+  traceWithRole,
+  windowFrom,
+} from "./traces";
 
 const BUILDS = {
   /** Lines and markers, enough for nearly every chart, and a fifth smaller than the full build. */
@@ -51,6 +61,7 @@ interface Point {
 }
 
 export interface PlotlyElement extends HTMLElement {
+  data?: Trace[];
   layout?: { yaxis?: { range?: [number, number] } };
   on?(event: "plotly_click" | "plotly_hover", listener: (event: { points: Point[] }) => void): void;
   on?(event: "plotly_unhover" | "plotly_doubleclick", listener: () => void): void;
@@ -156,6 +167,22 @@ export function followPointing(
     unfollow();
     clearTimeout(dwelling);
   };
+}
+
+const AT_ONCE = { mode: "immediate", frame: { duration: 0, redraw: false }, transition: { duration: 0 } } as const;
+
+/** Draw another prediction with its band. While it only moves, no other curve is drawn again. */
+export async function drawPrediction(
+  plotly: Plotly,
+  chart: PlotlyElement,
+  traces: readonly Trace[],
+  prediction: DrawnPrediction | null,
+): Promise<void> {
+  const drawn = predictedCurves(traces, prediction);
+  const [places, curves] = [[...drawn.keys()], [...drawn.values()]];
+  const onlyMoves = curves.every(({ x }, index) => x.length > 0 && chart.data?.[places[index] as number]?.x?.length);
+  if (onlyMoves) await plotly.animate(chart, { data: curves, traces: places }, AT_ONCE);
+  else await plotly.update(chart, { x: curves.map(({ x }) => x), y: curves.map(({ y }) => y) }, {}, places);
 }
 
 /** Extend the live traces with the telemetry of a trial; returns the unsubscribe function. */

@@ -7,6 +7,11 @@ declare module "plotly.js-basic-dist-min" {
       layout: Record<string, unknown>,
       traces: number[],
     ): Promise<unknown>;
+    animate(
+      element: HTMLElement,
+      frame: { data: Record<string, unknown>[]; traces: number[] },
+      options: Record<string, unknown>,
+    ): Promise<unknown>;
     downloadImage(figure: unknown, options: Record<string, unknown>): Promise<string>;
     purge(element: HTMLElement): void;
     Fx: {

@@ -79,15 +79,26 @@ export interface DrawnPrediction {
   upper: Points;
 }
 
-/** The traces with another predicted curve and band; with the figure's own for null. */
+/** The predicted curve and the edges of its band, by the place of the trace that shows each; the figure's for null. */
+export function predictedCurves(
+  traces: readonly Trace[],
+  prediction: DrawnPrediction | null,
+): Map<number, { x: unknown[]; y: unknown[] }> {
+  const curves = new Map<number, { x: unknown[]; y: unknown[] }>();
+  traces.forEach(({ meta, x, y }, place) => {
+    if (meta?.role !== "prediction" && meta?.role !== "band") return;
+    const points = prediction === null ? { time_s: x, values: y } : prediction[meta.edge ?? "curve"];
+    curves.set(place, { x: points?.time_s ?? [], y: points?.values ?? [] });
+  });
+  return curves;
+}
+
+/** The traces with another predicted curve and band, named by their role; with the figure's own for null. */
 export function withPrediction(traces: readonly Trace[], prediction: DrawnPrediction | null): Trace[] {
-  return traces.map((trace) => {
+  const curves = predictedCurves(traces, prediction);
+  return traces.map((trace, place) => {
     const { role, edge } = trace.meta ?? {};
-    if (role !== "prediction" && role !== "band") return trace;
-    const named = { ...trace, uid: edge === undefined ? role : `${role}-${edge}` };
-    if (prediction === null) return named;
-    const points = prediction[edge ?? "curve"];
-    return { ...named, x: points?.time_s ?? [], y: points?.values ?? [] };
+    return curves.has(place) ? { ...trace, ...curves.get(place), uid: edge ? `${role}-${edge}` : role } : trace;
   });
 }
 
