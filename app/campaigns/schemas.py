@@ -22,12 +22,23 @@ from app.common.schemas import (
 )
 from app.common.states import CampaignState, Outcome
 from app.core.statistics.comparisons import Verdict
+from app.core.tuning.definition_checks import (
+    MAX_CEILING_M,
+    MAX_FLIGHTS,
+    MAX_IMPROVEMENT,
+    MAX_SEED,
+    MIN_CEILING_M,
+    MIN_CONFIDENCE,
+)
 from app.core.tuning.proposals import AdviceKind
 from app.core.tuning.strategies import recommended_strategy
 from app.core.tuning.strategy import Explanation, Kind
 from app.fleet.schemas import CampaignVehicle, VehicleChoice
 
-Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
+# The ranges of a definition are documented here and checked in app.core.tuning.definition_checks with everything else,
+# so that one answer names every wrong field.
+Fraction = Annotated[Number, Field(json_schema_extra={"exclusiveMinimum": 0, "maximum": 1})]
+Whole = Annotated[int, Field(strict=True)]
 Key = Annotated[str, Field(max_length=40)]
 VERDICT: Final = (
     "verdict of the best gains against the first flight's; null while they are the same or no flight is valid"
@@ -69,10 +80,10 @@ class StopRule(Request):
     flight that ends below `min_battery_v` ends it."""
 
     kind: Literal["noise", "paper", "budget"] = "noise"
-    max_flights: Annotated[int, Field(strict=True, ge=1, le=200)] = 7
-    improvement: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=0.5)] = 0.05
-    confidence: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.5, lt=1)] = 0.9
-    min_battery_v: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)] | None = None
+    max_flights: Annotated[Whole, Field(json_schema_extra={"minimum": 1, "maximum": MAX_FLIGHTS})] = 7
+    improvement: Annotated[Number, Field(json_schema_extra={"minimum": 0, "maximum": MAX_IMPROVEMENT})] = 0.05
+    confidence: Annotated[Number, Field(json_schema_extra={"minimum": MIN_CONFIDENCE, "exclusiveMaximum": 1})] = 0.9
+    min_battery_v: Annotated[Number, Field(json_schema_extra={"exclusiveMinimum": 0})] | None = None
 
 
 def _recommended_strategy(definition: dict[str, object]) -> str:
@@ -97,9 +108,9 @@ class Definition(Request):
     bounds: dict[str, tuple[Number, Number]] = Field(default_factory=dict)
     first_step_fraction: Fraction = 0.25
     step_fraction: Fraction = 1.0
-    ceiling_m: Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)] = 4.5
+    ceiling_m: Annotated[Number, Field(json_schema_extra={"minimum": MIN_CEILING_M, "maximum": MAX_CEILING_M})] = 4.5
     stop: StopRule = Field(default_factory=StopRule)
-    seed: Annotated[int, Field(strict=True, ge=0, le=2**53 - 1)] = 1
+    seed: Annotated[Whole, Field(json_schema_extra={"minimum": 0, "maximum": MAX_SEED})] = 1
 
 
 class NewCampaign(Request):

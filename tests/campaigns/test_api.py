@@ -100,10 +100,24 @@ def test_everything_wrong_is_named_at_once(client: TestClient) -> None:
         json={
             "name": "a",
             "vehicle": {"kind": "twin", "options": {"colour": "red"}},
-            "definition": {"strategy": "guessing", "bounds": {"kq": [0, 1]}},
+            "definition": {
+                "strategy": "guessing",
+                "bounds": {"kq": [0, 1]},
+                "start": {"kind": "given", "gains": {"kp": -1, "ki": 13, "kd": 82}},
+                "stop": {"max_flights": 0, "confidence": 1},
+                "ceiling_m": 1,
+            },
         },
     )
-    assert set(problems_of(answer)) == {"definition.strategy", "definition.bounds.kq", "vehicle.options.colour"}
+    assert set(problems_of(answer)) == {
+        "vehicle.options.colour",
+        "definition.strategy",
+        "definition.bounds.kq",
+        "definition.start.gains.kp",
+        "definition.stop.max_flights",
+        "definition.stop.confidence",
+        "definition.ceiling_m",
+    }
 
 
 def test_a_campaign_can_be_renamed_and_redefined_before_its_first_flight(

@@ -15,6 +15,8 @@ MAX_IMPROVEMENT: Final = 0.5
 MIN_CEILING_M: Final = 3.2
 MAX_CEILING_M: Final = 100.0
 MIN_CONFIDENCE: Final = 0.5
+MAX_SEED: Final = 2**53 - 1
+"""Highest whole number up to which a JSON number is exact."""
 
 
 def check_definition(definition: Definition) -> None:
@@ -77,15 +79,18 @@ def _without_model(definition: Definition) -> Iterator[Problem]:
         yield Problem("start.kind", f"'simplex' needs a model, and {lacks}: choose 'default' or 'given'")
 
 
-def _policy(definition: Definition) -> tuple[Problem, ...]:
+def _policy(definition: Definition) -> Iterator[Problem]:
     if definition.experiment not in EXPERIMENTS:
-        return ()
+        return
+    space = EXPERIMENTS[definition.experiment].space
     try:
-        space = EXPERIMENTS[definition.experiment].space.narrowed(definition.bounds)
+        space = space.narrowed(definition.bounds)
+    except InputError as error:
+        yield from error.problems
+    try:
         _check_start(definition, space)
     except InputError as error:
-        return error.problems
-    return ()
+        yield from error.problems
 
 
 def _check_start(definition: Definition, space: PolicySpace) -> None:
@@ -145,5 +150,5 @@ def _stop(rule: StopRule) -> Iterator[Problem]:
 
 
 def _seed(seed: int) -> Iterator[Problem]:
-    if seed < 0:
-        yield Problem("seed", f"must not be negative, got {seed}")
+    if not 0 <= seed <= MAX_SEED:
+        yield Problem("seed", f"must be between 0 and {MAX_SEED}, got {seed}")

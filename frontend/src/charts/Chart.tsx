@@ -87,10 +87,7 @@ export function Chart({
         const predicted = latestPrediction.current;
         await library.react(
           target,
-          withLive(
-            predicted === undefined ? figure.data : withPrediction(figure.data, predicted),
-            liveNow(liveTrial),
-          ),
+          withLive(predicted === undefined ? figure.data : withPrediction(figure.data, predicted), liveNow(liveTrial)),
           layoutFor(figure, target.clientWidth),
           CONFIG,
         );

@@ -76,7 +76,7 @@ def test_the_default_definition_has_no_problems() -> None:
         (replace(GOOD, stop=StopRule(max_flights=201)), "stop.max_flights", "must be between 1 and 200, got 201"),
         (replace(GOOD, stop=StopRule(improvement=0.51)), "stop.improvement", "must be between 0 and 0.5, got 0.51"),
         (replace(GOOD, stop=StopRule(improvement=math.nan)), "stop.improvement", "must be between 0 and 0.5, got nan"),
-        (replace(GOOD, seed=-1), "seed", "must not be negative, got -1"),
+        (replace(GOOD, seed=-1), "seed", "must be between 0 and 9007199254740991, got -1"),
     ],
 )
 def test_each_unusable_field_is_named_with_its_reason(definition: Definition, field: str, reason: str) -> None:
@@ -84,7 +84,11 @@ def test_each_unusable_field_is_named_with_its_reason(definition: Definition, fi
 
 
 def test_all_problems_are_reported_at_once() -> None:
+    start = Start(kind="given", gains={"kp": -1, "ki": 13, "kd": 82})
     with pytest.raises(InputError) as refusal:
-        check_definition(replace(GOOD, strategy="luck", seed=-1, step_fraction=0.0))
-    assert [problem.field for problem in refusal.value.problems] == ["strategy", "step_fraction", "seed"]
+        check_definition(
+            replace(GOOD, strategy="luck", seed=-1, step_fraction=0.0, bounds={"ki": (9.0, 3.0)}, start=start)
+        )
+    fields = [problem.field for problem in refusal.value.problems]
+    assert fields == ["strategy", "bounds.ki", "start.gains.kp", "step_fraction", "seed"]
     assert refusal.value.hint
