@@ -57,8 +57,12 @@ def check_bounds(space: PolicySpace, gains: Gains) -> tuple[Check, ...]:
     return refused or (Check("bounds", True, "Every gain lies within its bounds.", worst=0.0, limit=0.0),)
 
 
-def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fraction: float, origin: str) -> Check:
-    """Check the largest change of a gain from the nearest of `references`, a share of its range, against `fraction`."""
+def check_step(space: PolicySpace, asked: Gains, references: Sequence[Gains], fraction: float, origin: str) -> Check:
+    """Check the largest change of a gain from the nearest of `references`, a share of its range, against `fraction`.
+
+    The change of a gain outside its bounds is that to the bound.
+    """
+    gains = space.mapping(space.nearest(space.vector(asked)))
     nearest = min(references, key=lambda reference: max(space.change(gains, reference).values()))
     name, worst = max(space.change(gains, nearest).items(), key=lambda item: item[1])
     base = space.vector(nearest)
@@ -66,7 +70,8 @@ def check_step(space: PolicySpace, gains: Gains, references: Sequence[Gains], fr
     vector = space.vector(gains)
     passed = worst <= fraction or bool(((low <= vector) & (vector <= high)).all())
     sentence = (
-        f"{name} changes most, by {percent(worst, 1)} of its range; "
+        f"{name} changes most, by {percent(worst, 1)} of its range"
+        f"{'' if gains[name] == asked[name] else ' to its bound'}; "
         f"{'at most' if passed else 'only'} {percent(fraction)} is allowed from {origin}."
     )
     beyond = {} if passed else space.mapping(space.nearest(vector.clip(low, high)))
@@ -146,8 +151,7 @@ def check_policy(
     )
     if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
         hazards = tuple(_flown_before(check) for check in hazards)
-    inside = space.mapping(space.nearest(space.vector(gains)))
-    limits = (*check_bounds(space, gains), _step(definition, experiment, space, inside, flights, start))
+    limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
     return GateResult(jointly_offered(gains, (*limits, *hazards)))
 
 

@@ -218,7 +218,7 @@ class GainStore:
             title="Gains",
             passed=held == self.wanted,
             found=found or written(held),
-            needed=written(self.wanted),
+            needed=written({name: self.wanted[name] for name in held or self.wanted}),
             hint="" if held == self.wanted else "Restore its safe gains, then stage again.",
         )
 

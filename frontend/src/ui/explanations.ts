@@ -17,6 +17,12 @@ export const EXPLANATIONS = explained({
       "Lower is better. Zero is impossible because climbing takes time: the reference trajectory itself scores 0.091 m.",
     ],
   },
+  altitude: {
+    question: "What does the altitude count from?",
+    answer: [
+      "On the ground it is the vehicle's own altitude, whose zero may lie above or below the ground. From the takeoff command on it counts from the ground on which the vehicle stood.",
+    ],
+  },
   errorSoFar: {
     question: "What is the error so far?",
     answer: [

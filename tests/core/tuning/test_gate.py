@@ -181,3 +181,10 @@ def test_the_step_of_a_gain_outside_its_bounds_is_that_to_the_bound() -> None:
     result = check_policy(Definition(step_fraction=1.0), TAKEOFF, SPACE, DEFAULT | {"kp": 99999}, [fly(1, DEFAULT)])
     assert [check.name for check in result.refusals if check.name in {"bounds", "step"}] == ["bounds"]
     assert next(check.offer for check in result.refusals if check.name == "bounds") == {"kp": 4000}
+
+
+@compiled_only
+def test_the_sentence_says_that_the_step_is_that_to_the_bound() -> None:
+    assert check("step", DEFAULT | {"kp": 99999}).sentence.startswith(
+        "kp changes most, by 92.9\u00a0% of its range to its bound;"
+    )

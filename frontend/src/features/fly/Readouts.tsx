@@ -76,6 +76,7 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
       <dl className={classes["row"]}>
         <Reading
           title={stale ? `${reading.title}, last known` : reading.title}
+          {...(reading.unit === "m" && { topic: "altitude" as const })}
           value={withUnit(stale ? lastOutput : output, reading.unit, reading.digits)}
           size="huge"
           stale={stale}
