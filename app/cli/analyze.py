@@ -13,7 +13,7 @@ from app.cli.files import unreadable_error
 from app.common.errors import InputError, Problem
 from app.core.analysis.analysis import Analysis, Assessment, analyze
 from app.core.analysis.margin import EXTRA_LAG_S, LARGEST_MARGIN, REQUIRED_MARGIN
-from app.core.analysis.proposal import BOUNDS, LARGEST_ACTIVITY
+from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.formatting import percent
 from app.logs.ardupilot_flight import read_ardupilot_flight
@@ -60,12 +60,12 @@ def _print(out: Console, file: Path, analysis: Analysis, parameters: Parameters)
         )
     present, *others = analysis.assessments
     listed = [present, *([analysis.proposed] if analysis.proposed else []), *others]
-    columns = ("gains", *BOUNDS, "predicted error", "90 % interval", "throttle activity", "margin")
+    columns = ("gains", *present.gains, "predicted error", "90 % interval", "throttle activity", "margin")
     out.print(table(columns, [_row(each) for each in listed], title="This flight with other gains"))
     out.print(
         f"Throttle activity is relative to the gains flown, at most {LARGEST_ACTIVITY:g} in a proposal. The margin is "
-        f"the factor on PSC_ACCZ_P and I at which the loop rings with {1e3 * EXTRA_LAG_S:.0f} ms more lag, at least "
-        f"{REQUIRED_MARGIN:g} in a proposal."
+        "the factor on P and I of the acceleration controller at which the loop rings with "
+        f"{1e3 * EXTRA_LAG_S:.0f} ms more lag, at least {REQUIRED_MARGIN:g} in a proposal."
     )
     if analysis.insufficient:
         out.print(escape(analysis.insufficient))
@@ -76,7 +76,7 @@ def _row(each: Assessment) -> tuple[str, ...]:
     margin = "rings" if not each.margin else f"{each.margin:.1f}" if each.margin < LARGEST_MARGIN else "> 8"
     return (
         each.name,
-        *(f"{each.gains[name]:g}" for name in BOUNDS),
+        *(f"{value:g}" for value in each.gains.values()),
         f"{1e3 * predicted.error_m:.1f} mm",
         f"{1e3 * predicted.low_m:.1f} … {1e3 * predicted.high_m:.1f} mm",
         f"{each.activity:.2f}",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.analysis.flight import LoggedFlight, Segment
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, UNSUPPORTED, parameters_from
+from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, UNSUPPORTED, in_older_names, parameters_from
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
@@ -31,6 +31,7 @@ _RATES_HZ: Final = (50.0, 2000.0)
 _FILTER_HZ: Final = 20.0
 _FILTERS_HZ: Final = (2.0, 100.0)
 _LEARNED: Final = "MOT_THST_HOVER"
+_NEWER_NAME: Final = "PSC_D_POS_P"
 
 
 def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
@@ -61,12 +62,13 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
     chosen = sorted(_most_change(alike, up["DPD"], time_s))
     given = values[most]
     if "PSC_POSZ_P" not in given:
-        raise _refused(name, "PSC_POSZ_P", "is missing: only releases with this parameter (4.0 to 4.6) can be analysed")
+        raise _refused(name, "PSC_POSZ_P", f"is missing, and {_NEWER_NAME} of release 4.7 too")
     hover = float(np.median(np.concatenate([throttle["ThH"][slice(*part)] for part in chosen])))
     rate_hz, filter_hz = given.get("SCHED_LOOP_RATE", _RATE_HZ), given.get("INS_ACCEL_FILTER", _FILTER_HZ)
     return LoggedFlight(
         parameters=parameters_from({**given, _LEARNED: hover}),
         filter_hz=filter_hz if _FILTERS_HZ[0] <= filter_hz <= _FILTERS_HZ[1] else _FILTER_HZ,
+        has_newer_names=_has_newer_names(tables),
         step_s=1.0 / (rate_hz if _RATES_HZ[0] <= rate_hz <= _RATES_HZ[1] else _RATE_HZ),
         segments=[_segment(time_s, up, throttle, slice(*part)) for part in chosen],
     )
@@ -148,12 +150,16 @@ def _parameter_changes(tables: Mapping[str, Table]) -> list[tuple[float, Mapping
     values: dict[str, float] = {}
     changes: list[tuple[float, Mapping[str, float]]] = []
     at_s = (numbers(table["TimeUS"]) / 1e6).tolist()
-    for time_s, raw, value in zip(at_s, table["Name"], numbers(table["Value"]).tolist(), strict=True):
-        name = bytes(raw).partition(b"\0")[0].decode("ascii", "replace")
+    for time_s, raw, logged in zip(at_s, table["Name"], numbers(table["Value"]).tolist(), strict=True):
+        name, value = in_older_names(bytes(raw).partition(b"\0")[0].decode("ascii", "replace"), logged)
         if name in wanted and np.isfinite(value) and values.get(name) != value:
             values = {**values, name: value}
             changes.append((time_s, values))
     return changes
+
+
+def _has_newer_names(tables: Mapping[str, Table]) -> bool:
+    return any(bytes(raw).partition(b"\0")[0] == _NEWER_NAME.encode() for raw in tables.get("PARM", {}).get("Name", ()))
 
 
 def _values_at(changes: list[tuple[float, Mapping[str, float]]], time_s: float) -> Mapping[str, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.control.ardupilot_log import LoopLog
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, UNSUPPORTED, parameters_from
+from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, UNSUPPORTED, in_older_names, parameters_from
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
@@ -45,7 +45,7 @@ def read_ardupilot_log(stream: BinaryIO, *, name: str) -> LoopLog:
     time_s = time_s[rows]
     values = _values(tables, float(time_s[0]))
     if "PSC_POSZ_P" not in values:
-        raise _refused(name, "PSC_POSZ_P", "is missing: the replica is of the release that has this parameter")
+        raise _refused(name, "PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
     rate_hz = values.get("SCHED_LOOP_RATE", _RATE_HZ)
     control, tuning = (_beside(tables.get(each, {}), time_s) for each in ("PIDA", "CTUN"))
     return LoopLog(
@@ -87,8 +87,13 @@ def _values(tables: Mapping[str, Table], until_s: float) -> dict[str, float]:
         return {}
     wanted = {*FIRMWARE_NAMES, *UNSUPPORTED, "SCHED_LOOP_RATE", "GUID_OPTIONS"}
     names = [bytes(raw).partition(b"\0")[0].decode("ascii", "replace") for raw in table["Name"]]
-    logged = zip(numbers(table["TimeUS"]).tolist(), names, numbers(table["Value"]).tolist(), strict=True)
-    return {each: value for at_us, each, value in logged if at_us <= 1e6 * until_s and each in wanted}
+    values = numbers(table["Value"]).tolist()
+    logged = dict(
+        in_older_names(each, value)
+        for at_us, each, value in zip(numbers(table["TimeUS"]).tolist(), names, values, strict=True)
+        if at_us <= 1e6 * until_s
+    )
+    return {each: value for each, value in logged.items() if each in wanted}
 
 
 def _targets(tables: Mapping[str, Table], values: Mapping[str, float]) -> list[tuple[float, float]]:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 from app.cli.commands import app
 from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
 from tests.logs.recorded import recorded
-from tests.logs.written import PARAMETERS, ardupilot_log
+from tests.logs.written import NEWER_PARAMETERS, PARAMETERS, ardupilot_log
 
 
 def analyze(*arguments: str | Path) -> Result:
@@ -38,6 +38,22 @@ def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_pa
     assert found["vehicle"]["mean"]["thrust_slope"] == pytest.approx(1.0, abs=0.01)
     lines = parameters.read_text().splitlines()
     assert {line.split(",")[0]: float(line.split(",")[1]) for line in lines} == pytest.approx(gains)
+
+
+def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path) -> None:
+    older, newer = tmp_path / "older.bin", tmp_path / "newer.bin"
+    flight = simulated_flight(QUIET)
+    older.write_bytes(ardupilot_log(flight, parameters=PARAMETERS))
+    newer.write_bytes(ardupilot_log(flight, parameters=NEWER_PARAMETERS))
+    files = [tmp_path / "older.param", tmp_path / "newer.param"]
+    outputs = [analyze(log, "--params", file).output for log, file in zip((older, newer), files, strict=True)]
+    assert "P = hover throttle, I = 2 P" in outputs[0]
+    assert "P = 0.1 hover throttle, I = 2 P" in outputs[1]
+    assert "2, 7, 0.1, 0.2" in outputs[1]
+    values = [[float(line.split(",")[1]) for line in file.read_text().splitlines()] for file in files]
+    names = [line.split(",")[0] for line in files[1].read_text().splitlines()]
+    assert names == ["PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I"]
+    assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3]])
 
 
 def test_the_document_alone_can_be_printed(steps: Path) -> None:

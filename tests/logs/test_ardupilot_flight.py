@@ -12,7 +12,7 @@ from app.core.errors import InputError, TrajectoryError
 from app.logs.ardupilot_flight import read_ardupilot_flight
 from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.logs.recorded import recorded
-from tests.logs.written import GUIDED, LAND, LANDED, LOITER, NOT_LANDED, PARAMETERS, STABILIZE, ardupilot_log
+from tests.logs.written import GUIDED, LAND, LANDED, LOITER, NEWER_PARAMETERS, NOT_LANDED, PARAMETERS, STABILIZE, ardupilot_log
 
 FLIGHT = simulated_flight(GUSTY)
 
@@ -51,6 +51,13 @@ def test_a_simulated_flight_is_read_as_it_was_flown() -> None:
         assert np.asarray(getattr(segment, name)) == pytest.approx(getattr(flown, name), rel=1e-6, abs=1e-6), name
     assert flight.parameters.hover_throttle == pytest.approx(0.35)
     assert replace(flight.parameters, hover_throttle=0.35) == Parameters()
+
+
+def test_parameters_of_release_4_7_are_read_by_their_new_names_and_units() -> None:
+    older, newer = (read(ardupilot_log(FLIGHT, parameters=each)) for each in (PARAMETERS, NEWER_PARAMETERS))
+    assert (older.has_newer_names, newer.has_newer_names) == (False, True)
+    assert newer.parameters == older.parameters
+    assert newer.named({"PSC_ACCZ_P": 0.5}) == {"PSC_D_ACC_P": 0.05}
 
 
 def test_every_mode_that_holds_altitude_counts_and_landing_does_not() -> None:
@@ -116,9 +123,10 @@ def test_a_missing_message_is_named_with_what_to_switch_on(message: bytes, reaso
     assert refusal(content) == (message.decode(), reason)
 
 
-def test_a_release_with_other_parameters_is_named() -> None:
+def test_a_log_without_the_gains_is_refused_by_both_of_their_names() -> None:
     without = {name: value for name, value in PARAMETERS.items() if name != "PSC_POSZ_P"}
-    assert refusal(ardupilot_log(FLIGHT, parameters=without))[0] == "PSC_POSZ_P"
+    refused = refusal(ardupilot_log(FLIGHT, parameters=without))
+    assert refused == ("PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
     assert refusal(ardupilot_log(FLIGHT).replace(b"PARM", b"XARM"))[0] == "PSC_POSZ_P"
 
 

@@ -20,6 +20,19 @@ PARAMETERS: Mapping[str, float] = {
     "INS_ACCEL_FILTER": 20.0,
 }
 
+NEWER_PARAMETERS: Mapping[str, float] = {
+    "PSC_D_POS_P": 1.0,
+    "PSC_D_VEL_P": 5.0,
+    "PSC_D_ACC_P": 0.05,
+    "PSC_D_ACC_I": 0.1,
+    "PSC_D_ACC_IMAX": 0.8,
+    "WP_SPD_UP": 2.5,
+    "MOT_THST_HOVER": 0.35,
+    "SCHED_LOOP_RATE": 400.0,
+    "INS_ACCEL_FILTER": 20.0,
+}
+"""The same values by the names and in the units of release 4.7."""
+
 
 def ardupilot_log(
     flight: LoggedFlight,

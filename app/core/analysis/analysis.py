@@ -46,8 +46,10 @@ class Behaviour:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assessment:
-    """A gain set on the copters that the flight allows. `activity` is relative to the gains of the flight; `margin` is
-    the least of those copters, 0 if one rings."""
+    """A gain set on the copters that the flight allows, by the names of the vehicle's release.
+
+    `activity` is relative to the gains of the flight; `margin` is the least of those copters, 0 if one rings.
+    """
 
     name: str
     gains: Mapping[str, float]
@@ -95,16 +97,17 @@ def analyze(flight: LoggedFlight) -> Analysis:
     model = FlightModel(flight, estimate.draws)
     present = _assess("As flown", _gains_of(flight), flight, model, estimate)
     _require_likeness(behaviour, estimate, present)
-    compared = [present, *(_assess(name, gains, flight, model, estimate) for name, gains in rules(flight).items())]
+    usual = rules(flight)
+    compared = [present, *(_assess(name, gains, flight, model, estimate) for name, gains in usual.items())]
     insufficient = _insufficient(estimate)
-    gains = None if insufficient else propose(flight, estimate.few, [each.gains for each in compared])
+    gains = None if insufficient else propose(flight, estimate.few, [_gains_of(flight), *usual.values()])
     return Analysis(
         behaviour=behaviour,
         estimate=estimate,
         assessments=tuple(compared),
         proposed=_assess("Proposed", gains, flight, model, estimate) if gains else None,
         insufficient=insufficient or (None if gains else _NONE_ALLOWED),
-        response=_response(flight, estimate, gains or present.gains),
+        response=_response(flight, estimate, gains or _gains_of(flight)),
     )
 
 
@@ -132,13 +135,17 @@ def rules(flight: LoggedFlight) -> dict[str, dict[str, float]]:
     """Gains that are set without a model, by name: the firmware's defaults, the rule of its documentation, two fixed
     sets."""
     hover = flight.throttle_mean
-    sets = {
-        "ArduCopter's defaults": (1.0, 5.0, 0.5, 1.0),
-        "P = hover throttle, I = 2 P": (1.0, 5.0, float(f"{hover:.2g}"), float(f"{2.0 * hover:.2g}")),
-        "2, 7, 1, 2": (2.0, 7.0, 1.0, 2.0),
-        "3, 8, 0.5, 3": (3.0, 8.0, 0.5, 3.0),
+    by_hover = _with_names((1.0, 5.0, float(f"{hover:.2g}"), float(f"{2.0 * hover:.2g}")))
+    fixed = [_with_names(values) for values in ((2.0, 7.0, 1.0, 2.0), (3.0, 8.0, 0.5, 3.0))]
+    return {
+        "ArduCopter's defaults": _with_names((1.0, 5.0, 0.5, 1.0)),
+        f"P = {'0.1 ' if flight.has_newer_names else ''}hover throttle, I = 2 P": by_hover,
+        **{", ".join(f"{value:g}" for value in flight.named(gains).values()): gains for gains in fixed},
     }
-    return {name: dict(zip(BOUNDS, values, strict=True)) for name, values in sets.items()}
+
+
+def _with_names(values: Sequence[float]) -> dict[str, float]:
+    return dict(zip(BOUNDS, values, strict=True))
 
 
 def _gains_of(flight: LoggedFlight) -> dict[str, float]:
@@ -231,7 +238,7 @@ def _assess(
     margins = [gain_margin(parameters, each, filter_hz=flight.filter_hz, step_s=flight.step_s) for each in estimate.few]
     return Assessment(
         name=name,
-        gains=dict(gains),
+        gains=flight.named(gains),
         prediction=prediction,
         activity=prediction.activity / model.fly(flight.parameters)[1],
         margin=min(margins),

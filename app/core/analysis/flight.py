@@ -1,13 +1,13 @@
 """A flight as ArduCopter's log holds it, and its signals at every step of the loop."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.ardupilot_parameters import Parameters
+from app.core.control.ardupilot_parameters import Parameters, in_newer_names
 from app.core.records.trajectory import Samples
 
 LEAD_S: Final = 2.0
@@ -47,12 +47,18 @@ class Segment:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoggedFlight:
     """Segments of one flight with the same parameters. `filter_hz` is the cut-off of the accelerometer's filter,
-    `step_s` the duration of a step of the loop."""
+    `step_s` the duration of a step of the loop. `has_newer_names` if the vehicle's parameters have the names and units
+    of release 4.7."""
 
     parameters: Parameters
     filter_hz: float
     step_s: float
     segments: Sequence[Segment]
+    has_newer_names: bool = False
+
+    def named(self, gains: Mapping[str, float]) -> dict[str, float]:
+        """Gains by the names and in the units of the vehicle's release."""
+        return in_newer_names(gains) if self.has_newer_names else dict(gains)
 
     @property
     def error_m(self) -> float:

@@ -174,6 +174,59 @@ GAINS: Final = ("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACC
 UNSUPPORTED: Final = ("PSC_VELZ_PDMX", "PSC_ACCZ_PDMX", "PSC_ACCZ_SMAX", "PSC_ACCZ_NTF", "PSC_ACCZ_NEF")
 """Limits and notch filters of the controllers that the replica lacks: they must be 0, as they are by default."""
 
+NEWER_NAMES: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
+    {
+        "PSC_D_POS_P": ("PSC_POSZ_P", 1.0),
+        "PSC_D_VEL_P": ("PSC_VELZ_P", 1.0),
+        "PSC_D_VEL_I": ("PSC_VELZ_I", 1.0),
+        "PSC_D_VEL_D": ("PSC_VELZ_D", 1.0),
+        "PSC_D_VEL_FF": ("PSC_VELZ_FF", 1.0),
+        "PSC_D_VEL_IMAX": ("PSC_VELZ_IMAX", 100.0),
+        "PSC_D_VEL_FLTE": ("PSC_VELZ_FLTE", 1.0),
+        "PSC_D_VEL_FLTD": ("PSC_VELZ_FLTD", 1.0),
+        "PSC_D_VEL_PDMX": ("PSC_VELZ_PDMX", 1.0),
+        "PSC_D_ACC_P": ("PSC_ACCZ_P", 10.0),
+        "PSC_D_ACC_I": ("PSC_ACCZ_I", 10.0),
+        "PSC_D_ACC_D": ("PSC_ACCZ_D", 10.0),
+        "PSC_D_ACC_FF": ("PSC_ACCZ_FF", 10.0),
+        "PSC_D_ACC_D_FF": ("PSC_ACCZ_D_FF", 10.0),
+        "PSC_D_ACC_IMAX": ("PSC_ACCZ_IMAX", 1000.0),
+        "PSC_D_ACC_FLTT": ("PSC_ACCZ_FLTT", 1.0),
+        "PSC_D_ACC_FLTE": ("PSC_ACCZ_FLTE", 1.0),
+        "PSC_D_ACC_FLTD": ("PSC_ACCZ_FLTD", 1.0),
+        "PSC_D_ACC_PDMX": ("PSC_ACCZ_PDMX", 1.0),
+        "PSC_D_ACC_SMAX": ("PSC_ACCZ_SMAX", 1.0),
+        "PSC_D_ACC_NTF": ("PSC_ACCZ_NTF", 1.0),
+        "PSC_D_ACC_NEF": ("PSC_ACCZ_NEF", 1.0),
+        "PSC_D_JERK": ("PSC_JERK_Z", 1.0),
+        "PSC_JERK_D": ("PSC_JERK_Z", 1.0),
+        "WP_SPD_UP": ("WPNAV_SPEED_UP", 100.0),
+        "WP_SPD_DN": ("WPNAV_SPEED_DN", 100.0),
+        "WP_ACC_Z": ("WPNAV_ACCEL_Z", 100.0),
+    }
+)
+"""Names since release 4.7, each with the name until 4.6 and the factor from the new value to the old: gains for an
+acceleration in m/s² instead of cm/s², throttle as a share instead of per mille, m instead of cm
+(<https://ardupilot.org/copter/docs/common-param-name-changes.html>)."""
+
+_SINGLE_PRECISION_DIGITS: Final = 7
+
+
+def in_older_names(name: str, value: float) -> tuple[str, float]:
+    """A parameter by the name and in the unit that it had until release 4.6; unchanged if it was not renamed."""
+    older, factor = NEWER_NAMES.get(name, (name, 1.0))
+    return older, _scaled(value, factor)
+
+
+def in_newer_names(values: Mapping[str, float]) -> dict[str, float]:
+    """Parameters by the names and in the units that they have since release 4.7."""
+    newer = {older: (name, 1.0 / factor) for name, (older, factor) in NEWER_NAMES.items()}
+    return {newer[name][0]: _scaled(value, newer[name][1]) for name, value in values.items()}
+
+
+def _scaled(value: float, factor: float) -> float:
+    return value if factor == 1.0 else float(f"{value * factor:.{_SINGLE_PRECISION_DIGITS}g}")
+
 
 def low_pass_gain(cutoff_hz: float, dt_s: float) -> float:
     """Share of the input that a first-order low-pass adopts per step of `dt_s`, 0 … 1; 1 for a cut-off of 0."""
@@ -185,7 +238,10 @@ def parameters_from(values: Mapping[str, float]) -> Parameters:
 
     Raises InputError that names a value outside its range, or one that the replica lacks.
     """
-    if problems := tuple(Problem(name, "must be 0") for name in UNSUPPORTED if values.get(name)):
+    unsupported = [(newer, older) for newer, (older, _) in NEWER_NAMES.items() if older in UNSUPPORTED]
+    if problems := tuple(
+        Problem(older, f"must be 0 ({newer} since release 4.7)") for newer, older in unsupported if values.get(older)
+    ):
         raise InputError(
             "The replica has no limits and notch filters inside the controllers.",
             hint="Record the loop with these parameters at 0, their default.",

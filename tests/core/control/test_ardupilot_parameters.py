@@ -8,6 +8,8 @@ from app.core.control.ardupilot_parameters import (
     RAMP_END,
     THROTTLE_GAIN,
     Parameters,
+    in_newer_names,
+    in_older_names,
     low_pass_gain,
     parameters_from,
 )
@@ -19,6 +21,34 @@ def test_values_by_the_firmwares_names_and_units() -> None:
     assert parameters == Parameters(position_p_1_s=2.2, climb_m_s=2.5, acceleration_m_s2=1.0)
     assert parameters.gains == {
         "PSC_POSZ_P": 2.2, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I": 1.0, "PSC_ACCZ_D": 0.0,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("newer", "older"),
+    [
+        (("PSC_D_POS_P", 1.5), ("PSC_POSZ_P", 1.5)),
+        (("PSC_D_VEL_P", 5.0), ("PSC_VELZ_P", 5.0)),
+        (("PSC_D_VEL_IMAX", 10.0), ("PSC_VELZ_IMAX", 1000.0)),
+        (("PSC_D_ACC_P", 0.05000000074505806), ("PSC_ACCZ_P", 0.5)),
+        (("PSC_D_ACC_IMAX", 0.8), ("PSC_ACCZ_IMAX", 800.0)),
+        (("PSC_D_ACC_FLTE", 20.0), ("PSC_ACCZ_FLTE", 20.0)),
+        (("PSC_D_JERK", 5.0), ("PSC_JERK_Z", 5.0)),
+        (("WP_SPD_UP", 2.5), ("WPNAV_SPEED_UP", 250.0)),
+        (("WP_ACC_Z", 1.0), ("WPNAV_ACCEL_Z", 100.0)),
+        (("MOT_THST_HOVER", 0.35), ("MOT_THST_HOVER", 0.35)),
+    ],
+)
+def test_release_4_7_renamed_parameters_and_changed_their_units(
+    newer: tuple[str, float], older: tuple[str, float]
+) -> None:
+    assert in_older_names(*newer) == older
+
+
+def test_gains_are_written_by_the_names_and_in_the_units_of_release_4_7() -> None:
+    gains = {"PSC_POSZ_P": 3.0, "PSC_VELZ_P": 8.0, "PSC_ACCZ_P": 0.854, "PSC_ACCZ_I": 3.0}
+    assert in_newer_names(gains) == {
+        "PSC_D_POS_P": 3.0, "PSC_D_VEL_P": 8.0, "PSC_D_ACC_P": 0.0854, "PSC_D_ACC_I": 0.3,
     }  # fmt: skip
 
 
@@ -71,7 +101,7 @@ def test_the_ramp_ends_at_ninety_percent_at_the_latest(most: float, end: float) 
         ({"PSC_ACCZ_I": -1.0}, "acceleration_i_1_s: must be at least 0"),
         ({"PSC_ACCZ_FLTE": math.nan}, "acceleration_error_filter_hz: must be at least 0"),
         ({"PSC_JERK_Z": math.inf}, "jerk_m_s3: must be positive"),
-        ({"PSC_ACCZ_SMAX": 50.0}, "PSC_ACCZ_SMAX: must be 0"),
+        ({"PSC_ACCZ_SMAX": 50.0}, "PSC_ACCZ_SMAX: must be 0 (PSC_D_ACC_SMAX since release 4.7)"),
     ],
 )
 def test_parameters_that_the_loop_is_not_defined_for_are_refused(values: dict[str, float], problem: str) -> None:

@@ -88,8 +88,8 @@ function Result({ analysis }: { analysis: LogAnalysis }) {
           <li>Deviations are predicted for the same manoeuvre in the same weather.</li>
           <li>Activity is that of the throttle, relative to the gains flown; a proposal has at most 1.5.</li>
           <li>
-            The margin is the factor on PSC_ACCZ_P and PSC_ACCZ_I at which the loop rings with 30 ms more lag; a
-            proposal has at least 2.
+            The margin is the factor on P and I of the acceleration controller at which the loop rings with 30 ms more
+            lag; a proposal has at least 2.
           </li>
         </ul>
         {proposed && (
