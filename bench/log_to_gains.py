@@ -1,11 +1,12 @@
 """From the log of one flight with ArduCopter's default gains to the second flight, on random vehicles.
 
     ./dev exec python -m bench.log_to_gains                    a few vehicles, against the limits
-    ./dev exec python -m bench.log_to_gains --vehicles 200     the figures of docs/benchmarks.md
+    ./dev exec python -m bench.log_to_gains --vehicles 200 --searches     the figures of docs/benchmarks.md
 
 Every vehicle has more physics than the model (bench/copters/simulation.py). An error is the mean of flights of the same
 steps in other weather. The best gains are the best of a grid that keep the limits of a proposal, the margin on the
-vehicle's own linear model. Exits with 1 beyond the limits, which are loose because the vehicles are few.
+vehicle's own linear model. `--searches` tunes each vehicle by black-box searches too. Exits with 1 beyond the limits,
+which are loose because the vehicles are few.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Final
 
@@ -23,6 +25,8 @@ from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, lea
 from app.core.analysis.proposal import BOUNDS, LARGEST_ACTIVITY, with_gains
 from app.core.control.ardupilot_parameters import STEP_S, Parameters
 from app.core.errors import TrajectoryError
+from app.core.records.trajectory import Samples
+from bench.copters.black_box import BUDGET, SEARCHES, best_of
 from bench.copters.simulation import FILTER_HZ, SimulatedCopter, fly_steps, sample
 
 SEED: Final = 20261125
@@ -31,6 +35,7 @@ FLIGHTS: Final = 6
 FLIGHTS_OF_THE_GRID: Final = 3
 GRID: Final = ((1.0, 1.7, 3.0), (5.0, 6.5, 8.0), (0.2, 0.3, 0.45, 0.65, 1.0, 1.5), (0.4, 0.7, 1.2, 1.7, 2.4, 3.0))
 PROPOSED: Final = "Proposed"
+SEARCHED_FLIGHTS: Final = (2, 5, 10, BUDGET)
 LIMITS: Final[Mapping[str, float]] = {"worse": 0.0, "unsafe": 0.0, "covered": 0.6, "near": 0.6}
 
 
@@ -45,10 +50,21 @@ class Result:
     predicted: Sequence[tuple[float, float]]
     rang: frozenset[str]
     refused: str | None
+    searched: Mapping[str, "Searched"]
 
 
-def judge(number: int) -> Result:
-    """Fly, analyse, and fly what is proposed and what people would set."""
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """A black-box search: the error of its best gains, m, after each number of flights, flights that rang, and whether
+    the best gains of all keep the margin."""
+
+    errors_m: Mapping[int, float]
+    rang: int
+    keeps_margin: bool
+
+
+def judge(number: int, *, searches: bool = False) -> Result:
+    """Fly, analyse, and fly what is proposed, what people would set, and what `searches` find."""
     random = np.random.default_rng((SEED, number))
     copter = sample(random)
     flown = Parameters(hover_throttle=copter.assumed_hover_throttle)
@@ -57,8 +73,9 @@ def judge(number: int) -> Result:
     try:
         analysis = analyze(first.log)
     except TrajectoryError as error:
-        return Result({}, np.nan, (), (), frozenset(), str(error))
+        return Result({}, np.nan, (), (), frozenset(), str(error), {})
     best_m = least_error(copter, flown, seeds[1:])
+    searched = search(copter, flown, seeds[1:]) if searches else {}
     errors_m: dict[str, float] = {}
     covered: list[bool] = []
     predicted: list[tuple[float, float]] = []
@@ -67,13 +84,43 @@ def judge(number: int) -> Result:
         flights = [fly_steps(copter, with_gains(flown, each.gains), seed=seed) for seed in seeds[1:]]
         errors_m[each.name] = float(np.mean([flight.error_m for flight in flights]))
         predicted.append((each.prediction.error_m, errors_m[each.name]))
-        damping = least_damping(with_gains(flown, each.gains), copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S)
-        if damping < RINGING_DAMPING:
+        if rings(copter, flown, each.gains):
             rang.add(each.name)
         if each.name == PROPOSED:
             within = (each.prediction.low_m, each.prediction.high_m)
             covered = [within[0] <= flight.error_m <= within[1] for flight in flights]
-    return Result(errors_m, best_m, covered, predicted, frozenset(rang), analysis.insufficient)
+    return Result(errors_m, best_m, covered, predicted, frozenset(rang), analysis.insufficient, searched)
+
+
+def rings(copter: SimulatedCopter, flown: Parameters, gains: Mapping[str, float]) -> bool:
+    """Whether the loop rings with these gains, by the vehicle's own linear model."""
+    parameters = with_gains(flown, gains)
+    return least_damping(parameters, copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S) < RINGING_DAMPING
+
+
+def search(copter: SimulatedCopter, flown: Parameters, seeds: Sequence[int]) -> dict[str, Searched]:
+    """What the black-box searches find from the gains of the first flight on, every flight in other weather."""
+    first = {name: value for name, value in flown.gains.items() if name in BOUNDS}
+    found = {}
+    for name, run in SEARCHES.items():
+        weather = iter(np.random.default_rng(seeds[0]).integers(2**31, size=BUDGET).tolist())
+        trials = run(
+            first,
+            lambda gains, weather=weather: fly_steps(copter, with_gains(flown, gains), seed=next(weather)).error_m,
+            seed=seeds[0],
+        )
+        last = with_gains(flown, best_of(trials).gains)
+        best = {number: with_gains(flown, best_of(trials[:number]).gains) for number in SEARCHED_FLIGHTS}
+        found[name] = Searched(
+            errors_m={
+                number: float(np.mean([fly_steps(copter, each, seed=seed).error_m for seed in seeds]))
+                for number, each in best.items()
+            },
+            rang=sum(rings(copter, flown, trial.gains) for trial in trials),
+            keeps_margin=damping_within_margin(last, copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S)
+            >= RINGING_DAMPING,
+        )
+    return found
 
 
 def sets(proposed: Assessment | None, others: Sequence[Assessment]) -> list[Assessment]:
@@ -96,28 +143,54 @@ def least_error(copter: SimulatedCopter, flown: Parameters, seeds: Sequence[int]
     return float(np.mean([fly_steps(copter, best, seed=seed).error_m for seed in seeds]))
 
 
+def print_sets(answered: Sequence[Result]) -> None:
+    """A line for each gain set of the analysis."""
+    best_m = np.array([each.best_m for each in answered])
+    for name in answered[0].errors_m if answered else ():
+        errors_m = np.array([each.errors_m[name] for each in answered])
+        print(f"{name:28} {described(errors_m, best_m)}; ring {sum(name in each.rang for each in answered)}")
+
+
+def print_searches(answered: Sequence[Result]) -> None:
+    """Lines for each black-box search."""
+    best_m = np.array([each.best_m for each in answered])
+    for name in answered[0].searched if answered else ():
+        found = [each.searched[name] for each in answered]
+        for number in SEARCHED_FLIGHTS:
+            errors_m = np.array([each.errors_m[number] for each in found])
+            print(f"{f'{name}, {number} flights':28} {described(errors_m, best_m)}")
+        print(
+            f"{name:28} {np.mean([each.rang for each in found]):.1f} flights of a vehicle ring; "
+            f"{np.mean([each.keeps_margin for each in found]):.0%} of the best gains keep the margin"
+        )
+
+
+def described(errors_m: Samples, best_m: Samples) -> str:
+    """Errors of one gain set for each vehicle, and how far they are from the best, shape (k,) each."""
+    ratios = errors_m / best_m
+    return (
+        f"error {1e3 * np.median(errors_m):5.1f} mm (median), {1e3 * np.quantile(errors_m, 0.95):5.1f} (95 %); "
+        f"of the best {np.median(ratios):.2f}; within 10 % {np.mean(ratios <= 1.1):.0%}"
+    )
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="bench.log_to_gains")
     parser.add_argument("--vehicles", type=int, default=QUICK_VEHICLES)
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--searches", action="store_true", help="tune by black-box searches too")
     options = parser.parse_args()
     with ProcessPoolExecutor(options.processes) as pool:
-        results = list(pool.map(judge, range(options.vehicles)))
+        results = list(pool.map(partial(judge, searches=options.searches), range(options.vehicles)))
     refused = [each for each in results if each.refused]
     answered = [each for each in results if PROPOSED in each.errors_m]
     print(
         f"{len(results)} vehicles, {len(answered)} with a proposal, {len(refused)} told that the log does not suffice"
     )
-    for name in answered[0].errors_m if answered else ():
-        ratios = np.array([each.errors_m[name] / each.best_m for each in answered])
-        errors_mm = 1e3 * np.array([each.errors_m[name] for each in answered])
-        print(
-            f"{name:28} error {np.median(errors_mm):5.1f} mm (median), {np.quantile(errors_mm, 0.95):5.1f} (95 %); "
-            f"of the best {np.median(ratios):.2f}; within 10 % {np.mean(ratios <= 1.1):.0%}; "
-            f"ring {sum(name in each.rang for each in answered)}"
-        )
+    print_sets(answered)
+    print_searches(answered)
     pairs = np.array([pair for each in answered for pair in each.predicted])
-    found = {
+    shares = {
         "worse": float(
             np.mean([each.errors_m[PROPOSED] > each.errors_m["ArduCopter's defaults"] for each in answered])
         ),
@@ -126,12 +199,12 @@ def main() -> int:
         "near": float(np.mean([each.errors_m[PROPOSED] <= 1.1 * each.best_m for each in answered])),
     }
     print(f"predicted over flown: median {np.median(pairs[:, 0] / pairs[:, 1]):.2f}")
-    print(f"worse than the defaults {found['worse']:.1%} (limit {LIMITS['worse']:.0%})")
-    print(f"ringing {found['unsafe']:.1%} (limit {LIMITS['unsafe']:.0%})")
-    print(f"flights inside the 90 % interval {found['covered']:.0%} (at least {LIMITS['covered']:.0%})")
-    print(f"within 10 % of the best {found['near']:.0%} (at least {LIMITS['near']:.0%})")
-    kept = found["covered"] >= LIMITS["covered"] and found["near"] >= LIMITS["near"]
-    return 0 if kept and found["worse"] <= LIMITS["worse"] and found["unsafe"] <= LIMITS["unsafe"] else 1
+    print(f"worse than the defaults {shares['worse']:.1%} (limit {LIMITS['worse']:.0%})")
+    print(f"ringing {shares['unsafe']:.1%} (limit {LIMITS['unsafe']:.0%})")
+    print(f"flights inside the 90 % interval {shares['covered']:.0%} (at least {LIMITS['covered']:.0%})")
+    print(f"within 10 % of the best {shares['near']:.0%} (at least {LIMITS['near']:.0%})")
+    kept = shares["covered"] >= LIMITS["covered"] and shares["near"] >= LIMITS["near"]
+    return 0 if kept and shares["worse"] <= LIMITS["worse"] and shares["unsafe"] <= LIMITS["unsafe"] else 1
 
 
 if __name__ == "__main__":
