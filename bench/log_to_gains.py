@@ -192,7 +192,7 @@ def main() -> int:
     pairs = np.array([pair for each in answered for pair in each.predicted])
     shares = {
         "worse": float(
-            np.mean([each.errors_m[PROPOSED] > each.errors_m["ArduCopter's defaults"] for each in answered])
+            np.mean([each.errors_m[PROPOSED] > each.errors_m["ArduCopter's default gains"] for each in answered])
         ),
         "unsafe": float(np.mean([PROPOSED in each.rang for each in answered])),
         "covered": float(np.mean([inside for each in answered for inside in each.covered])),

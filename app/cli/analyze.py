@@ -35,7 +35,7 @@ def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -
     _print(console(json_out), file, analysis, flight.parameters)
     write_json(json_out, _document(file, analysis))
     if params_out is not None:
-        _write_parameters(params_out, analysis)
+        _write_parameters(params_out, analysis, file.name)
 
 
 def _print(out: Console, file: Path, analysis: Analysis, parameters: Parameters) -> None:
@@ -67,13 +67,14 @@ def _print(out: Console, file: Path, analysis: Analysis, parameters: Parameters)
         "the factor on P and I of the acceleration controller at which the loop rings with "
         f"{1e3 * EXTRA_LAG_S:.0f} ms more lag, at least {REQUIRED_MARGIN:g} in a proposal."
     )
-    if analysis.insufficient:
-        out.print(escape(analysis.insufficient))
+    if analysis.at_limit:
+        out.print(f"At an end of the range searched: {', '.join(analysis.at_limit)}.")
+    out.print(escape(analysis.answer))
 
 
 def _row(each: Assessment) -> tuple[str, ...]:
     predicted = each.prediction
-    margin = "rings" if not each.margin else f"{each.margin:.1f}" if each.margin < LARGEST_MARGIN else "> 8"
+    margin = "< 1" if not each.margin else f"{each.margin:.1f}" if each.margin < LARGEST_MARGIN else "> 8"
     return (
         each.name,
         *(f"{value:g}" for value in each.gains.values()),
@@ -94,21 +95,23 @@ def _document(file: Path, analysis: Analysis) -> Mapping[str, object]:
             "standard_deviation": asdict(estimate.deviation),
             "residual_m_s2": estimate.residual_m_s2,
         },
+        "answer": analysis.answer,
         "assessments": [asdict(each) for each in analysis.assessments],
         "proposed": asdict(analysis.proposed) if analysis.proposed else None,
         "insufficient": analysis.insufficient,
+        "at_limit": list(analysis.at_limit),
     }
 
 
-def _write_parameters(target: Path, analysis: Analysis) -> None:
-    if analysis.proposed is None:
+def _write_parameters(target: Path, analysis: Analysis, file_name: str) -> None:
+    content = analysis.parameter_file(file_name)
+    if content is None:
         raise InputError(
             "No parameter file was written, because no gains are proposed.",
             hint=analysis.insufficient or "",
             problems=(Problem("--params", "has nothing to write"),),
         )
-    lines = [f"{name},{value:g}" for name, value in analysis.proposed.gains.items()]
     try:
-        target.write_text("\n".join((*lines, "")), encoding="utf-8")
+        target.write_text(content, encoding="utf-8")
     except OSError as error:
         raise unwritable_error("--params", target, error) from error

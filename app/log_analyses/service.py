@@ -1,7 +1,7 @@
 """Operations on log analyses: analyse an uploaded log. Nothing is stored."""
 
 import io
-from typing import Annotated
+from typing import Annotated, get_args
 
 from pydantic import Field
 
@@ -56,7 +56,10 @@ class AssessedGains(Schema):
     activity: Annotated[float, Field(description="throttle activity relative to the gains flown")]
     margin: Annotated[
         float,
-        Field(description="factor on the acceleration gains at which the loop rings with 30 ms more lag; 0: it rings"),
+        Field(
+            description="factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most "
+            "critical of the vehicles that the log allows; 0: less than 1, 8: at least 8"
+        ),
     ]
 
 
@@ -64,15 +67,18 @@ class LogAnalysis(Schema):
     """What a log tells about the altitude control of its vehicle. `assessments` begins with the gains flown."""
 
     file_name: str
+    answer: str
     behaviour: LoggedBehaviour
     vehicle: EstimatedVehicle
     proposed: AssessedGains | None
     insufficient: Annotated[str | None, Field(description="why nothing is proposed")]
     assessments: list[AssessedGains]
-    figure: FigureCard
+    at_limit: Annotated[list[str], Field(description="proposed gains at an end of the range that was searched")]
+    parameter_file: Annotated[str | None, Field(description="the proposed gains as a ground station loads them")]
+    figures: Annotated[dict[ThemeName, FigureCard], Field(description="by theme")]
 
 
-def analyze_upload(content: bytes, *, name: str, theme: ThemeName) -> LogAnalysis:
+def analyze_upload(content: bytes, *, name: str) -> LogAnalysis:
     """Analyse an uploaded log in a process with limits.
 
     Raises InputError that names what is missing or wrong.
@@ -83,8 +89,10 @@ def analyze_upload(content: bytes, *, name: str, theme: ThemeName) -> LogAnalysi
         each: EstimatedValue(mean=getattr(mean, each), deviation=getattr(deviation, each))
         for each in ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
     }
+    plot = _plot(analysis)
     return LogAnalysis(
         file_name=name,
+        answer=analysis.answer,
         behaviour=LoggedBehaviour.model_validate(analysis.behaviour, from_attributes=True),
         vehicle=EstimatedVehicle(
             **values,
@@ -94,7 +102,9 @@ def analyze_upload(content: bytes, *, name: str, theme: ThemeName) -> LogAnalysi
         proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
         insufficient=analysis.insufficient,
         assessments=[_assessed(each) for each in analysis.assessments],
-        figure=figure_card(card_of(PanelsFigure(_plot(analysis), theme))),
+        at_limit=list(analysis.at_limit),
+        parameter_file=analysis.parameter_file(name),
+        figures={theme: figure_card(card_of(PanelsFigure(plot, theme))) for theme in get_args(ThemeName)},
     )
 
 

@@ -1,6 +1,8 @@
 """Reader of a whole flight's altitude control in ArduPilot's on-board log (.bin), in every mode that holds altitude."""
 
+from bisect import bisect_right
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import BinaryIO, Final
 
@@ -8,95 +10,214 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.analysis.flight import LoggedFlight, Segment
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, UNSUPPORTED, in_older_names, parameters_from
+from app.core.analysis.proposal import BOUNDS
+from app.core.control.ardupilot_parameters import (
+    FIRMWARE_NAMES,
+    UNSUPPORTED,
+    in_newer_names,
+    in_older_names,
+    parameters_from,
+)
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.dataflash import is_dataflash, read_tables
+from app.logs.flight_parts import LONGEST_INTERVAL_S, SHORTEST_PART_S, Manoeuvres, Part, Rows, find_parts, jumps
 from app.logs.readers import HEAD_BYTES, READERS
 
-_WANTED: Final = frozenset({"PSCD", "CTUN", "MODE", "EV", "PARM"})
-_LOOP: Final = ("PD", "VD", "AD", "DPD", "DVD", "DAD", "TVD")
+_WANTED: Final = frozenset({"PSCD", "PSCZ", "CTUN", "ATT", "MODE", "EV", "ERR", "PARM"})
+_LOOP: Final = ("PD", "VD", "AD", "DVD", "DAD", "TVD")
+_REFERENCES: Final = ("DPD", "TPD")
+"""The shaped altitude: releases before 4.6 log it as the target."""
 _TUNING: Final = ("ThI", "ThO", "ThH")
 _HOLDS_ALTITUDE: Final = frozenset({2, 3, 4, 5, 6, 7, 16, 17})
 """ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, POSHOLD, BRAKE."""
-_NOT_LANDED, _MAYBE_LANDED, _LANDED = 28, 17, 18
+_NOT_LANDED, _LANDED = 28, 18
+_VIBRATION_FAILSAFE: Final = 29
 _AFTER_TAKEOFF_S: Final = 2.0
 _BEFORE_LANDING_S: Final = 3.0
-_LONGEST_INTERVAL_S: Final = 0.25
-_SHORTEST_SEGMENT_S: Final = 4.0
-_LONGEST_FLIGHT_S: Final = 120.0
+_LARGEST_LEAN: Final = 0.866
+"""Cosine of the lean beyond which rows are left out: 30°."""
+_JUMP_M: Final = 0.1
+_JUMP_M_S: Final = 1.0
+_LARGEST_ACCELERATION_M_S2: Final = 50.0
+_RESTART_S: Final = 1.0
+_INTERVAL_S: Final = 0.1
 _RATE_HZ: Final = 400.0
 _RATES_HZ: Final = (50.0, 2000.0)
 _FILTER_HZ: Final = 20.0
-_FILTERS_HZ: Final = (2.0, 100.0)
 _LEARNED: Final = "MOT_THST_HOVER"
-_NEWER_NAME: Final = "PSC_D_POS_P"
+_THRUST_CURVE: Final = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX")
+_USED: Final = frozenset(
+    {*FIRMWARE_NAMES, *UNSUPPORTED, *_THRUST_CURVE, "SCHED_LOOP_RATE", "INS_ACCEL_FILTER"} - {_LEARNED}
+)
+
+Parameters = Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Logged:
+    """Rows of the loop, up, shape (n,) each, with the throttle beside them; `time_s` increases."""
+
+    time_s: Samples
+    up: Mapping[str, Samples]
+    throttle: Mapping[str, Samples]
+    lean: Samples
+    """Cosine of the lean."""
+
+    @property
+    def is_sound(self) -> Rows:
+        """Rows of numbers that can be."""
+        acceleration = np.abs(self.up["AD"]) <= _LARGEST_ACCELERATION_M_S2
+        throttle = [(self.throttle[name] >= 0.0) & (self.throttle[name] <= 1.0) for name in _TUNING]
+        known = np.isfinite(np.sum(list(self.up.values()), axis=0))
+        return np.asarray(known & acceleration & np.all(throttle, axis=0))
+
+    @property
+    def is_reset(self) -> Rows:
+        """Rows at which the reference began anew, or the estimator moved altitude or climb rate."""
+        up = self.up
+        begun_anew = (up["reference"] == up["PD"]) & (up["DVD"] == up["VD"])
+        return np.asarray(
+            begun_anew
+            | jumps(self.time_s, up["PD"], up["VD"], _JUMP_M)
+            | jumps(self.time_s, up["reference"], up["DVD"], _JUMP_M)
+            | jumps(self.time_s, up["VD"], up["AD"], _JUMP_M_S)
+        )
+
+    def segment(self, rows: NDArray[np.int64]) -> Segment:
+        """The rows as a segment. A leaning vehicle demands more throttle by the cosine of its lean, so the share of it
+        that carries is given."""
+        return Segment(
+            time_s=self.time_s[rows],
+            z_m=self.up["PD"][rows],
+            v_m_s=self.up["VD"][rows],
+            a_m_s2=self.up["AD"][rows],
+            z_d_m=self.up["reference"][rows],
+            v_d_m_s=self.up["DVD"][rows],
+            a_d_m_s2=self.up["DAD"][rows],
+            v_t_m_s=self.up["TVD"][rows],
+            throttle=self.throttle["ThI"][rows],
+            throttle_filtered=self.throttle["ThO"][rows] * self.lean[rows],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _ParameterHistory:
+    """The values in force from each time on, s; `has_newer_names` of release 4.7."""
+
+    times_s: list[float]
+    values: list[Parameters]
+    has_newer_names: bool
+
+    def at(self, time_s: float) -> Parameters:
+        """The values at a time."""
+        place = bisect_right(self.times_s, time_s) - 1
+        return self.values[place] if place >= 0 else {}
 
 
 def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
-    """Read the parts in flight under the same parameters, at most 120 s, those with the most altitude change first.
+    """Read the parts in flight under the same parameters, at most 120 s, those with the most manoeuvres first.
 
     Raises TrajectoryError naming the message or parameter that is missing, or InputError for one not supported.
     """
     _require_dataflash(stream, name)
     tables = read_tables(contents(stream), _WANTED)
-    loop, tuning = tables.get("PSCD", {}), tables.get("CTUN", {})
-    if not {"TimeUS", *_LOOP} <= loop.keys():
-        raise _refused(name, "PSCD", "is missing: add NTUN to LOG_BITMASK, and fly again")
-    if not {"TimeUS", *_TUNING} <= tuning.keys():
-        raise _refused(name, "CTUN", "is missing: add CTUN to LOG_BITMASK, and fly again")
-    time_s = numbers(loop["TimeUS"]) / 1e6
-    up = {each: -numbers(loop[each]) for each in _LOOP}
-    throttle = {each: _at(tuning, each, time_s) for each in _TUNING}
-    sound = np.isfinite(np.sum([*up.values(), *throttle.values()], axis=0)) & (np.diff(time_s, prepend=-np.inf) > 0.0)
-    begun_anew = (up["DPD"] == up["PD"]) & (up["DVD"] == up["VD"])
-    changes = _parameter_changes(tables)
-    usable = sound & ~begun_anew & _in_flight(tables, time_s) & _holding_altitude(tables, time_s)
-    parts = _uninterrupted(time_s, usable, [at_s for at_s, _ in changes])
+    logged = _logged(tables, name)
+    history = _parameter_history(tables)
+    time_s = logged.time_s
+    conditions = (
+        (logged.is_sound, "PSCD", "has no rows of numbers beside rows of CTUN"),
+        (_in_flight(tables, time_s), "EV", "has no takeoff, or nothing between takeoff and landing"),
+        (_holding_altitude(tables, time_s), "MODE", "has no mode that holds altitude in flight"),
+        (~_compensating_vibration(tables, time_s), "ERR", "has vibration compensation in the whole flight"),
+        (logged.lean >= _LARGEST_LEAN, "ATT", "leans by more than 30° in the whole flight"),
+    )
+    usable = np.ones(len(time_s), dtype=np.bool_)
+    for condition, field, reason in conditions:
+        usable &= condition
+        if not usable.any():
+            raise _refused(name, field, reason)
+    parts = find_parts(time_s, usable, logged.is_reset, history.times_s)
     if not parts:
-        raise _refused(name, "PSCD", f"has no {_SHORTEST_SEGMENT_S:g} s in flight in a mode that holds altitude")
-    values = {part: _values_at(changes, float(time_s[part[0]])) for part in parts}
-    most = max(parts, key=lambda part: float(np.ptp(up["DPD"][part[0] : part[1]])))
-    alike = [part for part in parts if values[part] == values[most]]
-    chosen = sorted(_most_change(alike, up["DPD"], time_s))
-    given = values[most]
-    if "PSC_POSZ_P" not in given:
-        raise _refused(name, "PSC_POSZ_P", f"is missing, and {_NEWER_NAME} of release 4.7 too")
-    hover = float(np.median(np.concatenate([throttle["ThH"][slice(*part)] for part in chosen])))
-    rate_hz, filter_hz = given.get("SCHED_LOOP_RATE", _RATE_HZ), given.get("INS_ACCEL_FILTER", _FILTER_HZ)
+        raise _refused(
+            name,
+            "PSCD",
+            f"has no {SHORTEST_PART_S:g} s in flight in a mode that holds altitude without a gap of "
+            f"{LONGEST_INTERVAL_S:g} s, a jump of the altitude or a change of parameters",
+        )
+    manoeuvres = Manoeuvres(time_s, logged.up["DAD"])
+    given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
+    chosen = manoeuvres.choose([part for part in parts if history.at(float(time_s[part[0]])) == given])
+    hover = float(np.median(np.concatenate([logged.throttle["ThH"][slice(*part)] for part in chosen])))
+    _require_gains(given, name)
+    rate_hz = given.get("SCHED_LOOP_RATE", _RATE_HZ)
+    if not _RATES_HZ[0] <= rate_hz <= _RATES_HZ[1]:
+        raise _refused(name, "SCHED_LOOP_RATE", f"must be {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g} Hz, got {rate_hz:g}")
     return LoggedFlight(
         parameters=parameters_from({**given, _LEARNED: hover}),
-        filter_hz=filter_hz if _FILTERS_HZ[0] <= filter_hz <= _FILTERS_HZ[1] else _FILTER_HZ,
-        has_newer_names=_has_newer_names(tables),
-        step_s=1.0 / (rate_hz if _RATES_HZ[0] <= rate_hz <= _RATES_HZ[1] else _RATE_HZ),
-        segments=[_segment(time_s, up, throttle, slice(*part)) for part in chosen],
+        filter_hz=given.get("INS_ACCEL_FILTER", _FILTER_HZ),
+        step_s=1.0 / rate_hz,
+        segments=[logged.segment(_thinned(time_s, part)) for part in chosen],
+        has_newer_names=history.has_newer_names,
     )
 
 
-def _segment(time_s: Samples, up: Mapping[str, Samples], throttle: Mapping[str, Samples], rows: slice) -> Segment:
-    return Segment(
-        time_s=time_s[rows],
-        z_m=up["PD"][rows],
-        v_m_s=up["VD"][rows],
-        a_m_s2=up["AD"][rows],
-        z_d_m=up["DPD"][rows],
-        v_d_m_s=up["DVD"][rows],
-        a_d_m_s2=up["DAD"][rows],
-        v_t_m_s=up["TVD"][rows],
-        throttle=throttle["ThI"][rows],
-        throttle_filtered=throttle["ThO"][rows],
+def _thinned(time_s: Samples, part: Part) -> NDArray[np.int64]:
+    """Rows of a part at ten a second or fewer, as the vehicle logs them by default."""
+    first, end = part
+    tenths = np.floor((time_s[first:end] - time_s[first]) / _INTERVAL_S + 0.5)
+    return first + np.flatnonzero(np.diff(tenths, prepend=-1.0) > 0.0)
+
+
+def _logged(tables: Mapping[str, Table], name: str) -> _Logged:
+    loop, tuning = tables.get("PSCD", {}), tables.get("CTUN", {})
+    if "TimeUS" not in loop:
+        older = "; the log has PSCZ of an older release, which is not read" if tables.get("PSCZ") else ""
+        raise _refused(name, "PSCD", f"is missing: add NTUN to LOG_BITMASK, and fly again{older}")
+    reference = next((each for each in _REFERENCES if each in loop), None)
+    absent = [each for each in _LOOP if each not in loop]
+    if reference is None or absent:
+        raise _refused(name, f"PSCD.{absent[0] if absent else _REFERENCES[0]}", "is missing: this release is not read")
+    if not {"TimeUS", *_TUNING} <= tuning.keys():
+        raise _refused(name, "CTUN", "is missing: add CTUN to LOG_BITMASK, and fly again")
+    at_s = numbers(loop["TimeUS"]) / 1e6
+    rows = _increasing(at_s)
+    time_s = at_s[rows]
+    attitude = tables.get("ATT", {})
+    lean = np.ones(len(time_s))
+    if {"TimeUS", "Roll", "Pitch"} <= attitude.keys():
+        roll, pitch = (np.radians(_beside(attitude, each, time_s)) for each in ("Roll", "Pitch"))
+        lean = np.nan_to_num(np.cos(roll) * np.cos(pitch), nan=1.0)
+    return _Logged(
+        time_s,
+        {"reference": -numbers(loop[reference])[rows]} | {each: -numbers(loop[each])[rows] for each in _LOOP},
+        {each: _beside(tuning, each, time_s) for each in _TUNING},
+        lean,
     )
 
 
-def _at(table: Table, column: str, time_s: Samples) -> Samples:
-    """A column at other times, linear between its rows; NaN outside them."""
+def _increasing(at_s: Samples) -> NDArray[np.int64]:
+    """Rows, shape (k,), of the last time that the clock started, each later than all before it."""
+    restarts = np.flatnonzero(np.diff(at_s) < -_RESTART_S)
+    first = int(restarts[-1]) + 1 if restarts.size else 0
+    latest = np.maximum.accumulate(np.nan_to_num(at_s[first:], nan=-np.inf))
+    return first + np.flatnonzero(np.diff(latest, prepend=-np.inf) > 0.0)
+
+
+def _beside(table: Table, column: str, time_s: Samples) -> Samples:
+    """A column at other times, linear between its rows; NaN outside them, and between two that are too far apart."""
     at_s = numbers(table["TimeUS"]) / 1e6
-    order = np.argsort(at_s, kind="stable")
-    return np.interp(time_s, at_s[order], numbers(table[column])[order], left=np.nan, right=np.nan)
+    rows = _increasing(at_s)
+    at_s = at_s[rows]
+    after = np.clip(np.searchsorted(at_s, time_s), 1, max(len(at_s) - 1, 1))
+    values = np.interp(time_s, at_s, numbers(table[column])[rows], left=np.nan, right=np.nan)
+    if len(at_s) > 1:
+        values[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
+    return values
 
 
-def _holding_altitude(tables: Mapping[str, Table], time_s: Samples) -> NDArray[np.bool_]:
+def _holding_altitude(tables: Mapping[str, Table], time_s: Samples) -> Rows:
     holding = np.zeros(len(time_s), dtype=np.bool_)
     changes = [*rows_of(tables.get("MODE", {}), "TimeUS", "ModeNum"), (np.inf, np.nan)]
     for (begin_s, mode), (end_s, _) in pairwise(changes):
@@ -104,66 +225,52 @@ def _holding_altitude(tables: Mapping[str, Table], time_s: Samples) -> NDArray[n
     return holding
 
 
-def _in_flight(tables: Mapping[str, Table], time_s: Samples) -> NDArray[np.bool_]:
-    """Rows between takeoff and landing, by the vehicle's own events; all rows after the first takeoff without one."""
+def _in_flight(tables: Mapping[str, Table], time_s: Samples) -> Rows:
+    """Rows between takeoff and landing, by the vehicle's own events."""
     flying = np.zeros(len(time_s), dtype=np.bool_)
     for at_s, event in rows_of(tables.get("EV", {}), "TimeUS", "Id"):
         if event == _NOT_LANDED:
             flying |= time_s >= at_s + _AFTER_TAKEOFF_S
-        elif event in {_MAYBE_LANDED, _LANDED}:
+        elif event == _LANDED:
             flying &= time_s < at_s - _BEFORE_LANDING_S
     return flying
 
 
-def _uninterrupted(time_s: Samples, usable: NDArray[np.bool_], cuts_s: list[float]) -> list[tuple[int, int]]:
-    """First row and row after the last of each part without a gap or a cut that is long enough."""
-    rows = np.flatnonzero(usable)
-    if not rows.size:
-        return []
-    apart = (np.diff(rows) > 1) | (np.diff(time_s[rows]) > _LONGEST_INTERVAL_S)
-    apart |= np.diff(np.searchsorted(cuts_s, time_s[rows], side="right")) > 0
-    ends = [*np.flatnonzero(apart).tolist(), len(rows) - 1]
-    begins = [0, *(end + 1 for end in ends[:-1])]
-    parts = [(int(rows[begin]), int(rows[end]) + 1) for begin, end in zip(begins, ends, strict=True)]
-    return [(begin, end) for begin, end in parts if time_s[end - 1] - time_s[begin] >= _SHORTEST_SEGMENT_S]
+def _compensating_vibration(tables: Mapping[str, Table], time_s: Samples) -> Rows:
+    """Rows while the failsafe for vibration replaced the loop."""
+    compensating = np.zeros(len(time_s), dtype=np.bool_)
+    for at_s, subsystem, code in rows_of(tables.get("ERR", {}), "TimeUS", "Subsys", "ECode"):
+        if subsystem == _VIBRATION_FAILSAFE:
+            compensating[time_s >= at_s] = code != 0.0
+    return compensating
 
 
-def _most_change(parts: list[tuple[int, int]], reference_m: Samples, time_s: Samples) -> list[tuple[int, int]]:
-    """As many parts as fit into the longest flight, those with the largest altitude change first; a longer one is
-    cut."""
-    chosen: list[tuple[int, int]] = []
-    left_s = _LONGEST_FLIGHT_S
-    for begin, end in sorted(parts, key=lambda part: -float(np.ptp(reference_m[part[0] : part[1]]))):
-        within = begin + int(np.searchsorted(time_s[begin:end], time_s[begin] + left_s, side="right"))
-        if time_s[within - 1] - time_s[begin] >= _SHORTEST_SEGMENT_S:
-            chosen.append((begin, within))
-            left_s -= float(time_s[within - 1] - time_s[begin])
-    return chosen
-
-
-def _parameter_changes(tables: Mapping[str, Table]) -> list[tuple[float, Mapping[str, float]]]:
-    """Times at which parameters of the loop took new values, s, with all values from then on."""
+def _parameter_history(tables: Mapping[str, Table]) -> _ParameterHistory:
+    """Times at which parameters that the analysis uses took new values, with all values from then on."""
     table = tables.get("PARM", {})
+    history = _ParameterHistory([], [], has_newer_names=False)
     if not {"TimeUS", "Name", "Value"} <= table.keys():
-        return []
-    wanted = {*FIRMWARE_NAMES, *UNSUPPORTED, "SCHED_LOOP_RATE", "INS_ACCEL_FILTER"} - {_LEARNED}
-    values: dict[str, float] = {}
-    changes: list[tuple[float, Mapping[str, float]]] = []
+        return history
+    newer = in_newer_names(dict.fromkeys(BOUNDS, 0.0)).keys()
+    names = [bytes(raw).partition(b"\0")[0].decode("ascii", "replace") for raw in table["Name"]]
     at_s = (numbers(table["TimeUS"]) / 1e6).tolist()
-    for time_s, raw, logged in zip(at_s, table["Name"], numbers(table["Value"]).tolist(), strict=True):
-        name, value = in_older_names(bytes(raw).partition(b"\0")[0].decode("ascii", "replace"), logged)
-        if name in wanted and np.isfinite(value) and values.get(name) != value:
-            values = {**values, name: value}
-            changes.append((time_s, values))
-    return changes
+    values: Parameters = {}
+    for time_s, each, logged in zip(at_s, names, numbers(table["Value"]).tolist(), strict=True):
+        parameter, value = in_older_names(each, logged)
+        if parameter in _USED and np.isfinite(value) and values.get(parameter) != value:
+            values = {**values, parameter: value}
+            history.times_s.append(time_s)
+            history.values.append(values)
+    return _ParameterHistory(history.times_s, history.values, has_newer_names=not newer.isdisjoint(names))
 
 
-def _has_newer_names(tables: Mapping[str, Table]) -> bool:
-    return any(bytes(raw).partition(b"\0")[0] == _NEWER_NAME.encode() for raw in tables.get("PARM", {}).get("Name", ()))
-
-
-def _values_at(changes: list[tuple[float, Mapping[str, float]]], time_s: float) -> Mapping[str, float]:
-    return next((values for at_s, values in reversed(changes) if at_s <= time_s), {})
+def _require_gains(given: Parameters, name: str) -> None:
+    for each in BOUNDS:
+        if each not in given:
+            (newer,) = in_newer_names({each: 0.0})
+            raise _refused(name, each, f"is missing, and {newer} of release 4.7 too")
+        if given[each] <= 0.0:
+            raise _refused(name, each, f"must be positive, got {given[each]:g}")
 
 
 def _require_dataflash(stream: BinaryIO, name: str) -> None:

@@ -17,6 +17,11 @@ def analyze(*arguments: str | Path) -> Result:
     return CliRunner().invoke(app, ["analyze", *map(str, arguments)])
 
 
+def lines_of(file: Path) -> list[str]:
+    """Lines of a parameter file but for the comments."""
+    return [line for line in file.read_text().splitlines() if not line.startswith("#")]
+
+
 @pytest.fixture
 def steps(tmp_path: Path) -> Path:
     path = tmp_path / "steps.bin"
@@ -30,13 +35,14 @@ def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_pa
     result = analyze(steps, "--json", document, "--params", parameters)
     assert result.exit_code == 0, result.output
     assert "hover throttle 0.365, thrust slope 1.00 ± 0.01, lag of the motors 0 ± 3 ms" in result.output
-    for name in ("As flown", "Proposed", "ArduCopter's defaults", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
+    for name in ("As flown", "Proposed", "ArduCopter's default gains", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
         assert name in result.output
     found = json.loads(document.read_text())
     gains = found["proposed"]["gains"]
     assert found["proposed"]["prediction"]["error_m"] < 0.2 * found["assessments"][0]["prediction"]["error_m"]
     assert found["vehicle"]["mean"]["thrust_slope"] == pytest.approx(1.0, abs=0.01)
-    lines = parameters.read_text().splitlines()
+    assert found["answer"] in " ".join(result.output.split())
+    lines = lines_of(parameters)
     assert {line.split(",")[0]: float(line.split(",")[1]) for line in lines} == pytest.approx(gains)
 
 
@@ -50,8 +56,8 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
     assert "P = hover throttle, I = 2 P" in outputs[0]
     assert "P = 0.1 hover throttle, I = 2 P" in outputs[1]
     assert "2, 7, 0.1, 0.2" in outputs[1]
-    values = [[float(line.split(",")[1]) for line in file.read_text().splitlines()] for file in files]
-    names = [line.split(",")[0] for line in files[1].read_text().splitlines()]
+    values = [[float(line.split(",")[1]) for line in lines_of(file)] for file in files]
+    names = [line.split(",")[0] for line in lines_of(files[1])]
     assert names == ["PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I"]
     assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3]])
 
@@ -65,7 +71,8 @@ def test_gains_may_replace_gains_but_nothing_else(steps: Path, tmp_path: Path) -
     earlier = tmp_path / "gains.param"
     earlier.write_text("PSC_POSZ_P,1\n")
     assert analyze(steps, "--params", earlier).exit_code == 0
-    assert earlier.read_text().startswith("PSC_POSZ_P,3")
+    assert lines_of(earlier)[0] == "PSC_POSZ_P,3"
+    assert "# PSC_POSZ_P was 1" in earlier.read_text()
     before = steps.read_bytes()
     refused = analyze(steps, "--params", steps)
     assert refused.exit_code == 2

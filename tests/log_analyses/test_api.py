@@ -10,12 +10,12 @@ from tests.logs.recorded import recorded
 PATH = "/api/log-analyses"
 
 
-def send(client: TestClient, name: str, content: bytes, *, theme: str = "light") -> httpx2.Response:
-    return client.post(PATH, files={"file": (name, content)}, params={"theme": theme})
+def send(client: TestClient, name: str, content: bytes) -> httpx2.Response:
+    return client.post(PATH, files={"file": (name, content)})
 
 
 def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient) -> None:
-    answer = send(client, "steps.bin", recorded("arducopter_steps.bin"), theme="dark")
+    answer = send(client, "steps.bin", recorded("arducopter_steps.bin"))
     assert answer.status_code == 200, answer.text
     found = answer.json()
     assert found["file_name"] == "steps.bin"
@@ -23,7 +23,10 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
     assert found["vehicle"]["assumed_hover_throttle"] == pytest.approx(0.39)
     assert found["proposed"]["error_m"] < 0.2 * found["assessments"][0]["error_m"]
     assert found["insufficient"] is None
-    drawn = found["figure"]["figure"]["data"]
+    assert found["answer"].startswith("Mean deviation: 23.4 mm measured.")
+    assert "PSC_POSZ_P,3\n" in found["parameter_file"]
+    assert found["figures"].keys() == {"light", "dark"}
+    drawn = found["figures"]["dark"]["figure"]["data"]
     assert [(one["meta"]["panel"], one["meta"]["line"]) for one in drawn] == [
         (1, "Reference"),
         (1, "Flown"),

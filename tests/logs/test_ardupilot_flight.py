@@ -1,6 +1,7 @@
 """Flights in ArduCopter's logs: the recorded one, and simulated ones, logged well and badly."""
 
 import io
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,22 @@ import pytest
 from app.core.analysis.flight import LoggedFlight
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError
+from app.core.records.trajectory import Samples
 from app.logs.ardupilot_flight import read_ardupilot_flight
 from tests.core.analysis.flights import GUSTY, simulated_flight
 from tests.logs.recorded import recorded
-from tests.logs.written import GUIDED, LAND, LANDED, LOITER, NEWER_PARAMETERS, NOT_LANDED, PARAMETERS, STABILIZE, ardupilot_log
+from tests.logs.written import (
+    GUIDED,
+    LAND,
+    LANDED,
+    LOITER,
+    NEWER_PARAMETERS,
+    NOT_LANDED,
+    PARAMETERS,
+    STABILIZE,
+    VIBRATION_FAILSAFE,
+    ardupilot_log,
+)
 
 FLIGHT = simulated_flight(GUSTY)
 
@@ -74,13 +87,13 @@ def test_the_seconds_around_takeoff_and_landing_are_left_out() -> None:
 
 def test_a_manual_mode_is_refused() -> None:
     assert refusal(ardupilot_log(FLIGHT, modes=((0.0, STABILIZE),))) == (
-        "PSCD",
-        "has no 4 s in flight in a mode that holds altitude",
+        "MODE",
+        "has no mode that holds altitude in flight",
     )
 
 
 def test_a_log_that_never_left_the_ground_is_refused() -> None:
-    assert refusal(ardupilot_log(FLIGHT, events=()))[0] == "PSCD"
+    assert refusal(ardupilot_log(FLIGHT, events=())) == ("EV", "has no takeoff, or nothing between takeoff and landing")
 
 
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:
@@ -102,13 +115,102 @@ def test_parts_with_the_same_parameters_count_together() -> None:
     assert spans_s(flight) == [(10.0, 16.9), (18.0, 26.9)]
 
 
-def test_a_long_flight_is_cut() -> None:
-    """Of ten repetitions, 170 s, the 120 s from the beginning of the part."""
+def changed(**signals: Samples) -> LoggedFlight:
+    """The flight with other signals."""
     (segment,) = FLIGHT.segments
-    repeated = {name: np.tile(getattr(segment, name), 10) for name in type(segment).__slots__}
-    long = replace(segment, **{**repeated, "time_s": 0.1 * np.arange(10 * len(segment.time_s))})
-    log = ardupilot_log(replace(FLIGHT, segments=[long]))
-    assert spans_s(read(log)) == [(10.0, 130.0)]
+    return replace(FLIGHT, segments=[replace(segment, **signals)])
+
+
+def test_of_a_long_flight_the_two_minutes_with_most_manoeuvres_are_read() -> None:
+    """140 s of hover, then the steps: 17 s at the end."""
+    (segment,) = FLIGHT.segments
+    hover = {name: np.tile(getattr(segment, name)[20:40], 70) for name in type(segment).__slots__}
+    joined = {name: np.append(hover[name], getattr(segment, name)) for name in hover}
+    time_s = 0.1 * np.arange(len(joined["time_s"]))
+    log = ardupilot_log(replace(FLIGHT, segments=[replace(segment, **{**joined, "time_s": time_s})]))
+    ((begin_s, end_s),) = spans_s(read(log))
+    assert end_s - begin_s <= 120.0
+    assert (begin_s < 10.0 + 140.0 + 4.0, end_s > 10.0 + 140.0 + 13.0) == (True, True)
+
+
+def test_a_hundred_rows_a_second_are_thinned_to_ten() -> None:
+    (logged,) = FLIGHT.segments
+    time_s = np.arange(0.0, logged.duration_s, 0.01)
+    names = [name for name in type(logged).__slots__ if name != "time_s"]
+    often = {name: np.interp(time_s, logged.time_s, getattr(logged, name)) for name in names}
+    (segment,) = read(ardupilot_log(changed(time_s=time_s, **often))).segments
+    assert np.diff(segment.time_s)[1:] == pytest.approx(0.1, abs=0.011)
+
+
+def test_an_older_release_without_the_shaped_altitude_is_read_by_its_target() -> None:
+    older, newer = (read(ardupilot_log(FLIGHT, has_shaped_altitude=each)) for each in (False, True))
+    assert older.segments[0].z_d_m == pytest.approx(newer.segments[0].z_d_m)
+
+
+def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_named() -> None:
+    log = ardupilot_log(FLIGHT)
+    assert "PSCZ of an older release" in refusal(log.replace(b"PSCD", b"PSCZ"))[1]
+    assert refusal(log.replace(b",TVD", b",XVD")) == ("PSCD.TVD", "is missing: this release is not read")
+    assert refusal(log.replace(b",DPD,TPD", b",XPD,YPD"))[0] == "PSCD.DPD"
+
+
+def moved(name: str, at_s: float, by: float, *, rows: int | None = None) -> LoggedFlight:
+    """The flight with a signal moved from that time on, or for some rows."""
+    (segment,) = FLIGHT.segments
+    values = getattr(segment, name).copy()
+    first = round(10.0 * at_s)
+    values[first : None if rows is None else first + rows] += by
+    return changed(**{name: values})
+
+
+@pytest.mark.parametrize(("name", "by"), [("z_m", 0.5), ("z_m", -3.0), ("z_d_m", 0.5)])
+def test_a_reset_of_the_estimator_or_the_reference_ends_a_part(name: str, by: float) -> None:
+    assert spans_s(read(ardupilot_log(moved(name, 9.0, by)))) == [(10.0, 18.9), (19.0, 26.9)]
+
+
+def test_a_row_that_cannot_be_is_left_out() -> None:
+    """Dataflash has no checksum: one altitude of 1000 km, one climb rate of 3, one acceleration of 60 m/s²."""
+    for name, by in (("z_m", 1e6), ("v_m_s", 3.0), ("a_m_s2", 60.0), ("throttle_filtered", 40.0)):
+        assert spans_s(read(ardupilot_log(moved(name, 9.0, by, rows=1)))) == [(10.0, 18.9), (19.1, 26.9)], name
+
+
+def test_rows_without_a_throttle_beside_them_are_left_out() -> None:
+    assert spans_s(read(ardupilot_log(FLIGHT, without_throttle_s=(18.05, 19.05)))) == [(10.0, 18.0), (19.2, 26.9)]
+
+
+def test_rows_that_came_twice_count_once() -> None:
+    (segment,) = FLIGHT.segments
+    twice = {name: np.repeat(getattr(segment, name), 2) for name in type(segment).__slots__}
+    flight = read(ardupilot_log(replace(FLIGHT, segments=[replace(segment, **twice)])))
+    assert spans_s(flight) == [(10.0, 26.9)]
+
+
+def test_after_a_restart_of_the_clock_the_last_flight_counts() -> None:
+    """Two boots in one file, the first with 8 s more of it."""
+    first, second = ardupilot_log(FLIGHT, begin_s=18.0), ardupilot_log(FLIGHT)
+    assert spans_s(read(first + second)) == [(10.0, 26.9)]
+
+
+def test_a_leaning_vehicle_carries_by_the_cosine_of_its_throttle() -> None:
+    level = read(ardupilot_log(FLIGHT)).segments[0]
+    lean = [(0.2 * step, 12.0, 16.0) for step in range(200)]
+    leaning = read(ardupilot_log(FLIGHT, attitude=lean)).segments[0]
+    share = math.cos(math.radians(12.0)) * math.cos(math.radians(16.0))
+    assert leaning.throttle_filtered == pytest.approx(share * level.throttle_filtered)
+    steep = [(0.2 * step, 40.0 if 10.0 < 0.2 * step < 14.0 else 0.0, 0.0) for step in range(200)]
+    assert spans_s(read(ardupilot_log(FLIGHT, attitude=steep))) == [(13.9, 26.9)]
+    assert refusal(ardupilot_log(FLIGHT, attitude=[(at_s, 40.0, 0.0) for at_s, *_ in lean]))[0] == "ATT"
+
+
+def test_rows_while_vibration_is_compensated_are_left_out() -> None:
+    log = ardupilot_log(FLIGHT, errors=((12.0, VIBRATION_FAILSAFE, 1), (18.0, VIBRATION_FAILSAFE, 0), (20.0, 2, 1)))
+    assert spans_s(read(log)) == [(18.0, 26.9)]
+    assert refusal(ardupilot_log(FLIGHT, errors=((0.0, VIBRATION_FAILSAFE, 1),)))[0] == "ERR"
+
+
+def test_another_thrust_curve_ends_a_part() -> None:
+    flight = read(ardupilot_log(FLIGHT, changes=((12.0, "MOT_THST_EXPO", 0.2),)))
+    assert spans_s(flight) == [(12.0, 26.9)]
 
 
 @pytest.mark.parametrize(
@@ -123,10 +225,23 @@ def test_a_missing_message_is_named_with_what_to_switch_on(message: bytes, reaso
     assert refusal(content) == (message.decode(), reason)
 
 
-def test_a_log_without_the_gains_is_refused_by_both_of_their_names() -> None:
-    without = {name: value for name, value in PARAMETERS.items() if name != "PSC_POSZ_P"}
+@pytest.mark.parametrize(
+    ("gain", "newer"),
+    [
+        ("PSC_POSZ_P", "PSC_D_POS_P"),
+        ("PSC_VELZ_P", "PSC_D_VEL_P"),
+        ("PSC_ACCZ_P", "PSC_D_ACC_P"),
+        ("PSC_ACCZ_I", "PSC_D_ACC_I"),
+    ],
+)
+def test_a_log_without_a_gain_or_with_none_of_it_is_refused(gain: str, newer: str) -> None:
+    without = {name: value for name, value in PARAMETERS.items() if name != gain}
     refused = refusal(ardupilot_log(FLIGHT, parameters=without))
-    assert refused == ("PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
+    assert refused == (gain, f"is missing, and {newer} of release 4.7 too")
+    assert refusal(ardupilot_log(FLIGHT, parameters={**PARAMETERS, gain: 0.0})) == (gain, "must be positive, got 0")
+
+
+def test_a_log_without_parameters_is_refused() -> None:
     assert refusal(ardupilot_log(FLIGHT).replace(b"PARM", b"XARM"))[0] == "PSC_POSZ_P"
 
 
@@ -136,9 +251,11 @@ def test_a_limit_that_the_replica_lacks_is_named() -> None:
     assert [problem.field for problem in refused.value.problems] == ["PSC_ACCZ_SMAX"]
 
 
-def test_rates_and_filters_that_cannot_be_are_the_defaults() -> None:
-    flight = read(ardupilot_log(FLIGHT, parameters={**PARAMETERS, "SCHED_LOOP_RATE": 1e9, "INS_ACCEL_FILTER": 0.0}))
-    assert (flight.filter_hz, flight.step_s) == (20.0, 1 / 400)
+def test_a_loop_rate_that_cannot_be_is_refused() -> None:
+    assert refusal(ardupilot_log(FLIGHT, parameters={**PARAMETERS, "SCHED_LOOP_RATE": 1e9})) == (
+        "SCHED_LOOP_RATE",
+        "must be 50 to 2000 Hz, got 1e+09",
+    )
 
 
 def test_rows_that_are_rare_or_not_numbers_are_refused() -> None:

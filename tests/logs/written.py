@@ -6,9 +6,10 @@ from app.core.analysis.flight import LoggedFlight, Segment
 from app.core.records.trajectory import Samples
 from tests.logs.recorded import OnBoardLog
 
-PARM, MODE, EV, PSCD, CTUN = 1, 2, 3, 4, 5
+PARM, MODE, EV, PSCD, CTUN, ATT, ERR = 1, 2, 3, 4, 5, 6, 7
 GUIDED, LOITER, LAND, STABILIZE = 4, 5, 9, 0
 NOT_LANDED, LANDED = 28, 18
+VIBRATION_FAILSAFE = 29
 
 PARAMETERS: Mapping[str, float] = {
     "PSC_POSZ_P": 1.0,
@@ -43,25 +44,38 @@ def ardupilot_log(
     parameters: Mapping[str, float] = PARAMETERS,
     changes: Sequence[tuple[float, str, float]] = (),
     rows: slice = slice(None),
+    has_shaped_altitude: bool = True,
+    attitude: Sequence[tuple[float, float, float]] = (),
+    errors: Sequence[tuple[float, int, int]] = (),
+    without_throttle_s: tuple[float, float] = (0.0, 0.0),
 ) -> bytes:
-    """The first segment of the flight, which begins at `begin_s` after takeoff; times of modes, events and parameter
-    changes count from the takeoff, at 5 s of the vehicle's clock."""
+    """The first segment of the flight, which begins at `begin_s` after takeoff; times of modes, events, errors, roll
+    and pitch (degrees) and parameter changes count from the takeoff, at 5 s of the vehicle's clock. Older releases
+    have no shaped altitude beside the target."""
     log = OnBoardLog()
     log.define(PARM, "PARM", "QNf", "TimeUS,Name,Value")
     log.define(MODE, "MODE", "QBBB", "TimeUS,Mode,ModeNum,Rsn")
     log.define(EV, "EV", "QB", "TimeUS,Id")
-    log.define(PSCD, "PSCD", "Q" + 9 * "f", "TimeUS,DPD,TPD,PD,DVD,TVD,VD,DAD,TAD,AD")
+    log.define(ATT, "ATT", "Qff", "TimeUS,Roll,Pitch")
+    log.define(ERR, "ERR", "QBB", "TimeUS,Subsys,ECode")
+    columns = ("DPD", "TPD", "PD", "DVD", "TVD", "VD", "DAD", "TAD", "AD")[not has_shaped_altitude :]
+    log.define(PSCD, "PSCD", "Q" + len(columns) * "f", ",".join(("TimeUS", *columns)))
     log.define(CTUN, "CTUN", "Qfff", "TimeUS,ThI,ThO,ThH")
-    messages: list[tuple[int, int, str, tuple[float | bytes, ...]]] = []
+    messages: list[tuple[int, int, str, Sequence[float | bytes]]] = []
     messages += [(0, PARM, "<Q16sf", (name.encode(), value)) for name, value in parameters.items()]
     messages += [(_us(at_s), MODE, "<QBBB", (mode, mode, 1)) for at_s, mode in modes]
     messages += [(_us(at_s), EV, "<QB", (event,)) for at_s, event in events]
     messages += [(_us(at_s), PARM, "<Q16sf", (name.encode(), value)) for at_s, name, value in changes]
+    messages += [(_us(at_s), ATT, "<Qff", angles) for at_s, *angles in attitude]
+    messages += [(_us(at_s), ERR, "<QBB", codes) for at_s, *codes in errors]
     segment = flight.segments[0]
     for row in range(*rows.indices(len(segment.time_s))):
         at_us = _us(begin_s + float(segment.time_s[row] - segment.time_s[0]))
-        messages.append((at_us, PSCD, "<Q9f", tuple(-float(values[row]) for values in _loop(segment))))
+        loop = tuple(-float(values[row]) for values in _loop(segment))[-len(columns) :]
+        messages.append((at_us, PSCD, f"<Q{len(columns)}f", loop))
         throttle = (float(segment.throttle[row]), float(segment.throttle_filtered[row]))
+        if _us(without_throttle_s[0]) < at_us < _us(without_throttle_s[1]):
+            continue
         messages.append((at_us, CTUN, "<Q3f", (*throttle, parameters.get("MOT_THST_HOVER", 0.35))))
     for at_us, kind, layout, fields in sorted(messages, key=lambda message: message[0]):
         log.add(kind, layout, at_us, *fields)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.margin import gain_margin
+from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
 from app.core.analysis.proposal import BOUNDS, propose, with_gains
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
@@ -23,8 +23,8 @@ _LEAST_VARIATION: Final = 1e-6
 _OTHER_CONTROLLER_M_S: Final = 0.02
 _OTHER_CONTROLLER_SHARE: Final = 0.05
 _LARGEST_RESIDUAL_M_S2: Final = 1.5
-_LARGEST_MISFIT: Final = (0.005, 0.35)
-_LARGEST_SLOPE_DEVIATION: Final = 0.12
+_LARGEST_MISFIT: Final = (0.005, 0.25)
+_LARGEST_SLOPE_DEVIATION: Final = 0.15
 _FLY: Final = (
     "Fly at a height of 3 m or more in a mode that holds altitude (GUIDED, LOITER, ALT_HOLD, AUTO): hover for 5 s, "
     "climb 2 m, hover for 5 s, descend 2 m, hover for 5 s; with NTUN and CTUN in LOG_BITMASK."
@@ -74,14 +74,50 @@ class Response:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
     """Everything that a log answers. `assessments` begins with the gains of the flight; `proposed` is None if the log
-    does not suffice, or no gains do, which `insufficient` then says."""
+    does not suffice, no gains do, or none are better, which `insufficient` then says. `at_limit` names proposed gains
+    at an end of the range that was searched."""
 
     behaviour: Behaviour
     estimate: CopterEstimate
     assessments: Sequence[Assessment]
     proposed: Assessment | None
     insufficient: str | None
+    at_limit: Sequence[str]
     response: Response
+
+    @property
+    def answer(self) -> str:
+        """The answer in a sentence or two."""
+        flown, proposed = self.assessments[0], self.proposed
+        if proposed is None:
+            return self.insufficient or ""
+        measured = f"Mean deviation: {_mm(self.behaviour.error_m)} measured."
+        if proposed.prediction.error_m > _BETTER * flown.prediction.error_m:
+            return (
+                f"{measured} The model predicts about the same for the proposed gains, with a margin of "
+                f"{proposed.margin:.1f} instead of {f'{flown.margin:.1f}' if flown.margin else 'less than 1'}."
+            )
+        low, high = (f"{1e3 * each:.1f}" for each in (proposed.prediction.low_m, proposed.prediction.high_m))
+        return (
+            f"{measured} The model predicts {_mm(flown.prediction.error_m)} for the gains flown, and "
+            f"{_mm(proposed.prediction.error_m)} ({low} … {high} mm) for the proposed ones."
+        )
+
+    def parameter_file(self, file_name: str) -> str | None:
+        """The proposed gains as a ground station loads them, with those flown as comments; None without a proposal."""
+        if self.proposed is None:
+            return None
+        flown = self.assessments[0].gains
+        lines = [
+            f"# Gainline, from {file_name}. Load on the ground; fly first at a safe height, ready to take over.",
+            *(f"# {name} was {value:g}" for name, value in flown.items()),
+            *(f"{name},{value:g}" for name, value in self.proposed.gains.items()),
+        ]
+        return "\n".join((*lines, ""))
+
+
+def _mm(error_m: float) -> str:
+    return f"{1e3 * error_m:.1f} mm"
 
 
 def analyze(flight: LoggedFlight) -> Analysis:
@@ -101,16 +137,34 @@ def analyze(flight: LoggedFlight) -> Analysis:
     compared = [present, *(_assess(name, gains, flight, model, estimate) for name, gains in usual.items())]
     insufficient = _insufficient(estimate)
     gains = None if insufficient else propose(flight, estimate.few, [_gains_of(flight), *usual.values()])
+    proposed = _assess("Proposed", gains, flight, model, estimate) if gains else None
+    if proposed is None:
+        insufficient = insufficient or _NONE_ALLOWED
+    elif not _is_better(proposed, present):
+        gains, proposed, insufficient = None, None, _NONE_BETTER
     return Analysis(
         behaviour=behaviour,
         estimate=estimate,
         assessments=tuple(compared),
-        proposed=_assess("Proposed", gains, flight, model, estimate) if gains else None,
-        insufficient=insufficient or (None if gains else _NONE_ALLOWED),
+        proposed=proposed,
+        insufficient=insufficient,
+        at_limit=[*flight.named({name: gains[name] for name in BOUNDS if gains[name] in BOUNDS[name]})]
+        if gains
+        else [],
         response=_response(flight, estimate, gains or _gains_of(flight)),
     )
 
 
+def _is_better(proposed: Assessment, present: Assessment) -> bool:
+    """Whether it deviates less, or keeps a margin that the present gains lack."""
+    deviates_less = proposed.prediction.error_m <= _BETTER * present.prediction.error_m
+    return deviates_less or present.margin < REQUIRED_MARGIN <= proposed.margin
+
+
+_BETTER: Final = 0.95
+_NONE_BETTER: Final = (
+    "Keep the gains flown: they have the margin, and no others are predicted to deviate less by more than 5 %."
+)
 _NONE_ALLOWED: Final = (
     "No gains within the documented ranges keep the margin on this vehicle. Shorten its lags first: the motors', and "
     "the filters of the accelerometer and the acceleration controller."
@@ -138,7 +192,7 @@ def rules(flight: LoggedFlight) -> dict[str, dict[str, float]]:
     by_hover = _with_names((1.0, 5.0, float(f"{hover:.2g}"), float(f"{2.0 * hover:.2g}")))
     fixed = [_with_names(values) for values in ((2.0, 7.0, 1.0, 2.0), (3.0, 8.0, 0.5, 3.0))]
     return {
-        "ArduCopter's defaults": _with_names((1.0, 5.0, 0.5, 1.0)),
+        "ArduCopter's default gains": _with_names((1.0, 5.0, 0.5, 1.0)),
         f"P = {'0.1 ' if flight.has_newer_names else ''}hover throttle, I = 2 P": by_hover,
         **{", ".join(f"{value:g}" for value in flight.named(gains).values()): gains for gains in fixed},
     }
@@ -201,7 +255,7 @@ def _require_own_controller(flight: LoggedFlight) -> None:
     if differing > _OTHER_CONTROLLER_SHARE * rows:
         raise _unanswered(
             f"has another climb rate target than its own parameters give, in {differing} of {rows} rows: terrain "
-            "following, a failsafe, or a release with another position controller"
+            "following, or a release with another position controller"
         )
 
 
@@ -215,8 +269,9 @@ def _require_likeness(behaviour: Behaviour, estimate: CopterEstimate, present: A
     misfit_m = abs(present.prediction.error_m - behaviour.error_m)
     if misfit_m > max(least, share * behaviour.error_m):
         raise _unanswered(
-            f"has an error of {1e3 * behaviour.error_m:.1f} mm, and the model that fits it best "
-            f"{1e3 * present.prediction.error_m:.1f} mm"
+            f"has a deviation of {1e3 * behaviour.error_m:.1f} mm, where the gains in the log make the fitted vehicle "
+            f"deviate by {1e3 * present.prediction.error_m:.1f} mm: it flew with other gains, for instance set by a "
+            "tuning knob, or something else replaced the controller"
         )
 
 

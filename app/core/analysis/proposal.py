@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin
+from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, gain_margin
 from app.core.analysis.prediction import FlightModel
 from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, Parameters
 from app.core.models.copter import Copter
@@ -37,6 +37,9 @@ _MOST_FLIGHTS: Final = 150
 _FIRST_STEP, _LAST_STEP = 0.3, 0.01
 _PRICE_OF_ACTIVITY: Final = 0.05
 """Relative error that is as good as a relative throttle activity: 1 % of one for 20 % of the other."""
+_AS_GOOD: Final = math.log(1.05)
+_ACTIVITY_SOUGHT: Final = 0.97 * LARGEST_ACTIVITY
+"""The few copters of a search differ from all of them by up to 3 %."""
 _DIGITS: Final = 3
 _ROUNDING: Final = 0.005
 
@@ -53,10 +56,11 @@ def propose(
     flight: LoggedFlight, copters: Sequence[Copter], starts: Sequence[Mapping[str, float]]
 ) -> dict[str, float] | None:
     """Gains of `BOUNDS` with three digits, searched for from the best allowed one of `starts` and a gentle set; None if
-    none is allowed.
+    none is allowed. Of what is found and the starts, those within 5 % of the best error, the one with the largest
+    margin.
 
-    Allowed are gains within `BOUNDS` that ring with none of the copters within the margin, and move the throttle at
-    most `LARGEST_ACTIVITY` times as much as those of the flight.
+    Allowed are gains within `BOUNDS` with an acceleration controller's I of at least its P, that ring with none of the
+    copters within the margin, and move the throttle at most `LARGEST_ACTIVITY` times as much as those of the flight.
     """
     from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
@@ -77,13 +81,24 @@ def propose(
         return error + _PRICE_OF_ACTIVITY * activity
 
     @cache
-    def excess(point: _Point) -> tuple[float, float]:
-        """How far the point is beyond what is allowed, in damping and in activity; allowed if neither is positive."""
+    def excess(point: _Point) -> tuple[float, float, float]:
+        """How far the point is beyond what is allowed: in damping, activity, and P over I; allowed if none is
+        positive."""
         damping = min(
             damping_within_margin(parameters(point), each, filter_hz=flight.filter_hz, step_s=flight.step_s)
             for each in copters
         )
-        return RINGING_DAMPING - damping, flown(point)[1] - math.log(LARGEST_ACTIVITY)
+        gains = dict(zip(BOUNDS, point, strict=True))
+        return (
+            RINGING_DAMPING - damping,
+            flown(point)[1] - math.log(_ACTIVITY_SOUGHT),
+            gains["PSC_ACCZ_P"] - gains["PSC_ACCZ_I"],
+        )
+
+    def margin(point: _Point) -> float:
+        return min(
+            gain_margin(parameters(point), each, filter_hz=flight.filter_hz, step_s=flight.step_s) for each in copters
+        )
 
     low, high = np.log(np.array(list(BOUNDS.values()))).T
     points = [
@@ -108,5 +123,7 @@ def propose(
         options={"maxfev": _MOST_FLIGHTS, "initial_tr_radius": _FIRST_STEP, "final_tr_radius": _LAST_STEP},
     )
     rounded = tuple(math.log(float(f"{value:.{_DIGITS}g}")) for value in np.exp(found.x).tolist())
-    best = min((point for point in (rounded, *allowed) if max(excess(point)) <= 0.0), key=cost)
+    candidates = [point for point in (rounded, *allowed) if max(excess(point)) <= 0.0]
+    least = min(map(cost, candidates))
+    best = max((point for point in candidates if cost(point) <= least + _AS_GOOD), key=margin)
     return {name: float(f"{math.exp(value):.{_DIGITS}g}") for name, value in zip(BOUNDS, best, strict=True)}

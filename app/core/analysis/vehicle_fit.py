@@ -4,7 +4,9 @@
 
 The throttle also answers to disturbances, which would bias an ordinary regression: a gust raises the vehicle, and the
 loop lowers the throttle. The reference does not answer to them, so throttle and climb rate are first projected on its
-climb rate and acceleration (two-stage least squares). The motors' lag is not linear in this equation: each value of a
+climb rate and acceleration (two-stage least squares). Gusts last from row to row, which makes the result less certain
+than as many independent rows would: gusts that decay exponentially beside noise that does not last are an
+autoregressive moving average, found by its likelihood. The motors' lag is not linear in this equation: each value of a
 grid is weighed by what it leaves that follows the reference, and by what is usual.
 """
 
@@ -26,7 +28,6 @@ USUAL_LAG_S: Final = (0.05, 0.05)
 """Mean and standard deviation over vehicles."""
 
 _LAGS_S: Final = np.linspace(0.0, 0.25, 26)
-_STRONGEST_CORRELATION: Final = 0.95
 _ROUNDING: Final = np.array([0.0, 0.0, 0.0, 0.01 / math.sqrt(12.0)])
 _FREE_FALL: Final = -0.95
 _LEAST_THROTTLE: Final = 0.01
@@ -54,20 +55,77 @@ class CopterEstimate:
 
 
 @dataclass(frozen=True, slots=True)
+class _Noise:
+    """Gusts that decay by `decay` from row to row, beside noise that does not last; `smoothing` is from 0, gusts alone,
+    to `decay`, noise alone."""
+
+    decay: float
+    smoothing: float
+
+    def whitened(self, values: Samples) -> Samples:
+        """Rows, shape (n, …), without the correlation of this noise."""
+        from scipy.signal import lfilter
+
+        return np.asarray(lfilter([1.0, -self.decay], [1.0, -self.smoothing], values, axis=0))
+
+    def covariance(self, values: Samples) -> Samples:
+        """Covariance of the products of `values`, shape (n, k), with such noise of unit innovations, (k, k)."""
+        from scipy.signal import lfilter
+
+        coloured = np.asarray(lfilter([1.0, -self.smoothing], [1.0, -self.decay], values[::-1], axis=0))
+        return np.asarray(coloured.T @ coloured)
+
+
+_NOISES: Final = [
+    _Noise(decay, share * decay)
+    for decay in (0.5, 0.7, 0.8, 0.87, 0.92, 0.96, 0.98)
+    for share in (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.87, 0.93, 1.0)
+]
+
+
+@dataclass(frozen=True, slots=True)
 class _Rows:
-    """Scored rows of all segments for one lag: log(1 + a/g), shape (n,), its causes, (n, 3), and their projections on
-    the instruments, orthonormal, (n, m)."""
+    """Rows for one lag: log(1 + a/g), shape (n,), its causes, (n, 3), orthonormal instruments, (n, m), and the causes
+    projected on these, (n, 3)."""
 
     lag_s: float
     sought: Samples
     causes: Samples
-    projected: Samples
     instruments: Samples
+    projected: Samples
 
     @property
     def left(self) -> Samples:
         """What two-stage least squares leaves, shape (n,)."""
         return self.sought - self.causes @ np.linalg.lstsq(self.projected, self.sought, rcond=None)[0]
+
+    @property
+    def variance(self) -> float:
+        """Variance of what is left."""
+        rows, causes = self.causes.shape
+        return float(np.sum(self.left**2)) / int(rows - causes)
+
+    def whitened(self, noise: _Noise) -> "_Rows":
+        """The rows without the correlation of this noise."""
+        return _with_instruments(self.lag_s, *map(noise.whitened, (self.sought, self.causes, self.instruments)))
+
+    def log_likelihood(self, noise: _Noise) -> float:
+        """Logarithm of the restricted likelihood of this noise."""
+        white = self.whitened(noise)
+        rows, causes = self.causes.shape
+        log_determinant = float(np.linalg.slogdet(white.projected.T @ white.projected).logabsdet)
+        return -0.5 * (int(rows - causes) * math.log(white.variance) + log_determinant)
+
+    def independent_variance(self, noise: _Noise) -> float:
+        """Variance of independent rows that would make the slope as uncertain as this noise does."""
+        inverse = np.linalg.inv(self.projected.T @ self.projected)
+        uncertainty = inverse @ noise.covariance(self.projected) @ inverse
+        return self.whitened(noise).variance * float(uncertainty[0, 0] / inverse[0, 0])
+
+
+def _with_instruments(lag_s: float, sought: Samples, causes: Samples, instruments: Samples) -> _Rows:
+    orthonormal, _ = np.linalg.qr(instruments)
+    return _Rows(lag_s, sought, causes, orthonormal, orthonormal @ (orthonormal.T @ causes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +144,8 @@ def fit_copter(flight: LoggedFlight) -> CopterEstimate:
     from scipy.stats import norm
 
     candidates = [_rows(flight, lag_s) for lag_s in _LAGS_S.tolist()]
-    left = min((each.left for each in candidates), key=np.var)
-    variance = float(np.var(left)) / _independent_share(left)
+    best = min(candidates, key=lambda each: each.variance)
+    variance = best.independent_variance(max(_NOISES, key=best.log_likelihood))
     regressions = [_regress(each, variance) for each in candidates]
     log_weight = np.array([each.log_likelihood + norm.logpdf(each.lag_s, *USUAL_LAG_S) for each in regressions])
     weight = np.exp(log_weight - log_weight.max())
@@ -96,7 +154,7 @@ def fit_copter(flight: LoggedFlight) -> CopterEstimate:
         mean=_copter(values.mean(axis=0)),
         deviation=_copter(np.hypot(values.std(axis=0), _ROUNDING)),
         draws=tuple(_copter(row) for row in values),
-        residual_m_s2=float(np.std(left)) * GRAVITY_M_S2,
+        residual_m_s2=math.sqrt(best.variance) * GRAVITY_M_S2,
     )
 
 
@@ -109,18 +167,19 @@ def _rows(flight: LoggedFlight, lag_s: float) -> _Rows:
     throttle = np.log(rows(lambda each: _sensed_throttle(each, flight, lag_s)))
     causes = np.column_stack([throttle, rows(lambda each: each.v_m_s), ones])
     accelerations = [rows(partial(_accelerations_before, rows=back)) for back in range(_INSTRUMENT_ROWS)]
-    instruments, _ = np.linalg.qr(np.column_stack([rows(lambda each: each.v_d_m_s), *accelerations, ones]))
-    return _Rows(lag_s, sought, causes, instruments @ (instruments.T @ causes), instruments)
+    instruments = np.column_stack([rows(lambda each: each.v_d_m_s), *accelerations, ones])
+    return _with_instruments(lag_s, sought, causes, instruments)
 
 
 def _accelerations_before(segment: Segment, *, rows: int) -> Samples:
-    """Acceleration of the reference some rows before each, shape (n,); the first rows, which are not scored, wrap."""
-    return np.roll(segment.a_d_m_s2, rows)
+    """Acceleration of the reference some rows before each, shape (n,); that of the first row before the first."""
+    before = np.maximum(np.arange(len(segment.time_s)) - rows, 0)
+    return np.asarray(segment.a_d_m_s2[before])
 
 
 def _regress(rows: _Rows, variance: float) -> _Regression:
-    """Two-stage least squares with the usual slope and drag as further observations; `variance` is that of a row of
-    uncorrelated noise with the effect of the one found."""
+    """Two-stage least squares with the usual slope and drag as further observations; `variance` is that of independent
+    rows."""
     usual = np.array([USUAL_SLOPE[0], -USUAL_DRAG_1_S[0] / GRAVITY_M_S2, 0.0])
     certainty = np.diag([USUAL_SLOPE[1] ** -2, (USUAL_DRAG_1_S[1] / GRAVITY_M_S2) ** -2, 0.0])
     information = rows.projected.T / variance
@@ -136,13 +195,6 @@ def _sensed_throttle(segment: Segment, flight: LoggedFlight, lag_s: float) -> Sa
     accelerometer = accelerometer_filter(flight.filter_hz, flight.step_s)
     sensed = filtered(steps.throttle_filtered, motor_filter(lag_s, flight.step_s), accelerometer)
     return np.maximum(np.interp(segment.time_s, steps.time_s, sensed), _LEAST_THROTTLE)
-
-
-def _independent_share(values: Samples) -> float:
-    """Share of the values that are as good as independent, for noise with the correlation of neighbours found."""
-    correlation = float(np.corrcoef(values[1:], values[:-1])[0, 1])
-    limited = min(max(correlation, 0.0), _STRONGEST_CORRELATION)
-    return (1.0 - limited) / (1.0 + limited)
 
 
 def _draws(regressions: Sequence[_Regression], weight: Samples) -> Samples:

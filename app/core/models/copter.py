@@ -87,8 +87,11 @@ Filter = tuple[Samples, Samples]
 
 
 def accelerometer_filter(cutoff_hz: float, dt_s: float) -> Filter:
-    """The second-order Butterworth filter of INS_ACCEL_FILTER."""
+    """The second-order Butterworth filter of INS_ACCEL_FILTER; none for a cut-off of 0, or beyond half the rate."""
     from scipy.signal import butter
+
+    if not 0.0 < cutoff_hz < 0.5 / dt_s:
+        return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
 
     numerator, denominator = butter(2, cutoff_hz, fs=1.0 / dt_s)
     return np.asarray(numerator), np.asarray(denominator)

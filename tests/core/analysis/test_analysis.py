@@ -122,4 +122,49 @@ def test_a_flight_that_the_model_does_not_repeat_is_refused() -> None:
     (segment,) = flight.segments
     off = segment.z_d_m + 0.1
     moved = changed(flight, z_d_m=off, v_t_m_s=segment.v_t_m_s + 0.1 * flight.parameters.position_p_1_s)
-    assert "the model that fits it best" in refusal(moved)
+    assert "it flew with other gains" in refusal(moved)
+
+
+def stiff_flight(acceleration_p: float) -> LoggedFlight:
+    """3, 8 and an integral gain of 3 on a vehicle with fast motors, in gusts."""
+    nimble = replace(GUSTY, motor_lag_s=0.02)
+    gains = {"position_p_1_s": 3.0, "velocity_p_1_s": 8.0, "acceleration_i_1_s": 3.0}
+    return simulated_flight(nimble, acceleration_p=acceleration_p, **gains)
+
+
+def test_good_gains_are_kept() -> None:
+    found = analyze(stiff_flight(0.8))
+    assert found.assessments[0].margin > 2.0
+    assert found.proposed is None
+    assert found.answer.startswith("Keep the gains flown")
+    assert found.parameter_file("flight.bin") is None
+
+
+def test_gains_that_lack_the_margin_are_answered_by_some_that_have_it() -> None:
+    found = analyze(stiff_flight(1.0))
+    assert found.assessments[0].margin < 2.0
+    assert found.proposed is not None
+    assert found.proposed.margin >= 2.0
+    assert "about the same for the proposed gains, with a margin of 2.1 instead of 1.9" in found.answer
+
+
+def test_the_answer_tells_what_was_measured_and_what_is_predicted() -> None:
+    found = analyze(recorded_steps())
+    assert found.proposed is not None
+    low, high = (f"{1e3 * each:.1f}" for each in (found.proposed.prediction.low_m, found.proposed.prediction.high_m))
+    assert found.answer == (
+        f"Mean deviation: 27.4 mm measured. The model predicts {1e3 * found.assessments[0].prediction.error_m:.1f} mm "
+        f"for the gains flown, and {1e3 * found.proposed.prediction.error_m:.1f} mm ({low} … {high} mm) for the "
+        "proposed ones."
+    )
+    assert {"PSC_POSZ_P", "PSC_VELZ_P"} <= set(found.at_limit)
+
+
+def test_among_gains_that_deviate_alike_those_with_more_margin_are_proposed() -> None:
+    """On the binary's vehicle 3, 8, 0.85, 3 has the least deviation, at a margin of 2.0; 3, 8, 0.5, 3 deviates 0.1 mm
+    more."""
+    found = analyze(recorded_steps())
+    stiff = next(each for each in found.assessments if each.name == "3, 8, 0.5, 3")
+    assert found.proposed is not None
+    assert found.proposed.prediction.error_m < 1.05 * stiff.prediction.error_m
+    assert found.proposed.margin >= stiff.margin > 3.0

@@ -25,6 +25,7 @@ def test_a_proposal_is_allowed_and_better_than_what_it_began_with(copter: Simula
     gains = propose(flight, estimate.few, [DEFAULTS, STIFF])
     assert gains is not None
     assert all(low <= gains[name] <= high for name, (low, high) in BOUNDS.items())
+    assert gains["PSC_ACCZ_I"] >= gains["PSC_ACCZ_P"]
     model = FlightModel(flight, estimate.few)
     parameters = with_gains(flight.parameters, gains)
     error_m, activity = model.fly(parameters)

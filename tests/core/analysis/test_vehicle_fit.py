@@ -1,5 +1,7 @@
 """The fitted vehicle, against the real binary's and against simulated ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,17 @@ def test_random_vehicles_lie_within_their_uncertainty() -> None:
         assert estimate.mean.hover_throttle == pytest.approx(copter.hover_throttle, rel=0.06)
     assert np.abs(apart).max() < 3.0
     assert abs(np.mean(apart)) < 1.0
+
+
+def test_the_stated_uncertainty_of_the_slope_is_that_of_many_flights() -> None:
+    """Of 24 flights of one vehicle in gusts, with 10 rows a second: the deviation of (slope − 1)/stated is within 30 %
+    of 1, twice the error of 24."""
+    estimates = [
+        fit_copter(simulated_flight(replace(GUSTY, gust_m_s2=0.25, noise_m_s2=0.2), seed=seed)) for seed in range(24)
+    ]
+    apart = [(each.mean.thrust_slope - 1.0) / each.deviation.thrust_slope for each in estimates]
+    assert np.std(apart) == pytest.approx(1.0, abs=0.3)
+    assert abs(np.mean(apart)) < 0.6
 
 
 def test_the_draws_have_the_stated_mean_and_deviation() -> None:

@@ -180,7 +180,7 @@ export type AssessedGains = {
     /**
      * Margin
      *
-     * factor on the acceleration gains at which the loop rings with 30 ms more lag; 0: it rings
+     * factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most critical of the vehicles that the log allows; 0: less than 1, 8: at least 8
      */
     margin: number;
 };
@@ -2246,6 +2246,10 @@ export type LogAnalysis = {
      * File Name
      */
     file_name: string;
+    /**
+     * Answer
+     */
+    answer: string;
     behaviour: LoggedBehaviour;
     vehicle: EstimatedVehicle;
     proposed: AssessedGains | null;
@@ -2259,7 +2263,26 @@ export type LogAnalysis = {
      * Assessments
      */
     assessments: Array<AssessedGains>;
-    figure: FigureCard;
+    /**
+     * At Limit
+     *
+     * proposed gains at an end of the range that was searched
+     */
+    at_limit: Array<string>;
+    /**
+     * Parameter File
+     *
+     * the proposed gains as a ground station loads them
+     */
+    parameter_file: string | null;
+    /**
+     * Figures
+     *
+     * by theme
+     */
+    figures: {
+        [key: string]: FigureCard;
+    };
 };
 
 /**
@@ -7051,14 +7074,7 @@ export type AnalyzeLogData = {
         'Idempotency-Key'?: string | null;
     };
     path?: never;
-    query?: {
-        /**
-         * Theme
-         *
-         * colours for a light or a dark page
-         */
-        theme?: 'light' | 'dark';
-    };
+    query?: never;
     url: '/api/log-analyses';
 };
 

@@ -1,8 +1,8 @@
 import { Anchor, Button, FileButton, Group, Skeleton, Text, Title, useComputedColorScheme } from "@mantine/core";
 import { IconDownload, IconFileUpload } from "@tabler/icons-react";
-import { type DragEvent, useState } from "react";
+import { useRef, useState } from "react";
 import { Link } from "react-router";
-import { type LogAnalysis, useLogAnalysis } from "../../api/logAnalyses";
+import { type LogAnalysis, useAnalyzeLog } from "../../api/logAnalyses";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { DataTable } from "../../ui/DataTable";
 import { ErrorNotice } from "../../ui/Notices";
@@ -11,7 +11,7 @@ import { Panel } from "../../ui/Panel";
 import row from "../../ui/RowCard.module.css";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./Checks.module.css";
-import { answerOf, behaviourOf, gainsTable, parameterFile, vehicleOf } from "./logAnalysis";
+import { behaviourOf, gainsTable, vehicleOf } from "./logAnalysis";
 
 const FIGURE_HEIGHT_PX = 560;
 const ROW_PX = 37;
@@ -19,14 +19,12 @@ const ROW_PX = 37;
 /** Better altitude gains from the log of a flight, without a campaign. */
 export function LogAnalysisPage() {
   useTitle("Log analysis");
-  const theme = useComputedColorScheme("light");
-  const [file, setFile] = useState<File | null>(null);
   const [over, setOver] = useState(false);
-  const analysis = useLogAnalysis(file, theme);
-  const drop = (event: DragEvent) => {
-    event.preventDefault();
-    setOver(false);
-    setFile(event.dataTransfer.files[0] ?? null);
+  const resetFile = useRef<() => void>(null);
+  const { mutate, data, error, variables, isPending } = useAnalyzeLog();
+  const analyze = (file: File | null | undefined) => {
+    if (file && !isPending) mutate(file);
+    resetFile.current?.();
   };
   return (
     // biome-ignore lint/a11y/noStaticElementInteractions: dropping a file is a shortcut for the button below
@@ -37,13 +35,22 @@ export function LogAnalysisPage() {
         setOver(true);
       }}
       onDragLeave={() => setOver(false)}
-      onDrop={drop}
+      onDrop={(event) => {
+        event.preventDefault();
+        setOver(false);
+        analyze(event.dataTransfer.files[0]);
+      }}
     >
       <Title order={1}>Log analysis</Title>
-      {analysis.data && <Result analysis={analysis.data} />}
-      {analysis.isLoading && <Skeleton height={320} radius="md" aria-busy="true" />}
+      {isPending && (
+        <Panel title={variables.name}>
+          <p aria-live="polite">Analysing the log. This takes about 10 seconds.</p>
+          <Skeleton height={280} mt={12} radius="md" aria-hidden />
+        </Panel>
+      )}
+      {data && <Result analysis={data} />}
       <Panel
-        title={analysis.data ? "Analyse another log" : "Better altitude gains from one log"}
+        title={data ? "Analyse another log" : "Better altitude gains from one log"}
         className={over ? classes["over"] : ""}
       >
         <Text maw="90ch" lh={1.45} mb={10}>
@@ -51,15 +58,15 @@ export function LogAnalysisPage() {
           should climb and descend by about 2 m with a few seconds of hover between. The file is not stored.
         </Text>
         <Group gap={10} mt={12} mb={10}>
-          <FileButton accept=".bin" onChange={setFile}>
+          <FileButton accept=".bin" onChange={analyze} resetRef={resetFile}>
             {(props) => (
-              <Button {...props} loading={analysis.isFetching} leftSection={<IconFileUpload size={20} aria-hidden />}>
+              <Button {...props} loading={isPending} leftSection={<IconFileUpload size={20} aria-hidden />}>
                 Choose log
               </Button>
             )}
           </FileButton>
         </Group>
-        <ErrorNotice error={analysis.error} />
+        <ErrorNotice error={error} />
         <Text size="sm" c="dimmed">
           To compare a log with the replica of its controller, use the{" "}
           <Anchor component={Link} to="/controller" inherit underline="always">
@@ -73,31 +80,34 @@ export function LogAnalysisPage() {
 }
 
 function Result({ analysis }: { analysis: LogAnalysis }) {
-  const { file_name, proposed, figure } = analysis;
+  const { file_name, answer, proposed, at_limit, parameter_file, figures } = analysis;
+  const figure = figures[useComputedColorScheme("light")];
   const table = gainsTable(analysis);
   return (
     <article className={classes["check"]} aria-label={`Analysis of ${file_name}`}>
       <Panel title={file_name}>
         <p className={classes["sentence"]} data-passed={proposed !== null || undefined}>
-          {answerOf(analysis)}
+          {answer}
         </p>
         <Facts title="Flight" facts={behaviourOf(analysis)} />
         <Facts title="Vehicle" facts={vehicleOf(analysis)} />
         <DataTable table={table} label="Gains compared" height={ROW_PX * (table.rows.length + 1)} />
         <ul className={page["notes"]}>
-          <li>Deviations are predicted for the same manoeuvre in the same weather.</li>
+          <li>Deviations are predicted for the same manoeuvre in the same weather, other parameters as flown.</li>
           <li>Activity is that of the throttle, relative to the gains flown; a proposal has at most 1.5.</li>
           <li>
             The margin is the factor on P and I of the acceleration controller at which the loop rings with 30 ms more
             lag; a proposal has at least 2.
           </li>
+          {at_limit.length > 0 && <li>At an end of the range searched: {at_limit.join(", ")}.</li>}
+          {proposed && <li>Load the gains on the ground. Fly them first at a safe height, ready to take over.</li>}
         </ul>
-        {proposed && (
+        {parameter_file !== null && (
           <Button
             component="a"
             mt="sm"
             variant="default"
-            href={`data:text/plain;charset=utf-8,${encodeURIComponent(parameterFile(proposed))}`}
+            href={`data:text/plain;charset=utf-8,${encodeURIComponent(parameter_file)}`}
             download={`${file_name.replace(/\.bin$/i, "")}.param`}
             leftSection={<IconDownload size={18} aria-hidden />}
           >
@@ -105,7 +115,7 @@ function Result({ analysis }: { analysis: LogAnalysis }) {
           </Button>
         )}
       </Panel>
-      <FigurePanel title={figure.title} card={figure} error={null} height={FIGURE_HEIGHT_PX} />
+      {figure && <FigurePanel title={figure.title} card={figure} error={null} height={FIGURE_HEIGHT_PX} />}
     </article>
   );
 }

@@ -9,13 +9,6 @@ const HOVER_DIFFERENCE = 0.1;
 
 const millimetres = (metres: number): string => `${(1000 * metres).toFixed(1)} mm`;
 
-/** The answer in a sentence. */
-export function answerOf({ proposed, insufficient, assessments, behaviour }: LogAnalysis): string {
-  const present = assessments[0]?.error_m ?? behaviour.error_m;
-  if (proposed === null) return insufficient ?? "";
-  return `The proposed gains are predicted to deviate by ${millimetres(proposed.error_m)} in the mean, instead of ${millimetres(present)}.`;
-}
-
 /** What the flight was, as separate facts. */
 export function behaviourOf({ behaviour }: LogAnalysis): string[] {
   const { duration_s, reference_range_m, error_m, largest_deviation_m, throttle_mean, saturated_share } = behaviour;
@@ -69,13 +62,6 @@ export function gainsTable({ proposed, assessments }: LogAnalysis): FigureTable 
 }
 
 function marginText({ margin }: AssessedGains): string {
-  if (margin === 0) return "rings";
+  if (margin === 0) return "< 1";
   return margin < LARGEST_MARGIN ? margin.toFixed(1) : `> ${LARGEST_MARGIN}`;
-}
-
-/** A file of the proposed gains as a ground station loads it. */
-export function parameterFile(proposed: AssessedGains): string {
-  return Object.entries(proposed.gains)
-    .map(([name, value]) => `${name},${value}\n`)
-    .join("");
 }
