@@ -4,7 +4,7 @@ emphasised, the next one's prediction dashed.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, cast
 
 from app.core.formatting import count
 from app.figures import theme
@@ -46,12 +46,12 @@ class TrajectoriesFigure:
     one) with `prediction_lower` and `prediction_upper` (if its band is known), at those `TABLE_TIMES_S` that lie within
     the experiment.
 
-    Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, band,
-    glitch, limit, live, pointed, off scale) and, for flights, `trial` and `standing` (best, latest, baseline, earlier,
-    invalid, unjudged); a flight's `uid` is `flight-` and its number, that of its deviation `deviation-` and its number.
-    The traces `live`, `live deviation` and `pointed` are empty: a page fills the first two during a flight, the last
-    with the flight under the pointer if that one has no curve of its own. The altitude limit, `limit`, is hidden: the
-    page on which a flight is observed shows it.
+    Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, predicted
+    deviation, band, glitch, limit, live, pointed, off scale) and, for flights, `trial` and `standing` (best, latest,
+    baseline, earlier, invalid, unjudged). Every trace has its own `uid`: a flight's is `flight-` and its number, that
+    of its deviation `deviation-` and its number. The traces `live`, `live deviation` and `pointed` are empty: a page
+    fills the first two during a flight, the last with the flight under the pointer if that one has no curve of its own.
+    The altitude limit, `limit`, is hidden: the page on which a flight is observed shows it.
 
     The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. A set point
     of zero has no deviations: they would repeat the output.
@@ -103,7 +103,7 @@ class TrajectoriesFigure:
             uirevision="takeoffs",
         )
         summary = self._summary(sum(index < len(drawn) for index in outside))
-        return ready(self, traces, layout, summary=summary, table=self._table(drawn, envelope))
+        return ready(self, _with_uids(traces), layout, summary=summary, table=self._table(drawn, envelope))
 
     @property
     def _lasts_s(self) -> float:
@@ -159,8 +159,9 @@ class TrajectoriesFigure:
             f"{proposal.curve_name}: deviation",
             deviation_of(proposal.curve, self.history.set_point),
             points,
-            role="deviation",
-            about={"standing": "prediction"},
+            role="predicted deviation",
+            about={"trial": proposal.number},
+            uid="predicted-deviation",
             line=_style(palette, "prediction"),
             showlegend=False,
             yaxis="y2",
@@ -282,6 +283,7 @@ class TrajectoriesFigure:
                 CURVE_POINTS,
                 role="prediction",
                 about={"trial": proposal.number},
+                uid="prediction",
                 line=_style(palette, "prediction"),
                 legendrank=899,
                 hovertemplate=reading(
@@ -298,7 +300,6 @@ class TrajectoriesFigure:
             role=role,
             showlegend=False,
             line=theme.line(palette.ink, 3.5),
-            uid=role,
             legendrank=1,
             cliponaxis=True,
             hovertemplate=reading(name, self.history.output_unit),
@@ -352,6 +353,18 @@ class TrajectoriesFigure:
                 named.append((Column("prediction_upper", f"{title}, at most", unit, 3), history.proposal.band.upper))
         lasts = float(history.set_point.time_s[-1])
         return table_of_curves([time_s for time_s in TABLE_TIMES_S if time_s <= lasts], 1, named)
+
+
+def _with_uids(traces: list[Trace]) -> list[Trace]:
+    """The traces, each with a `uid`: its own, else its role and what it is about.
+
+    Plotly gives a trace without one that of the trace at the same place in the figure before, which may be a flight's.
+    """
+    return [{"uid": _described(cast("Mapping[str, object]", trace["meta"])), **trace} for trace in traces]
+
+
+def _described(meta: Mapping[str, object]) -> str:
+    return "-".join(map(str, meta.values())).replace(" ", "-")
 
 
 def _style(palette: Palette, standing: str) -> dict[str, object]:

@@ -7,6 +7,7 @@ from playwright.sync_api import Locator, expect
 from bench.seeding import seed_database
 from tests.e2e.conftest import Server
 from tests.e2e.dashboard import Dashboard, Json
+from tests.e2e.states import States
 
 FLIGHTS = 1000
 SAMPLES = 4000
@@ -91,6 +92,32 @@ def test_a_flight_that_is_pointed_at_stands_out_as_curve_and_row(page_of_many: D
     best = best_of(page_of_many)
     time_s, altitude_m = page_of_many.record(best["trial_id"] - best["trial_number"] + plain)
     np.testing.assert_allclose(lent["y"], np.interp(lent["x"], time_s, altitude_m), atol=5e-3)
+
+
+_POINTED = """chart => Array.from(chart.querySelectorAll("[data-pointed]"), curve => {
+  const {role, trial} = curve.__data__[0].trace.meta;
+  return [role, trial];
+})"""
+"""Role and flight of the highlighted curves: of what is drawn, not of what its element is called."""
+
+
+def test_a_row_points_at_its_own_curves_after_flights_were_flown_on_the_open_page(
+    dashboard: Dashboard, states: States
+) -> None:
+    """Seen: row 1 highlighted the set point and flight 4, until the page was loaded again."""
+    campaign_id = states.campaign(strategy="calibrated", stop={"kind": "budget", "max_flights": 20}, flights=1)
+    dashboard.open_campaign(campaign_id)
+    dashboard.wait_for_flight(1)
+    for number in (2, 3):
+        dashboard.fly_headless(campaign_id, 1)
+        dashboard.wait_for_flight(number)
+    dashboard.settled()
+    dashboard.open_tab("Flights")
+    for flight in (1, 2, 3):
+        row(dashboard, flight).hover()
+        dashboard.until(lambda: dashboard.plot("takeoffs").evaluate(_POINTED))
+        pointed = dashboard.plot("takeoffs").evaluate(_POINTED)
+        assert sorted(pointed) == [["deviation", flight], ["flight", flight]]
 
 
 def place_of(chart: Locator, flight: int) -> tuple[float, float]:

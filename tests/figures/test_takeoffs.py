@@ -12,7 +12,7 @@ from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, la
 def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() -> None:
     card = TrajectoriesFigure(history(proposal=proposal(1))).compute()
     assert [one["meta"]["role"] for one in traces(card)] == [
-        "set point", "reference", "deviation", "prediction", "live", "pointed", "live deviation"]  # fmt: skip
+        "set point", "reference", "predicted deviation", "prediction", "live", "pointed", "live deviation"]  # fmt: skip
     assert set(trace(card, "set point")["y"]) == {3.0}
     assert trace(card, "live")["x"] == []
 
@@ -38,6 +38,27 @@ def test_the_best_flight_is_emphasised_and_drawn_above_all_others() -> None:
     ]
     widths = {one["meta"]["trial"]: one["line"]["width"] for one in traces(card.compute()) if "trial" in one["meta"]}
     assert widths[2] > max(widths[1], widths[3], widths[4])
+
+
+@pytest.mark.parametrize("flights", [3, 40])
+def test_every_trace_has_its_own_uid_and_keeps_it_in_the_figure_after_another_flight(flights: int) -> None:
+    """A trace without one would get that of the trace at its place before: a flight's, which then points at it."""
+
+    def uids(flown: int) -> dict[str, dict[str, object]]:
+        own = [
+            flight(number, 0.4 - 0.001 * number, glitches=(Range(5.0, 5.2),), overshoot_m=9.0 if number == 2 else 0.3)
+            for number in range(1, flown + 1)
+        ]
+        aborted = flight(flown + 1, None, outcome="aborted")
+        drawn = traces(TrajectoriesFigure(history(*own, aborted, proposal=proposal(flown + 2, band_m=0.2))).compute())
+        found = {one["uid"]: one["meta"] for one in drawn}
+        assert len(found) == len(drawn)
+        return found
+
+    before, after = uids(flights), uids(flights + 1)
+    for uid in before.keys() & after.keys():
+        assert before[uid]["role"] == after[uid]["role"]
+    assert {"set-point", "reference", "prediction", "band-lower", "live", "flight-1", "deviation-1"} <= before.keys()
 
 
 def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
@@ -113,7 +134,10 @@ def test_the_chart_opens_at_the_climb_with_the_deviation_below_and_knows_the_who
     assert (deviation["yaxis"], deviation.get("xaxis", "x"), deviation["showlegend"]) == ("y2", "x", False)
     expected = np.interp(deviation["x"], TIME_S, climb(0.5).values - 3.0)
     np.testing.assert_allclose(deviation["y"], expected, atol=1e-4)
-    assert trace(card, "deviation", standing="prediction")["line"] == trace(card, "prediction")["line"]
+    predicted = trace(card, "predicted deviation", trial=3)
+    assert (predicted["line"], predicted["yaxis"]) == (trace(card, "prediction")["line"], "y2")
+    expected = np.interp(predicted["x"], TIME_S, climb(0.1).values - 3.0)
+    np.testing.assert_allclose(predicted["y"], expected, atol=1e-4)
 
 
 def test_an_error_around_zero_is_its_own_deviation() -> None:
