@@ -2,14 +2,22 @@
 
 import re
 
+import numpy as np
 import pytest
 from playwright.sync_api import Locator, Route, expect
 
-from tests.e2e.dashboard import Dashboard
+from tests.e2e.dashboard import Dashboard, Json
 from tests.e2e.states import States
 
 PATIENT = {"kind": "budget", "max_flights": 20}
 OWN = {"kp": 700, "ki": 60}
+_DEVIATION_LINE = """chart => {
+  const {xaxis, yaxis2} = chart._fullLayout;
+  const line = chart.querySelector(".tracepredicted-deviation path.js-line").getAttribute("d");
+  const points = line.slice(1).split("L").map(point => point.split(",").map(Number));
+  return [points.map(([x]) => xaxis.p2l(x)), points.map(([, y]) => yaxis2.p2l(y))];
+}"""
+"""Seconds and deviations along the line as it is drawn, not as the chart was told."""
 
 
 def gains_shown(dashboard: Dashboard) -> dict[str, float]:
@@ -39,6 +47,7 @@ def fly_what_is_shown(dashboard: Dashboard, campaign_id: int, number: int, choic
     predicted = dashboard.post(f"/campaigns/{campaign_id}/prediction", {"gains": shown})
     expect(card_of(dashboard, number)).to_contain_text(f"{predicted['predicted_error']:.3f} m")
     dashboard.until(lambda: is_drawn(dashboard, predicted["curve"]["values"]))
+    dashboard.until(lambda: is_deviation_drawn(dashboard, predicted["curve"]))
     dashboard.fly()
     dashboard.wait_for_flight(number)
     assert dashboard.trials(campaign_id)[number - 1]["gains"] == shown, choice
@@ -48,6 +57,13 @@ def is_drawn(dashboard: Dashboard, altitude_m: list[float]) -> bool:
     """Whether the dashed curve is that one, to the eye."""
     drawn = dashboard.trace("takeoffs", "prediction")
     return drawn is not None and drawn["y"][-1] == pytest.approx(altitude_m[-1], abs=1e-3)
+
+
+def is_deviation_drawn(dashboard: Dashboard, curve: Json) -> bool:
+    """Whether the dashed line in the lower panel shows that curve less the set point, 3 m."""
+    time_s, deviation_m = dashboard.plot("takeoffs").evaluate(_DEVIATION_LINE)
+    expected = np.interp(time_s, curve["time_s"], curve["values"]) - 3.0
+    return bool(np.allclose(deviation_m, expected, atol=0.01))
 
 
 def test_the_green_button_flies_the_gains_shown_whatever_is_chosen(dashboard: Dashboard, states: States) -> None:

@@ -114,6 +114,19 @@ test("a zoom says which seconds are looked at, and the way back that it is all o
   expect(windowFrom({ "yaxis.range[0]": 0 }, [0, 32])).toBeUndefined();
 });
 
+test("the predicted deviation belongs to the prediction that is drawn, from the command on", () => {
+  const predicted: Trace[] = [
+    { meta: { role: "set point" }, x: [0, 2, 4, 32], y: [3, 3, 5, 5] },
+    { meta: { role: "prediction", trial: 3 }, x: [0, 32], y: [0, 5] },
+    { meta: { role: "predicted deviation", trial: 3 }, yaxis: "y2", x: [0, 32], y: [-3, 0] },
+  ];
+  const curve = { time_s: [-0.1, 0, 1, 3, 33], values: [0, 0.1, 2.5, 4.5, 5.25] };
+  const [, , deviation] = withPrediction(predicted, { curve, lower: null, upper: null });
+  expect(deviation).toMatchObject({ yaxis: "y2", x: [0, 1, 3, 33], y: [-2.9, -0.5, 0.5, 0.25] });
+  expect(withPrediction(predicted, { curve: null, lower: null, upper: null })[2]).toMatchObject({ x: [], y: [] });
+  expect(withPrediction(predicted, null)).toEqual(predicted);
+});
+
 test("another prediction takes the place of the figure's, with its band, and leaves the flights", () => {
   const predicted: Trace[] = [
     ...traces,

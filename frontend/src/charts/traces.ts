@@ -44,13 +44,22 @@ export function liveCurves(traces: readonly Trace[], { timeS, measured }: LiveFl
   const setPoint = traces[traceWithRole(traces, "set point")];
   if (live >= 0) curves.set(live, { x: timeS, y: measured, showlegend: true });
   if (deviation >= 0 && setPoint !== undefined) {
-    const first = timeS.findIndex((time) => time >= 0);
-    const x = first < 0 ? [] : timeS.slice(first);
-    const wanted = interpolated(x, setPoint.x as number[], setPoint.y as number[]);
-    const y = wanted.map((value, place) => (measured[timeS.length - x.length + place] ?? Number.NaN) - value);
-    curves.set(deviation, { x, y, showlegend: false });
+    curves.set(deviation, { ...deviationFrom(setPoint, timeS, measured), showlegend: false });
   }
   return curves;
+}
+
+/** Output − set point, from the command on. */
+function deviationFrom(
+  setPoint: Trace,
+  timeS: readonly number[],
+  output: readonly number[],
+): { x: number[]; y: number[] } {
+  const first = timeS.findIndex((time) => time >= 0);
+  const x = first < 0 ? [] : timeS.slice(first);
+  const wanted = interpolated(x, setPoint.x as number[], setPoint.y as number[]);
+  const y = wanted.map((value, place) => (output[first + place] ?? Number.NaN) - value);
+  return { x, y };
 }
 
 /** Values of a polyline at ascending places; constant beyond its ends. */
@@ -79,27 +88,35 @@ export interface DrawnPrediction {
   upper: Points;
 }
 
-/** The predicted curve and the edges of its band, by the place of the trace that shows each; the figure's for null. */
+const PREDICTED = new Set(["prediction", "band", "predicted deviation"]);
+
+/**
+ * The predicted curve, the edges of its band and its deviation from the set point, by the place of the trace that shows
+ * each; the figure's for null.
+ */
 export function predictedCurves(
   traces: readonly Trace[],
   prediction: DrawnPrediction | null,
 ): Map<number, { x: unknown[]; y: unknown[] }> {
   const curves = new Map<number, { x: unknown[]; y: unknown[] }>();
-  traces.forEach(({ meta, x, y }, place) => {
-    if (meta?.role !== "prediction" && meta?.role !== "band") return;
-    const points = prediction === null ? { time_s: x, values: y } : prediction[meta.edge ?? "curve"];
-    curves.set(place, { x: points?.time_s ?? [], y: points?.values ?? [] });
+  const setPoint = traces[traceWithRole(traces, "set point")];
+  traces.forEach(({ meta, x = [], y = [] }, place) => {
+    if (!PREDICTED.has(meta?.role ?? "")) return;
+    if (prediction === null) {
+      curves.set(place, { x, y });
+      return;
+    }
+    const { time_s = [], values = [] } = prediction[meta?.edge ?? "curve"] ?? {};
+    const isDeviation = meta?.role === "predicted deviation" && setPoint !== undefined;
+    curves.set(place, isDeviation ? deviationFrom(setPoint, time_s, values) : { x: time_s, y: values });
   });
   return curves;
 }
 
-/** The traces with another predicted curve and band, named by their role; with the figure's own for null. */
+/** The traces with another predicted curve, with its band and deviation; with the figure's own for null. */
 export function withPrediction(traces: readonly Trace[], prediction: DrawnPrediction | null): Trace[] {
   const curves = predictedCurves(traces, prediction);
-  return traces.map((trace, place) => {
-    const { role, edge } = trace.meta ?? {};
-    return curves.has(place) ? { ...trace, ...curves.get(place), uid: edge ? `${role}-${edge}` : role } : trace;
-  });
+  return traces.map((trace, place) => ({ ...trace, ...curves.get(place) }));
 }
 
 const FADED = 0.22;
