@@ -23,7 +23,8 @@ class ErrorsFigure:
     `predicted_error`, `predicted_low`, `predicted_high`, `best_so_far`; the proposal is the last row.
 
     Every trace carries `meta.role`: noise (around the best), best so far, threshold, interval, predicted, repeats,
-    measured, not counted, not yet judged, off scale.
+    measured, not counted, not yet judged, off scale. In `interval` and `predicted` the next flight is the last one, and
+    `meta.next` is its number: a page puts other gains in its place. Both are hidden while they are empty.
     """
 
     history: History
@@ -169,24 +170,30 @@ class ErrorsFigure:
         A bar behind the diamond of the prediction, cut at the edge.
         """
         known = self._expected()
-        if not known:
+        if not known and self.history.proposal is None:
             return []
-        unit, x, y, text = self.history.error_unit, [], [], []
+        x, y, text = [], [], []
         for number, interval in known:
             x += [number, number, None]
             y += [round(max(0.0, interval.low), 6), round(min(1.08 * top, interval.high), 6), None]
-            text += 3 * [f"expected {interval.low:.4f} … {interval.high:.4f} {unit}"]
+            text += 3 * [f"{interval.low:.4f} … {interval.high:.4f}"]
         return [
             scatter(
                 "90 % interval",
                 (x, y),
                 role="interval",
+                about=self._next,
+                visible=bool(known),
                 text=text,
                 line=theme.line(theme.with_opacity(palette.prediction, 0.4), 8),
                 connectgaps=False,
-                hovertemplate="<b>Flight %{x}</b><br>%{text}<extra></extra>",
+                hovertemplate=f"<b>Flight %{{x}}</b><br>expected %{{text}} {self.history.error_unit}<extra></extra>",
             )
         ]
+
+    @property
+    def _next(self) -> dict[str, object]:
+        return {} if self.history.proposal is None else {"next": self.history.proposal.number}
 
     def _expected(self) -> list[tuple[int, Range]]:
         flights = () if self._is_crowded else self.history.flights
@@ -270,18 +277,20 @@ class ErrorsFigure:
         if self.history.proposal is not None:
             pairs.append((self.history.proposal.number, self.history.proposal.predicted_error))
         known = [(number, round(value, 6)) for number, value in pairs if value is not None]
-        if not known:
+        if not known and self.history.proposal is None:
             return []
         return [
             scatter(
                 "Predicted",
                 ([number for number, _ in known], [min(value, round(top, 6)) for _, value in known]),
                 role="predicted",
+                about=self._next,
+                visible=bool(known),
                 mode="markers",
-                text=[f"{value:.4f} {self.history.error_unit}" for _, value in known],
+                text=[f"{value:.4f}" for _, value in known],
                 marker={"size": 13, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
                 cliponaxis=False,
-                hovertemplate="<b>Flight %{x}, predicted</b><br>%{text}<extra></extra>",
+                hovertemplate=f"<b>Flight %{{x}}, predicted</b><br>%{{text}} {self.history.error_unit}<extra></extra>",
             )
         ]
 

@@ -1,4 +1,4 @@
-"""The gains of each flight, one small panel per gain, with the proposed ones as open diamonds."""
+"""The gains of each flight, one small panel per gain, with the next ones as open diamonds."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -17,7 +17,10 @@ GAP = 0.09
 
 @dataclass(frozen=True, slots=True)
 class GainsFigure:
-    """Table columns: `flight`, then one per gain in its own unit; the proposal is the row `next`."""
+    """Table columns: `flight`, then one per gain in its own unit; the proposal is the row `next`.
+
+    Every trace carries `meta`: `role` (flown, best, next) and `gain`. A page puts other gains in the place of `next`.
+    """
 
     history: History
     theme: ThemeName = "light"
@@ -81,17 +84,17 @@ class GainsFigure:
             drawn.append({**flown, **star, "mode": "markers", "meta": {"role": "best", "gain": gain.name}})
         if proposal is None:
             return drawn
-        proposed = scatter(
-            f"{gain.title}, proposed",
+        following = scatter(
+            f"{gain.title}, next",
             ([proposal.number], [proposal.gains[gain.name]]),
-            role="proposed",
+            role="next",
             about={"gain": gain.name},
             mode="markers",
             marker={"size": 11, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 2}},
-            hovertemplate=f"<b>Flight %{{x}}, proposed</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
+            hovertemplate=f"<b>Flight %{{x}}, next</b><br>{gain.name} = %{{y:g}}{unit}<extra></extra>",
             **axes,
         )
-        return [*drawn, proposed]
+        return [*drawn, following]
 
     def _axes(self, palette: Palette, index: int, gain: Gain, last: int) -> dict[str, object]:
         count, suffix = len(self.history.gains), theme.suffix(index)

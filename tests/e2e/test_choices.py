@@ -48,6 +48,7 @@ def fly_what_is_shown(dashboard: Dashboard, campaign_id: int, number: int, choic
     expect(card_of(dashboard, number)).to_contain_text(f"{predicted['predicted_error']:.3f} m")
     dashboard.until(lambda: is_drawn(dashboard, predicted["curve"]["values"]))
     dashboard.until(lambda: is_deviation_drawn(dashboard, predicted["curve"]))
+    dashboard.until(lambda: next_in_the_lower_charts(dashboard, number) == (predicted["predicted_error"], shown))
     dashboard.fly()
     dashboard.wait_for_flight(number)
     assert dashboard.trials(campaign_id)[number - 1]["gains"] == shown, choice
@@ -64,6 +65,16 @@ def is_deviation_drawn(dashboard: Dashboard, curve: Json) -> bool:
     time_s, deviation_m = dashboard.plot("takeoffs").evaluate(_DEVIATION_LINE)
     expected = np.interp(time_s, curve["time_s"], curve["values"]) - 3.0
     return bool(np.allclose(deviation_m, expected, atol=0.01))
+
+
+def next_in_the_lower_charts(dashboard: Dashboard, number: int) -> tuple[object, dict[str, float]]:
+    """Error and gains at the diamonds of the next flight."""
+    error = dashboard.trace("errors", "predicted")
+    assert error is not None
+    gains = [trace for trace in dashboard.traces("gains") if trace["meta"]["role"] == "next"]
+    assert [trace["x"] for trace in gains] == [[number]] * len(gains)
+    drawn = dict(zip(error["x"], error["y"], strict=True)).get(number)
+    return pytest.approx(drawn, abs=1e-6), {trace["meta"]["gain"]: trace["y"][0] for trace in gains}
 
 
 def test_the_green_button_flies_the_gains_shown_whatever_is_chosen(dashboard: Dashboard, states: States) -> None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from app.figures.data import Noise, Range, Repeats
@@ -43,7 +45,8 @@ def test_a_prediction_far_above_all_flights_is_drawn_at_the_edge_with_its_value(
     card = ErrorsFigure(history(flight(1, 0.3, predicted_error=2.0), flight(2, 0.2))).compute()
     drawn = trace(card, "predicted")
     assert drawn["y"] == pytest.approx([layout(card)["yaxis"]["range"][1]], abs=1e-6)
-    assert drawn["text"] == ["2.0000 m"]
+    assert drawn["text"] == ["2.0000"]
+    assert "%{text} m<" in drawn["hovertemplate"]
 
 
 @pytest.mark.parametrize(("flights", "step"), [(1, 1), (12, 1), (13, 2), (60, 5), (119, 10), (500, 50), (1000, 100)])
@@ -94,6 +97,21 @@ def test_each_flight_stands_over_the_interval_it_was_expected_in() -> None:
     drawn = trace(card, "interval")
     assert drawn["x"] == [2, 2, None, 3, 3, None]
     assert drawn["y"] == [0.18, 0.22, None, 0.0, 0.15, None]
+
+
+def test_the_next_flight_is_the_last_of_the_predictions_and_named_for_the_page_that_moves_it() -> None:
+    flights = (flight(1, 0.3), flight(2, 0.19, predicted_error=0.2, interval=Range(0.18, 0.22)))
+    card = ErrorsFigure(history(*flights, proposal=proposal(3, interval=Range(0.1, 0.15)))).compute()
+    for role in ("predicted", "interval"):
+        drawn = trace(card, role)
+        assert (drawn["meta"]["next"], drawn["visible"]) == (3, True)
+        assert [number for number in drawn["x"] if number is not None][-1] == 3
+    unpredicted = replace(proposal(2), predicted_error=None)
+    card = ErrorsFigure(history(flight(1, 0.3), proposal=unpredicted)).compute()
+    for role in ("predicted", "interval"):
+        assert (trace(card, role)["x"], trace(card, role)["visible"]) == ([], False)
+    without_proposal = ErrorsFigure(history(*TABLE_1[2:])).compute()
+    assert not {"predicted", "interval"} & {one["meta"]["role"] for one in traces(without_proposal)}
 
 
 def test_an_interval_far_above_all_errors_is_cut_at_the_edge_and_does_not_stretch_the_axis() -> None:

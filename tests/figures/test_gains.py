@@ -21,7 +21,8 @@ def test_every_panel_says_above_it_what_its_gain_is() -> None:
 
 def test_the_proposed_gains_are_open_diamonds_at_the_next_flight() -> None:
     card = GainsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute()
-    assert (trace(card, "proposed", gain="ki")["x"], trace(card, "proposed", gain="ki")["y"]) == ([2], [200])
+    drawn = trace(card, "next", gain="ki")
+    assert (drawn["x"], drawn["y"], drawn["marker"]["symbol"]) == ([2], [200], "diamond-open")
 
 
 def test_a_change_of_one_count_does_not_fill_the_panel() -> None:

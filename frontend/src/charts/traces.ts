@@ -8,6 +8,9 @@ interface TraceMeta {
   trial?: number;
   standing?: string;
   edge?: "lower" | "upper";
+  gain?: string;
+  /** Number of the next flight, whose values are the last ones. */
+  next?: number;
 }
 
 export interface Trace {

@@ -1,11 +1,12 @@
 /** The charts of a campaign. Each keeps its own state, so that the page is not rendered again for it. */
 
 import { SegmentedControl, useComputedColorScheme } from "@mantine/core";
-import { useIdle, useMediaQuery } from "@mantine/hooks";
-import { memo, useCallback, useDeferredValue, useEffect, useRef, useState } from "react";
+import { useDebouncedValue, useIdle, useMediaQuery } from "@mantine/hooks";
+import { memo, useCallback, useDeferredValue, useEffect, useMemo, useRef, useState } from "react";
 import { type TimeRange, useCampaignFigure, useCurveOf, useLandscape } from "../../api/queries";
 import type { Campaign, FigureCard, Trial } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
+import { type NextFlight, withNextError, withNextGains } from "../../charts/nextFlight";
 import { type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
 import classes from "./CampaignPage.module.css";
 import type { Preview } from "./useNextFlight";
@@ -93,14 +94,32 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
 
 interface ByFlightProps {
   campaignId: number;
+  preview: Preview | null;
   onChoose: (trialNumber: number) => void;
 }
 
+/** These charts are drawn again once the gains are at rest, so that the curve follows without delay. */
+const AT_REST_MS = 200;
+
+function nextOf({ gains, prediction, isCurrent }: Preview): NextFlight {
+  const known = isCurrent ? prediction : null;
+  return { gains, predictedError: known?.predicted_error ?? null, interval: known?.interval ?? null };
+}
+
+/** Changes a figure for the gains that are chosen; undefined for the proposed ones. */
+function useNext(
+  preview: Preview | null,
+  change: (figure: PlotlyFigure, next: NextFlight) => PlotlyFigure,
+): ((figure: PlotlyFigure) => PlotlyFigure) | undefined {
+  return useMemo(() => (preview === null ? undefined : (figure) => change(figure, nextOf(preview))), [preview, change]);
+}
+
 /** Error and gains per flight. */
-export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, onChoose }: ByFlightProps) {
+export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, preview, onChoose }: ByFlightProps) {
   const theme = useComputedColorScheme("light");
   const errors = useCampaignFigure(campaignId, "errors", theme);
   const gains = useCampaignFigure(campaignId, "gains", theme);
+  const [rested] = useDebouncedValue(preview, AT_REST_MS);
   const height = Math.max(LOWER_PX, PANEL_PX * ((gains.data?.table?.columns.length ?? 1) - 1));
   return (
     <>
@@ -110,9 +129,17 @@ export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, onChoos
         error={errors.error}
         height={height}
         topic="threshold"
+        dressed={useNext(rested, withNextError)}
         onChoose={onChoose}
       />
-      <FigurePanel title="Gains per flight" card={gains.data} error={gains.error} height={height} onChoose={onChoose} />
+      <FigurePanel
+        title="Gains per flight"
+        card={gains.data}
+        error={gains.error}
+        height={height}
+        dressed={useNext(rested, withNextGains)}
+        onChoose={onChoose}
+      />
     </>
   );
 });

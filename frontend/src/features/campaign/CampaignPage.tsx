@@ -144,7 +144,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
         </Tabs.List>
         <Tabs.Panel value="trends" pt="var(--gap)">
           <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)">
-            <ByFlightPanels campaignId={campaign.id} onChoose={choose} />
+            <ByFlightPanels campaignId={campaign.id} preview={preview} onChoose={choose} />
           </SimpleGrid>
         </Tabs.Panel>
         <Tabs.Panel value="flights" keepMounted>

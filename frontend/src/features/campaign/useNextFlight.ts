@@ -7,8 +7,10 @@ import { typed, typedGain } from "../../ui/format";
 import { type ChoiceName, type GainRow, gainRows, isOutside, preselected, readGains } from "./choices";
 import type { GainEntry } from "./GainTable";
 
-/** The prediction that the chart draws in place of the proposal's. */
+/** What the charts draw in place of the proposal. */
 export interface Preview {
+  /** Null while they cannot be read or lie outside their bounds. */
+  gains: GainSet | null;
   prediction: GainsPrediction | null;
   /** False while it belongs to other gains than those chosen. */
   isCurrent: boolean;
@@ -76,8 +78,11 @@ export function useNextFlight(
     [isUnpredicted, prediction.result],
   );
   const preview = useMemo(
-    () => (isProposal ? null : { prediction: predicted, isCurrent: prediction.isCurrent }),
-    [isProposal, predicted, prediction.isCurrent],
+    () =>
+      isProposal
+        ? null
+        : { gains: isUnpredicted ? null : gains, prediction: predicted, isCurrent: prediction.isCurrent },
+    [isProposal, isUnpredicted, gains, predicted, prediction.isCurrent],
   );
   useEffect(() => onPreview(preview), [onPreview, preview]);
   useEffect(() => () => onPreview(null), [onPreview]);
