@@ -6,15 +6,16 @@ from typing import Any, ClassVar, Final
 from app.core import formatting
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.data import History, Range, last_number
+from app.figures.data import FlightData, History, Range, last_number
 from app.figures.overlays import MANY, off_scale_traces
 from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 FEW: Final = 8
 """Up to this number of flights, every error is labelled."""
-FOOT: Final = 0.05
-"""Height of the marks for flights without an error, as a share of the axis."""
+STRIP: Final = 0.09
+"""Height of the strip below the axis of errors, for flights without one, as a share of the figure."""
+_STRIP_GAP: Final = 0.04
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,8 @@ class ErrorsFigure:
 
     Every trace carries `meta.role`: noise (around the best), best so far, threshold, interval, predicted, repeats,
     measured, not counted, not yet judged, off scale. In `interval` and `predicted` the next flight is the last one, and
-    `meta.next` is its number: a page puts other gains in its place. Both are hidden while they are empty.
+    `meta.next` is its number: a page puts other gains in its place. Both are hidden while they are empty. Flights
+    without an error are marked in a strip below the axis of errors.
     """
 
     history: History
@@ -43,7 +45,7 @@ class ErrorsFigure:
 
     def compute(self) -> Card:
         palette, history = PALETTES[self.theme], self.history
-        last, span = last_number(history), self._span()
+        last, span, strip = last_number(history), self._span(), self._strip(palette)
         traces = [
             *self._noise(palette, last),
             self._best_so_far(palette),
@@ -52,20 +54,46 @@ class ErrorsFigure:
             *self._predicted(palette, 1.08 * span.high),
             *self._repeats(palette),
             *self._measured(palette),
-            *self._without_error(palette, FOOT * span.high),
+            *self._not_valid(palette),
         ]
         scored = [flight for flight in history.flights if flight.error is not None]
         outside = [scored[index] for index in span.outside]
         traces += off_scale_traces(palette, outside, span.high, history.error_unit, last=last, crowded=self._is_crowded)
         layout = theme.layout(
             palette,
-            xaxis=theme.titled(palette, "Flight", **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]}),
-            yaxis=theme.titled(palette, f"Error ({history.error_unit})", range=[0, 1.08 * span.high], nticks=6),
+            xaxis=theme.titled(
+                palette,
+                "Flight",
+                anchor="y2" if strip else "y",
+                **theme.flight_ticks(last) | {"range": [0.5, last + 0.95]},
+            ),
+            yaxis=theme.titled(
+                palette,
+                f"Error ({history.error_unit})",
+                domain=[STRIP + _STRIP_GAP if strip else 0.0, 1.0],
+                range=[0, 1.08 * span.high],
+                nticks=6,
+            ),
+            **strip,
             margin={**theme.MARGIN_PX, "l": 60, "r": 30},
             annotations=self._labels(palette, span.high),
             uirevision="errors",
         )
         return ready(self, traces, layout, summary=self._summary(), table=self._table())
+
+    def _strip(self, palette: Palette) -> dict[str, object]:
+        """The ordinate of the strip below the errors; empty if every flight has an error."""
+        if all(flight.error is not None for flight in self.history.flights):
+            return {}
+        strip = theme.axis(
+            palette,
+            domain=[0.0, STRIP],
+            range=[-1, 1],
+            tickvals=[0],
+            ticktext=["no error"],
+            fixedrange=True,
+        )
+        return {"yaxis2": strip}
 
     def _span(self) -> RobustRange:
         """Range up to the first flight's error, every other one that is no outlier, and the next flight's interval."""
@@ -221,28 +249,44 @@ class ErrorsFigure:
             if flight.error is not None and flight.error <= top and (flight is best or len(flights) <= FEW)
         ]
 
-    def _without_error(self, palette: Palette, height: float) -> list[Trace]:
-        """Marks at the bottom, clear of the axis labels, for flights without a meaningful error or without a review."""
+    def _not_valid(self, palette: Palette) -> list[Trace]:
+        """Marks for flights that do not count and those without a review: at their error, or in the strip."""
         flights = self.history.flights
         uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet judged"}]
         unjudged = [flight for flight in flights if flight.outcome == "not yet judged"]
-        marked = {
-            "not counted": (uncounted, "x-thin", palette.bad),
-            "not yet judged": (unjudged, "circle-open", palette.dim),
-        }
+        marked = (
+            ("not counted", uncounted, "x-thin", palette.bad),
+            ("not yet judged", unjudged, "circle-open", palette.dim),
+        )
+        return [
+            trace
+            for role, marks, symbol, colour in marked
+            for trace in self._marks(role, marks, {"symbol": symbol, "color": colour, "line": {"color": colour}})
+        ]
+
+    def _marks(self, role: str, flights: list[FlightData], style: dict[str, Any]) -> list[Trace]:
+        scored = [flight for flight in flights if flight.error is not None]
+        others = [flight for flight in flights if flight.error is None]
+        places = (
+            ("y", scored, [_rounded(flight.error) for flight in scored], f"error {self._reading}"),
+            ("y2", others, [0] * len(others), "no error"),
+        )
         return [
             scatter(
                 role.capitalize(),
-                ([flight.number for flight in marks], [round(height, 6)] * len(marks)),
+                ([flight.number for flight in placed], heights),
                 role=role,
                 mode="markers",
-                text=[flight.outcome for flight in marks],
-                marker={"size": 10, "symbol": symbol, "color": colour, "line": {"width": 2, "color": colour}},
+                text=[flight.outcome for flight in placed],
+                marker={**style, "size": 10, "line": {**style["line"], "width": 2}},
                 cliponaxis=False,
-                hovertemplate="<b>Flight %{x}, %{text}</b><extra></extra>",
+                yaxis=axis,
+                legendgroup=role,
+                showlegend=placed is scored or not scored,
+                hovertemplate=f"<b>Flight %{{x}}, %{{text}}</b><br>{note}<extra></extra>",
             )
-            for role, (marks, symbol, colour) in marked.items()
-            if marks
+            for axis, placed, heights, note in places
+            if placed
         ]
 
     def _best_so_far(self, palette: Palette) -> Trace:
