@@ -13,7 +13,7 @@ from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 Style = Literal[
-    "goal", "reference", "before", "after", "model", "recorded", "replica", "differs", "mean", "spread",
+    "goal", "reference", "measured", "before", "after", "model", "recorded", "replica", "differs", "mean", "spread",
     "run 1", "run 2", "run 3", "run 4", "run 5", "run 6",
 ]  # fmt: skip
 """Role of a line. Each style differs from the others in dash or width too, not in colour alone."""
@@ -160,6 +160,7 @@ def _pen(palette: Palette, style: Style) -> tuple[str, float, str]:
     pens: dict[Style, tuple[str, float, str]] = {
         "goal": (palette.dim, 1.5, "dot"),
         "reference": (palette.dim, 1.5, "dashdot"),
+        "measured": (palette.ink, 2, "solid"),
         "before": (palette.bad, 2, "dash"),
         "after": (palette.best, 2.5, "solid"),
         "model": (palette.prediction, 2, "dash"),

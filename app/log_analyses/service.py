@@ -135,8 +135,8 @@ def _plot(analysis: Analysis) -> Plot:
 
     def panel(y_title: str, digits: int, flown: Samples, predicted: Samples, *more: Line) -> Panel:
         lines = (
-            Line(name="Flown", style="before", x=time_s, y=_rounded(flown)),
-            Line(name=which, style="after", x=time_s, y=_rounded(predicted)),
+            Line(name="Flown", style="measured", x=time_s, y=_rounded(flown)),
+            Line(name=which, style="model", x=time_s, y=_rounded(predicted)),
         )
         return Panel(y_title=y_title, digits=digits, lines=(*more, *lines))
 

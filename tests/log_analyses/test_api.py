@@ -4,6 +4,7 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from app.figures.theme import PALETTES
 from tests.builders import problems_of
 from tests.logs.recorded import recorded
 
@@ -36,6 +37,13 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
         (3, "Flown"),
         (3, "Predicted with the proposed gains"),
     ]
+    dark = PALETTES["dark"]
+    looks = {one["meta"]["line"]: (one["line"]["color"], one["line"]["dash"]) for one in drawn}
+    assert looks == {
+        "Reference": (dark.dim, "dot"),
+        "Flown": (dark.ink, "solid"),
+        "Predicted with the proposed gains": (dark.prediction, "dash"),
+    }
     flown, predicted = (sum(map(abs, drawn[place]["y"])) / len(drawn[place]["y"]) for place in (3, 4))
     assert flown == pytest.approx(25.0, abs=3.0)
     assert predicted < 0.4 * flown
