@@ -1,15 +1,25 @@
 """The panel below a flight's output: its deviation from a set point that is a step."""
 
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
 
 from app.figures import theme
-from app.figures.data import Curve
+from app.figures.base import Trace
+from app.figures.data import Curve, FlightData
+from app.figures.overlays import off_scale
 from app.figures.theme import Palette
 
-LIMIT: Final = 0.2
+NEAR: Final = 0.05
+"""Deviation at which the climb has ended, as a share of the set point; the range of the panel is not smaller."""
+MOST: Final = 0.5
 """Largest deviation in the panel, as a share of the set point: the climb begins at a deviation of all of it."""
+OPEN: Final = 0.2
+"""The same before the first flight."""
+ROOM: Final = 1.1
+LABEL_S: Final = 1.2
+"""Width of a label."""
 
 
 def is_step(set_point: Curve) -> bool:
@@ -24,9 +34,75 @@ def deviation_of(curve: Curve, set_point: Curve) -> Curve:
     return Curve(time_s, curve.values[flown] - np.interp(time_s, set_point.time_s, set_point.values))
 
 
-def deviation_axis(palette: Palette, set_point: Curve, unit: str, **more: object) -> dict[str, object]:
-    """The ordinate of the panel, ± 20 % of the set point."""
-    limit = LIMIT * float(set_point.values.max())
+def after_climb(deviation: Curve, set_point: Curve) -> Curve:
+    """The part of a deviation from the end of the climb to the end of the set point.
+
+    The climb ends where the output is first within 5 % of the set point, or if it never is, nearest to it.
+    """
+    lasts = deviation.time_s <= set_point.time_s[-1]
+    time_s, values = deviation.time_s[lasts], deviation.values[lasts]
+    if len(values) == 0:
+        return Curve(time_s, values)
+    is_near = np.abs(values) <= NEAR * float(set_point.values.max())
+    first = int(is_near.argmax() if is_near.any() else np.abs(values).argmin())
+    return Curve(time_s[first:], values[first:])
+
+
+def deviation_limit(curves: Sequence[Curve], set_point: Curve) -> float:
+    """Limit of a symmetric axis that contains the deviation of these outputs after their climb, within bounds."""
+    target = float(set_point.values.max())
+    deviations = [after_climb(deviation_of(curve, set_point), set_point).values for curve in curves]
+    peaks = [float(np.abs(values).max()) for values in deviations if len(values)]
+    return min(MOST * target, max(NEAR * target, *peaks) * ROOM) if peaks else OPEN * target
+
+
+def off_scale_deviations(
+    palette: Palette, flights: Sequence[FlightData], set_point: Curve, limit: float, *, opening_s: float
+) -> list[Trace]:
+    """Marks at the edge of the panel for flights that leave it after the climb, labelled where there is room.
+
+    They are at the largest deviation until `opening_s`, or of the whole flight if it leaves the panel only later.
+    """
+    peaks = sorted(_peaks(flights, set_point, limit, opening_s), key=lambda peak: peak[:2])
+    marks, free_s = list[Trace](), 0.0
+    for time_s, number, deviation in peaks:
+        has_room = time_s >= free_s
+        free_s = time_s + LABEL_S if has_room else free_s
+        marks.append(
+            off_scale(
+                str(number),
+                deviation,
+                -limit,
+                limit,
+                palette.bad,
+                role="off scale deviation",
+                trial=number,
+                text=f"Deviation of flight {number}",
+                in_print=has_room,
+                yaxis="y2",
+            )
+        )
+    return marks
+
+
+def _peaks(
+    flights: Sequence[FlightData], set_point: Curve, limit: float, opening_s: float
+) -> Iterator[tuple[float, int, Curve]]:
+    """Time of the mark, number and deviation of each flight that leaves the panel."""
+    for flight in flights:
+        if flight.curve is None:
+            continue
+        whole = after_climb(deviation_of(flight.curve, set_point), set_point)
+        opening = whole.time_s <= opening_s
+        for part in (Curve(whole.time_s[opening], whole.values[opening]), whole):
+            size = np.abs(part.values)
+            if len(size) and size.max() > limit:
+                yield float(part.time_s[size.argmax()]), flight.number, part
+                break
+
+
+def deviation_axis(palette: Palette, limit: float, unit: str, **more: object) -> dict[str, object]:
+    """The ordinate of the panel, from −limit to limit."""
     return theme.titled(
         palette,
         f"Deviation ({unit})",

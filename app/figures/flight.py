@@ -12,7 +12,7 @@ from app.core.records.flight_events import FlightEvent
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, literal, ready, scatter, table_of_curves
 from app.figures.data import Band, Curve, Range
-from app.figures.deviations import deviation_axis, deviation_of, is_step
+from app.figures.deviations import deviation_axis, deviation_limit, deviation_of, is_step
 from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -134,7 +134,9 @@ class FlightFigure:
         output = f"{record.output_title} ({record.output_unit})"
         axes: dict[str, object] = {"yaxis": theme.titled(palette, output, domain=places[0], range=[low, high])}
         if self._has_deviation:
-            axes["yaxis2"] = deviation_axis(palette, goal, record.output_unit, domain=places[1])
+            axes["yaxis2"] = deviation_axis(
+                palette, deviation_limit([curve], goal), record.output_unit, domain=places[1]
+            )
         for place, panel in enumerate(record.panels, start=2 + self._has_deviation):
             axes[f"yaxis{place}"] = theme.titled(palette, panel.title, domain=places[place - 1], nticks=4)
         begin = float(curve.time_s[0]) - 0.01 * float(goal.time_s[-1])

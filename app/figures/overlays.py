@@ -127,7 +127,19 @@ def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit:
     )
 
 
-def off_scale(label: str, curve: Curve, low: float, high: float, colour: str, *, trial: int, text: str) -> Trace:
+def off_scale(
+    label: str,
+    curve: Curve,
+    low: float,
+    high: float,
+    colour: str,
+    *,
+    trial: int,
+    text: str,
+    role: str = "off scale",
+    in_print: bool = True,
+    **more: object,
+) -> Trace:
     """A triangle at the edge where a flight leaves the scale `low` … `high`, labelled with its peak value."""
     values = curve.values
     up = bool(values.max() - high >= low - values.min())
@@ -136,16 +148,17 @@ def off_scale(label: str, curve: Curve, low: float, high: float, colour: str, *,
     return scatter(
         name,
         ([round(float(curve.time_s[peak]), 3)], [high if up else low]),
-        role="off scale",
+        role=role,
         about={"trial": trial},
-        mode="markers+text",
-        text=[f"{label} {'↑' if up else '↓'} {values[peak]:.1f}"],
+        mode="markers+text" if in_print else "markers",
+        text=[f"{label} {'↑' if up else '↓'} {values[peak]:.1f}" if in_print else ""],
         textposition="bottom center" if up else "top center",
         marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
         textfont={"color": colour},
         showlegend=False,
         cliponaxis=False,
         hovertemplate=f"{name}<extra></extra>",
+        **more,
     )
 
 

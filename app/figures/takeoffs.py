@@ -10,7 +10,7 @@ from app.core.formatting import count
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, History, Range
-from app.figures.deviations import deviation_axis, deviation_of, is_step
+from app.figures.deviations import deviation_axis, deviation_limit, deviation_of, is_step, off_scale_deviations
 from app.figures.overlays import (
     PERCENTILES,
     Envelope,
@@ -47,7 +47,8 @@ class TrajectoriesFigure:
     the experiment.
 
     Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, predicted
-    deviation, band, glitch, limit, live, pointed, off scale) and, for flights, `trial` and `standing` (best, latest,
+    deviation, band, glitch, limit, live, pointed, off scale, off scale
+    deviation) and, for flights, `trial` and `standing` (best, latest,
     baseline, earlier, invalid, unjudged). Every trace has its own `uid`: a flight's is `flight-` and its number, that
     of its deviation `deviation-` and its number. The traces `live`, `live deviation` and `pointed` are empty: a page
     fills the first two during a flight, the last with the flight under the pointer if that one has no curve of its own.
@@ -95,6 +96,12 @@ class TrajectoriesFigure:
         for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
             label, text = str(flight.number), f"Flight {flight.number}"
             traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.number, text=text))
+        leaving = []
+        if is_step(history.set_point):
+            leaving = off_scale_deviations(
+                palette, drawn, history.set_point, self._deviation_limit, opening_s=OPENING_S[1]
+            )
+        traces += leaving
         layout = theme.layout(
             palette,
             **self._axes(palette, low, high),
@@ -102,7 +109,7 @@ class TrajectoriesFigure:
             meta={"whole_s": self._whole_s},
             uirevision="takeoffs",
         )
-        summary = self._summary(sum(index < len(drawn) for index in outside))
+        summary = self._summary(sum(index < len(drawn) for index in outside), len(leaving))
         return ready(self, _with_uids(traces), layout, summary=summary, table=self._table(drawn, envelope))
 
     @property
@@ -126,7 +133,7 @@ class TrajectoriesFigure:
             ),
         }
         if both:
-            axes["yaxis2"] = deviation_axis(palette, history.set_point, unit, domain=[0.0, DEVIATION_SHARE])
+            axes["yaxis2"] = deviation_axis(palette, self._deviation_limit, unit, domain=[0.0, DEVIATION_SHARE])
         return axes
 
     def _deviations(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
@@ -170,6 +177,14 @@ class TrajectoriesFigure:
             ),
         )
         return [*own, predicted]
+
+    @property
+    def _deviation_limit(self) -> float:
+        """Contains the best, the latest valid and the next flight."""
+        history = self.history
+        shown = [history.best, *history.valid[-1:], history.proposal]
+        curves = [one.curve for one in shown if one is not None and one.curve is not None]
+        return deviation_limit(curves, history.set_point)
 
     def _span(self, drawn: list[FlightData]) -> tuple[float, float, tuple[int, ...]]:
         """From the ground to above the set point; if the set point is zero, the range of the first flight."""
@@ -317,13 +332,14 @@ class TrajectoriesFigure:
         )
         return scatter(name, drawn, role=role, about=about, **style)
 
-    def _summary(self, outside: int) -> str:
+    def _summary(self, outside: int, leaving: int) -> str:
         history = self.history
         if not history.flights:
             return f"{history.output_title} over time: no flight yet, set point and reference only."
         best = history.best
         found = "" if best is None else f" Best: flight {best.number}, error {best.error:.3f} {history.error_unit}."
         off = f" {outside} off scale, marked at the top." if outside else ""
+        off += f" Deviation of {leaving} off scale, marked at the edge." if leaving else ""
         return f"{history.output_title} over time: {count(len(history.flights), 'flight')}.{found}{off}"
 
     def _table(self, drawn: list[FlightData], envelope: Envelope | None) -> Table:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.figures.data import Curve, Range
+from app.figures.data import Curve, FlightData, NextFlight, Range
 from app.figures.scale import robust_range, thinned
 from app.figures.takeoffs import TrajectoriesFigure
 from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, layout, proposal, trace, traces
@@ -129,7 +129,7 @@ def test_the_chart_opens_at_the_climb_with_the_deviation_below_and_knows_the_who
     drawn = layout(card)
     assert drawn["xaxis"]["range"] == [-0.3, 8.0]
     assert drawn["meta"]["whole_s"] == [pytest.approx(-0.326), 32.6]
-    assert drawn["yaxis2"]["range"] == [pytest.approx(-0.6), pytest.approx(0.6)]
+    assert drawn["yaxis2"]["range"] == [pytest.approx(-0.55, abs=1e-3), pytest.approx(0.55, abs=1e-3)]
     deviation = trace(card, "deviation", trial=2)
     assert (deviation["yaxis"], deviation.get("xaxis", "x"), deviation["showlegend"]) == ("y2", "x", False)
     expected = np.interp(deviation["x"], TIME_S, climb(0.5).values - 3.0)
@@ -138,6 +138,42 @@ def test_the_chart_opens_at_the_climb_with_the_deviation_below_and_knows_the_who
     assert (predicted["line"], predicted["yaxis"]) == (trace(card, "prediction")["line"], "y2")
     expected = np.interp(predicted["x"], TIME_S, climb(0.1).values - 3.0)
     np.testing.assert_allclose(predicted["y"], expected, atol=1e-4)
+
+
+def deviation_range(*flights: FlightData, following: NextFlight | None = None) -> list[float]:
+    found: list[float] = layout(TrajectoriesFigure(history(*flights, proposal=following)).compute())["yaxis2"]["range"]
+    return found
+
+
+def test_the_deviations_of_best_and_latest_valid_flight_fit_their_panel_after_the_climb() -> None:
+    """Seen: an overshoot of 0.81 m left a panel of ± 0.5 m."""
+    best, latest = flight(2, 0.1, overshoot_m=0.02), flight(3, 0.3, overshoot_m=0.81)
+    assert deviation_range(flight(1, 0.4), best, latest) == pytest.approx([-0.891, 0.891], abs=1e-3)
+    aborted = flight(4, None, outcome="aborted", overshoot_m=1.2)
+    assert deviation_range(best, latest, aborted)[1] == pytest.approx(0.891, abs=1e-3)
+    assert deviation_range(flight(1, 0.4, overshoot_m=0.9), best)[1] == pytest.approx(1.1 * 0.15)
+    assert deviation_range(flight(1, 0.4, overshoot_m=9.0))[1] == pytest.approx(1.5)
+    assert deviation_range(following=proposal(1))[1] == pytest.approx(1.1 * 0.15)
+    assert deviation_range()[1] == pytest.approx(0.6)
+
+
+def test_a_landing_after_the_set_point_has_ended_does_not_widen_the_panel() -> None:
+    time_s = np.linspace(0.0, 40.0, 4001)
+    landed = Curve(time_s, np.where(time_s < 33.0, np.minimum(3.0, 2.0 * time_s), 0.0))
+    assert deviation_range(replace(flight(1, 0.3), curve=landed))[1] == pytest.approx(1.1 * 0.15)
+
+
+def test_a_deviation_that_leaves_its_panel_after_the_climb_is_marked_at_the_edge() -> None:
+    flights = (flight(1, 0.4, overshoot_m=0.81), flight(2, 0.3, overshoot_m=0.8), flight(3, 0.1, overshoot_m=0.02))
+    card = TrajectoriesFigure(history(*flights)).compute()
+    limit = layout(card)["yaxis2"]["range"][1]
+    first, second = (trace(card, "off scale deviation", trial=number) for number in (1, 2))
+    assert (first["x"], first["y"], first["yaxis"]) == ([pytest.approx(2.0, abs=0.01)], [limit], "y2")
+    assert (first["text"], first["mode"]) == (["1 ↑ 0.8"], "markers+text")
+    assert first["hovertemplate"].startswith("Deviation of flight 1 reaches 0.81")
+    assert (second["text"], second["mode"]) == ([""], "markers")
+    assert {one["meta"]["trial"] for one in traces(card) if one["meta"]["role"] == "off scale deviation"} == {1, 2}
+    assert card.summary.endswith("Deviation of 2 off scale, marked at the edge.")
 
 
 def test_an_error_around_zero_is_its_own_deviation() -> None:

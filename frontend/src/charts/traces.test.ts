@@ -71,6 +71,7 @@ test("a point of a flight's curve or a mark over its number names the flight, th
   expect(flightAt(traces, 0, 0.5)).toBeNull();
   expect(flightAt(traces, 99, 0.5)).toBeNull();
   expect(flightAt(marks, 0, 4)).toBe(4);
+  expect(flightAt([{ meta: { role: "off scale deviation", trial: 3 }, x: [2.1] }], 0, 2.1)).toBe(3);
   expect(marksOver(marks, 4)).toEqual([{ curveNumber: 0, pointNumber: 2 }]);
   expect(marksOver(marks, 3)).toEqual([]);
   expect(traceWithRole(traces, "live")).toBe(3);
