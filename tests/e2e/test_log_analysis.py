@@ -1,5 +1,6 @@
 """The page of a log analysis: a log dropped and chosen, its answer, the parameter file, and logs that are refused."""
 
+import re
 from base64 import b64encode
 from pathlib import Path
 
@@ -77,6 +78,6 @@ def test_the_same_log_can_be_sent_again_and_another_theme_sends_nothing(page_of_
         dashboard.until(lambda times=times: len(sent) == times)
         expect(page.get_by_role("alert")).to_contain_text("is not a log")
     page.evaluate("() => { dispatchEvent(new Event('focus')); document.dispatchEvent(new Event('visibilitychange')); }")
-    dashboard.button("Dark theme").click()
+    page.get_by_role("button", name=re.compile("^Switch to the")).click()
     expect(page.get_by_role("alert")).to_contain_text("is not a log")
     assert len(sent) == 2
