@@ -8,7 +8,7 @@ import numpy as np
 from app.figures import theme
 from app.figures.base import Trace
 from app.figures.data import Curve, FlightData
-from app.figures.overlays import off_scale
+from app.figures.overlays import off_scale, part_off_scale
 from app.figures.theme import Palette
 
 NEAR: Final = 0.05
@@ -92,13 +92,10 @@ def _peaks(
     for flight in flights:
         if flight.curve is None:
             continue
-        whole = after_climb(deviation_of(flight.curve, set_point), set_point)
-        opening = whole.time_s <= opening_s
-        for part in (Curve(whole.time_s[opening], whole.values[opening]), whole):
-            size = np.abs(part.values)
-            if len(size) and size.max() > limit:
-                yield float(part.time_s[size.argmax()]), flight.number, part
-                break
+        settled = after_climb(deviation_of(flight.curve, set_point), set_point)
+        part = part_off_scale(settled, -limit, limit, opening_s)
+        if part is not None:
+            yield float(part.time_s[np.abs(part.values).argmax()]), flight.number, part
 
 
 def deviation_axis(palette: Palette, limit: float, unit: str, **more: object) -> dict[str, object]:

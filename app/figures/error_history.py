@@ -13,9 +13,9 @@ from app.figures.theme import PALETTES, Palette, ThemeName
 
 FEW: Final = 8
 """Up to this number of flights, every error is labelled."""
-STRIP: Final = 0.09
+STRIP: Final = 0.1
 """Height of the strip below the axis of errors, for flights without one, as a share of the figure."""
-_STRIP_GAP: Final = 0.04
+_STRIP_GAP: Final = 0.07
 
 
 @dataclass(frozen=True, slots=True)

@@ -127,6 +127,18 @@ def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit:
     )
 
 
+def part_off_scale(curve: Curve, low: float, high: float, opening_s: float) -> Curve | None:
+    """What leaves the scale `low` … `high`: the part until `opening_s`, which a chart shows first, or all of the curve.
+
+    None if all of it stays within the scale.
+    """
+    opening = curve.time_s <= opening_s
+    for part in (Curve(curve.time_s[opening], curve.values[opening]), curve):
+        if len(part.values) and (part.values.max() > high or part.values.min() < low):
+            return part
+    return None
+
+
 def off_scale(
     label: str,
     curve: Curve,
@@ -144,7 +156,7 @@ def off_scale(
     values = curve.values
     up = bool(values.max() - high >= low - values.min())
     peak = int(values.argmax() if up else values.argmin())
-    name = f"{text} reaches {values[peak]:.2f}"
+    name = f"{text} reaches {values[peak]:.2f} at {curve.time_s[peak]:.1f} s"
     return scatter(
         name,
         ([round(float(curve.time_s[peak]), 3)], [high if up else low]),

@@ -19,6 +19,7 @@ from app.figures.overlays import (
     envelope_traces,
     glitch_traces,
     off_scale,
+    part_off_scale,
     select_individual_flights,
 )
 from app.figures.scale import robust_span, thin_by_bends, thinned
@@ -95,7 +96,8 @@ class TrajectoriesFigure:
             traces.append(self._empty(palette, "live deviation", "Flying now, deviation", yaxis="y2"))
         for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
             label, text = str(flight.number), f"Flight {flight.number}"
-            traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.number, text=text))
+            part = part_off_scale(curve, low, high, OPENING_S[1]) or curve
+            traces.append(off_scale(label, part, low, high, palette.bad, trial=flight.number, text=text))
         leaving = []
         if is_step(history.set_point):
             leaving = off_scale_deviations(

@@ -201,6 +201,19 @@ def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others()
     assert "1 off scale" in card.summary
 
 
+def test_a_flight_that_leaves_the_scale_in_the_visible_part_is_marked_there() -> None:
+    """Seen: the mark stood at the highest peak, after the first 8 s."""
+    growing = Curve(
+        TIME_S, np.minimum(3.0, 2.0 * TIME_S) + 0.5 * TIME_S * np.exp(-((TIME_S - 5.0) ** 2)) + (TIME_S > 20.0) * 6.0
+    )
+    wild = replace(flight(2, 2.0), curve=growing)
+    card = TrajectoriesFigure(history(flight(1, 0.3), wild, flight(3, 0.2), flight(4, 0.21))).compute()
+    assert layout(card)["yaxis"]["range"][1] < 5.0
+    mark = trace(card, "off scale", trial=2)
+    assert mark["x"] == [pytest.approx(5.1, abs=0.1)]
+    assert mark["text"] == ["2 ↑ 5.5"]
+
+
 def test_the_table_gives_the_same_curves_in_numbers() -> None:
     card = TrajectoriesFigure(history(flight(1, 0.3), proposal=proposal(2))).compute()
     assert card.table is not None
