@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { abortStage } from "./flights";
+import { abortStage, stillUnderWay } from "./flights";
 
 test("an abort is under way only once the worker has accepted it", () => {
   const none = { asked: new Set<number>(), accepted: new Set<number>(), trouble: null };
@@ -8,4 +8,10 @@ test("an abort is under way only once the worker has accepted it", () => {
   expect(abortStage(7, asked)).toBe("sending");
   expect(abortStage(7, { ...asked, trouble: "The worker does not answer." })).toBe("not sent");
   expect(abortStage(7, { ...asked, accepted: new Set([7]) })).toBe("accepted");
+});
+
+test("an abort of an earlier attempt is forgotten, so that ABORT of the next one is not labelled as pressed", () => {
+  const asked = new Set([7, 8]);
+  expect([...stillUnderWay(asked, new Set([8, 9]))]).toEqual([8]);
+  expect(stillUnderWay(asked, new Set([7, 8, 9]))).toBe(asked);
 });

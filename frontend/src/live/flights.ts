@@ -52,9 +52,15 @@ async function askToAbort(trialId: number): Promise<string | null> {
   }
 }
 
+/** The trials of `ids` that are still under way; the same set if all are. */
+export function stillUnderWay(ids: ReadonlySet<number>, underWay: ReadonlySet<number>): ReadonlySet<number> {
+  const kept = [...ids].filter((id) => underWay.has(id));
+  return kept.length === ids.size ? ids : new Set(kept);
+}
+
 /**
  * Abort by trial id. The request is repeated until the worker accepts it or the flight is over. `accepted` are the
- * flights whose abort it has accepted; `trouble` is the reason why one has not been accepted yet.
+ * flights whose abort it has accepted; both forget a flight that is over, because its trial may fly again. `trouble` is the reason why one has not been accepted yet.
  */
 export function useAbort(flying: readonly FlyingCampaign[]) {
   const [asked, setAsked] = useState<ReadonlySet<number>>(new Set());
@@ -80,8 +86,11 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
   );
 
   useEffect(() => {
+    const underWay = new Set([...flying, ...liveFlightsNow()].map(({ trialId }) => trialId));
+    setAsked((before) => stillUnderWay(before, underWay));
+    setAccepted((before) => stillUnderWay(before, underWay));
     if (flying.length === 0) setTrouble(null);
-  }, [flying.length]);
+  }, [flying]);
 
   return { asked, accepted, trouble, press };
 }
