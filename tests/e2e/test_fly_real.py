@@ -63,6 +63,17 @@ def trial_id(dashboard: Dashboard, states: States, vehicle_id: int) -> Iterator[
         dashboard.post(f"/trials/{trial}/abort")
 
 
+RECORD_SCREENS = """() => {
+    window.screens = [];
+    const read = () => window.screens.push({
+        word: document.querySelector("h1").innerText,
+        readings: [...document.querySelectorAll("dl")].map((list) => list.innerText).join("\\n"),
+    });
+    new MutationObserver(read).observe(document.body, {subtree: true, childList: true, characterData: true});
+}"""
+"""Keep what the fly screen shows from now on, with every change of it."""
+
+
 def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
     take_control(dashboard)
     stage(dashboard, len(TRIED))
@@ -74,8 +85,16 @@ def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, 
     see_it_fly(dashboard, 40)
     throttle = dashboard.page.locator("dt", has_text="Throttle").locator("xpath=following-sibling::dd")
     expect(throttle).to_have_text(re.compile(r"^[1-9]\d*\s%$"))
+    dashboard.page.evaluate(RECORD_SCREENS)
     abort(dashboard)
     expect(word(dashboard)).to_have_text("Aborted")
+    screens = dashboard.page.evaluate("window.screens")
+    descent = [screen for screen in screens if screen["word"] == "Aborted, landing"]
+    assert descent
+    assert not any("Ends in" in screen["readings"] for screen in descent)
+    assert all("not scored" in screen["readings"] for screen in descent)
+    assert "Starting" not in {screen["word"] for screen in screens}
+    assert re.search(r"Record length\s*\d+\.\d s", screens[-1]["readings"])
     expect(dashboard.page.get_by_text("Safe gains restored and read back.")).to_be_visible()
     expect(dashboard.page.get_by_role("link", name="Next flight")).to_be_visible()
     trial = dashboard.get(f"/trials/{trial_id}")

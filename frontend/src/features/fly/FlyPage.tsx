@@ -1,6 +1,6 @@
 import { Anchor, Button, Skeleton, useComputedColorScheme } from "@mantine/core";
 import { IconAlertOctagonFilled, IconArrowBarToDown, IconChevronLeft } from "@tabler/icons-react";
-import { useCallback, useMemo } from "react";
+import { useCallback, useMemo, useRef } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { useCampaign, useCampaignFigure, useTrial } from "../../api/queries";
@@ -9,7 +9,7 @@ import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicle } from "../../api/vehicles";
 import { Chart } from "../../charts/Chart";
 import { type PlotlyFigure, wholeFlight, withChosen, withLimit, withTimeRange } from "../../charts/traces";
-import type { AbortControl } from "../../live/flights";
+import { type AbortControl, abortStage } from "../../live/flights";
 import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
 import { VehicleBadge } from "../../ui/Badges";
@@ -19,7 +19,7 @@ import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
-import { type FlyStep, flyStateLabel, flyStep } from "./flyScreen";
+import { type FlyStep, flyStateLabel, flyStep, isAbortStep } from "./flyScreen";
 import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
@@ -71,8 +71,14 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const readiness = useReadiness(trial.id, vehicle?.id ?? null);
   const isReady = readiness?.is_ready ?? false;
   const isHeld = readiness?.steps.includes("staged") === true;
-  const { word, tone } = flyStateLabel(trial, step, status, { quarantined, readiness });
+  const { word, tone } = flyStateLabel(trial, step, status, {
+    quarantined,
+    readiness,
+    phase: live?.phase ?? null,
+  });
   const isFlying = step === "flying";
+  const isAborting = abortStage(trial.id, abort) === "accepted" || isAbortStep(status?.status.step);
+  const isAborted = useIsAborted(trial.flight?.id ?? null, isFlying && isAborting);
   const watching = useReadOnlyReason(vehicle);
   const barred = BARRED.has(step) && (quarantined || watching !== null);
   const steps = {
@@ -109,6 +115,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           status={status}
           hasLink={vehicle !== null}
           isFlying={isFlying}
+          isAborted={isAborted}
           endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}
         />
         <div className={classes["chart"]}>
@@ -138,6 +145,13 @@ function Screen({ campaign, trial, vehicle }: Props) {
       {vehicle !== null && <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching !== null} />}
     </div>
   );
+}
+
+/** Whether this flight was aborted while the page watched: its later steps on the ground do not tell. */
+function useIsAborted(flightId: number | null, isAborting: boolean): boolean {
+  const aborted = useRef<number | null>(null);
+  if (isAborting) aborted.current = flightId;
+  return flightId !== null && aborted.current === flightId;
 }
 
 function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure | null; summary: string } {

@@ -19,6 +19,9 @@ interface Props {
   status: Aged | null;
   hasLink: boolean;
   isFlying: boolean;
+  /** Whether the flight was aborted: its error is not scored from then on, and its record has no known end. */
+  isAborted: boolean;
+  /** Planned length of the record, s; null if unknown. */
   endS: number | null;
 }
 
@@ -59,7 +62,7 @@ function useLastKnown(value: number | null | undefined): number | null | undefin
 }
 
 /** Large readings: altitude and error, then the rest. Stale readings are grey. */
-export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }: Props) {
+export function Readouts({ trial, unit, live, status, hasLink, isFlying, isAborted, endS }: Props) {
   const reading = readingOf(live?.channel ?? "altitude_m");
   const measured = isFlying ? live?.measured.at(-1) : undefined;
   const linked = status?.status;
@@ -67,9 +70,8 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
   const stale = hasLink ? !(status?.isCurrent ?? false) : isFlying && !isCurrent;
   const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
   const lastOutput = useLastKnown(output);
+  const isScored = isFlying && !isAborted;
   const error = isFlying ? live?.errorSoFar : trial.error;
-  const errorTitle = isFlying ? "Error so far" : "Error";
-  const hasFlown = !isFlying && trial.flown_at !== null;
   const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
     <div className={`${classes["readouts"]} numbers`}>
@@ -82,9 +84,9 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
           stale={stale}
         />
         <Reading
-          title={`${errorTitle}${predicted}`}
-          topic={isFlying ? "errorSoFar" : "error"}
-          value={withUnit(error, unit)}
+          title={`${isScored ? "Error so far" : "Error"}${predicted}`}
+          topic={isScored ? "errorSoFar" : "error"}
+          value={isFlying && isAborted ? "not scored" : withUnit(error, unit)}
           size="large"
           stale={isFlying && stale}
         />
@@ -101,14 +103,17 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, endS }:
         )}
         <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />
         {hasLink && <LinkReading status={status} />}
-        {isFlying ? (
-          <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />
-        ) : (
-          <Reading title="Record length" value={hasFlown && trial.record === null ? NOTHING : withUnit(endS, "s", 0)} />
-        )}
+        {isScored && <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />}
+        {!isFlying && <Reading title="Record length" value={recordLength(trial, endS)} />}
       </dl>
     </div>
   );
+}
+
+/** Length of the record; before the flight the planned one. */
+function recordLength({ flown_at, record }: Trial, plannedS: number | null): string {
+  if (record !== null) return withUnit(record.duration_s, "s", 1);
+  return flown_at === null ? withUnit(plannedS, "s", 0) : NOTHING;
 }
 
 interface HeldGainsProps {

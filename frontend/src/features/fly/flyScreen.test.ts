@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type { Trial } from "../../api/types";
 import type { Loss, Readiness } from "../../live/readiness";
 import { aged, statusFrom } from "../../live/vehicleStatus";
-import { areReadBackSince, flyStateLabel, flyStep, gainTicks, secondsLeft } from "./flyScreen";
+import { areReadBackSince, flyStateLabel, flyStep, gainTicks, isAbortStep, secondsLeft } from "./flyScreen";
 
 type Flight = NonNullable<Trial["flight"]>;
 
@@ -60,6 +60,26 @@ test("the word in flight is the vehicle's own step, and a silent vehicle is neve
   expect(flyStateLabel({ state: "lost", flight }, "judge", null, { quarantined: false, readiness: null }).word).toBe(
     "Lost",
   );
+});
+
+test("after touchdown it restores the safe gains, until the record is stored; it does not start again", () => {
+  const trial = { state: "flying", flight } as const;
+  const around = { quarantined: false, readiness: null };
+  const word = (phase: string | null) =>
+    flyStateLabel(trial, "flying", statusAt("idle", 0.1), { ...around, phase }).word;
+  const restoring = "Landed, restoring safe gains";
+  expect([word("flying"), word("landed"), word("ended")]).toEqual(["Starting", restoring, restoring]);
+});
+
+test("an aborted flight and one whose link is lost end before their record is complete", () => {
+  expect(["take-off", "record", "land", "abort-land", "link lost", undefined].map(isAbortStep)).toEqual([
+    false,
+    false,
+    false,
+    true,
+    true,
+    false,
+  ]);
 });
 
 test("without the worker it is not known whether the link is lost", () => {

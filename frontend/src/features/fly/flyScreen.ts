@@ -72,26 +72,43 @@ function stagedLabel(readiness: Readiness | null): StateLabel {
   return isOnlyControl ? { word: "Staged", tone: "quiet" } : { word: "Not ready to fly", tone: "bad" };
 }
 
+interface Around {
+  quarantined: boolean;
+  readiness: Readiness | null;
+  /** From the event stream. */
+  phase?: string | null;
+}
+
+function hasLanded(phase: string | null): boolean {
+  return phase === "landed" || phase === "ended";
+}
+
 /** Main label. For a vehicle with a link, `status` has the step; a stale one is never "In flight". */
 export function flyStateLabel(
   trial: Standing,
   step: FlyStep,
   status: Aged | null,
-  { quarantined, readiness }: { quarantined: boolean; readiness: Readiness | null },
+  { quarantined, readiness, phase = null }: Around,
 ): StateLabel {
   if (step === "flying" && status !== null) {
     const away = readiness?.losses.map(({ kind }) => AWAY[kind]).find((word) => word !== undefined);
     if (away !== undefined) return { word: away, tone: "bad" };
     if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
     if (IN_FLIGHT.has(status.status.step)) {
-      const isBad = status.status.step === "link lost" || status.status.step === "abort-land";
-      return { word: stepWord(status.status.step), tone: isBad ? "bad" : "busy" };
+      return { word: stepWord(status.status.step), tone: isAbortStep(status.status.step) ? "bad" : "busy" };
     }
-    if (!quarantined) return { word: "Starting", tone: "busy" };
+    if (!quarantined) return { word: hasLanded(phase) ? "Landed, restoring safe gains" : "Starting", tone: "busy" };
   }
   if (quarantined) return { word: "Quarantined", tone: "bad" };
   if (step === "over" || (step === "judge" && trial.state === "lost")) return trialStateLabel(trial.state);
   return step === "staged" ? stagedLabel(readiness) : WORDS[step];
+}
+
+const ABORTED: ReadonlySet<string> = new Set(["abort-land", "link lost"]);
+
+/** Whether the vehicle ends the flight before its record is complete. */
+export function isAbortStep(step: string | undefined): boolean {
+  return step !== undefined && ABORTED.has(step);
 }
 
 export interface GainTick {
