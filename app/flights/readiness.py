@@ -60,9 +60,9 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "link silent": LossText(
-            what=f"No current data has been received from the vehicle for {SILENT_AFTER_S:g} s.",
+            what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
-            what_in_flight=f"Nothing has been received from the vehicle for {SILENT_AFTER_S:g} s.",
+            what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
             way_on_in_flight=f"Land is repeated until the vehicle confirms it. {_BY_HAND}",
         ),
         "gains unknown": LossText(
