@@ -124,6 +124,21 @@ def test_what_is_no_recording_is_refused_in_words(page_of_checks: Dashboard) -> 
     assert dashboard.get("/controller-checks")["total"] == 0
 
 
+def test_a_refused_file_is_named_above_the_verdict_on_an_earlier_one(page_of_checks: Dashboard) -> None:
+    dashboard, page = page_of_checks, page_of_checks.page
+    dashboard.button("Check example").click()
+    result = page.get_by_text(re.compile("^The replica agrees"))
+    expect(result).to_be_visible()
+    choose(dashboard, file_of("alive.data", "1.0 31 ALIVE 1\n"))
+    heading = page.get_by_role("heading", name="alive.data was not checked")
+    expect(heading).to_be_in_viewport()
+    refusal, verdict = heading.bounding_box(), result.bounding_box()
+    assert refusal is not None
+    assert verdict is not None
+    assert refusal["y"] < verdict["y"]
+    expect(page.get_by_role("alert")).to_contain_text("contains no VERT_LOOP")
+
+
 def test_a_file_may_be_dropped_on_the_page(page_of_checks: Dashboard) -> None:
     dashboard, page = page_of_checks, page_of_checks.page
     dropped = page.evaluate_handle(

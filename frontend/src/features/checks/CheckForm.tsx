@@ -1,6 +1,6 @@
 import { Button, FileButton, Group, Text, TextInput } from "@mantine/core";
 import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
-import { useState } from "react";
+import { useEffect, useRef, useState } from "react";
 import { useNavigate } from "react-router";
 import { type RecordingCheck, useCheckExample } from "../../api/checks";
 import { problemOf } from "../../api/problems";
@@ -66,9 +66,26 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
           Check example
         </Button>
       </Group>
-      <ErrorNotice error={upload.error ?? example.error} />
-      <GainsAsked upload={upload} onCheck={onCheck} />
+      <ErrorNotice error={example.error} />
     </Panel>
+  );
+}
+
+/** Why a recording was not checked, above the result of an earlier one; renders nothing without a refusal. */
+export function RefusedRecording({ upload, onCheck }: Pick<Props, "upload" | "onCheck">) {
+  const notice = useRef<HTMLDivElement>(null);
+  const { error, variables } = upload;
+  useEffect(() => {
+    if (error !== null) notice.current?.scrollIntoView({ block: "nearest" });
+  }, [error]);
+  if (error === null) return null;
+  return (
+    <div ref={notice} className={classes["refused"]}>
+      <Panel title={`${variables?.file.name ?? "The recording"} was not checked`}>
+        <ErrorNotice error={error} />
+        <GainsAsked upload={upload} onCheck={onCheck} />
+      </Panel>
+    </div>
   );
 }
 

@@ -11,7 +11,7 @@ import { addPage } from "../../ui/paging";
 import row from "../../ui/RowCard.module.css";
 import { Time } from "../../ui/Time";
 import { useTitle } from "../../ui/useTitle";
-import { CheckForm } from "./CheckForm";
+import { CheckForm, RefusedRecording } from "./CheckForm";
 import { CheckResult } from "./CheckResult";
 import { checkStateLabel, KINDS } from "./checks";
 
@@ -47,6 +47,7 @@ export function ControllerPage() {
       onDrop={drop}
     >
       <Title order={1}>Controller check</Title>
+      <RefusedRecording upload={upload} onCheck={check} />
       {checkId > 0 && <CheckResult key={checkId} checkId={checkId} upload={upload} onCheck={check} />}
       <CheckForm upload={upload} onCheck={check} over={over} brief={checkId > 0} />
       <EarlierChecks shown={checkId} />
