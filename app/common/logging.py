@@ -48,6 +48,7 @@ def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -
     if sys.stderr.isatty():
         to_stderr.setLevel(logging.WARNING)
     logging.basicConfig(level=level.upper(), handlers=[to_file, to_stderr], force=True)
+    logging.getLogger("alembic.runtime.plugins").setLevel(logging.WARNING)  # it names each of its plugins
     logging.raiseExceptions = False  # with a full disk, not every log line must become a traceback
     structlog.configure(
         processors=[

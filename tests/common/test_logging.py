@@ -1,7 +1,10 @@
 """What the worker wrote down about a job, over HTTP."""
 
 import json
+import subprocess
+import sys
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 from fastapi.testclient import TestClient
 
@@ -47,3 +50,21 @@ def test_a_job_without_lines_has_none_and_no_job_is_not_found(client: TestClient
         jobs.enqueue_job(session, "proposal")
     assert get(client, "/api/jobs/1/log") == {"lines": [], "total": 0}
     assert client.get("/api/jobs/2/log").status_code == 404
+
+
+MIGRATE = """
+import sys
+from pathlib import Path
+from app.common.logging import configure_logs
+from app.db.migrate import migrate
+
+folder = Path(sys.argv[1])
+configure_logs(folder, "web", "info")
+migrate(folder / "gainline.sqlite3")
+"""
+
+
+def test_the_first_start_logs_the_migration_and_not_the_plugins_of_alembic(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", MIGRATE, tmp_path], capture_output=True, text=True, check=True)
+    assert "Running upgrade" in done.stderr
+    assert "plugin" not in done.stderr

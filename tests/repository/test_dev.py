@@ -3,6 +3,7 @@
 import ast
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,6 +27,18 @@ def test_without_a_command_it_lists_its_commands() -> None:
     assert done.returncode == 0
     assert "./dev up" in done.stdout
     assert "./dev test" in done.stdout
+
+
+def test_help_of_a_command_sets_nothing_up(tmp_path: Path) -> None:
+    """In a fresh checkout: nothing of it may be installed for a help text."""
+    (tmp_path / "bench").symlink_to(ROOT / "bench")
+    fresh = tmp_path / "dev"
+    fresh.write_bytes(DEV.read_bytes())
+    for command in ("up", "setup", "test", "api"):
+        done = subprocess.run([sys.executable, fresh, command, "--help"], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert f"./dev {command}" in done.stdout
+    assert not (tmp_path / ".dev").exists()
 
 
 def test_an_unknown_command_is_refused() -> None:
