@@ -45,7 +45,7 @@ _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAI
 _ANOTHER: Final = "Check which vehicle it is, then try again."
 _LAND_REPEATED: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
 _RESTARTED: Final = "It restarted: its gains have not been read since."
-_STAGE_AGAIN: Final = "Stage the flight again."
+_STAGE_AGAIN: Final = "Press Stage gains so that they are written and read back again."
 _SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
 
 
@@ -243,11 +243,11 @@ class MavlinkVehicle:
         self._require_not_quarantined()
         self._require_uid()
         if not watched.positions:
-            raise VehicleError("It does not send its position, so it may have restarted.", hint=_STAGE_AGAIN)
+            raise VehicleError("The vehicle does not send its position, so it may have restarted.", hint=_STAGE_AGAIN)
         if restarted or self._gains.staged is None:
-            raise VehicleError("It restarted, so its gains are no longer those staged.", hint=_STAGE_AGAIN)
+            raise VehicleError("The vehicle restarted.", hint=_STAGE_AGAIN)
         if (held := self._gains.read()) != self._gains.staged:
-            raise VehicleError(f"It holds {written(held)}, not the staged gains.", hint=_STAGE_AGAIN)
+            raise VehicleError(f"The vehicle holds {written(held)}, not the staged gains.", hint=_STAGE_AGAIN)
 
     def check(self) -> tuple[CheckItem, ...]:
         """Run all preflight checks, which takes two seconds or more; a failed check is an item of the result, not an
