@@ -41,7 +41,7 @@ class ErrorsFigure:
     def not_ready(self) -> str | None:
         if any(flight.error is not None for flight in self.history.flights):
             return None
-        return "The error of each flight appears here after the first landing."
+        return "The error of each flight appears here after the first valid flight."
 
     def compute(self) -> Card:
         palette, history = PALETTES[self.theme], self.history

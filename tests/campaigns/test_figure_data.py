@@ -101,7 +101,7 @@ def test_a_campaign_without_flights_shows_what_is_missing(client: TestClient, da
     campaign = create_ready_campaign(client, database)
     card = get(client, f"/api/campaigns/{campaign['id']}/figures/errors")
     assert (card["state"], card["figure"]) == ("waiting", None)
-    assert "first landing" in card["reason"]
+    assert "first valid flight" in card["reason"]
 
 
 @pytest.mark.parametrize(

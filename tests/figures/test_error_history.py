@@ -16,7 +16,7 @@ TABLE_1 = [
 
 
 def test_without_a_scored_flight_the_card_says_when_it_will_be_filled() -> None:
-    assert ErrorsFigure(history()).not_ready() == "The error of each flight appears here after the first landing."
+    assert ErrorsFigure(history()).not_ready() == "The error of each flight appears here after the first valid flight."
     assert ErrorsFigure(history(flight(1, None, outcome="aborted"))).not_ready() is not None
 
 

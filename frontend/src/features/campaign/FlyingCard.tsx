@@ -2,7 +2,7 @@ import { Button, Stack } from "@mantine/core";
 import { Link } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
 import { useIsCurrent, useLiveFlight } from "../../live/store";
-import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
+import { isSaturated, readingOf } from "../../live/telemetry";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { Note } from "../../ui/Note";
@@ -11,20 +11,12 @@ import { percent, predictedText } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import classes from "./NextFlight.module.css";
+import { flyingStage, STAGED } from "./nextStep";
 
 interface Props {
   campaign: Campaign;
   trial: Trial | undefined;
   step: { trialId: number; trialNumber: number };
-}
-
-const STAGED = "Staged, waiting for takeoff";
-
-function stageWord(trial: Trial | undefined, live: LiveFlight | null): string {
-  const waits = trial?.state === "staged" && trial.flight?.mode === "stage" && trial.flight.take_off_at === null;
-  if (waits && live?.phase !== "flying") return STAGED;
-  if (live !== null && live.timeS.length > 0) return "In flight";
-  return trial?.state === "planned" ? "Waiting for the worker" : "Staging";
 }
 
 /** Live values of the flight in progress. The ABORT button is in the header of every page. */
@@ -33,7 +25,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const { registered } = campaign.vehicle;
-  const stage = stageWord(trial, live);
+  const stage = flyingStage(trial, live);
   const isStale = !useIsCurrent(live) && live !== null && live.timeS.length > 0;
   return (
     <Panel
@@ -73,7 +65,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
         )}
         {registered && (
           <Button component={Link} to={`/fly/${step.trialId}`} size="lg">
-            Open the fly screen
+            Open fly screen
           </Button>
         )}
         {stage !== STAGED && (

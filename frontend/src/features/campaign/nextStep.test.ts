@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Campaign, NextFlight, Proposal, Trial } from "../../api/types";
-import { bestOf, nextStep, speedOf } from "./nextStep";
+import { bestOf, flyingStage, nextStep, STAGED, speedOf } from "./nextStep";
 
 const campaign = {
   state: "deciding",
@@ -19,6 +19,15 @@ test("a fresh proposal is what to do next", () => {
 test("what flies comes before everything else", () => {
   const flying = { ...campaign, flying: { trial_id: 8, trial_number: 2 } };
   expect(nextStep(flying, ready, [trial(8, "flying")])).toEqual({ kind: "flying", trialId: 8, trialNumber: 2 });
+});
+
+test("a flight is in flight from its takeoff on, as the bar says, even before the first sample", () => {
+  const waiting = { ...trial(8, "staged"), flight: { mode: "stage", take_off_at: null } } as unknown as Trial;
+  const none = { phase: "staged", timeS: [] };
+  expect(flyingStage(trial(8, "planned"), null)).toBe("Waiting for the worker");
+  expect(flyingStage(trial(8, "staged"), { ...none, phase: "staging" })).toBe("Staging");
+  expect(flyingStage(waiting, none)).toBe(STAGED);
+  expect(flyingStage(trial(8, "staged"), { ...none, phase: "flying" })).toBe("In flight");
 });
 
 test("a flight that has landed is not flying any more, even if the campaign is not up to date yet", () => {

@@ -1,6 +1,7 @@
 /** The next action in a campaign, which the right-hand card of its page shows. */
 
 import type { Campaign, NextFlight, Proposal, Trial, Trouble } from "../../api/types";
+import type { LiveFlight } from "../../live/telemetry";
 import { wasFlown } from "../../ui/states";
 
 export type NextStep =
@@ -13,6 +14,16 @@ export type NextStep =
   | { kind: "computing" }
   | { kind: "failed"; problem: Trouble | null }
   | { kind: "finished" };
+
+export const STAGED = "Staged, waiting for takeoff";
+
+/** How far the flight in progress has come. The event stream may be ahead of the stored state. */
+export function flyingStage(trial: Trial | undefined, live: Pick<LiveFlight, "phase" | "timeS"> | null): string {
+  const waits = trial?.state === "staged" && trial.flight?.mode === "stage" && trial.flight.take_off_at === null;
+  if (waits && live?.phase !== "flying") return STAGED;
+  if (live?.phase === "flying" || (live !== null && live.timeS.length > 0)) return "In flight";
+  return trial?.state === "planned" ? "Waiting for the worker" : "Staging";
+}
 
 /** Whether the flight in progress has landed according to the list of flights. */
 export function hasLanded({ flying }: Campaign, trials: readonly Trial[]): boolean {
