@@ -36,7 +36,7 @@ FLIGHTS_AT_MOST: Final = 9
 DECIDED: Final = "Ada and Ben, from the flights of this campaign"
 CHARTS: Final = re.compile("^[34]$")
 """Takeoffs, errors and gains; the landscape as well if it has been computed by then."""
-STAGE: Final = re.compile(r"^Stage flight \d+$")
+OPEN: Final = "Open fly screen"
 
 
 @pytest.fixture
@@ -58,10 +58,10 @@ def test_a_day_from_the_wizard_to_the_report(
     first = fly_the_first(dashboard, campaign_id, vehicle_id)
     abort_the_second(dashboard, campaign_id, vehicle_id)
     mark_the_third_invalid(dashboard, campaign_id, first)
-    fly_another(dashboard, campaign_id, lambda: press(dashboard, STAGE))
+    fly_another(dashboard, campaign_id, lambda: press(dashboard, OPEN))
     repeat_the_best(dashboard, campaign_id)
     while not is_over(dashboard, campaign_id):
-        fly_another(dashboard, campaign_id, lambda: press(dashboard, STAGE))
+        fly_another(dashboard, campaign_id, lambda: press(dashboard, OPEN))
     see_the_result(dashboard, campaign_id)
     promote(dashboard, campaign_id, vehicle_id)
     open_the_report(dashboard, campaign_id)
@@ -102,7 +102,7 @@ def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
     """Begun and ended on the page; its flights are written."""
     page = dashboard.page
     expect(dashboard.panel("Rehearse first")).to_contain_text("Not passed yet")
-    expect(page.get_by_role("button", name=STAGE)).to_have_count(0)
+    expect(page.get_by_role("button", name=OPEN)).to_have_count(0)
     picture(dashboard, "rehearse")
     dashboard.button("Rehearse on a simulation").click()
     expect(page.get_by_text("This is a rehearsal")).to_be_visible()
@@ -111,13 +111,13 @@ def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
     states.rehearse(campaign_id)
     expect(page.get_by_text("Rehearsal passed")).to_be_visible()
     page.get_by_role("link", name=f"{NAME} on Number 1").click()
-    expect(page.get_by_role("button", name=STAGE)).to_be_visible()
+    expect(page.get_by_role("button", name=OPEN)).to_be_visible()
 
 
 # ---- at the vehicle
 
 
-def press(dashboard: Dashboard, label: re.Pattern[str]) -> None:
+def press(dashboard: Dashboard, label: str | re.Pattern[str]) -> None:
     dashboard.page.get_by_role("button", name=label).click()
 
 
@@ -138,7 +138,7 @@ def proposed(dashboard: Dashboard, campaign_id: int) -> Json:
 
     def stage_the_step() -> None:
         dashboard.choose_proposed(campaign_id)
-        press(dashboard, STAGE)
+        press(dashboard, OPEN)
 
     trial = planned(dashboard, campaign_id, stage_the_step)
     assert trial["gains"] == proposal["gains"]
@@ -246,7 +246,7 @@ def repeat_the_best(dashboard: Dashboard, campaign_id: int) -> None:
 
     def stage_a_repeat() -> None:
         dashboard.choose("Repeat")
-        press(dashboard, STAGE)
+        press(dashboard, OPEN)
 
     trial = fly_another(dashboard, campaign_id, stage_a_repeat)
     assert trial["gains"] == winner["gains"]

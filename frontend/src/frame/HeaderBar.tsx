@@ -85,7 +85,7 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
         to={`/fly/${flying.trialId}`}
         className={`${classes["readings"]} numbers`}
         data-stale={!isCurrent || undefined}
-        title="Open the fly screen"
+        title="Open fly screen"
       >
         {time === undefined ? (
           <span>{live?.phase === "staging" || live?.phase === "staged" ? live.phase : "in flight"}</span>

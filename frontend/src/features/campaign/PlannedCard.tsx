@@ -72,7 +72,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
                 variant={needs_staging ? "filled" : "default"}
                 leftSection={<IconPlaneDeparture size={22} aria-hidden />}
               >
-                Stage flight {trial.number}
+                Open fly screen
               </Button>
             ) : (
               <SpeedSwitch value={speed} onChange={setSpeed} />

@@ -162,7 +162,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
     <>
       {!needs_staging && button(`Fly flight ${number}`, true, () => create.mutate({ ...trial, ...order }))}
       {registered ? (
-        button(`Stage flight ${number}`, needs_staging, () => create.mutate(trial))
+        button("Open fly screen", needs_staging, () => create.mutate(trial))
       ) : (
         <SpeedSwitch value={speed} onChange={setSpeed} />
       )}
