@@ -110,6 +110,13 @@ test.each(["1e9", "NaN", "Infinity", "abc", "", "  ", "1 000", "1,5", "0x10", "1
   },
 );
 
+test("a comma is answered with what is right for the field", () => {
+  expect(readNumber("32,6").reason).toBe("Use a decimal point, not a comma: 32.6.");
+  expect(readNumber("283,5", true).reason).toBe("Enter a whole number, without a comma.");
+  expect(readNumber("1500.5", true).reason).toBe("Enter a whole number.");
+  expect(readNumber("1,000,000", true).reason).toContain("is not a number. Enter a whole number such as 400.");
+});
+
 test("what a field is filled with can be read again", () => {
   expect([400, -50.25, 1e-7, 0].map((value) => readNumber(typed(value)).value)).toEqual([400, -50.25, 1e-7, 0]);
   expect(typedGain(-50.123456789)).toBe("-50.1235");

@@ -104,8 +104,11 @@ const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 export function readNumber(text: string, isWhole = false): Reading {
   const trimmed = text.trim().replace(/^−/, "-");
   if (trimmed === "") return { reason: "Enter a number." };
+  const pointed = trimmed.replace(",", ".");
+  if (isWhole && PLAIN.test(pointed) && pointed !== trimmed)
+    return { reason: "Enter a whole number, without a comma." };
   if (isWhole && PLAIN.test(trimmed) && !Number.isInteger(Number(trimmed))) return { reason: "Enter a whole number." };
-  if (trimmed.includes(",")) return { reason: "Use a decimal point, not a comma: 1.5." };
+  if (PLAIN.test(pointed) && pointed !== trimmed) return { reason: `Use a decimal point, not a comma: ${pointed}.` };
   const value = Number(trimmed);
   if (!PLAIN.test(trimmed) || !Number.isFinite(value)) {
     const example = isWhole ? "a whole number such as 400" : "a decimal number such as 400 or 12.5";
