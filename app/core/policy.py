@@ -14,7 +14,7 @@ Vector = NDArray[np.float64]
 Gains = Mapping[str, float]
 
 _ROUNDING: Final = 1e-9  # a step of exactly the allowed fraction is allowed
-_HINT: Final = "Correct the gains listed, then send the set again; nothing was changed."
+_HINT: Final = "Correct the gains listed; nothing was changed."
 
 
 def is_finite(value: float) -> bool:

@@ -109,7 +109,8 @@ class VehicleKind:
             raise InputError(
                 f"These options do not suit the vehicle {self.name}.",
                 problems=tuple(problems),
-                hint="Correct the options listed, or omit them to use their defaults.",
+                hint="Correct the options listed.",
+                script_hint="Correct the options listed, or omit them to use their defaults.",
             )
         return complete
 

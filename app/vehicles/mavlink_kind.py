@@ -117,8 +117,8 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
     except InputError as error:
         return (*problems, *error.problems)
     if options["simulated"] and not _may_simulate(address, simulation_hosts):
-        possible = ", ".join(("a loopback address", *sorted(simulation_hosts)))
-        problems.append(Problem("simulated", f"is not possible at {address}: only {possible} can be simulated"))
+        here = " or ".join(("127.0.0.1", *sorted(simulation_hosts)))
+        problems.append(Problem("simulated", f"must be off for {address}: a simulation has the address {here}"))
     problems += _second_source_problems(str(options["second_source"]), str(options["scored_source"]))
     if options["signing_key_file"] and options["autopilot"] == "paparazzi":
         problems.append(

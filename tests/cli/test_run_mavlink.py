@@ -50,7 +50,7 @@ def test_a_whole_campaign_is_flown_over_the_link(tmp_path: Path, monkeypatch: py
         (("--vehicle", "mavlink:udp:10.0.0.2:4245"), "vehicle.kind: mavlink is not a simulation"),
         (
             ("--vehicle", "mavlink:udp:10.0.0.2:4245", "--set", "simulated=true"),
-            "vehicle.options.simulated: is not possible at udp:10.0.0.2:4245",
+            "vehicle.options.simulated: must be off for udp:10.0.0.2:4245",
         ),
         (("--vehicle", "mavlink:here"), "vehicle.options.address: must be udp:HOST:PORT"),
         (("--vehicle", "twin:udp:127.0.0.1:4245"), "vehicle.options.address: is not an option of twin"),

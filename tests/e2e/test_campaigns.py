@@ -227,6 +227,9 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     dashboard.button("Create campaign").click()
     expect(page.get_by_label("Maximum flights")).to_have_attribute("aria-invalid", "true")
     expect(page.get_by_label("Maximum flights")).to_be_focused()
+    expect(page.get_by_role("alert")).to_have_text(
+        "Correct the marked fields: Maximum flights, Scored window, bounds of kp."
+    )
     page.get_by_label("Maximum flights").fill("7")
     dashboard.button("Create campaign").click()
     expect(page.get_by_label("kp maximum")).to_have_attribute("aria-invalid", "true")
@@ -239,3 +242,22 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
     assert made["definition"]["bounds"] == {"kp": [0, 2000]}
     expect(page.get_by_text("Scored window: 20 s from the takeoff command")).to_be_visible(timeout=30_000)
+
+
+def test_what_blocks_a_new_campaign_stands_beside_its_button(dashboard: Dashboard) -> None:
+    dashboard.open("/new")
+    page, create = dashboard.page, dashboard.button("Create campaign")
+    blocked = page.get_by_role("main").get_by_role("status")
+    page.get_by_role("button", name=re.compile("^Advanced")).click()
+    page.get_by_label("kp maximum").fill("283,5")
+    expect(page.get_by_text("Enter a whole number, without a comma.")).to_be_visible()
+    name = page.get_by_label("Name", exact=True)
+    name.fill(" ")
+    expect(create).to_be_disabled()
+    expect(blocked).to_have_text("Enter a name. Enter a number for kp maximum.")
+    expect(blocked).to_be_in_viewport()
+    expect(name).to_have_attribute("aria-invalid", "true")
+    name.fill("Bee")
+    page.get_by_label("kp maximum").fill("2000")
+    expect(blocked).to_have_count(0)
+    expect(create).to_be_enabled()

@@ -45,6 +45,11 @@ OWN_WORDS: Final[dict[object, str]] = {
     LinkDownError: "It is retried until the worker confirms it. If a vehicle is in the air, use its own remote control"
 }
 """What to do, where the page does not repeat the API's hint: its banner says how a worker is started again."""
+OF_FORMS: Final[dict[object, str]] = {
+    InputError: "Correct the marked fields: bounds of kp.",
+    "invalid": "Correct the marked fields: Maximum flights.",
+}
+"""What a form says instead of the API's sentence and hint, because every reason stands at its field."""
 RETRIED_MS: Final = 40_000
 """A read that failed at the server is tried three times more before the page says so."""
 
@@ -349,29 +354,30 @@ def test_an_error_states_what_happened_and_what_to_do(
     undo = PROVOKED[kind](dashboard, shared_server, states)
     try:
         title = TITLES[kind] if isinstance(kind, str) else over_http._KINDS[kind][1]
-        _is_told(dashboard, told, title, OWN_WORDS.get(kind))
+        _is_told(dashboard, told, title, kind)
     finally:
         dashboard.page.remove_listener("response", note)
         if undo is not None:
             undo()
 
 
-def _is_told(dashboard: Dashboard, told: list[Json], title: str, own_words: str | None) -> None:
+def _is_told(dashboard: Dashboard, told: list[Json], title: str, kind: type[GainlineError] | str) -> None:
     """One of the refusals of that title stands on the page, with what to do and where; code without its backticks."""
+    of_form = OF_FORMS.get(kind)
     expect(dashboard.page.get_by_role("alert").first).to_be_visible(timeout=RETRIED_MS)
 
     def shown() -> list[Json]:
         """The page shows one of several failed reads."""
         open_details(dashboard.page)
         text = dashboard.page.locator("body").inner_text()
-        return [one for one in told if one["title"] == title and one["detail"] in text]
+        return [one for one in told if one["title"] == title and (of_form or one["detail"]) in text]
 
     dashboard.until(lambda: shown() != [])
     problem = shown()[-1]
     assert problem["hint"]
     if problem["script_hint"]:
         expect(dashboard.page.locator("body")).not_to_contain_text(problem["script_hint"], use_inner_text=True)
-    for text in (own_words or problem["hint"], *(one["reason"] for one in problem["problems"])):
+    for text in (of_form or OWN_WORDS.get(kind) or problem["hint"], *(one["reason"] for one in problem["problems"])):
         shown_text = text.replace("`", "")
         expect(dashboard.page.locator("body")).to_contain_text(shown_text, use_inner_text=True, ignore_case=True)
 

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import {
   ApiError,
+  formProblem,
   inPercent,
   limitsOf,
   offersOf,
@@ -125,4 +126,15 @@ test("a gain out of bounds is the first reason, before what a simulation of it s
     ],
   });
   expect(reasonsByWeight(problem)[0]).toContain("between 0 and 4000");
+});
+
+test("a form names the marked fields by their labels, not in the words of the API", () => {
+  const labels = { name: "Name", "stop.max_flights": "Maximum flights", "gains.kp": "kp" };
+  expect(formProblem(refused, labels)).toMatchObject({
+    title: "Correct the marked fields: Maximum flights, kp.",
+    detail: "",
+    hint: "",
+    problems: refused.problems,
+  });
+  expect(formProblem(refused, { "gains.kp": "kp" })).toBe(refused);
 });

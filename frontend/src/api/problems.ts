@@ -177,6 +177,17 @@ export function otherProblems(problem: Problem | null, fields: readonly string[]
   );
 }
 
+/** A form's refusal in the form's own words where every reason is shown at a field of `labels`; otherwise as it is. */
+export function formProblem(error: unknown, labels: Readonly<Record<string, string>>): Problem | null {
+  const problem = problemOf(error);
+  if (problem === null || problem.problems.length === 0) return problem;
+  const fields = Object.keys(labels);
+  if (otherProblems(problem, fields).length > 0) return problem;
+  const reasons = reasonsByField(problem, fields);
+  const marked = fields.filter((field) => reasons[field] !== undefined).map((field) => labels[field]);
+  return { ...problem, title: `Correct the marked fields: ${[...new Set(marked)].join(", ")}.`, detail: "", hint: "" };
+}
+
 /** Whether to retry a failed read: an unreachable server may return, a refusal is final. */
 export function retries(failures: number, error: unknown): boolean {
   const problem = problemOf(error);

@@ -27,9 +27,14 @@ export function FormPage({ title, error, isPending, children }: Props) {
   );
 }
 
-/** The fields without a valid number, which block the form. */
-export function MissingNumbers({ fields }: { fields: readonly string[] }) {
-  return fields.length === 0 ? null : <p role="status">Enter a number for {fields.join(", ")}.</p>;
+/** What blocks the form, beside its button: texts that are missing, and fields without a valid number. */
+export function MissingEntries({ numbers, texts = [] }: { numbers: readonly string[]; texts?: readonly string[] }) {
+  if (numbers.length + texts.length === 0) return null;
+  return (
+    <p role="status" className={classes["missing"]}>
+      {[...texts, ...(numbers.length > 0 ? [`Enter a number for ${numbers.join(", ")}.`] : [])].join(" ")}
+    </p>
+  );
 }
 
 /** The library makes ids of it, so it must be one word. */

@@ -1,5 +1,5 @@
 import { IconAlertTriangle, IconEye, IconLockOpen } from "@tabler/icons-react";
-import { otherProblems, type Problem, problemOf } from "../api/problems";
+import { formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
 import classes from "./Notices.module.css";
 
 interface Props {
@@ -44,11 +44,15 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
   );
 }
 
-/** A form's refusal: its heading says what to do, where the reasons are written at their fields. */
-export function FormErrorNotice({ error, shown }: Required<Props>) {
-  const problem = problemOf(error);
-  const isMarked = problem !== null && problem.problems.length > 0 && otherProblems(problem, shown).length === 0;
-  return <ErrorNotice error={isMarked ? { ...problem, title: "Correct the marked fields." } : error} shown={shown} />;
+interface FormErrorProps {
+  error: unknown;
+  /** Labels of the form's fields, by the names that the server has for them; each shows its own reason. */
+  labels: Readonly<Record<string, string>>;
+}
+
+/** A form's refusal: which fields to correct, where all reasons are written at their fields. */
+export function FormErrorNotice({ error, labels }: FormErrorProps) {
+  return <ErrorNotice error={formProblem(error, labels)} shown={Object.keys(labels)} />;
 }
 
 /** Explains why this browser has read-only access; renders nothing without a reason. */
@@ -74,6 +78,6 @@ export function UnlockedNotice({ what }: { what: string | null }) {
 }
 
 /** Text between backticks is code. */
-function withCode(why: string) {
+export function withCode(why: string) {
   return why.split("`").map((part, index) => (index % 2 === 1 ? <code key={part}>{part}</code> : part));
 }

@@ -70,7 +70,10 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           <PriorScatter campaignId={campaign.id} />
         )}
         <FlightWindow definition={campaign.definition} />
-        <FormErrorNotice error={chosen.error} shown={chosen.entry ? chosen.rows.map(({ name }) => name) : []} />
+        <FormErrorNotice
+          error={chosen.error}
+          labels={chosen.entry ? Object.fromEntries(chosen.rows.map(({ name }) => [name, name])) : {}}
+        />
         {isRefused && chosen.gate !== null && chosen.choice === undefined && (
           <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />
         )}

@@ -5,7 +5,15 @@ import type { Catalogue, OptionInfo } from "../../api/types";
 import { NumberField, OptionField, type OptionValue } from "../../ui/Fields";
 import { unitsOf } from "../../ui/units";
 import classes from "./NewCampaign.module.css";
-import { boundReasons, type CampaignForm, gainsOf, hasModel, optionsOf, type StopKind } from "./newCampaign";
+import {
+  ADVANCED_LABELS,
+  boundReasons,
+  type CampaignForm,
+  gainsOf,
+  hasModel,
+  optionsOf,
+  type StopKind,
+} from "./newCampaign";
 
 interface Props {
   form: CampaignForm;
@@ -59,7 +67,8 @@ export function AdvancedFields(props: Props) {
       />
       <Group title="Random seed">
         <NumberField
-          label="Seed"
+          label={ADVANCED_LABELS.seed}
+          whole
           description="The same seed reproduces the same scatter"
           value={form.seed}
           error={reasons["seed"]}
@@ -97,14 +106,15 @@ function StopFields({ form, catalogue, reasons, set }: Props) {
       />
       <p className={classes["note"]}>{STOPS[form.stop].line}</p>
       <NumberField
-        label="Maximum flights"
+        label={ADVANCED_LABELS["stop.max_flights"]}
+        whole
         value={form.maxFlights}
         error={reasons["stop.max_flights"]}
         onChange={(maxFlights) => set({ maxFlights })}
       />
       {form.stop === "paper" && (
         <NumberField
-          label="Improvement threshold"
+          label={ADVANCED_LABELS["stop.improvement"]}
           suffix=" %"
           value={form.improvementPercent}
           error={reasons["stop.improvement"]}
@@ -113,7 +123,7 @@ function StopFields({ form, catalogue, reasons, set }: Props) {
       )}
       {form.stop === "noise" && (
         <NumberField
-          label="Confidence"
+          label={ADVANCED_LABELS["stop.confidence"]}
           suffix=" %"
           value={form.confidencePercent}
           error={reasons["stop.confidence"]}
@@ -122,7 +132,7 @@ function StopFields({ form, catalogue, reasons, set }: Props) {
       )}
       {unitsOf(catalogue, form.experiment).output === "m" && (
         <NumberField
-          label="Minimum battery voltage"
+          label={ADVANCED_LABELS["stop.min_battery_v"]}
           placeholder="No limit"
           suffix=" V"
           value={form.minBatteryV}
@@ -178,6 +188,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
               label="Minimum"
               aria-label={`${gain.name} minimum`}
               value={low}
+              whole={gain.integer}
               error={lowReason}
               onChange={(value) => change([value, high])}
             />
@@ -185,6 +196,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
               label="Maximum"
               aria-label={`${gain.name} maximum`}
               value={high}
+              whole={gain.integer}
               error={highReason}
               onChange={(value) => change([low, value])}
             />
@@ -192,7 +204,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
         );
       })}
       <NumberField
-        label="Maximum first step"
+        label={ADVANCED_LABELS.first_step_fraction}
         description="Fraction of each gain's range, until the first valid flight"
         suffix=" %"
         value={form.firstStepPercent}
@@ -200,7 +212,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
         onChange={(firstStepPercent) => set({ firstStepPercent })}
       />
       <NumberField
-        label="Maximum later step"
+        label={ADVANCED_LABELS.step_fraction}
         description="Fraction of each gain's range, after that"
         suffix=" %"
         value={form.stepPercent}
@@ -209,7 +221,7 @@ function BoundFields({ form, catalogue, reasons, set }: Props) {
       />
       {hasModel(catalogue, form.experiment) && unitsOf(catalogue, form.experiment).output === "m" && (
         <NumberField
-          label="Gate ceiling"
+          label={ADVANCED_LABELS.ceiling_m}
           description="Gains that could take the vehicle above this altitude are refused"
           suffix=" m"
           value={form.ceilingM}

@@ -10,7 +10,7 @@ import { useVehicles } from "../../api/vehicles";
 import { Aside } from "../../ui/Aside";
 import { SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
+import { FoldedSection, FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
 import { FormErrorNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import { AdvancedFields } from "./AdvancedFields";
@@ -22,6 +22,7 @@ import {
   gainsOf,
   inUnitsOfForm,
   kindsFor,
+  LABELS,
   registeredFor,
   requestFrom,
   type StartKind,
@@ -59,6 +60,8 @@ export function NewCampaignPage() {
   );
 }
 
+const ENTER_NAME = "Enter a name.";
+
 const STARTS: Record<StartKind, string> = {
   default: "The vehicle's default gains",
   simplex: "Best gains on the model (simplex)",
@@ -80,19 +83,22 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   const navigate = useNavigate();
   const create = useCreateCampaign();
   const { plain, advanced } = fieldsOf(form, catalogue);
+  const labels = { ...plain, ...advanced };
   const request = requestFrom(form, catalogue);
   const problem = standingProblem(create.error, create.variables, request);
-  const reasons = inUnitsOfForm(reasonsByField(problem, [...plain, ...advanced]));
+  const reasons = inUnitsOfForm(reasonsByField(problem, Object.keys(labels)));
   useEffect(() => {
     if (create.error) document.querySelector<HTMLElement>('main [aria-invalid="true"]')?.focus();
   }, [create.error]);
 
-  const refusedBelow = advanced.some((field) => reasons[field] !== undefined);
+  const refusedBelow = Object.keys(advanced).some((field) => reasons[field] !== undefined);
   const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
   const strategies = strategiesFor(catalogue, form.experiment);
   const strategy = strategies.find(({ name }) => name === form.strategy);
   const recommended = strategies[0]?.name;
   const unread = unreadable(form, catalogue);
+  const isNamed = form.name.trim() !== "";
+  const isUnreadBelow = unread.some((label) => !(label in form.startGains));
   const isReal = vehicles.some(({ id, is_real }) => id === form.registered?.id && is_real);
   return (
     <form
@@ -105,7 +111,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
     >
       {catalogue.experiments.length > 1 && (
         <SelectField
-          label="Experiment"
+          label={LABELS["definition.experiment"]}
           data={catalogue.experiments.map(({ name, title }) => ({ value: name, label: title }))}
           value={form.experiment}
           error={reasons["definition.experiment"]}
@@ -129,22 +135,22 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         </Aside>
       )}
       <TextInput
-        label="Name"
+        label={LABELS.name}
         value={form.name}
         maxLength={120}
-        error={reasons["name"]}
+        error={isNamed ? reasons["name"] : ENTER_NAME}
         onChange={(event) => set({ name: event.currentTarget.value })}
       />
       <div className={classes["pair"]}>
         <SelectField
-          label="Start from"
+          label={LABELS["start.kind"]}
           data={startsFor(catalogue, form.experiment).map((value) => ({ value, label: STARTS[value] }))}
           value={form.start}
           error={reasons["start.kind"]}
           onChange={(value) => set({ start: value })}
         />
         <SelectField
-          label="Strategy"
+          label={LABELS.strategy}
           description={`${strategies.length > 1 && form.strategy === recommended ? "Recommended. " : ""}${strategy?.line ?? ""}`}
           data={strategies.map(({ name, title }) => ({ value: name, label: title }))}
           value={form.strategy}
@@ -170,16 +176,16 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
           onChange={(startGains) => set({ startGains })}
         />
       )}
-      <FoldedSection title="Advanced: stop rule, window, bounds, seed" forcedOpen={refusedBelow}>
+      <FoldedSection title="Advanced: stop rule, window, bounds, seed" forcedOpen={refusedBelow || isUnreadBelow}>
         <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
       </FoldedSection>
-      <FormErrorNotice error={problem} shown={[...plain, ...advanced]} />
-      <MissingNumbers fields={unread} />
+      <FormErrorNotice error={problem} labels={labels} />
       <div className={classes["create"]}>
+        <MissingEntries numbers={unread} texts={isNamed ? [] : [ENTER_NAME]} />
         <Button
           type="submit"
           size="lg"
-          disabled={unread.length > 0}
+          disabled={unread.length > 0 || !isNamed}
           loading={create.isPending}
           leftSection={<IconPlus size={22} aria-hidden />}
         >

@@ -240,35 +240,52 @@ export function optionsOf(form: CampaignForm, catalogue: Catalogue): OffersOptio
   };
 }
 
-/** Server names of the form's fields: always visible ones and advanced ones. */
-export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: string[]; advanced: string[] } {
+/** Labels by the server's names of the fields. */
+export const LABELS = {
+  name: "Name",
+  "definition.experiment": "Experiment",
+  "vehicle.kind": "Vehicle",
+  "vehicle.id": "Vehicle",
+  strategy: "Strategy",
+  "start.kind": "Start from",
+} as const;
+
+export const ADVANCED_LABELS = {
+  "stop.max_flights": "Maximum flights",
+  "stop.improvement": "Improvement threshold",
+  "stop.confidence": "Confidence",
+  "stop.min_battery_v": "Minimum battery voltage",
+  first_step_fraction: "Maximum first step",
+  step_fraction: "Maximum later step",
+  ceiling_m: "Gate ceiling",
+  seed: "Seed",
+} as const;
+
+type Labels = Record<string, string>;
+
+function labelled(names: readonly string[], prefix: string, title = ""): Labels {
+  return Object.fromEntries(names.map((name) => [`${prefix}.${name}`, `${title}${name}`]));
+}
+
+/** Labels of the form's fields by their server names: always visible ones and advanced ones. */
+export function fieldsOf(form: CampaignForm, catalogue: Catalogue): { plain: Labels; advanced: Labels } {
   const gains = gainsOf(catalogue, form.experiment).map(({ name }) => name);
   const options = optionsOf(form, catalogue);
+  const titled = (offered: readonly OptionInfo[], prefix: string): Labels =>
+    Object.fromEntries(offered.map(({ name, title }) => [`${prefix}.${name}`, title]));
   return {
-    plain: [
-      "name",
-      "definition.experiment",
-      "vehicle.kind",
-      "vehicle.id",
-      "strategy",
-      "start.kind",
-      ...(form.start === "given" ? gains.map((name) => `start.gains.${name}`) : []),
-      ...(form.start === "campaign" ? ["start.donor"] : []),
-    ],
-    advanced: [
-      ...options.strategy.map(({ name }) => `definition.options.${name}`),
-      ...options.experiment.map(({ name }) => `experiment_options.${name}`),
-      "stop.max_flights",
-      "stop.improvement",
-      "stop.confidence",
-      "stop.min_battery_v",
-      ...gains.map((name) => `bounds.${name}`),
-      "first_step_fraction",
-      "step_fraction",
-      "ceiling_m",
-      ...options.vehicle.map(({ name }) => `vehicle.options.${name}`),
-      "seed",
-    ],
+    plain: {
+      ...LABELS,
+      ...(form.start === "given" ? labelled(gains, "start.gains") : {}),
+      ...(form.start === "campaign" ? { "start.donor": "Campaign" } : {}),
+    },
+    advanced: {
+      ...ADVANCED_LABELS,
+      ...titled(options.strategy, "definition.options"),
+      ...titled(options.experiment, "experiment_options"),
+      ...labelled(gains, "bounds", "bounds of "),
+      ...titled(options.vehicle, "vehicle.options"),
+    },
   };
 }
 
@@ -303,14 +320,14 @@ export function unreadable(form: CampaignForm, catalogue: Catalogue): string[] {
       .filter(({ name, default: standard }) => typeof standard === "number" && typeof chosen[name] === "string")
       .map(({ title }) => title);
   const entries: [string, NumberEntry][] = [
-    ["Maximum flights", form.maxFlights],
-    ["Improvement threshold", form.stop === "paper" ? form.improvementPercent : ""],
-    ["Confidence", form.stop === "noise" ? form.confidencePercent : ""],
-    ["Minimum battery voltage", form.minBatteryV],
-    ["Maximum first step", form.firstStepPercent],
-    ["Maximum later step", form.stepPercent],
-    ["Gate ceiling", form.ceilingM],
-    ["Seed", form.seed],
+    [ADVANCED_LABELS["stop.max_flights"], form.maxFlights],
+    [ADVANCED_LABELS["stop.improvement"], form.stop === "paper" ? form.improvementPercent : ""],
+    [ADVANCED_LABELS["stop.confidence"], form.stop === "noise" ? form.confidencePercent : ""],
+    [ADVANCED_LABELS["stop.min_battery_v"], form.minBatteryV],
+    [ADVANCED_LABELS.first_step_fraction, form.firstStepPercent],
+    [ADVANCED_LABELS.step_fraction, form.stepPercent],
+    [ADVANCED_LABELS.ceiling_m, form.ceilingM],
+    [ADVANCED_LABELS.seed, form.seed],
     ...gains.flatMap((name): [string, NumberEntry][] => [
       [`${name} minimum`, form.bounds[name]?.[0] ?? ""],
       [`${name} maximum`, form.bounds[name]?.[1] ?? ""],

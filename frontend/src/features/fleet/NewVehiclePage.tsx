@@ -10,7 +10,7 @@ import type { Catalogue } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
 import { OptionField, SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FoldedSection, FormPage, GainFields, MissingNumbers } from "../../ui/FormPage";
+import { FoldedSection, FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
 import { FormErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import {
@@ -36,6 +36,15 @@ export function NewVehiclePage() {
   );
 }
 
+const LABELS = {
+  name: "Name",
+  "options.autopilot": "Autopilot",
+  "options.address": "Address",
+  "options.simulated": "Simulation on this computer",
+  safe_gains_confirmed: "Verified safe on this vehicle",
+  statement: "Verified by, and how",
+};
+
 function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
   const [form, setForm] = useState<VehicleForm>(() => startingVehicle(catalogue));
   const navigate = useNavigate();
@@ -45,21 +54,16 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
     set({ options: { ...form.options, [name]: value } });
   const further = furtherOptions(catalogue);
   const gains = gainsFor(catalogue, autopilotOf(form));
-  const folded = further.map(({ name }) => `options.${name}`);
-  const fields = [
-    "name",
-    "options.autopilot",
-    "options.address",
-    "options.simulated",
-    "safe_gains_confirmed",
-    "statement",
-    ...gains.map(({ name }) => `safe_gains.${name}`),
+  const folded = Object.fromEntries(further.map(({ name, title }) => [`options.${name}`, title]));
+  const labels = {
+    ...LABELS,
+    ...Object.fromEntries(gains.map(({ name }) => [`safe_gains.${name}`, name])),
     ...folded,
-  ];
+  };
   const request = vehicleRequest(form);
   const problem = standingProblem(register.error, register.variables, request);
-  const reasons = reasonsByField(problem, fields);
-  const refusedBelow = folded.some((field) => reasons[field] !== undefined);
+  const reasons = reasonsByField(problem, Object.keys(labels));
+  const refusedBelow = Object.keys(folded).some((field) => reasons[field] !== undefined);
 
   const unread = unreadGains(form);
   const simulated = isSimulated(form);
@@ -75,7 +79,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
     >
       <ReadOnlyNotice why={refusal} />
       <TextInput
-        label="Name"
+        label={LABELS.name}
         description="Shown on every page, for example the number on the airframe"
         value={form.name}
         maxLength={120}
@@ -84,14 +88,14 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
       />
       <div className={classes["pair"]}>
         <SelectField
-          label="Autopilot"
+          label={LABELS["options.autopilot"]}
           data={AUTOPILOTS}
           value={autopilotOf(form)}
           error={reasons["options.autopilot"]}
           onChange={(value) => setForm(withAutopilot(form, catalogue, value))}
         />
         <TextInput
-          label="Address"
+          label={LABELS["options.address"]}
           description="udp:HOST:PORT@LOCALPORT, udpin:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD"
           inputWrapperOrder={["label", "input", "description", "error"]}
           value={String(form.options["address"] ?? "")}
@@ -110,7 +114,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         </p>
         <Switch
           size="md"
-          label="Simulation on this computer"
+          label={LABELS["options.simulated"]}
           checked={simulated}
           error={reasons["options.simulated"]}
           onChange={(event) => setOption("simulated", event.currentTarget.checked)}
@@ -128,14 +132,14 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
         <Stack gap={12}>
           <Checkbox
             size="md"
-            label="Verified safe on this vehicle"
+            label={LABELS.safe_gains_confirmed}
             description="Confirms exactly these gains: a change of one of them clears it."
             checked={form.confirmed}
             error={reasons["safe_gains_confirmed"]}
             onChange={(event) => set({ confirmed: event.currentTarget.checked })}
           />
           <TextInput
-            label="Verified by, and how"
+            label={LABELS.statement}
             placeholder="A. Pilot: flown by hand this morning"
             value={form.statement}
             maxLength={500}
@@ -157,8 +161,8 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           ))}
         </div>
       </FoldedSection>
-      <FormErrorNotice error={problem} shown={fields} />
-      <MissingNumbers fields={unread} />
+      <FormErrorNotice error={problem} labels={labels} />
+      <MissingEntries numbers={unread} />
       <Button
         type="submit"
         size="lg"

@@ -111,12 +111,17 @@ interface FormProps {
   onDone: () => void;
 }
 
+const DECIDED_BY = "Decided by, and based on which flights";
+
 function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
   const [gains, setGains] = useState<Record<string, NumberEntry>>({ ...vehicle.safe_gains, ...entered });
   const [statement, setStatement] = useState("");
   const edit = useEditVehicle(vehicle.id);
-  const fields = ["statement", ...Object.keys(gains).map((name) => `safe_gains.${name}`)];
-  const reasons = reasonsByField(problemOf(edit.error), fields);
+  const labels = {
+    ...Object.fromEntries(Object.keys(gains).map((name) => [`safe_gains.${name}`, name])),
+    statement: DECIDED_BY,
+  };
+  const reasons = reasonsByField(problemOf(edit.error), Object.keys(labels));
   const read = Object.entries(gains).filter((entry): entry is [string, number] => typeof entry[1] === "number");
   return (
     <Panel title="Change safe gains">
@@ -144,13 +149,13 @@ function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
           ))}
         </div>
         <TextInput
-          label="Decided by, and based on which flights"
+          label={DECIDED_BY}
           value={statement}
           maxLength={500}
           error={reasons["statement"]}
           onChange={(event) => setStatement(event.currentTarget.value)}
         />
-        <FormErrorNotice error={edit.error} shown={fields} />
+        <FormErrorNotice error={edit.error} labels={labels} />
         <Group gap={10}>
           <Button
             type="submit"
