@@ -22,7 +22,7 @@ import { SelectField } from "../../ui/Fields";
 import { bytesText } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
 import { Note } from "../../ui/Note";
-import { ErrorNotice } from "../../ui/Notices";
+import { ErrorNotice, withCode } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useOperatorName, useSpeechWanted } from "../../ui/usePreferences";
 import { useTitle } from "../../ui/useTitle";
@@ -216,7 +216,7 @@ function Reachable({ system: { addresses, exposes, host, in_container } }: { sys
         </Note>
       )}
       <Aside tone="warn">
-        <strong>The server listens on {host}</strong>, so {exposes}
+        <strong>The server listens on {host}</strong>, so {withCode(exposes)}
       </Aside>
     </>
   );
@@ -235,7 +235,7 @@ function LocalOnly({ system: { exposes, host, is_exposed } }: { system: System }
       <code className={classes["command"]}>gainline serve --host 0.0.0.0</code>
       <Note>or, in a checkout, with ./dev up --host 0.0.0.0. The address then appears here.</Note>
       <Aside tone="warn">
-        <strong>Security:</strong> {exposes}
+        <strong>Security:</strong> {withCode(exposes)}
       </Aside>
     </>
   );
