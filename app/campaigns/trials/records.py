@@ -55,14 +55,14 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
     if flown.gain_names and row.gains.keys() != set(flown.gain_names):
         raise InputError(
             f"The log has the gains {', '.join(flown.gain_names)}; this campaign tunes {', '.join(row.gains)}.",
-            hint="It is a log of another autopilot. Upload it to a campaign whose experiment has these gains.",
-            problems=(Problem("file", f"does not contain the gains {', '.join(row.gains)}"),),
+            hint="Upload it to a campaign whose experiment has these gains.",
+            problems=(Problem("file", "is a log of another autopilot"),),
         )
     if not flown.gain_names:
         return
     if not flown.gains:
         raise InputError(
-            f"The log does not contain the gains {', '.join(row.gains)} that the vehicle used.",
+            "The log does not say with which gains it was flown.",
             hint="Choose a log with the vehicle's parameters: for Paparazzi's .data file add the .log file of the same "
             "name; start a telemetry log before the ground station connects. Or upload the record as a CSV file, which "
             "takes the planned gains as flown.",

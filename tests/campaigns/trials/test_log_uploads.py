@@ -159,6 +159,7 @@ def test_a_log_of_another_autopilot_is_refused_also_where_its_gains_are_not_in_i
     answer = client.post(path_of(create_trial(client, campaign["id"])), content=data, headers=ANY)
     assert (answer.status_code, set(problems_of(answer))) == (422, {"file"})
     assert "The log has the gains kp, ki, kd" in answer.json()["detail"]
+    assert problems_of(answer) == {"file": "is a log of another autopilot"}
 
 
 def test_of_a_log_with_two_takeoffs_the_one_that_is_asked_for_is_stored(client: TestClient, trial: Json) -> None:
@@ -191,6 +192,7 @@ def test_a_log_without_gains_is_refused_and_says_where_they_can_be_found(client:
     data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False)).encode()
     answer = client.post(f"{path_of(trial)}?confirm=true&invalid=true", content=data, headers=ANY)
     assert (answer.status_code, problems_of(answer)) == (422, {"file": "does not contain values of kp, ki, kd"})
+    assert answer.json()["detail"] == "The log does not say with which gains it was flown."
     assert ".log file of the same name" in answer.json()["hint"]
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
 
