@@ -131,9 +131,9 @@ def test_after_a_restart_of_the_drone_no_tick_stands_beside_gains_that_it_no_lon
     drone.switch_off()
     page.evaluate(SILENT_FOR, 0.5)
     drone.switch_on()
-    expect(page.get_by_text(
-            "The vehicle restarted. Press Stage gains so that they are written and read back again."
-        )).to_be_visible()
+    expect(
+        page.get_by_text("The vehicle restarted. Press Stage gains so that they are written and read back again.")
+    ).to_be_visible()
     expect(page.get_by_text("may or may not have been received")).to_have_count(0)
     expect(page.get_by_label("read back")).to_have_count(0)
     expect(dashboard.button("Stage gains")).to_be_enabled()

@@ -414,7 +414,10 @@ def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json
     assert trial(client, planned)["flight"]["state"] == "cancelled"
 
 
-LOST = {"link silent": "No current data has been received from the vehicle for more than 2 s.", "gains unknown": "has restarted"}
+LOST = {
+    "link silent": "No current data has been received from the vehicle for more than 2 s.",
+    "gains unknown": "has restarted",
+}
 
 
 @pytest.mark.parametrize("unready", LOST)

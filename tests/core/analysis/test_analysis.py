@@ -128,8 +128,9 @@ def test_a_flight_that_the_model_does_not_repeat_is_refused() -> None:
 def stiff_flight(acceleration_p: float) -> LoggedFlight:
     """3, 8 and an integral gain of 3 on a vehicle with fast motors, in gusts."""
     nimble = replace(GUSTY, motor_lag_s=0.02)
-    gains = {"position_p_1_s": 3.0, "velocity_p_1_s": 8.0, "acceleration_i_1_s": 3.0}
-    return simulated_flight(nimble, acceleration_p=acceleration_p, **gains)
+    return simulated_flight(
+        nimble, position_p_1_s=3.0, velocity_p_1_s=8.0, acceleration_p=acceleration_p, acceleration_i_1_s=3.0
+    )
 
 
 def test_good_gains_are_kept() -> None:

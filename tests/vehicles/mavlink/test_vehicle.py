@@ -297,7 +297,11 @@ def test_an_unreadable_signing_key_is_refused_without_being_quoted() -> None:
         ({"scored_source": "mocap"}, "scored_source", "needs a second_source"),
         ({"second_source": "camera"}, "second_source", "must be natnet:HOST?body=ID"),
         ({"simulated": True, "address": "udp:10.0.0.2:4245"}, "simulated", "must be off for udp:10.0.0.2:4245"),
-        ({"simulated": True, "address": "serial:/dev/ttyUSB0:57600"}, "simulated", "a simulation has the address 127.0.0.1"),
+        (
+            {"simulated": True, "address": "serial:/dev/ttyUSB0:57600"},
+            "simulated",
+            "a simulation has the address 127.0.0.1",
+        ),
         ({"autopilot": "betaflight"}, "autopilot", "must be paparazzi, ardupilot, px4"),
         ({"address": "nowhere"}, "address", "must be udp:"),
         ({"clock_speed": 10.0}, "clock_speed", "must be 1"),
