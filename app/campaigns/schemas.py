@@ -256,7 +256,8 @@ class SparkCurve(Schema):
 
 
 class CampaignSummary(Schema):
-    """A campaign as one card of the list. `spark` holds the first flight, the best and the latest, at most 7."""
+    """A campaign as one card of the list. `best` is of the gains with the best mean, `first_error` the mean with the
+    first gains; `spark` holds the first flight, the best and the latest, at most 7."""
 
     id: int
     name: str
@@ -404,20 +405,21 @@ class Comparison(Schema):
 
 
 class Drift(Schema):
-    """The first gains' last flight compared with their first: `confidence` that anything has changed."""
+    """Change of the error with the same gains over the campaign: `confidence` that anything has changed; `resolved`
+    from 90 % on."""
 
     first_trial: int
     last_trial: int
     difference: float
     standard_error: float
     confidence: float
+    resolved: bool
     sentence: str
 
 
 class Trend(Schema):
-    """Slope of the error of the gains flown most often, with its 90 % interval."""
+    """Slope of the error of the gains flown most often against the battery voltage, with its 90 % interval."""
 
-    against: Literal["flight number", "battery voltage"]
     unit: str
     slope: float
     lower: float
@@ -452,7 +454,7 @@ class CampaignStatistics(Schema):
     groups: list[RepeatGroup]
     comparison: Comparison | None
     drift: Drift | None
-    trends: list[Trend]
+    battery_trend: Trend | None
     optimism: float
     shrunk_error: float | None
     track_record: TrackRecord

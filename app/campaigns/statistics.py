@@ -1,7 +1,7 @@
 """API view of a campaign's statistics."""
 
 from collections.abc import Sequence
-from typing import Final, Literal
+from typing import Final
 
 from sqlalchemy.orm import Session
 
@@ -18,7 +18,7 @@ from app.campaigns.schemas import (
     Trend,
 )
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, format_gains, percent, plus_minus, short, signed
+from app.core.formatting import confidence_text, count, format_gains, percent, plus_minus, short, signed
 from app.core.statistics.comparisons import Group, PooledScatter, drift_of, optimism, pool_scatter, trend_of
 from app.core.tuning import predictions
 from app.core.tuning.confirmation import ComparisonState, compare_winner, standing_within_bounds, verdict_sentence
@@ -54,7 +54,9 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
         groups=[] if now is None else [_group(now, group) for group in now.groups],
         comparison=None if now is None else _comparison(experiment, now),
         drift=drift,
-        trends=[] if now is None else _trends(experiment, max(now.groups, key=lambda group: group.size), trials),
+        battery_trend=None
+        if now is None
+        else _battery_trend(experiment, max(now.groups, key=lambda group: group.size), trials),
         optimism=expected,
         shrunk_error=None if now is None or scatter.reported is None else now.winner.mean + expected,
         track_record=TrackRecord.model_validate(record, from_attributes=True),
@@ -67,7 +69,7 @@ def _scatter_source(
 ) -> str:
     """What the scatter of one flight was estimated from: repeats, prior, or both."""
     prior, repeats = experiment.scatter, sum(group.size - 1 for group in groups)
-    estimate = f"prior estimate of {short(prior.sd)} {experiment.error_unit}"
+    estimate = f"prior estimate of {prior.sd:.3g} {experiment.error_unit}"
     if not scatter.known:
         return "Not measured for this autopilot, and no gain set has been flown twice. Fly a gain set again."
     if scatter.identical:
@@ -140,64 +142,47 @@ def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | No
 
 
 def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
-    found = drift_of(now.baseline, now.scatter)
+    found = drift_of(now.groups, now.scatter)
     if found is None:
         return None
-    amount = plus_minus(found.difference, found.standard_error, experiment.error_unit, sign="+")
-    finding = "has drifted" if found.confidence >= _SURE else "shows no resolvable drift"
+    unit, is_resolved = experiment.error_unit, found.confidence >= _SURE
+    amount = plus_minus(found.difference, found.standard_error, unit, sign="+")
+    sentence = (
+        f"{'The vehicle has drifted' if is_resolved else 'No drift resolved'}: from flight {found.first_number} to "
+        f"{found.last_number} the error with the same gains changed by {amount} "
+        f"({confidence_text(found.confidence)} confidence)."
+    )
     return Drift(
         first_trial=found.first_number,
         last_trial=found.last_number,
         difference=found.difference,
         standard_error=found.standard_error,
         confidence=found.confidence,
-        sentence=f"From flight {found.first_number} to {found.last_number}, with the same gains, the vehicle "
-        f"{finding}: {amount}, {percent(found.confidence)} confidence.",
+        resolved=is_resolved,
+        sentence=sentence,
     )
 
 
-def _trends(experiment: Experiment, group: Group, trials: Sequence[TrialRow]) -> list[Trend]:
-    """Trends of the gains flown most often: their errors by flight number, and by battery voltage where it was
-    measured."""
+def _battery_trend(experiment: Experiment, group: Group, trials: Sequence[TrialRow]) -> Trend | None:
+    """Slope of the error of the gains flown most often by battery voltage, where that was measured."""
     voltages = {row.number: row.landing_battery_v for row in trials}
-    with_voltage = [
+    measured = [
         (volts, error)
         for number, error in zip(group.numbers, group.errors, strict=True)
         if (volts := voltages[number]) is not None
     ]
-    found = (
-        _trend("flight number", "per flight", experiment, [float(number) for number in group.numbers], group.errors),
-        _trend(
-            "battery voltage",
-            "per V",
-            experiment,
-            [volts for volts, _ in with_voltage],
-            [error for _, error in with_voltage],
-        ),
-    )
-    return [trend for trend in found if trend is not None]
-
-
-def _trend(
-    against: Literal["flight number", "battery voltage"],
-    per: str,
-    experiment: Experiment,
-    x: Sequence[float],
-    errors: Sequence[float],
-) -> Trend | None:
-    found = trend_of(x, errors, _SURE)
+    found = trend_of([volts for volts, _ in measured], [error for _, error in measured], _SURE)
     if found is None:
         return None
-    unit = f"{experiment.error_unit} {per}"
+    unit = f"{experiment.error_unit} per V"
     relation = "changes with" if found.is_resolved else "shows no dependence on"
     return Trend(
-        against=against,
         unit=unit,
         slope=found.slope,
         lower=found.lower,
         upper=found.upper,
-        sentence=f"The error {relation} the {against}: {signed(found.slope)} {unit}, {percent(_SURE)} interval "
-        f"{signed(found.lower)} … {signed(found.upper)}.",
+        sentence=f"The error {relation} the battery voltage: {signed(found.slope)} {unit}, {percent(_SURE)} interval "
+        f"{signed(found.lower)} … {signed(found.upper)} {unit}.",
     )
 
 

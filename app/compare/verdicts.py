@@ -191,7 +191,7 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
     """Compare two flights of the same gains in one campaign: whether anything has changed between them."""
     errors = dict(zip(group.numbers, group.errors, strict=True))
     numbers = (against.row.number, side.row.number)
-    found = drift_of(Group(group.gains, numbers, (errors[numbers[0]], errors[numbers[1]])), side.scatter)
+    found = drift_of([Group(group.gains, numbers, (errors[numbers[0]], errors[numbers[1]]))], side.scatter)
     assert found is not None
     amount = measured(abs(found.difference), found.standard_error, side.experiment.error_unit)
     relation = (

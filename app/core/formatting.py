@@ -1,5 +1,5 @@
 """Numbers in sentences, tables and figures: significant digits that match the uncertainty, and one form for gains,
-shares and amounts. Sentences have a hyphen for a minus, tables and figures a true minus sign.
+shares and amounts, with a true minus sign.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Final, Literal
 NOTHING: Final = "–"
 
 _MAX_DIGITS: Final = 6
-_SHORT_DIGITS: Final = 4
+_SHORT_DECIMALS: Final = 3
 _LISTED_RUNS: Final = 5
 _TWO_DIGITS_BELOW: Final = 3.55
 """An uncertainty with leading digits below this is given a second digit: 0.012 as 0.01 would lose too much."""
@@ -27,15 +27,16 @@ def decimals(uncertainty: float | None) -> int:
 def plus_minus(value: float, standard_error: float, unit: str, *, sign: Literal["-", "+"] = "-") -> str:
     """`0.105 ± 0.012 m`, with as many digits as the uncertainty justifies; `sign="+"` always prints the sign."""
     digits = decimals(standard_error)
-    return f"{value:{sign}.{digits}f} ± {standard_error:.{digits}f} {unit}"
+    return _true_minus(f"{value:{sign}z.{digits}f} ± {standard_error:.{digits}f} {unit}")
 
 
 def short(value: float | None) -> str:
-    """An error without a stated uncertainty: three significant digits, at most four decimals; a dash for None."""
+    """An error without a stated uncertainty: three significant digits, at most three decimals as on the pages, but at
+    least one digit above zero; a dash for None."""
     if value is None:
         return NOTHING
     power = math.floor(math.log10(abs(value))) if value else 0
-    return f"{value:.{min(_SHORT_DIGITS, max(0, 2 - power))}f}"
+    return _true_minus(f"{value:.{min(max(0, 2 - power), max(_SHORT_DECIMALS, -power))}f}")
 
 
 def percent(share: float, digits: int = 0) -> str:
@@ -47,6 +48,18 @@ def confidence_text(confidence: float) -> str:
     """`93 %`, `99.7 %` or `more than 99.9 %`, never certainty; as on the pages."""
     return (
         f"more than {percent(0.999, 1)}" if confidence > 0.999 else percent(confidence, 1 if confidence > 0.99 else 0)
+    )
+
+
+def relative_to(value: float, base: float) -> str:
+    """An error compared with a positive one, as on the pages: `72 % lower`, `12 % higher`, `4.1 times as high`."""
+    change = value / base - 1.0
+    if abs(change) < 0.005:
+        return "the same"
+    return (
+        f"{value / base:.2g} times as high"
+        if change > 1.0
+        else f"{percent(abs(change))} {'lower' if change < 0.0 else 'higher'}"
     )
 
 
@@ -73,9 +86,9 @@ def times(amount: int) -> str:
 
 
 def signed(value: float) -> str:
-    """`-0.012`, `+0.0000073`: two significant digits without an exponent."""
+    """`−0.012`, `+0.0000073`: two significant digits without an exponent."""
     power = math.floor(math.log10(abs(value))) if value else 0
-    return f"{value:+.{max(0, 1 - power)}f}"
+    return _true_minus(f"{value:+.{max(0, 1 - power)}f}")
 
 
 def named_flights(numbers: Sequence[int]) -> str:
@@ -105,8 +118,12 @@ def format_gains(gains: Mapping[str, float]) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """`0.132`; with a true minus sign, and a dash for None."""
-    return NOTHING if value is None else f"{value:.{digits}f}".replace("-", "−")
+    """`0.132`; a dash for None."""
+    return NOTHING if value is None else _true_minus(f"{value:z.{digits}f}")
+
+
+def _true_minus(text: str) -> str:
+    return text.replace("-", "−")
 
 
 def measured(value: float | None, uncertainty: float | None, unit: str) -> str:
@@ -121,7 +138,7 @@ def measured(value: float | None, uncertainty: float | None, unit: str) -> str:
 def gain(value: float) -> str:
     """A gain for tables: an integer in full, any other with four significant digits."""
     text = f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
-    return text.replace("-", "−")
+    return _true_minus(text)
 
 
 def gains(values: Mapping[str, float]) -> str:

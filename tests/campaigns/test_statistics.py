@@ -1,5 +1,7 @@
 """Statistics, advice, intervals, variants and warm starts over HTTP, on flights with known errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -92,15 +94,36 @@ def test_what_noise_hides_is_unresolved_and_says_how_many_flights_would_decide(
     assert (card["verdict"], card["best"]) == ("unresolved", seen["best"])
 
 
-def test_a_trend_is_told_once_three_flights_of_one_policy_are_there(client: TestClient, database: Database) -> None:
+def test_one_sentence_says_how_the_error_with_the_same_gains_has_changed(
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database, definition=LONG)
-    for settling_s in (1.0, 1.1, 1.2, 1.3):
+    for settling_s in (1.9, 1.6, 1.3, 1.0):
         fly(client, database, campaign["id"], settling_s, gains=DEFAULT)
-    (trend,) = get(client, f"/api/campaigns/{campaign['id']}/statistics")["trends"]
-    assert trend["against"] == "flight number"
-    assert trend["slope"] == pytest.approx((climb_error(1.3) - climb_error(1.0)) / 3, rel=1e-3)
-    assert trend["lower"] > 0.0
-    assert "changes with" in trend["sentence"]
+    found = get(client, f"/api/campaigns/{campaign['id']}/statistics")
+    drift = found["drift"]
+    assert (drift["first_trial"], drift["last_trial"], drift["resolved"]) == (1, 4, True)
+    assert drift["difference"] == pytest.approx(climb_error(1.0) - climb_error(1.9), rel=1e-2)
+    assert drift["sentence"].startswith(
+        "The vehicle has drifted: from flight 1 to 4 the error with the same gains changed by −0."
+    )
+    assert " m (" in drift["sentence"]
+    assert [note for note in found["notes"] if "flight number" in note or "drift" in note] == [drift["sentence"]]
+
+
+def test_the_error_is_told_against_the_battery_voltage(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition=LONG)
+    for settling_s, volts in ((1.0, 12.0), (1.1, 11.0), (1.2, 10.0), (1.3, 9.0)):
+        create_trial(client, campaign["id"], fly={"speed": None}, gains=DEFAULT)
+        record = create_record(settling_s)
+        battery_v = np.full(len(record.trajectory), volts)
+        trajectory = replace(record.trajectory, channels={**record.trajectory.channels, "battery_v": battery_v})
+        land(database, lift_off(database), replace(record, trajectory=trajectory))
+        run_jobs(database)
+    trend = get(client, f"/api/campaigns/{campaign['id']}/statistics")["battery_trend"]
+    assert trend["slope"] == pytest.approx((climb_error(1.0) - climb_error(1.3)) / 3, rel=1e-2)
+    assert trend["upper"] < 0.0
+    assert trend["sentence"].startswith("The error changes with the battery voltage: −0.")
 
 
 def test_a_flight_of_a_proposal_carries_its_interval_and_is_held_against_it(

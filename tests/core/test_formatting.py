@@ -12,6 +12,7 @@ from app.core.formatting import (
     number,
     percent,
     plus_minus,
+    relative_to,
     short,
     short_percent,
     signed,
@@ -36,15 +37,26 @@ def test_a_difference_has_the_digits_that_its_uncertainty_supports(
 
 def test_a_drift_has_its_sign() -> None:
     assert plus_minus(0.0312, 0.012, "m", sign="+") == "+0.031 ± 0.012 m"
+    assert plus_minus(-0.0312, 0.012, "m", sign="+") == "−0.031 ± 0.012 m"
 
 
 def test_without_an_uncertainty_three_digits_are_enough() -> None:
     assert [short(value) for value in (0.41154, 0.0933, 3.3818, 152.3, 0.0, 2.1e-6, None)] == [
-        "0.412", "0.0933", "3.38", "152", "0.00", "0.0000", "–"]  # fmt: skip
+        "0.412", "0.093", "3.38", "152", "0.00", "0.000002", "–"]  # fmt: skip
 
 
 def test_a_share_is_held_together_by_a_space_that_does_not_break() -> None:
     assert [percent(0.9), percent(0.9995, 1), percent(1.0)] == ["90\u00a0%", "100.0\u00a0%", "100\u00a0%"]
+
+
+def test_an_error_is_told_relative_to_another() -> None:
+    assert [relative_to(value, 0.5) for value in (0.139, 0.56, 2.075, 0.5001)] == [
+        "72\u00a0% lower", "12\u00a0% higher", "4.2 times as high", "the same"]  # fmt: skip
+
+
+def test_a_number_that_rounds_to_zero_has_no_sign() -> None:
+    assert [number(-0.0002), number(-0.012), plus_minus(-0.0002, 0.01, "m", sign="+")] == [
+        "0.000", "−0.012", "+0.000 ± 0.010 m"]  # fmt: skip
 
 
 def test_a_share_may_have_three_significant_digits() -> None:
@@ -61,7 +73,7 @@ def test_amounts_have_their_nouns_and_groups_of_digits() -> None:
 
 
 def test_a_slope_has_its_sign_and_no_exponent() -> None:
-    assert [signed(value) for value in (0.0123, -7.3e-06, 140.0, 0.0)] == ["+0.012", "-0.0000073", "+140", "+0.0"]
+    assert [signed(value) for value in (0.0123, -7.3e-06, 140.0, 0.0)] == ["+0.012", "−0.0000073", "+140", "+0.0"]
 
 
 def test_flights_are_listed_in_runs_and_counted_where_there_are_many() -> None:

@@ -120,7 +120,8 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """The last flight of a policy compared with its first: `confidence` that the error has changed at all."""
+    """Change of the error of the same gains from flight `first_number` to `last_number`: `confidence` that it has
+    changed at all."""
 
     first_number: int
     last_number: int
@@ -206,13 +207,14 @@ def compare(
         return Comparison(
             verdict="not known yet", confidence=None, difference=difference, standard_error=None, further=None
         )
-    certainty = _certainty(difference, scatter, (first.size, second.size), allowance)
+    standard_error = _standard_error(scatter, (first.size, second.size))
+    certainty = _certainty(difference, standard_error, scatter.degrees_of_freedom, allowance)
     verdict: Verdict = "unresolved" if certainty < confidence else "better" if difference < 0.0 else "worse"
     return Comparison(
         verdict=verdict,
         confidence=certainty,
         difference=difference,
-        standard_error=_standard_error(scatter, (first.size, second.size)),
+        standard_error=standard_error,
         further=_further(first, second, scatter, confidence, candidates, looks)
         if plan_further and verdict == "unresolved"
         else None,
@@ -250,17 +252,28 @@ def _products_of_others(factors: Matrix) -> Matrix:
     return before * after
 
 
-def drift_of(group: Group, scatter: PooledScatter) -> Drift | None:
-    """Compare the last with the first flight of a policy, two-sided; None unless it was repeated."""
-    if group.size < 2:
+def drift_of(groups: Sequence[Group], scatter: PooledScatter) -> Drift | None:
+    """Change of the error along the flight number, from the first to the last repeated flight; None without repeats.
+
+    Least squares with one slope for all policies, each at its own level (analysis of covariance), and the pooled
+    scatter; the test is two-sided. For a single repeat it is the difference of the two flights.
+    """
+    repeated = [group for group in groups if group.size > 1]
+    if not repeated:
         return None
-    difference = group.errors[-1] - group.errors[0]
+    numbers = [np.array(group.numbers, dtype=np.float64) for group in repeated]
+    centred = [own - own.mean() for own in numbers]
+    spread = sum(float(own @ own) for own in centred)
+    moved = sum(float(own @ np.array(group.errors)) for own, group in zip(centred, repeated, strict=True))
+    first, last = min(group.numbers[0] for group in repeated), max(group.numbers[-1] for group in repeated)
+    difference = moved / spread * (last - first)
+    standard_error = scatter.sigma / sqrt(spread) * (last - first)
     return Drift(
-        first_number=group.numbers[0],
-        last_number=group.numbers[-1],
+        first_number=first,
+        last_number=last,
         difference=difference,
-        standard_error=_standard_error(scatter, (1, 1)),
-        confidence=_certainty(difference, scatter, (1, 1), 2),
+        standard_error=standard_error,
+        confidence=_certainty(difference, standard_error, scatter.degrees_of_freedom, 2),
     )
 
 
@@ -303,14 +316,13 @@ def _standard_error(scatter: PooledScatter, sizes: tuple[int, int]) -> float:
     return scatter.sigma * float(np.sqrt(1.0 / sizes[0] + 1.0 / sizes[1]))
 
 
-def _certainty(difference: float, scatter: PooledScatter, sizes: tuple[int, int], allowance: float) -> float:
+def _certainty(difference: float, standard_error: float, degrees_of_freedom: float, allowance: float) -> float:
     """1 − allowance·P(t ≥ |difference|/standard error), at least zero."""
     from scipy.special import stdtr
 
-    standard_error = _standard_error(scatter, sizes)
     if standard_error == 0.0:
         return 1.0 if difference else 0.0
-    tail = float(stdtr(scatter.degrees_of_freedom, -abs(difference) / standard_error))
+    tail = float(stdtr(degrees_of_freedom, -abs(difference) / standard_error))
     return max(1.0 - allowance * tail, 0.0)
 
 
@@ -321,9 +333,10 @@ def _further(
     sizes = [first.size, second.size]
     for count in range(1, MAX_FURTHER_FLIGHTS + 1):
         sizes[0 if sizes[0] <= sizes[1] else 1] += 1
-        known = PooledScatter(sigma=scatter.sigma, degrees_of_freedom=scatter.degrees_of_freedom + count)
+        standard_error = _standard_error(scatter, (sizes[0], sizes[1]))
         look = looks + count if looks else 0
         allowance = candidates * max(look * (look + 1), 1)
-        if _certainty(first.mean - second.mean, known, (sizes[0], sizes[1]), allowance) >= confidence:
+        freedom = scatter.degrees_of_freedom + count
+        if _certainty(first.mean - second.mean, standard_error, freedom, allowance) >= confidence:
             return FlightsToDecide(first=sizes[0] - first.size, second=sizes[1] - second.size)
     return None

@@ -120,7 +120,7 @@ export const EXPLANATIONS = explained({
   drift: {
     question: "What is drift?",
     answer: [
-      "A change of the error with the same gains over time, for example from battery, wind or wear. The latest flight with the first gains is compared with the earliest, so the first gains must be flown at least twice.",
+      "A change of the error with the same gains over time, for example from battery, wind or wear. It is a straight line through all flights of gains that were flown at least twice, from the first such flight to the last.",
     ],
   },
   overshoot: {

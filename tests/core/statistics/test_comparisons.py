@@ -158,14 +158,29 @@ def test_a_single_lucky_flight_does_not_overtake_what_was_shown_twice() -> None:
     assert select_winner((proven, clearly), scatter) is clearly
 
 
-def test_drift_is_the_last_flight_of_a_policy_against_its_first() -> None:
-    assert drift_of(group(0.2), KNOWN) is None
-    found = drift_of(group(0.20, 0.25, 0.2141), KNOWN)
+def test_the_drift_of_one_policy_is_its_slope_from_the_first_flight_to_the_last() -> None:
+    assert drift_of([group(0.2), group(0.3, a=2.0, first=2)], KNOWN) is None
+    found = drift_of([group(0.20, 0.25, 0.2141)], KNOWN)
     assert found is not None
     assert (found.first_number, found.last_number) == (1, 3)
     assert found.difference == pytest.approx(PAPER_SIGMA)
     assert found.standard_error == pytest.approx(PAPER_SIGMA * np.sqrt(2.0))
     assert found.confidence == pytest.approx(2.0 * stats.norm.cdf(np.sqrt(0.5)) - 1.0, abs=1e-4)
+
+
+def test_the_drift_of_several_policies_is_the_slope_of_a_regression_with_a_level_for_each() -> None:
+    """Least squares on the number and one indicator for each policy, solved by numpy."""
+    first, second = (Group({"a": 1.0}, (1, 4, 6), (0.55, 0.50, 0.46)), Group({"a": 2.0}, (3, 5, 7), (0.15, 0.14, 0.12)))
+    found = drift_of([first, Group({"a": 3.0}, (2,), (0.3,)), second], KNOWN)
+    assert found is not None
+    design = np.array(
+        [[n, is_first, 1 - is_first] for ns, is_first in ((first.numbers, 1), (second.numbers, 0)) for n in ns]
+    )
+    slope = np.linalg.lstsq(design, np.array(first.errors + second.errors), rcond=None)[0][0]
+    variance = np.linalg.inv(design.T @ design)[0, 0]
+    assert (found.first_number, found.last_number) == (1, 7)
+    assert found.difference == pytest.approx(6.0 * slope)
+    assert found.standard_error == pytest.approx(6.0 * PAPER_SIGMA * np.sqrt(variance))
 
 
 @settings(max_examples=50)

@@ -380,10 +380,7 @@ export type CampaignStatistics = {
     groups: Array<RepeatGroup>;
     comparison: Comparison | null;
     drift: Drift | null;
-    /**
-     * Trends
-     */
-    trends: Array<Trend>;
+    battery_trend: Trend | null;
     /**
      * Optimism
      */
@@ -402,7 +399,8 @@ export type CampaignStatistics = {
 /**
  * CampaignSummary
  *
- * A campaign as one card of the list. `spark` holds the first flight, the best and the latest, at most 7.
+ * A campaign as one card of the list. `best` is of the gains with the best mean, `first_error` the mean with the
+ * first gains; `spark` holds the first flight, the best and the latest, at most 7.
  */
 export type CampaignSummary = {
     /**
@@ -1100,7 +1098,8 @@ export type DonorOutput = {
 /**
  * Drift
  *
- * The first gains' last flight compared with their first: `confidence` that anything has changed.
+ * Change of the error with the same gains over the campaign: `confidence` that anything has changed; `resolved`
+ * from 90 % on.
  */
 export type Drift = {
     /**
@@ -1123,6 +1122,10 @@ export type Drift = {
      * Confidence
      */
     confidence: number;
+    /**
+     * Resolved
+     */
+    resolved: boolean;
     /**
      * Sentence
      */
@@ -3447,13 +3450,9 @@ export type Trajectory = {
 /**
  * Trend
  *
- * Slope of the error of the gains flown most often, with its 90 % interval.
+ * Slope of the error of the gains flown most often against the battery voltage, with its 90 % interval.
  */
 export type Trend = {
-    /**
-     * Against
-     */
-    against: 'flight number' | 'battery voltage';
     /**
      * Unit
      */

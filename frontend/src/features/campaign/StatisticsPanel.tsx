@@ -35,8 +35,8 @@ export function StatisticsPanel({ campaignId }: { campaignId: number }) {
 }
 
 function Results(all: CampaignStatistics) {
-  const { comparison, drift, track_record: record, notes, trends } = all;
-  const shown = [comparison, drift, record, ...trends].map((one) => one?.sentence ?? "");
+  const { comparison, drift, track_record: record, notes, battery_trend: trend } = all;
+  const shown = [comparison, drift, record, trend].map((one) => one?.sentence ?? "");
   return (
     <div className={classes["results"]}>
       <div className={classes["facts"]}>
@@ -52,9 +52,7 @@ function Results(all: CampaignStatistics) {
               {drift.sentence} <HelpTip topic="drift" />
             </li>
           )}
-          {trends.map(({ against, sentence }) => (
-            <li key={against}>{sentence}</li>
-          ))}
+          {trend && <li>{trend.sentence}</li>}
           {notes
             .filter((note) => !shown.includes(note))
             .map((note) => (
@@ -126,7 +124,9 @@ function Scatter({ sigma, degrees_of_freedom: freedom, scatter_source: source, e
 function directionText({ of, agreeing, disagreeing, sentence }: CampaignStatistics["track_record"]): string {
   const changed = agreeing + disagreeing;
   if (of === 0) return sentence;
-  return changed === 0 ? "" : `${agreeing} of ${changed} flights changed the error in the predicted direction.`;
+  return changed === 0
+    ? ""
+    : `${agreeing} of ${count(changed, "flight")} with new gains changed the error in the predicted direction. Repeats are not counted: they predict no change.`;
 }
 
 function Predictions({ record }: { record: CampaignStatistics["track_record"] }) {
