@@ -186,3 +186,8 @@ def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
     return any(
         dict(flight.gains) == dict(gains) for flight in flights if flight.outcome == "valid" or flight.against_gains
     )
+
+
+def aborted_by_gains(flights: Sequence[Flight]) -> list[Flight]:
+    """The flights whose abort counts against their gains."""
+    return [flight for flight in flights if flight.outcome == "aborted" and flight.against_gains]

@@ -198,7 +198,7 @@ def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
 
 _ABORTS: Final = {
     HIGHEST_M: ("abort altitude", "m", "rises to"),
-    TOUCH_DOWN_M_S: ("abort touch-down", "m/s", "hits the ground at"),
+    TOUCH_DOWN_M_S: ("abort touch-down", "m/s", "touches down at"),
 }
 """Name and unit of the check, and what the vehicle does, of each reported value of an abort."""
 
@@ -227,10 +227,16 @@ def _case(parameters: Sequence["ModelParameter"], model: Vector, step: float | N
 def _case_parts(parameters: Sequence["ModelParameter"], model: Vector, step: float | None, event: str) -> Iterator[str]:
     for parameter, value in zip(parameters, model.tolist(), strict=True):
         if value or parameter.nominal:
-            unit = f" {parameter.unit}" if parameter.unit in {"s", "1/s", "m"} else ""
-            yield f"{parameter.title.lower()} {value:.2g}{unit}"
+            yield f"{parameter.title.lower()} {short_value(value, parameter.unit)}"
     if step is not None:
         yield f"{event} at {model[START_LATENCY_S] + step * STEP_S:.1f} s"
+
+
+def short_value(value: float, unit: str) -> str:
+    """Two significant digits; times below 0.1 s in milliseconds, to a tenth."""
+    if unit == "s" and abs(value) < 0.1:
+        return f"{1e3 * value:.{1 if abs(value) < 0.01 else 0}f} ms"
+    return f"{value:.2g}{f' {unit}' if unit in {'s', '1/s', 'm'} else ''}"
 
 
 LONGEST_S: Final = 32.6

@@ -31,6 +31,8 @@ SCATTER_NOT_KNOWN: Final = (
     "the gain sets again."
 )
 
+NO_STEP: Final = "No further step is flown:"
+
 _CONFIRMATION_FLIGHTS: Final = 2
 """Flights reserved for repeating the winner and the baseline."""
 
@@ -136,9 +138,10 @@ def _next(
         return _confirm_baseline(definition, experiment, now, left, proposal)
     if left <= 0:
         return Confirmation(phase="decided", why=verdict_sentence(experiment, now))
-    if now.winner.size < 2 and left > _CONFIRMATION_FLIGHTS and _is_worth_a_step(definition, now, left, proposal):
-        return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
-    return _flown_again(experiment, now)
+    if obstacle := _obstacle_to_step(definition, experiment, now, left, proposal):
+        again = _flown_again(experiment, now)
+        return replace(again, why=f"{again.why} {obstacle}")
+    return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
 
 
 def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
@@ -169,8 +172,8 @@ def _confirm_baseline(
         return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
     tried = len(now.groups) - 1
     found = f"None of the other sets flown ({tried}) is better." if tried else "No other set was flown."
-    outlook = _describe_improvement(definition, experiment, now, left, proposal)
-    return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {outlook}".strip())
+    obstacle = "" if left <= 0 else _no_prospect(definition, experiment, now, left, proposal)
+    return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {obstacle}".strip())
 
 
 def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
@@ -197,6 +200,28 @@ def _only_once(now: ComparisonState) -> str:
     return f", because each gain set was flown only once{assumed}"
 
 
+def _obstacle_to_step(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
+) -> str:
+    """Why no step is flown before the winner is compared with the baseline; empty if one is."""
+    if not _is_worth_a_step(definition, now, left, proposal):
+        return _no_prospect(definition, experiment, now, left, proposal)
+    if now.winner.size > 1:
+        return f"{NO_STEP} steps end with the first repeat of the best gains."
+    if left <= _CONFIRMATION_FLIGHTS:
+        return f"{NO_STEP} the last {_CONFIRMATION_FLIGHTS} flights are reserved for the best and the first gains."
+    return ""
+
+
+def _no_prospect(
+    definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
+) -> str:
+    if proposal.kind == "none":
+        return f"{NO_STEP} the strategy proposes none."
+    outlook = _describe_improvement(definition, experiment, now, left, proposal)
+    return f"{NO_STEP} {outlook[0].lower()}{outlook[1:]}"
+
+
 def _is_worth_a_step(definition: Definition, now: ComparisonState, left: int, proposal: Proposal) -> bool:
     if proposal.kind == "manual":
         return True
@@ -216,12 +241,14 @@ def _detectable_difference(definition: Definition, now: ComparisonState, left: i
 def _describe_improvement(
     definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
 ) -> str:
-    unit = experiment.error_unit
-    if proposal.kind in {"none", "manual"} or left <= 0:
-        return "The strategy proposes no further step." if proposal.kind == "none" else ""
+    """Predicted improvement of a step with what the remaining flights can resolve; empty for a `manual` proposal."""
+    if proposal.kind == "manual":
+        return ""
+    unit, improvement = experiment.error_unit, _predicted_improvement(now, proposal)
+    if improvement <= 0.0:
+        return "The next step is not predicted to reduce the error."
     detectable = _detectable_difference(definition, now, left)
-    improvement = _predicted_improvement(now, proposal)
-    relation = "at least" if improvement >= detectable else "below"
+    relation = "more than" if improvement >= detectable else "less than"
     return (
         f"The next step is predicted to reduce the error by {short(improvement)} {unit}, {relation} the "
         f"{short(detectable)} {unit} that {count(left, 'flight')} can resolve at {percent(definition.stop.confidence)} "

@@ -24,6 +24,9 @@ def envelope_of(definition: Definition, experiment: Experiment) -> Envelope:
     return Envelope(ceiling_m=definition.ceiling_m, safe_gains=safe_gains)
 
 
+_LEAST_CHANGE: Final = 0.0005
+"""A smaller change, as a share of the range, is none at the digits printed."""
+
 NUMBERS: Final = "numbers"
 """Name of the check that cannot be overruled."""
 
@@ -69,9 +72,11 @@ def check_step(space: PolicySpace, asked: Gains, references: Sequence[Gains], fr
     low, high = space.reachable(base, fraction)
     vector = space.vector(gains)
     passed = worst <= fraction or bool(((low <= vector) & (vector <= high)).all())
+    change = (
+        f"{name} changes most, by {percent(worst, 1)} of its range" if worst >= _LEAST_CHANGE else "No gain changes"
+    )
     sentence = (
-        f"{name} changes most, by {percent(worst, 1)} of its range"
-        f"{'' if gains[name] == asked[name] else ' to its bound'}; "
+        f"{change}{'' if gains[name] == asked[name] else ' to its bound'}; "
         f"{'at most' if passed else 'only'} {percent(fraction)} is allowed from {origin}."
     )
     beyond = {} if passed else space.mapping(space.nearest(vector.clip(low, high)))

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from app.core.definition import Definition, Flight
+from app.core.definition import Definition, Flight, aborted_by_gains
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, ModelledExperiment
-from app.core.formatting import format_gains, short
-from app.core.policy import PolicySpace
+from app.core.formatting import format_gains, named_flights, short
+from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import Group, groups_of, pool_scatter
 from app.core.tuning.calibration import known_distribution
-from app.core.tuning.confirmation import Confirmation, compare_winner, confirm, standing_within_bounds
+from app.core.tuning.confirmation import NO_STEP, Confirmation, compare_winner, confirm, standing_within_bounds
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
 from app.core.tuning.gate import GateResult, check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
@@ -24,7 +24,7 @@ from app.core.tuning.strategy import Explanation, Kind, Proposal
 from app.core.tuning.transfer import Transfer, transfer
 
 _ORIGIN = {
-    "default": "the experiment's default gains",
+    "default": "the vehicle's default gains",
     "simplex": "the nominal model's optimum, found by Nelder–Mead from the default gains",
     "given": "the gains given in the campaign's definition",
     "campaign": "the best gains of the campaign that this one starts from",
@@ -75,10 +75,8 @@ def _manual_proposal(
         proposal = by_hand(definition, experiment, space, flights)
         return _confirmed(definition, experiment, space, flights, proposal)
     gains = start_gains(definition, experiment, space)
-    summary = (
-        f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); there is no model of this "
-        "vehicle's controller, so there is no prediction."
-    )
+    origin = _describe_start(definition, gains, flights)
+    summary = f"{origin}; there is no model of this vehicle's controller, so there is no prediction."
     lesson = "The result of these gains, as a reference for the others."
     explanation = Explanation(summary=summary, lesson=lesson)
     return Proposal(kind="start", gains=gains, predicted=None, predicted_error=None, explanation=explanation)
@@ -111,8 +109,21 @@ def _start(
         if is_informative(None if start.interval is None else start.interval.lower, corrected=False)
         else "is too uncertain to predict its error"
     )
-    summary = f"The first flight uses {_ORIGIN[definition.start.kind]} ({format_gains(gains)}); {source} {outlook}."
+    summary = f"{_describe_start(definition, gains, flights)}; {source} {outlook}."
     return replace(start, explanation=replace(start.explanation, summary=summary))
+
+
+def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flight]) -> str:
+    """Source of the start gains, without a full stop; first the flights with these gains that were aborted."""
+    source = f"{_ORIGIN[definition.start.kind]} ({format_gains(gains)})"
+    numbers = [flight.number for flight in aborted_by_gains(flights) if dict(flight.gains) == dict(gains)]
+    if numbers:
+        aborted = f"{named_flights(numbers).capitalize()} {'was' if len(numbers) == 1 else 'were'} aborted"
+        return (
+            f"{aborted} because of the vehicle's behaviour with these gains. Fly them again only if you know why; "
+            f"otherwise use custom gains. They are {source}"
+        )
+    return f"The {'next' if flights else 'first'} flight uses {source}"
 
 
 def _confirmed(
@@ -163,9 +174,7 @@ def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | 
 AdviceKind = Literal["step", "repeat", "baseline", "stop"]
 
 _MANUAL_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
-_NOTHING_BETTER: Final = (
-    "No further step is proposed; flying the best gains again shows whether their error stays the same."
-)
+_REPEAT_SHOWS: Final = "Flying the best gains again shows whether their error stays the same."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,7 +207,9 @@ def advise(
     if verdict.stop:
         return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=verdict.why)
     if now is not None and proposal.kind == "none" and tells_noise:
-        why = f"{proposal.explanation.summary} {_NOTHING_BETTER}"
+        budget = definition.stop.max_flights
+        ended = f"{NO_STEP} the budget of {budget} flights is used up. " if len(flights) >= budget else ""
+        why = f"{proposal.explanation.summary} {ended}{_REPEAT_SHOWS}"
         return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
     if now is None or tells_noise:
         kind = _MANUAL_KINDS.get(proposal.kind, "step")

@@ -14,6 +14,7 @@ from app.core.experiments.takeoff_hazards import (
     check_flights,
     divergence_distance,
     fly_runs,
+    short_value,
     undamped_swing,
 )
 from app.core.models.vertical_hazards import (
@@ -281,3 +282,11 @@ def test_a_flight_that_is_lost_is_not_followed_any_further() -> None:
     assert runs.reports[0, HIGHEST_M] == pytest.approx(LOST_M, abs=0.2)
     assert runs.reports[0, HIGHEST_STEP] < 3600
     assert runs.aborts[0, 0].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [(1.6e-5, "s", "0.0 ms"), (0.0042, "s", "4.2 ms"), (0.02, "s", "20 ms"), (0.25, "s", "0.25 s"), (0.63, "", "0.63")],
+)
+def test_short_times_of_a_case_are_in_milliseconds(value: float, unit: str, text: str) -> None:
+    assert short_value(value, unit) == text

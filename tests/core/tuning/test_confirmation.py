@@ -48,17 +48,19 @@ def phase(flights: list[Flight], proposal: Proposal, definition: Definition = NO
 def test_a_step_with_a_resolvable_improvement_is_flown() -> None:
     found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.3))
     assert found.phase == "step"
-    assert "is predicted to reduce the error by 0.200 m, at least the" in found.why
+    assert "is predicted to reduce the error by 0.200 m, more than the 0.008 m that 11 flights" in found.why
 
 
 def test_a_step_without_a_resolvable_improvement_ends_a_campaign_without_a_winner() -> None:
     found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.499))
     assert found.phase == "decided"
-    assert "is predicted to reduce the error by 0.0010 m, below the" in found.why
+    assert "is predicted to reduce the error by 0.001 m, less than the 0.008 m that 11 flights" in found.why
     assert "No other set was flown." in found.why
     tried = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
     assert tried.phase == "decided"
-    assert "None of the other sets flown (1) is better. The strategy proposes no further step." in tried.why
+    assert (
+        "None of the other sets flown (1) is better. No further step is flown: the strategy proposes none." in tried.why
+    )
 
 
 def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided() -> None:
@@ -221,7 +223,30 @@ def test_a_campaign_reopened_after_its_decision_is_advised_to_repeat_the_best_ga
     verdict = evaluate_stop_rule(NOISE, flights, proposal, open_until_flight=7)
     advice = advise(NOISE, QuadraticExperiment(), flights, proposal, verdict)
     assert (advice.kind, advice.gains["a"]) == ("repeat", 2.0)
-    assert "No further step is proposed" in advice.why
+    assert "Flying the best gains again shows whether their error stays the same." in advice.why
+    full = replace(NOISE, stop=replace(NOISE.stop, max_flights=4))
+    ended = advise(
+        full, QuadraticExperiment(), flights, proposal, evaluate_stop_rule(full, flights, proposal, open_until_flight=7)
+    )
+    assert "No further step is flown: the budget of 4 flights is used up." in ended.why
+
+
+def test_a_flight_that_is_no_step_says_why_there_is_none() -> None:
+    def why(flights: list[Flight], proposal: Proposal, budget: int = 12) -> str:
+        definition = replace(NOISE, stop=replace(NOISE.stop, max_flights=budget))
+        return confirm(definition, QuadraticExperiment(), flights, proposal).why
+
+    once, twice = flown((1, 0.5), (2, 0.2)), flown((1, 0.5), (2, 0.2), (2, 0.2))
+    decided = flown((1, 0.5), (2, 0.2), (2, 0.2), (1, 0.5))
+    assert why(once, proposed("none")).endswith("No further step is flown: the strategy proposes none.")
+    assert "No further step is flown: the next step is predicted to reduce the error by 0.001 m, less" in why(
+        once, proposed(error=0.199)
+    )
+    assert why(once, proposed(error=0.3)).endswith("the next step is not predicted to reduce the error.")
+    assert why(once, proposed(), 4).endswith("the last 2 flights are reserved for the best and the first gains.")
+    assert why(twice, proposed()).endswith("steps end with the first repeat of the best gains.")
+    assert why(decided, proposed("none")).startswith("Better with")
+    assert why(decided, proposed("none")).endswith("No further step is flown: the strategy proposes none.")
 
 
 def test_gains_that_look_certainly_better_are_flown_again_for_a_reason_that_is_given() -> None:

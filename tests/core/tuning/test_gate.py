@@ -69,6 +69,13 @@ def test_before_the_first_flight_a_quarter_of_each_range_around_the_start_is_all
 
 
 @compiled_only
+def test_the_start_gains_themselves_change_nothing() -> None:
+    assert check("step", DEFAULT).sentence == (
+        "No gain changes; at most 25\u00a0% is allowed from the start gains before the first valid flight."
+    )
+
+
+@compiled_only
 def test_after_a_valid_flight_the_whole_range_is_open_by_default() -> None:
     assert check("step", {"kp": 4000, "ki": 1073, "kd": 409}, flown=True).passed
 

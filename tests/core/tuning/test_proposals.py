@@ -1,6 +1,7 @@
 """Whole campaigns, and the rule above all: a proposal is a pure function of the definition and the flights."""
 
 import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -104,7 +105,14 @@ def test_without_a_valid_flight_the_start_gains_are_proposed() -> None:
     assert "not yet corrected by any flight, is too uncertain to predict its error" in start.explanation.summary
     flown = fly(1, start.gains)
     aborted = Flight(number=1, gains=flown.gains, trajectory=flown.trajectory, error=None, outcome="aborted")
-    assert same(start, next_proposal(Definition(), [aborted]))
+    again = next_proposal(Definition(), [aborted])
+    assert same(start, replace(again, explanation=start.explanation))
+    assert again.explanation.summary.startswith(
+        "Flight 1 was aborted because of the vehicle's behaviour with these gains. Fly them again only if you know "
+        "why; otherwise use custom gains. They are the vehicle's default gains ("
+    )
+    excused = next_proposal(Definition(), [replace(aborted, against_gains=False)])
+    assert excused.explanation.summary.startswith("The next flight uses the vehicle's default gains (")
 
 
 def test_given_start_gains_are_proposed_as_they_are() -> None:

@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, best_flight, was_flown
+from app.core.definition import Definition, Flight, aborted_by_gains, best_flight, was_flown
 from app.core.experiments.base import Matrix, ModelledExperiment
 from app.core.experiments.takeoff import Takeoff
-from app.core.formatting import count, format_gains, percent, short
+from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import Calibration, calibrate
 from app.core.tuning.gate import allows
@@ -65,7 +65,7 @@ def propose(
         gradient=_gradient(experiment, space, space.nearest(space.vector(base.gains)), models),
         direction=space.by_name(choice.gains - space.vector(base.gains)),
         clipped=clipped,
-        notes=(*choice.notes, *_notes(fraction, clipped)),
+        notes=(*choice.notes, *_notes(fraction, flights)),
         lesson=_describe_lesson(calibration, prediction),
         fitted=calibration.fitted,
         trust_fraction=fraction,
@@ -163,11 +163,13 @@ def _summary(
     )
 
 
-def _notes(fraction: float, clipped: tuple[str, ...]) -> tuple[str, ...]:
+def _notes(fraction: float, flights: Sequence[Flight]) -> tuple[str, ...]:
     kept = "The deviation of the best flight from the model is added inside the control loop."
-    limits = f"Clipped by a bound or the trust region: {', '.join(clipped)}." if clipped else ""
-    trust = f"Steps are limited to {percent(fraction)} of each gain's range." if fraction < 1.0 else ""
-    return tuple(filter(None, (kept, limits, trust)))
+    aborted = [flight.number for flight in aborted_by_gains(flights)]
+    if not aborted or fraction >= 1.0:
+        return (kept,)
+    did = "its abort halved the trust region" if len(aborted) == 1 else "each abort halved the trust region"
+    return kept, f"{named_flights(aborted).capitalize()} counted against the gains: {did}."
 
 
 def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> str:
@@ -178,7 +180,7 @@ def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> 
     shares = np.divide(np.abs(errors @ values), spread, out=np.zeros_like(spread), where=spread > 0.0)
     most = calibration.fitted[int(np.argmax(np.round(shares, 9)))]
     return (
-        f"Mostly {most.title.lower()}, now {most.value:.3g} ± {most.standard_error:.1g} {most.unit}: it contributes "
+        f"Mostly {most.title.lower()}, now {plus_minus(most.value, most.standard_error, most.unit)}: it contributes "
         "most to the uncertainty of the predicted error."
     )
 

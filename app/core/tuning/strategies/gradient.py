@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, Option, best_flight, was_flown
+from app.core.definition import Definition, Flight, Option, aborted_by_gains, best_flight, was_flown
 from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
@@ -122,14 +122,14 @@ def propose(
         _first_allowed_step(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
     )
     explanation = Explanation(
-        summary=_summary(experiment, base, best, chosen, len(ladder), refused),
+        summary=_summary(experiment, base, best, chosen, len(ladder), refused, flights),
         base_flight=base.number,
         gradient=space.by_name(slopes),
         direction=space.by_name(direction),
         ladder=ladder,
         chosen_length=chosen.length if chosen else None,
         clipped=chosen.clipped if chosen else (),
-        notes=(correction, *_notes(chosen, refused)),
+        notes=(correction, *_notes(refused)),
     )
     gains = space.mapping(base_gains) if chosen is None else chosen.gains
     trajectory, error = model.predict(space.vector(gains))
@@ -190,6 +190,7 @@ def _summary(
     chosen: LadderStep | None,
     tried: int,
     refused: Sequence[LadderStep],
+    flights: Sequence[Flight],
 ) -> str:
     unit = experiment.error_unit
     origin = f"The best flight so far is {base.number} ({format_gains(base.gains)}), error {short(base.error)} {unit}."
@@ -203,7 +204,8 @@ def _summary(
             f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
             f"{chosen.length:.4g} has the lowest predicted error: {short(chosen.predicted_error)} {unit}."
         )
-    why = "is refused by the gate" if refused else "did not improve on it"
+    aborted = any(dict(flight.gains) == best.gains for flight in aborted_by_gains(flights))
+    why = "is refused by the gate" if refused else "was aborted" if aborted else "did not improve on it"
     return (
         f"{origin} The longer step in the same direction {why}, so the next one is shorter, {chosen.length:.4g} "
         f"instead of {best.length:.4g}; predicted error {short(chosen.predicted_error)} {unit}."
@@ -220,10 +222,8 @@ def _corrected(definition: Definition, experiment: ModelledExperiment, base: Fli
     return correct_by_bias(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
 
 
-def _notes(chosen: LadderStep | None, refused: Sequence[LadderStep]) -> tuple[str, ...]:
-    stopped = f"Clipped by a bound or the step limit: {', '.join(chosen.clipped)}." if chosen and chosen.clipped else ""
-    shortened = f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}." if refused else ""
-    return tuple(filter(None, (stopped, shortened)))
+def _notes(refused: Sequence[LadderStep]) -> tuple[str, ...]:
+    return (f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}.",) if refused else ()
 
 
 GRADIENT: Final = Strategy(
