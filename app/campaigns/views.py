@@ -32,6 +32,7 @@ from app.campaigns.variants import choices_of
 from app.common.conflict_checks import allowed
 from app.common.schemas import Gate, Interval, Trouble
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
+from app.core.definition import aborted_by_gains
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
 from app.core.tuning.predictions import is_informative
@@ -103,8 +104,8 @@ def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSum
 def _summary(
     row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal, spark: list[SparkCurve]
 ) -> CampaignSummary:
-    valid = [trial for trial in trials if trial.state == TrialState.VALID]
     now = standing_of(row, trials)
+    best = [] if now is None else [trial for trial in trials if trial.number in now.winner.numbers]
     return CampaignSummary(
         id=row.id,
         name=row.name,
@@ -114,8 +115,8 @@ def _summary(
         experiment=row.experiment,
         strategy=row.strategy,
         flights=_counts(trials).flown,
-        best=best_trial(trials, now),
-        first_error=valid[0].error if valid else None,
+        best=best_trial(best, now),
+        first_error=None if now is None else now.baseline.mean,
         verdict=_verdict(now),
         rehearsal=rehearsal.state,
         next_action=_next_action(row, trials, rehearsal),
@@ -191,12 +192,14 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
 
 
 def _choices(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow], advice: Advice) -> list[FlightChoice]:
+    flights = history.flown_gains(trials)
+    is_doubtful = row.kind == "start" and any(flight.gains == row.gains for flight in aborted_by_gains(flights))
     return [
         FlightChoice(
             kind=kind,
             gains=gains,
             proposed=gains == row.gains,
-            recommended=advice.kind != "stop" and gains == advice.gains,
+            recommended=advice.kind != "stop" and gains == advice.gains and not is_doubtful,
         )
         for kind, gains in choices_of(campaign, row, trials).items()
     ]

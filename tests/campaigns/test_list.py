@@ -4,7 +4,18 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
-from tests.builders import create_campaign, create_flown_trial, create_ready_campaign, get, problems_of
+from tests.builders import (
+    create_campaign,
+    create_flown_trial,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    get,
+    land,
+    lift_off,
+    problems_of,
+    run_jobs,
+)
 
 SORTS = ["-created", "created", "-updated", "name", "error"]
 
@@ -84,3 +95,14 @@ def test_a_query_that_makes_no_sense_is_refused_by_field(client: TestClient, que
     answer = client.get(f"/api/campaigns?{query}")
     assert answer.status_code == 422
     assert field in problems_of(answer)
+
+
+def test_a_card_compares_the_means_of_the_best_gains_and_of_the_first(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 20}})
+    for settling_s, chosen in ((1.5, {}), (1.3, {}), (1.0, {"gains": {"kp": 290, "ki": 20, "kd": 82}})):
+        create_trial(client, campaign["id"], fly={"speed": None}, **chosen)
+        land(database, lift_off(database), create_record(settling_s))
+        run_jobs(database)
+    groups = get(client, f"/api/campaigns/{campaign['id']}/statistics")["groups"]
+    (card,) = get(client, "/api/campaigns")["items"]
+    assert (card["first_error"], card["best"]["mean"]) == (groups[0]["mean"], groups[1]["mean"])

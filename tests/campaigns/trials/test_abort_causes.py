@@ -168,3 +168,13 @@ def test_a_record_that_waits_on_the_disk_keeps_why_it_was_broken_off(tmp_path: P
     spool.reserve(1)
     spool.write(1, create_record(ending="aborted", reason="enough", on_request=True))
     assert spool.read(1).record.on_request
+
+
+def test_the_start_gains_are_not_recommended_again_after_an_abort_that_counts_against_them(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database)
+    aborted(client, database, campaign, on_request=False)
+    again = proposal(client, campaign)
+    assert [(one["kind"], one["recommended"]) for one in again["choices"]] == [("baseline", False)]
+    assert again["advice"]["why"].startswith("Flight 1 was aborted because of the vehicle's behaviour")
