@@ -143,6 +143,7 @@ def _environment() -> "Environment":
         "gain": formatting.gain,
         "gains": formatting.gains,
         "signed_gain": _signed_gain,
+        "relative_to": formatting.relative_to,
         "count": formatting.count,
         "flights": formatting.named_flights,
         "cell": _cell,

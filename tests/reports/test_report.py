@@ -86,6 +86,9 @@ def test_the_report_says_what_the_api_says(client: TestClient, campaign: Json) -
     best = campaign["best"]
     assert measured(best["mean"], best["standard_error"], "m") in page.said
     assert statistics["comparison"]["sentence"] in page.said
+    first = statistics["groups"][0]
+    assert f"First gains (flight 1): {measured(first['mean'], first['standard_error'], 'm')}; the best" in page.said
+    assert "± is the standard deviation of one flight" in page.said
     assert statistics["track_record"]["sentence"] in page.said
     assert campaign["definition_digest"] in page.said
     health = get(client, "/api/health")
@@ -291,7 +294,7 @@ def test_photos_are_printed_on_the_page_of_their_note_and_no_heading_ends_a_page
         for part in ("Line 12 of flight {}.", "Flight {}, photo 1 of 5", "Flight {}, photo 5 of 5"):
             assert part.format(number) in page.said
     headings = {text for tag, text in read(client, campaign).headings if tag != "h1"}
-    assert {"Runs", "Takeoff curves", "Records"} <= headings
+    assert {"Table of flights", "Takeoff curves", "Records"} <= headings
     assert [page.lines[-1] for page in pages if page.lines[-1] in headings] == []
 
 
