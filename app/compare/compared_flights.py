@@ -193,6 +193,12 @@ def _refusal(
     )
 
 
+def vehicle_name(campaign: CampaignRow) -> str:
+    """A registered vehicle's own name, otherwise its kind."""
+    vehicle = campaign.vehicle
+    return vehicle.name if vehicle.registered else vehicle.title
+
+
 def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
     """Vehicle, experiment and strategy with their settings, the battery, and other recorded settings of a flight."""
     row, campaign = side.row, side.campaign
@@ -200,7 +206,7 @@ def settings_of(side: ComparisonFlight, battery: str) -> list[FlightSetting]:
     strategy = STRATEGIES[campaign.strategy]
     options = fleet.options_of(campaign)
     found = [
-        FlightSetting(title="Vehicle", unit="", value=campaign.vehicle.title),
+        FlightSetting(title="Vehicle", unit="", value=vehicle_name(campaign)),
         *_options(options, () if kind is None else kind.options),
         FlightSetting(title="Experiment", unit="", value=side.experiment.title),
         *_options(

@@ -16,6 +16,7 @@ from app.compare.compared_flights import (
     setting_differences,
     settings_of,
     sides_of,
+    vehicle_name,
 )
 from app.compare.schemas import ComparedFlight, FlightComparison, FlightSetting
 from app.compare.verdicts import compare_pairs, find_leading_pair, list_notes, overall_verdict
@@ -96,7 +97,7 @@ def _flight(side: ComparisonFlight, settings: list[FlightSetting]) -> ComparedFl
         number=row.number,
         campaign_id=campaign.id,
         campaign_name=campaign.name,
-        vehicle=campaign.vehicle.title,
+        vehicle=vehicle_name(campaign),
         is_real=campaign.vehicle.is_real,
         experiment=side.experiment.title,
         state=row.state,

@@ -147,7 +147,7 @@ function ErrorCell({ flight: { error, group, scatter }, unit }: { flight: Compar
   );
 }
 
-const UNJUDGED = { gains: "", repeats: "Same gains", apart: "No verdict", "no error": "No error" } as const;
+const UNJUDGED = { gains: "", repeats: "Same gains", apart: "No verdict", "no error": "Not scored" } as const;
 
 function Against({ pair, first, unit }: { pair: FlightPair | null; first: string; unit: string }) {
   if (pair === null) return <small className={classes["small"]}>reference</small>;
