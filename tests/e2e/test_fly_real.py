@@ -127,7 +127,7 @@ def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
 
         dashboard.until(is_over)
     assert "Review flight 1" not in said
-    expect(dashboard.panel("Flight budget used")).to_contain_text("Best: flight 1")
+    expect(dashboard.panel("Flight budget used")).to_contain_text("Best gains (flight 1)")
     assert state_of(dashboard, trial_id) == "valid"
 
 

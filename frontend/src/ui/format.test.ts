@@ -126,3 +126,11 @@ test("what a field is filled with can be read again", () => {
 test("a number without a unit is printed alone", () => {
   expect([unitAfter("1"), unitAfter(""), unitAfter("m")]).toEqual(["", "", " m"]);
 });
+
+test("an error of more than twice another is a multiple of it", () => {
+  expect([against(315, "the best"), against(80, "the best"), against(-59, "the best")]).toEqual([
+    "4.2 times the best",
+    "80\u00a0% above the best",
+    "59\u00a0% below the best",
+  ]);
+});

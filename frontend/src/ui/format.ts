@@ -24,8 +24,9 @@ export function percentText(percent: number, digits = 0): string {
   return `${Number(percent.toFixed(digits))}\u00a0%`;
 }
 
-/** A change in percent as text: "59 % below the best". */
+/** A change in percent as text: "59 % below the best"; from twice as much on "4.1 times the best". */
 export function against(percent: number, base: string): string {
+  if (percent > 100) return `${Number((1 + percent / 100).toPrecision(2))} times ${base}`;
   const size = percentText(Math.abs(percent));
   if (size === percentText(0)) return `the same as ${base}`;
   return `${size} ${percent < 0 ? "below" : "above"} ${base}`;

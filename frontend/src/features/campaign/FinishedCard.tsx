@@ -1,36 +1,32 @@
 import { Button, Stack } from "@mantine/core";
 import { IconArchive, IconRepeat } from "@tabler/icons-react";
 import { useArchive, useReopen } from "../../api/mutations";
-import type { Campaign, Trial } from "../../api/types";
+import { useStatistics } from "../../api/queries";
+import type { Campaign, CampaignStatistics, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
-import { against, flightsText, percentChange, withUnit } from "../../ui/format";
-import { GainList, gainsInBrackets, sameHeld } from "../../ui/gains";
+import { against, count, flightsText, percentChange } from "../../ui/format";
+import { GainList } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { campaignStateLabel } from "../../ui/states";
-import { plusMinus } from "../../ui/uncertainty";
+import { confidenceText, plusMinus } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
 import { CloneForm } from "../campaigns/CloneForm";
 import classes from "./NextFlight.module.css";
 import { bestOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
-import { VERDICTS } from "./verdict";
+import { confirmationOf, confirmationText, endingOf, VERDICTS } from "./verdict";
+
+type RepeatGroup = CampaignStatistics["groups"][number];
 
 const FURTHER_FLIGHTS = 3;
-const CONFIRMATION = ["repeat", "baseline", "repeat"] as const;
 
 const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meaning: string }> = {
   candidate: { word: "Candidate", meaning: "not yet confirmed by repeat flights." },
   confirmed: { word: "Confirmed", meaning: "better than the first gains in repeat flights." },
   "not confirmed": { word: "Not confirmed", meaning: "no improvement over the first gains in repeat flights." },
 };
-
-/** The gains that were repeated, if they are others than those of the best flight. */
-function otherWinner({ winner }: Campaign, best: Trial): string {
-  if (winner === null || sameHeld(winner.gains, best.gains)) return "";
-  return `${gainsInBrackets(winner.gains)} of ${flightsText(winner.trial_numbers)}, `;
-}
 
 interface Props {
   campaign: Campaign;
@@ -44,54 +40,37 @@ interface Props {
 export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props) {
   const archive = useArchive(campaign.id);
   const reopen = useReopen(campaign.id);
-  const isCandidate = campaign.standing === "candidate";
+  const statistics = useStatistics(campaign.id).data;
+  const groups = statistics?.groups ?? [];
+  const [winner, first] = [groups.find(({ is_best }) => is_best), groups.find(({ is_baseline }) => is_baseline)];
+  const missing = campaign.standing === "candidate" ? confirmationOf(winner, first) : [];
+  const isCandidate = missing.length > 0;
+  const further = isCandidate ? missing.length : FURTHER_FLIGHTS;
   const experiment = campaign.definition.experiment ?? "";
-  const unit = useUnits(experiment).error;
   const best = bestOf(campaign, trials);
-  const first = trials.find((trial) => trial.state === "valid");
   const title = campaignStateLabel("finished", campaign.outcome).word;
-  const change = percentChange(campaign.best?.mean, first?.error);
+  const reason = endingOf(campaign, statistics?.comparison ?? null);
   return (
     <Panel title={title}>
       <Stack gap={14}>
-        {campaign.stop_reason?.toLowerCase() !== title.toLowerCase() && <Note fz="body">{campaign.stop_reason}</Note>}
-        {best !== null && campaign.best !== null && (
-          <Aside tone="good" className={`${classes["best"]} numbers`}>
-            <p>Best: flight {best.number}</p>
-            <p className={classes["figure"]}>{plusMinus(campaign.best.mean, campaign.best.standard_error, unit)}</p>
-            {campaign.best.standard_error !== null && <p>± standard error</p>}
-            {campaign.best.flights > 1 && <p>mean of {campaign.best.flights} flights</p>}
-            <p>
-              <GainList gains={best.gains} experiment={experiment} />
-            </p>
-            {first && change !== null && best.id !== first.id && (
-              <p>
-                {against(change, `flight ${first.number}`)} ({withUnit(first.error, unit)})
-                {campaign.verdict && <strong> · {VERDICTS[campaign.verdict].toLowerCase()}</strong>}
-              </p>
-            )}
-            {campaign.standing !== null && (
-              <p>
-                <strong>{STANDINGS[campaign.standing].word}</strong>: {otherWinner(campaign, best)}
-                {STANDINGS[campaign.standing].meaning}
-              </p>
-            )}
+        {reason.toLowerCase() !== title.toLowerCase() && <Note fz="body">{reason}</Note>}
+        {winner !== undefined && first !== undefined && (
+          <Result campaign={campaign} winner={winner} first={first} comparison={statistics?.comparison ?? null} />
+        )}
+        {statistics?.drift?.resolved && (
+          <Aside tone="warn" fz="small">
+            {statistics.drift.sentence}
           </Aside>
         )}
-        {isCandidate && (
-          <Note fz="body">
-            Two more flights with the best gains and one with the first gains will show whether the best gains are
-            better.
-          </Note>
-        )}
+        {isCandidate && <Note fz="body">{confirmationText(missing)}</Note>}
         {campaign.actions.includes("reopen") && (
           <Button
             variant={isCandidate && !isSecondary ? "filled" : "default"}
             leftSection={<IconRepeat size={20} aria-hidden />}
             loading={reopen.isPending}
-            onClick={() => reopen.mutate({ flights: FURTHER_FLIGHTS, plan: isCandidate ? [...CONFIRMATION] : [] })}
+            onClick={() => reopen.mutate({ flights: further, plan: missing })}
           >
-            {isCandidate ? `Confirm with ${FURTHER_FLIGHTS} flights` : `Reopen for ${FURTHER_FLIGHTS} more flights`}
+            {isCandidate ? `Confirm with ${count(further, "flight")}` : `Reopen for ${further} more flights`}
           </Button>
         )}
         <ErrorNotice error={reopen.error} />
@@ -118,5 +97,48 @@ export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props)
         <ErrorNotice error={archive.error} />
       </Stack>
     </Panel>
+  );
+}
+
+interface ResultProps {
+  campaign: Campaign;
+  winner: RepeatGroup;
+  first: RepeatGroup;
+  comparison: CampaignStatistics["comparison"];
+}
+
+/** The best gains beside the first, each with the mean of all its flights. */
+function Result({ campaign, winner, first, comparison }: ResultProps) {
+  const experiment = campaign.definition.experiment ?? "";
+  const unit = useUnits(experiment).error;
+  const change = percentChange(winner.mean, first.mean);
+  return (
+    <Aside tone="good" className={`${classes["best"]} numbers`}>
+      <p>Best gains ({flightsText(winner.trial_numbers)})</p>
+      <p className={classes["figure"]}>{plusMinus(winner.mean, winner.standard_error, unit)}</p>
+      {winner.standard_error !== null && <p>{winner.errors.length > 1 ? "mean " : ""}± standard error</p>}
+      <p>
+        <GainList gains={winner.gains} experiment={experiment} />
+      </p>
+      {change !== null && comparison !== null && (
+        <>
+          <p>
+            First gains ({flightsText(first.trial_numbers)}): {plusMinus(first.mean, first.standard_error, unit)}
+          </p>
+          <p>
+            {against(change, "the first gains")} ·{" "}
+            <strong>
+              {VERDICTS[comparison.verdict].toLowerCase()}
+              {comparison.confidence !== null && ` with ${confidenceText(comparison.confidence)} confidence`}
+            </strong>
+          </p>
+        </>
+      )}
+      {campaign.standing !== null && (
+        <p>
+          <strong>{STANDINGS[campaign.standing].word}</strong>: {STANDINGS[campaign.standing].meaning}
+        </p>
+      )}
+    </Aside>
   );
 }

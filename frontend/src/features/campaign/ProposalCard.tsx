@@ -6,11 +6,12 @@ import { offersOf } from "../../api/problems";
 import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
 import { useConnection } from "../../live/store";
+import { sameHeld } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useHasModel, useUnits } from "../../ui/units";
-import { isRepeat, refusalOf, trialOf } from "./choices";
+import { isDoubtful, isRepeat, refusalOf, repeatSource, trialOf } from "./choices";
 import { FlightChoices } from "./FlightChoices";
 import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
@@ -45,6 +46,10 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const number = Math.max(0, ...trials.map((trial) => trial.number)) + 1;
   const isEvaluated = chosen.gains !== null && chosen.error === null;
   const isRefused = chosen.isChecked && chosen.gate?.passed === false;
+  const groups = useStatistics(campaign.id).data?.groups ?? [];
+  const group = groups.find(({ gains }) => chosen.gains !== null && sameHeld(gains, chosen.gains));
+  const isBestAgain = isRepeat(chosen.name) && group?.is_best === true;
+  const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
       <Stack gap={14}>
@@ -61,7 +66,8 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           <PredictedError
             predicted={chosen.predicted}
             isCurrent={chosen.isPredicted}
-            best={campaign.best?.error ?? null}
+            best={isBestAgain ? null : (groups.find(({ is_best }) => is_best)?.mean ?? null)}
+            source={repeatSource(chosen.name, group)}
             unit={units.error}
             hasModel={hasModel}
           />
@@ -87,7 +93,12 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         />
         <div>
           {chosen.choice?.proposed && (
-            <ProposalExplanation explanation={proposal.explanation} unit={units.error} gains={proposal.gains} />
+            <ProposalExplanation
+              explanation={proposal.explanation}
+              said={isAnnounced ? "" : proposal.advice.why}
+              unit={units.error}
+              gains={proposal.gains}
+            />
           )}
           {isEvaluated && (chosen.choice !== undefined || !isRefused) && (
             <GateChecks gate={chosen.gate} isCurrent={chosen.isChecked} />
@@ -136,7 +147,8 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   const isReady = gains !== null && isChecked && isPredicted && gate?.passed === true;
   const trial = trialOf(proposal, chosen.choice, gains ?? {});
   const order = { fly: { speed: speedOf(speed) } };
-  const isAdvised = proposal.recommended !== "stop" && !isSecondary;
+  const isWarned = chosen.choice !== undefined && isDoubtful(proposal);
+  const isAdvised = proposal.recommended !== "stop" && !isWarned && !isSecondary;
   const button = (label: string, isMain: boolean, onClick: () => void) => (
     <Button
       fullWidth

@@ -7,14 +7,17 @@ import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import { intervalText, percent, plusMinus } from "../../ui/uncertainty";
-import { CHOICES, type ChoiceName } from "./choices";
+import { CHOICES, type ChoiceName, isDoubtful } from "./choices";
 import classes from "./NextFlight.module.css";
 
 interface PredictedErrorProps {
   predicted: { predicted_error: number | null; interval: Interval | null } | null;
   /** Whether the prediction belongs to the gains shown. */
   isCurrent: boolean;
+  /** Mean error of the best gains; null if nothing is to be compared with it. */
   best: number | null;
+  /** What the prediction is, if it is no model's. */
+  source: string;
   unit: string;
   /** Whether there is a model of the controller. */
   hasModel: boolean;
@@ -26,7 +29,7 @@ function unpredicted(best: number | null, hasModel: boolean): string {
 }
 
 /** Predicted error with its interval; grey while it belongs to other gains. */
-export function PredictedError({ predicted, isCurrent, best, unit, hasModel }: PredictedErrorProps) {
+export function PredictedError({ predicted, isCurrent, best, source, unit, hasModel }: PredictedErrorProps) {
   const { predicted_error: error = null, interval = null } = predicted ?? {};
   const change = percentChange(error, best);
   if (error === null && isCurrent) return <Note fz="body">{unpredicted(best, hasModel)}</Note>;
@@ -44,6 +47,7 @@ export function PredictedError({ predicted, isCurrent, best, unit, hasModel }: P
             <HelpTip topic="interval" />
           </small>
         )}
+        {isCurrent && source && <small>{source}</small>}
         {change !== null && <small>{against(change, "the best")}</small>}
       </span>
     </div>
@@ -63,6 +67,13 @@ export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
   const { kind, why } = proposal.advice;
   const isRecommended = proposal.choices.some(({ kind: one, recommended }) => recommended && one === chosen);
   if (chosen === "own" ? kind !== "stop" : isFirst && isRecommended) return null;
+  if (isDoubtful(proposal)) {
+    return (
+      <Aside tone="warn" fz="small">
+        {why}
+      </Aside>
+    );
+  }
   if (!isRecommended && kind !== "stop") return <Note fz="body">{CHOICES[chosen].hint}</Note>;
   const Icon = ICONS[kind];
   return (
@@ -78,21 +89,26 @@ export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
 
 interface ProposalExplanationProps {
   explanation: Explanation;
+  /** What the card says already. */
+  said: string;
   unit: string;
   gains: Readonly<Record<string, number>>;
 }
 
 /** Explanation of the proposed gains: summary, expected information, trust region, limits, fitted parameters. */
-export function ProposalExplanation({ explanation, unit, gains }: ProposalExplanationProps) {
+export function ProposalExplanation({ explanation, said, unit, gains }: ProposalExplanationProps) {
   const { clipped = [], notes = [], lesson = "", fitted = [], trust_fraction: trust = null } = explanation;
+  const summary = said.includes(explanation.summary) ? [] : [explanation.summary];
+  const isModelled = Object.keys(explanation.gradient ?? {}).length > 0 || fitted.length > 0;
+  if (!isModelled && lesson === "" && summary.length + notes.length === 0) return null;
   return (
     <>
       <details className={classes["more"]}>
         <summary>Explanation</summary>
         <Stack gap={14}>
-          <span>
-            {explanation.summary} <HelpTip topic="bias" />
-          </span>
+          {summary.map((sentence) => (
+            <span key={sentence}>{sentence}</span>
+          ))}
           {lesson && (
             <span>
               <strong>What this flight will show:</strong> {lesson}
@@ -105,8 +121,10 @@ export function ProposalExplanation({ explanation, unit, gains }: ProposalExplan
             </span>
           )}
           {clipped.length > 0 && <span>Limited by: {clipped.join(", ")}.</span>}
-          {notes.map((note) => (
-            <span key={note}>{note}</span>
+          {notes.map((note, index) => (
+            <span key={note}>
+              {note} {index === 0 && isModelled && <HelpTip topic="bias" />}
+            </span>
           ))}
           {fitted.length > 0 && <Fitted parameters={fitted} />}
         </Stack>
@@ -147,13 +165,13 @@ function Fitted({ parameters }: { parameters: readonly FittedParameter[] }) {
 }
 
 /** Details: the gradient, and the steps evaluated along it. */
-function Tried({ explanation, unit, gains }: ProposalExplanationProps) {
+function Tried({ explanation, unit, gains }: Omit<ProposalExplanationProps, "said">) {
   const { gradient = {}, ladder = [], chosen_length: chosen } = explanation;
   const slopes = Object.entries(gradient);
   if (slopes.length === 0 && ladder.length === 0) return null;
   return (
     <details className={classes["more"]}>
-      <summary>Steps evaluated on the model</summary>
+      <summary>{ladder.length > 0 ? "Steps evaluated on the model" : "Gradient of the error"}</summary>
       <Stack gap={14}>
         {slopes.length > 0 && (
           <span className="numbers">

@@ -28,6 +28,7 @@ import { comparison } from "./useSelectedFlights";
 import classes from "./Verdict.module.css";
 import {
   bestBeforeOf,
+  bestBeforeTitle,
   comparedWith,
   isScored,
   repeatPurpose,
@@ -115,7 +116,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         <p className={classes["reason"]}>{trial.reason}</p>
       )}
       <AbortCause trial={trial} />
-      <TrialComparisons trial={trial} unit={unit} />
+      <TrialComparisons trial={trial} best={bestBeforeTitle(trial, trials).toLowerCase()} unit={unit} />
       {trial.overrule_reason && (
         <Aside tone="warn" mt={6} fz="body">
           <strong>Refused by the gate, overruled:</strong> {trial.overrule_reason}
@@ -134,7 +135,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           <PredictionResult trial={trial} />
         </Fact>
         {bestBefore && (
-          <Fact title={`Previous best, flight ${bestBefore.number}`}>
+          <Fact title={`${bestBeforeTitle(trial, trials)}, flight ${bestBefore.number}`}>
             {withUnit(bestBefore.error, unit)}{" "}
             {!asked && !isCompared && <Change error={trial.error} other={bestBefore.error} unit={unit} />}
           </Fact>
@@ -206,7 +207,7 @@ const ICONS = {
 } as const;
 
 /** Verdicts of the flight's gains against the best before it and against the first. */
-function TrialComparisons({ trial, unit }: { trial: Trial; unit: string }) {
+function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; unit: string }) {
   if (trial.comparisons.length === 0) return null;
   const asked = repeatPurpose(trial) !== "";
   return (
@@ -218,7 +219,7 @@ function TrialComparisons({ trial, unit }: { trial: Trial; unit: string }) {
             <Icon size={20} aria-hidden />
             <span>
               {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>} vs.
-              flight {trial_number} ({against === "first" ? "first" : "previous best"})
+              flight {trial_number} ({against === "first" ? "first" : best})
               {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
               {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
               <small>{standard_error === null ? "(no repeat flights yet)" : "(± standard error)"}</small>

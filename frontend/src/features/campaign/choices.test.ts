@@ -4,11 +4,13 @@ import {
   changeText,
   type GainRow,
   gainRows,
+  isDoubtful,
   isOutside,
   placeIn,
   preselected,
   readGains,
   refusalOf,
+  repeatSource,
   sliderStep,
   trialOf,
 } from "./choices";
@@ -77,6 +79,7 @@ describe("a table of gains", () => {
 test.each([
   [900, 1143, "×1.27"],
   [13, 438, "×33.7"],
+  [1070, 14, "÷76.4"],
   [4, 4, "same"],
   [0, 12, "+12"],
   [-2, 1, "+3"],
@@ -84,6 +87,21 @@ test.each([
   [2, 0, "−2"],
 ])("the change from %d to %d is %s", (now, then, text) => {
   expect(changeText(now, then)).toBe(text);
+});
+
+test("a repeat says of which flights it predicts the mean", () => {
+  expect(repeatSource("repeat", { trial_numbers: [2, 3] })).toBe("mean of flights 2, 3 with these gains");
+  expect(repeatSource("baseline", { trial_numbers: [1] })).toBe("error of flight 1 with these gains");
+  expect(repeatSource("step", { trial_numbers: [1] })).toBe("");
+});
+
+test("start gains that were aborted because of them are doubtful", () => {
+  const baseline = { kind: "baseline", gains: {}, proposed: true, recommended: false } as const;
+  expect(isDoubtful({ kind: "start", recommended: "baseline", choices: [baseline] })).toBe(true);
+  expect(isDoubtful({ kind: "start", recommended: "baseline", choices: [{ ...baseline, recommended: true }] })).toBe(
+    false,
+  );
+  expect(isDoubtful({ kind: "step", recommended: "stop", choices: [baseline] })).toBe(false);
 });
 
 test("a gain outside the bounds stands at their edge", () => {

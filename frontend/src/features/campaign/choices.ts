@@ -2,8 +2,10 @@
 
 import type { GainSet } from "../../api/evaluation";
 import type { Problem } from "../../api/problems";
-import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal } from "../../api/types";
-import { gainText, readNumber } from "../../ui/format";
+import type { CampaignStatistics, FlightChoice, GainInfo, Gate, NewTrial, Proposal } from "../../api/types";
+import { flightsText, gainText, readNumber } from "../../ui/format";
+
+type RepeatGroup = Pick<CampaignStatistics["groups"][number], "trial_numbers">;
 
 export type ChoiceName = FlightChoice["kind"] | "own";
 
@@ -23,6 +25,21 @@ export function isRepeat(name: ChoiceName): boolean {
 /** The recommended choice; without one the proposal's own. */
 export function preselected({ choices }: Proposal): ChoiceName {
   return (choices.find(({ recommended }) => recommended) ?? choices.find(({ proposed }) => proposed))?.kind ?? "own";
+}
+
+/** Whether the start gains are offered again although a flight with them was aborted because of them. */
+export function isDoubtful({
+  kind,
+  recommended,
+  choices,
+}: Pick<Proposal, "kind" | "recommended" | "choices">): boolean {
+  return kind === "start" && recommended !== "stop" && !choices.some((choice) => choice.recommended);
+}
+
+/** The flights of these gains, whose mean is the prediction of a repeat. */
+export function repeatSource(name: ChoiceName, group: RepeatGroup | undefined): string {
+  if (!isRepeat(name) || group === undefined) return "";
+  return `${group.trial_numbers.length > 1 ? "mean" : "error"} of ${flightsText(group.trial_numbers)} with these gains`;
 }
 
 /** What to fly, without how: the proposal, a variant with the gains that are shown, or custom gains. */
@@ -63,10 +80,11 @@ export function gainRows(
   });
 }
 
-/** `×1.27`; the difference where a factor says nothing. */
+/** `×1.27`, `÷76.3` below a tenth; the difference where a factor says nothing. */
 export function changeText(now: number, next: number): string {
   if (now === next) return "same";
   const factor = Number((next / now).toPrecision(3));
+  if (factor > 0 && factor < 0.1) return `÷${Number((now / next).toPrecision(3))}`;
   if (factor > 0 && Number.isFinite(factor) && factor !== 1) return `×${factor}`;
   return `${next > now ? "+" : "−"}${gainText(Math.abs(next - now))}`;
 }

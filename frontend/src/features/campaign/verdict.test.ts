@@ -4,8 +4,12 @@ import {
   abortSentence,
   abortWords,
   bestBeforeOf,
+  bestBeforeTitle,
   comparedWith,
+  confirmationOf,
+  confirmationText,
   consequenceOf,
+  endingOf,
   heldGainsNotice,
   marksOf,
   otherClasses,
@@ -20,7 +24,15 @@ import {
 } from "./verdict";
 
 const trial = (number: number, state: Trial["state"], error: number | null, predicted_error: number | null = null) =>
-  ({ id: number, number, state, error, predicted_error, actions: ["classify"] }) as unknown as Trial;
+  ({
+    id: number,
+    number,
+    state,
+    error,
+    predicted_error,
+    gains: { kp: number },
+    actions: ["classify"],
+  }) as unknown as Trial;
 
 const first = trial(1, "valid", 0.3267);
 const glitch = trial(2, "invalid", 0.05);
@@ -29,6 +41,30 @@ const all = [first, glitch, third, trial(4, "planned", null)];
 
 test("a flight is compared with the best valid one before it", () => {
   expect(bestBeforeOf(third, all)?.number).toBe(1);
+});
+
+test("the best before a flight is still the best so far, or was", () => {
+  const worse = trial(4, "valid", 0.2);
+  expect(bestBeforeTitle(worse, [...all.slice(0, 3), worse])).toBe("Best so far");
+  expect(bestBeforeTitle(third, all)).toBe("Previous best");
+});
+
+test("a candidate is confirmed by the flights that it lacks", () => {
+  const flown = (times: number) => ({ errors: Array<number>(times).fill(0.2) });
+  expect(confirmationOf(flown(1), flown(2))).toEqual(["repeat"]);
+  expect(confirmationOf(flown(1), flown(1))).toEqual(["repeat", "baseline"]);
+  expect(confirmationOf(flown(2), flown(3))).toEqual([]);
+  expect(confirmationText(["repeat"])).toBe(
+    "The best and the first gains have to fly at least twice each: 1 more flight with the best gains.",
+  );
+});
+
+test("why a campaign ended is said without the verdict that stands beside it", () => {
+  const reason = "All 7 flights of the budget have been flown. Better with 99 % confidence.";
+  expect(endingOf({ stop_reason: reason }, { sentence: "Better with 99 % confidence." })).toBe(
+    "All 7 flights of the budget have been flown.",
+  );
+  expect(endingOf({ stop_reason: reason }, null)).toBe(reason);
 });
 
 test("the first flight has nothing before it", () => {
@@ -101,6 +137,10 @@ test("a flight that repeats gains on purpose is held against its own prediction"
 test("what a class would change is said before: which flight is the best then, and that the gains are found anew", () => {
   expect(consequenceOf(third, all, "invalid")).toBe(
     "Flight 3 is the best. Without it, flight 1 becomes the best, and the next gains are recomputed.",
+  );
+  const repeat = { ...trial(5, "valid", 0.19), gains: third.gains } as Trial;
+  expect(consequenceOf(third, [...all, repeat], "invalid")).toBe(
+    "Flight 3 is the best. Without it, the best gains stay, then known from flight 5 only, and the next gains are recomputed.",
   );
   expect(consequenceOf(first, all, "invalid")).toBe(
     "Flight 3 remains the best. The next gains are recomputed without flight 1.",

@@ -1,6 +1,7 @@
 /** Texts and decisions about the result of a flight. */
 
 import type { Campaign, CampaignStatistics, Trial, Vehicle } from "../../api/types";
+import { count, flightsText } from "../../ui/format";
 import { gainsInBrackets, inOrder, sameHeld } from "../../ui/gains";
 import { wasFlown } from "../../ui/states";
 
@@ -64,6 +65,12 @@ export function bestBeforeOf(trial: Pick<Trial, "number">, trials: readonly Tria
     (best, one) => (best === null || (one.error ?? 0) < (best.error ?? 0) ? one : best),
     null,
   );
+}
+
+/** What the best flight before this one is by now: still the best, or only then. */
+export function bestBeforeTitle(trial: Pick<Trial, "number">, trials: readonly Trial[]): string {
+  const before = bestBeforeOf(trial, trials)?.number;
+  return before === bestOfCounted(trials)?.number ? "Best so far" : "Previous best";
 }
 
 /** Whether the flight has an error, which its panel shows with all that the verdict sentence says. */
@@ -136,12 +143,18 @@ export function consequenceOf(trial: Trial, trials: readonly Trial[], outcome: T
     const until = best === null ? "" : ` Flight ${best.number} is the best of the others.`;
     return `Flight ${trial.number} is scored from its record and used for the next gains.${until}`;
   }
-  const other = bestOfCounted(trials.filter(({ id }) => id !== trial.id));
+  const others = trials.filter(({ id }) => id !== trial.id);
+  const other = bestOfCounted(others);
   if (other === null) {
     return `No other flight is valid. Without flight ${trial.number}, the campaign restarts from its start gains.`;
   }
-  if (best?.id === trial.id)
-    return `Flight ${trial.number} is the best. Without it, flight ${other.number} becomes the best, and the next gains are recomputed.`;
+  if (best?.id === trial.id) {
+    const same = others.filter(({ state, gains }) => state === "valid" && sameHeld(gains, trial.gains));
+    const change = sameHeld(other.gains, trial.gains)
+      ? `the best gains stay, then known from ${flightsText(same.map(({ number }) => number))} only`
+      : `flight ${other.number} becomes the best`;
+    return `Flight ${trial.number} is the best. Without it, ${change}, and the next gains are recomputed.`;
+  }
   return `Flight ${other.number} remains the best. The next gains are recomputed without flight ${trial.number}.`;
 }
 
@@ -151,6 +164,34 @@ export function standingWithout(trial: Trial, trials: readonly Trial[]): string 
   const best = bestOfCounted(trials);
   if (best === null) return "No flight is valid now. The next gains are the start gains.";
   return `Flight ${best.number} is the best. The next gains are computed without flight ${trial.number}.`;
+}
+
+type Repeated = Pick<CampaignStatistics["groups"][number], "errors">;
+type Variant = "repeat" | "baseline";
+
+/** The flights that are missing until the best and the first gains have each flown twice. */
+export function confirmationOf(winner: Repeated | undefined, first: Repeated | undefined): Variant[] {
+  const missing = (variant: Variant, group: Repeated | undefined) =>
+    Array<Variant>(group === undefined ? 0 : Math.max(0, 2 - group.errors.length)).fill(variant);
+  return [...missing("repeat", winner), ...missing("baseline", first)];
+}
+
+/** What the flights of a confirmation are for. */
+export function confirmationText(plan: readonly Variant[]): string {
+  const of = (variant: Variant, gains: string) => {
+    const flights = plan.filter((one) => one === variant).length;
+    return flights === 0 ? [] : [`${count(flights, "more flight")} with the ${gains} gains`];
+  };
+  const parts = [...of("repeat", "best"), ...of("baseline", "first")];
+  return `The best and the first gains have to fly at least twice each: ${parts.join(" and ")}.`;
+}
+
+/** Why the campaign ended, without the verdict, which is shown beside it. */
+export function endingOf(
+  { stop_reason: reason }: Pick<Campaign, "stop_reason">,
+  comparison: Pick<NonNullable<CampaignStatistics["comparison"]>, "sentence"> | null,
+): string {
+  return comparison === null ? reason : reason.replace(comparison.sentence, "").replaceAll("  ", " ").trim();
 }
 
 /** Whether the best gains may become the vehicle's safe gains; if not, the reason and the action. */
