@@ -48,9 +48,10 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     assert min(errors) < 0.5 * errors[0]
     assert dashboard.get(f"/campaigns/{campaign_id}")["state"] == "finished"
     groups = dashboard.get(f"/campaigns/{campaign_id}/statistics")["groups"]
-    best = next(group for group in groups if group["is_best"])
+    winner = next(group for group in groups if group["is_best"])
+    best = trials[int(np.argmin(errors))]
     expect(dashboard.panel("Converged").or_(dashboard.panel("Flight budget used"))).to_contain_text(
-        printed(best["mean"], best["standard_error"])
+        f"{winner['mean']:.3f} m"  # without scatter, as the repeats of this simulation are identical
     )
     dashboard.open_tab("Error and gains")
     dashboard.until(lambda: len((dashboard.trace("errors", "measured") or {"y": []})["y"]) == len(errors))

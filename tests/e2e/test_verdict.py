@@ -52,7 +52,7 @@ def test_marking_the_best_invalid_says_what_it_changes_before_and_after_and_is_u
     assert dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["history_digest"] != before
 
     verdict.get_by_role("button", name="Undo: mark valid").click()
-    expect(verdict.get_by_text("best so far")).to_be_visible()
+    expect(verdict.get_by_role("heading", name=f"Flight {best['number']} · best so far")).to_be_visible()
     assert dashboard.get(f"/campaigns/{campaign_id}")["best"]["trial_number"] == best["number"]
 
 
