@@ -92,6 +92,7 @@ class ErrorsFigure:
             tickvals=[0],
             ticktext=["no error"],
             fixedrange=True,
+            automargin=False,
         )
         return {"yaxis2": strip}
 

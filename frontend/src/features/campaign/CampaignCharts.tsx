@@ -100,6 +100,8 @@ interface ByFlightProps {
 
 /** These charts are drawn again once the gains are at rest, so that the curve follows without delay. */
 const AT_REST_MS = 200;
+/** For a prediction so long; the marks of the gains before stay meanwhile. */
+const WAITS_MS = 1500;
 
 function nextOf({ gains, prediction, isCurrent }: Preview): NextFlight {
   const known = isCurrent ? prediction : null;
@@ -119,7 +121,7 @@ export const ByFlightPanels = memo(function ByFlightPanels({ campaignId, preview
   const theme = useComputedColorScheme("light");
   const errors = useCampaignFigure(campaignId, "errors", theme);
   const gains = useCampaignFigure(campaignId, "gains", theme);
-  const [rested] = useDebouncedValue(preview, AT_REST_MS);
+  const [rested] = useDebouncedValue(preview, preview?.isCurrent === false ? WAITS_MS : AT_REST_MS);
   const height = Math.max(LOWER_PX, PANEL_PX * ((gains.data?.table?.columns.length ?? 1) - 1));
   return (
     <>
