@@ -53,7 +53,8 @@ def test_its_figures_and_statistics_stand_without_predictions(client: TestClient
     cards = [get(client, f"/api/campaigns/{campaign['id']}/figures/{name}") for name in ("takeoffs", "errors", "gains")]
     cards.append(get(client, f"/api/trials/{trials[-1]['id']}/figure"))
     assert [card["state"] for card in cards] == ["ready"] * 4, [card["reason"] for card in cards]
-    drawn = [trace["name"] for card in cards for trace in card["figure"]["data"] if "name" in trace]
+    traces = [trace for card in cards for trace in card["figure"]["data"] if trace.get("visible", True)]
+    drawn = [trace["name"] for trace in traces if "name" in trace]
     assert not [name for name in drawn if "predict" in name.lower()]
     said = get(client, f"/api/campaigns/{campaign['id']}/statistics")
     assert said["track_record"]["of"] == 0

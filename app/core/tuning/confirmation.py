@@ -218,8 +218,13 @@ def _no_prospect(
 ) -> str:
     if proposal.kind == "none":
         return f"{NO_STEP} the strategy proposes none."
-    outlook = _describe_improvement(definition, experiment, now, left, proposal)
-    return f"{NO_STEP} {outlook[0].lower()}{outlook[1:]}"
+    improvement, unit = _predicted_improvement(now, proposal), experiment.error_unit
+    if improvement <= 0.0:
+        return f"{NO_STEP} it is not predicted to reduce the error."
+    return (
+        f"{NO_STEP} it would reduce the error by {short(improvement)} {unit}, less than the "
+        f"{short(_detectable_difference(definition, now, left))} {unit} that {count(left, 'flight')} can resolve."
+    )
 
 
 def _is_worth_a_step(definition: Definition, now: ComparisonState, left: int, proposal: Proposal) -> bool:
@@ -241,18 +246,15 @@ def _detectable_difference(definition: Definition, now: ComparisonState, left: i
 def _describe_improvement(
     definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal
 ) -> str:
-    """Predicted improvement of a step with what the remaining flights can resolve; empty for a `manual` proposal."""
+    """Predicted improvement of a step that is flown, and what the remaining flights can resolve; empty for a `manual`
+    proposal."""
     if proposal.kind == "manual":
         return ""
-    unit, improvement = experiment.error_unit, _predicted_improvement(now, proposal)
-    if improvement <= 0.0:
-        return "The next step is not predicted to reduce the error."
-    detectable = _detectable_difference(definition, now, left)
-    relation = "more than" if improvement >= detectable else "less than"
+    unit = experiment.error_unit
     return (
-        f"The next step is predicted to reduce the error by {short(improvement)} {unit}, {relation} the "
-        f"{short(detectable)} {unit} that {count(left, 'flight')} can resolve at {percent(definition.stop.confidence)} "
-        "confidence."
+        f"The next step is predicted to reduce the error by {short(_predicted_improvement(now, proposal))} {unit}, "
+        f"more than the {short(_detectable_difference(definition, now, left))} {unit} that {count(left, 'flight')} can "
+        f"resolve at {percent(definition.stop.confidence)} confidence."
     )
 
 
