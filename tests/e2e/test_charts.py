@@ -1,5 +1,7 @@
 """The charts of a campaign with a thousand flights: one flight seen everywhere, a zoom that shows more, small pages."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from playwright.sync_api import Locator, expect
@@ -101,6 +103,12 @@ _POINTED = """chart => Array.from(chart.querySelectorAll("[data-pointed]"), curv
 """Role and flight of the highlighted curves: of what is drawn, not of what its element is called."""
 
 
+def points_at(dashboard: Dashboard, flight: int) -> bool:
+    """Whether both curves of the flight are highlighted, and nothing else."""
+    pointed = dashboard.plot("takeoffs").evaluate(_POINTED)
+    return sorted(pointed) == [["deviation", flight], ["flight", flight]]
+
+
 def test_a_row_points_at_its_own_curves_after_flights_were_flown_on_the_open_page(
     dashboard: Dashboard, states: States
 ) -> None:
@@ -115,9 +123,7 @@ def test_a_row_points_at_its_own_curves_after_flights_were_flown_on_the_open_pag
     dashboard.open_tab("Flights")
     for flight in (1, 2, 3):
         row(dashboard, flight).hover()
-        dashboard.until(lambda: dashboard.plot("takeoffs").evaluate(_POINTED))
-        pointed = dashboard.plot("takeoffs").evaluate(_POINTED)
-        assert sorted(pointed) == [["deviation", flight], ["flight", flight]]
+        dashboard.until(partial(points_at, dashboard, flight))
 
 
 def place_of(chart: Locator, flight: int) -> tuple[float, float]:
