@@ -159,6 +159,10 @@ def test_the_answer_tells_what_was_measured_and_what_is_predicted() -> None:
         "proposed ones."
     )
     assert {"PSC_POSZ_P", "PSC_VELZ_P"} <= set(found.at_limit)
+    lines = (found.parameter_file("steps.bin") or "").splitlines()
+    assert lines[0].startswith("# Gainline, from steps.bin. Load on the ground")
+    assert lines[1] == "# PSC_POSZ_P was 1"
+    assert lines[-4:] == [f"{name},{value:g}" for name, value in found.proposed.gains.items()]
 
 
 def test_among_gains_that_deviate_alike_those_with_more_margin_are_proposed() -> None:

@@ -91,6 +91,12 @@ def test_the_accelerometer_s_filter_passes_half_the_power_at_its_cut_off() -> No
     assert np.ptp(behind[800:]) / np.ptp(wave[800:]) == pytest.approx(math.sqrt(0.5), rel=0.01)
 
 
+@pytest.mark.parametrize("cutoff_hz", [0.0, 200.0, 250.0])
+def test_a_filter_that_is_off_or_beyond_half_the_rate_is_none(cutoff_hz: float) -> None:
+    noise = np.random.default_rng(1).standard_normal(100)
+    assert filtered(noise, accelerometer_filter(cutoff_hz, STEP_S)) == pytest.approx(noise)
+
+
 def test_the_motors_reach_63_percent_within_their_lag() -> None:
     rise = filtered(np.concatenate([np.zeros(1), np.ones(400)]), motor_filter(0.1, STEP_S))
     assert rise[round(0.1 / STEP_S)] == pytest.approx(1.0 - math.exp(-1.0), abs=0.01)
