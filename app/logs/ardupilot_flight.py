@@ -21,7 +21,7 @@ from app.core.control.ardupilot_parameters import (
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
-from app.logs.dataflash import is_dataflash, read_tables
+from app.logs.dataflash import is_dataflash, parameters_in, read_tables
 from app.logs.flight_parts import LONGEST_INTERVAL_S, SHORTEST_PART_S, Manoeuvres, Part, Rows, find_parts, jumps
 from app.logs.readers import HEAD_BYTES, READERS
 
@@ -247,21 +247,16 @@ def _compensating_vibration(tables: Mapping[str, Table], time_s: Samples) -> Row
 
 def _parameter_history(tables: Mapping[str, Table]) -> _ParameterHistory:
     """Times at which parameters that the analysis uses took new values, with all values from then on."""
-    table = tables.get("PARM", {})
-    history = _ParameterHistory([], [], has_newer_names=False)
-    if not {"TimeUS", "Name", "Value"} <= table.keys():
-        return history
     newer = in_newer_names(dict.fromkeys(BOUNDS, 0.0)).keys()
-    names = [bytes(raw).partition(b"\0")[0].decode("ascii", "replace") for raw in table["Name"]]
-    at_s = (numbers(table["TimeUS"]) / 1e6).tolist()
+    history = _ParameterHistory([], [], has_newer_names=any(name in newer for _, name, _ in parameters_in(tables)))
     values: Parameters = {}
-    for time_s, each, logged in zip(at_s, names, numbers(table["Value"]).tolist(), strict=True):
-        parameter, value = in_older_names(each, logged)
+    for time_s, name, logged in parameters_in(tables):
+        parameter, value = in_older_names(name, logged)
         if parameter in _USED and np.isfinite(value) and values.get(parameter) != value:
             values = {**values, parameter: value}
             history.times_s.append(time_s)
             history.values.append(values)
-    return _ParameterHistory(history.times_s, history.values, has_newer_names=not newer.isdisjoint(names))
+    return history
 
 
 def _require_gains(given: Parameters, name: str) -> None:

@@ -12,7 +12,7 @@ from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, UNSUPPORTED, i
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
-from app.logs.dataflash import read_tables
+from app.logs.dataflash import parameters_in, read_tables
 
 _WANTED: Final = frozenset({"PSCD", "PIDA", "CTUN", "GUIP", "MODE", "PARM"})
 _MOTION: Final = ("PD", "DPD", "VD", "DVD", "DAD", "TVD")
@@ -82,17 +82,8 @@ def _longest_in_guided(
 
 def _values(tables: Mapping[str, Table], until_s: float) -> dict[str, float]:
     """Parameters by name as they were when the flight began."""
-    table = tables.get("PARM", {})
-    if not {"TimeUS", "Name", "Value"} <= table.keys():
-        return {}
     wanted = {*FIRMWARE_NAMES, *UNSUPPORTED, "SCHED_LOOP_RATE", "GUID_OPTIONS"}
-    names = [bytes(raw).partition(b"\0")[0].decode("ascii", "replace") for raw in table["Name"]]
-    values = numbers(table["Value"]).tolist()
-    logged = dict(
-        in_older_names(each, value)
-        for at_us, each, value in zip(numbers(table["TimeUS"]).tolist(), names, values, strict=True)
-        if at_us <= 1e6 * until_s
-    )
+    logged = dict(in_older_names(each, value) for at_s, each, value in parameters_in(tables) if at_s <= until_s)
     return {each: value for each, value in logged.items() if each in wanted}
 
 

@@ -10,6 +10,8 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core.control.ardupilot_parameters import GAINS as ARDUPILOT_GAINS
+from app.core.control.ardupilot_parameters import NEWER_NAMES
 from app.core.control.loop_log import GAINS
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
@@ -88,13 +90,11 @@ def _own_names(*names: str) -> Sequence[LoggedGain]:
 PAPARAZZI_SETS: Final[GainSets] = (_own_names(*GAINS),)
 
 ARDUPILOT_SETS: Final[GainSets] = (
-    _own_names("PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D"),
-    (
-        LoggedGain("PSC_D_POS_P", "PSC_POSZ_P"),
-        LoggedGain("PSC_D_VEL_P", "PSC_VELZ_P"),
-        LoggedGain("PSC_D_ACC_P", "PSC_ACCZ_P", 0.1),
-        LoggedGain("PSC_D_ACC_I", "PSC_ACCZ_I", 0.1),
-        LoggedGain("PSC_D_ACC_D", "PSC_ACCZ_D", 0.1),
+    _own_names(*ARDUPILOT_GAINS),
+    tuple(
+        LoggedGain(newer, older, 1.0 / factor)
+        for newer, (older, factor) in NEWER_NAMES.items()
+        if older in ARDUPILOT_GAINS
     ),
 )
 """Until 4.6, and from 4.7 on."""

@@ -135,6 +135,14 @@ def _table(data: Contents, kind: _Kind, places: "array[int]") -> Table:
     return {name: rows[name] / 100.0 if name in kind.hundredths else rows[name] for name in kind.dtype.names or ()}
 
 
+def parameters_in(tables: Mapping[str, Table]) -> Iterator[tuple[float, str, float]]:
+    """Time, s, name and value of each parameter, logged at the start of the log and at every change."""
+    table = tables.get("PARM", {})
+    if {"TimeUS", "Name", "Value"} <= table.keys():
+        names = (_text(bytes(raw)) for raw in table["Name"])
+        yield from zip(_seconds(table).tolist(), names, numbers(table["Value"]).tolist(), strict=True)
+
+
 def _text(raw: bytes) -> str:
     return raw.partition(b"\0")[0].decode("ascii", "replace")
 
@@ -161,14 +169,10 @@ def _altitude(tables: Mapping[str, Table]) -> tuple[Samples, dict[str, Samples],
 
 def _settings(tables: Mapping[str, Table]) -> Iterator[Setting]:
     """The gains, logged at the start of the log and at every change."""
-    table = tables.get("PARM", {})
     names = names_in(ARDUPILOT_SETS)
-    if not {"TimeUS", "Name", "Value"} <= table.keys():
-        return
-    for time_s, raw, value in zip(_seconds(table), table["Name"], numbers(table["Value"]), strict=True):
-        name = _text(bytes(raw))
+    for time_s, name, value in parameters_in(tables):
         if name in names and np.isfinite(value):
-            yield Setting(float(time_s), name, float(value))
+            yield Setting(time_s, name, value)
 
 
 def _moments(tables: Mapping[str, Table]) -> tuple[list[LogEvent], list[LogEvent], list[LogEvent]]:
