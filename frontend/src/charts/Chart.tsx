@@ -1,5 +1,5 @@
 import type { Plotly } from "plotly.js-basic-dist-min";
-import { useEffect, useRef, useState } from "react";
+import { useCallback, useEffect, useRef, useState } from "react";
 import type { TimeRange } from "../api/queries";
 import { liveNow } from "../live/store";
 import { afterPaint } from "../ui/throttle";
@@ -70,50 +70,55 @@ export function Chart({
   const [plotly, setPlotly] = useState<Plotly | null>(null); // once it has drawn
   const [broken, setBroken] = useState<string | null>(null);
   const queue = useRef<Promise<unknown>>(Promise.resolve());
-  const drawnFigure = useRef<PlotlyFigure | null>(null);
+  const drawn = useRef<{ figure: PlotlyFigure; prediction: Props["prediction"] } | null>(null);
   const latestPrediction = useRef(prediction);
   latestPrediction.current = prediction;
+  /** One drawing after the other; one that fails is told, and does not stop those after it. */
+  const enqueue = useCallback((draw: () => Promise<void>) => {
+    queue.current = queue.current
+      .then(draw)
+      .catch((error: unknown) => setBroken(error instanceof Error ? error.message : String(error)));
+  }, []);
 
   useEffect(() => {
     const target = element.current;
     if (target === null) return;
     let wanted = true;
-    queue.current = queue.current.then(async () => {
-      try {
-        const library = await loadPlotly(build);
-        if (drawnFigure.current !== figure) await afterPaint();
-        if (!wanted) return;
-        drawnFigure.current = figure;
-        const predicted = latestPrediction.current;
-        await library.react(
-          target,
-          withLive(predicted === undefined ? figure.data : withPrediction(figure.data, predicted), liveNow(liveTrial)),
-          layoutFor(figure, target.clientWidth),
-          CONFIG,
-        );
-        listen(target, figure.data, { whole: wholeOf(figure), onChoose, onPlace, onWindow, onReset });
-        setPlotly(library);
-        setBroken(null);
-      } catch (error) {
-        setBroken(error instanceof Error ? error.message : String(error));
-      }
+    enqueue(async () => {
+      const library = await loadPlotly(build);
+      if (drawn.current?.figure !== figure) await afterPaint();
+      if (!wanted) return;
+      const predicted = latestPrediction.current;
+      drawn.current = { figure, prediction: predicted };
+      await library.react(
+        target,
+        withLive(predicted === undefined ? figure.data : withPrediction(figure.data, predicted), liveNow(liveTrial)),
+        layoutFor(figure, target.clientWidth),
+        CONFIG,
+      );
+      listen(target, figure.data, { whole: wholeOf(figure), onChoose, onPlace, onWindow, onReset });
+      setPlotly(library);
+      setBroken(null);
     });
     return () => {
       wanted = false;
     };
-  }, [figure, liveTrial, onChoose, onPlace, onWindow, onReset, build]);
+  }, [figure, liveTrial, onChoose, onPlace, onWindow, onReset, build, enqueue]);
 
   useEffect(() => {
     const target = element.current;
     if (target === null || plotly === null || prediction === undefined) return;
     let wanted = true;
-    queue.current = queue.current.then(async () => {
-      if (wanted && drawnFigure.current === figure) await drawPrediction(plotly, target, figure.data, prediction);
+    enqueue(async () => {
+      const last = drawn.current;
+      if (!wanted || last?.figure !== figure || last.prediction === prediction) return;
+      drawn.current = { figure, prediction };
+      await drawPrediction(plotly, target, figure.data, prediction);
     });
     return () => {
       wanted = false;
     };
-  }, [plotly, figure, prediction]);
+  }, [plotly, figure, prediction, enqueue]);
 
   useEffect(() => {
     const target = element.current;
