@@ -192,8 +192,7 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
 
 
 def _choices(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow], advice: Advice) -> list[FlightChoice]:
-    flights = history.flown_gains(trials)
-    is_doubtful = row.kind == "start" and any(flight.gains == row.gains for flight in aborted_by_gains(flights))
+    is_doubtful = row.kind == "start" and bool(aborted_by_gains(history.flown_gains(trials), row.gains))
     return [
         FlightChoice(
             kind=kind,

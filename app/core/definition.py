@@ -188,6 +188,10 @@ def was_flown(gains: Gains, flights: Sequence[Flight]) -> bool:
     )
 
 
-def aborted_by_gains(flights: Sequence[Flight]) -> list[Flight]:
-    """The flights whose abort counts against their gains."""
-    return [flight for flight in flights if flight.outcome == "aborted" and flight.against_gains]
+def aborted_by_gains(flights: Sequence[Flight], gains: Gains | None = None) -> list[Flight]:
+    """The flights whose abort counts against their gains; only those with `gains` if they are given."""
+    return [
+        flight
+        for flight in flights
+        if flight.outcome == "aborted" and flight.against_gains and (gains is None or dict(flight.gains) == dict(gains))
+    ]

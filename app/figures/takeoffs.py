@@ -48,15 +48,13 @@ class TrajectoriesFigure:
     the experiment.
 
     Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, predicted
-    deviation, band, glitch, limit, live, pointed, off scale, off scale
-    deviation) and, for flights, `trial` and `standing` (best, latest,
-    baseline, earlier, invalid, unjudged). Every trace has its own `uid`: a flight's is `flight-` and its number, that
-    of its deviation `deviation-` and its number. The traces `live`, `live deviation` and `pointed` are empty: a page
-    fills the first two during a flight, the last with the flight under the pointer if that one has no curve of its own.
-    The altitude limit, `limit`, is hidden: the page on which a flight is observed shows it.
-
-    The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. A set point
-    of zero has no deviations: they would repeat the output.
+    deviation, band, glitch, limit, live, pointed, off scale, off scale deviation) and, for flights, `trial` and
+    `standing` (best, latest, baseline, earlier, invalid, unjudged). Every trace has its own `uid`: a flight's is
+    `flight-` and its number, that of its deviation `deviation-` and its number. The traces `live`, `live deviation` and
+    `pointed` are empty: a page fills the first two during a flight, the last with the flight under the pointer if that
+    one has no curve of its own. The altitude limit, `limit`, is hidden: the page on which a flight is observed shows
+    it. The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. A set
+    point of zero has no deviations: they would repeat the output.
     """
 
     history: History

@@ -15,16 +15,13 @@ from scipy.stats import qmc
 
 from app.core.analysis.proposal import BOUNDS
 from app.core.records.trajectory import Samples
+from bench.targets.flying import BudgetSpentError
 
 BUDGET: Final = 20
 _FIRST_STEP: Final = 0.25
 
 Gains = Mapping[str, float]
 _LOW, _HIGH = np.log(np.array(list(BOUNDS.values()))).T
-
-
-class _BudgetSpentError(Exception):
-    """The last flight has been flown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +42,7 @@ def nelder_mead(first: Gains, fly: Callable[[Gains], float], *, seed: int) -> li
     flown = _Flown(fly)
     start = _point(first)
     simplex = np.vstack((start, start + np.diag(np.where(start > 0.5, -_FIRST_STEP, _FIRST_STEP))))
-    with suppress(_BudgetSpentError):
+    with suppress(BudgetSpentError):
         minimize(
             flown.error,
             start,
@@ -60,7 +57,7 @@ def quadratic_models(first: Gains, fly: Callable[[Gains], float], *, seed: int) 
     """COBYQA: a quadratic model of the error within a trust region."""
     flown = _Flown(fly)
     start = _point(first)
-    with suppress(_BudgetSpentError):
+    with suppress(BudgetSpentError):
         minimize(
             flown.error,
             start,
@@ -75,7 +72,7 @@ def random_search(first: Gains, fly: Callable[[Gains], float], *, seed: int) -> 
     """Points that fill the bounds evenly (Sobol), in random order."""
     flown = _Flown(fly)
     points = qmc.Sobol(len(BOUNDS), rng=np.random.default_rng(seed)).random_base2(5)
-    with suppress(_BudgetSpentError):
+    with suppress(BudgetSpentError):
         for point in (_point(first), *points):
             flown.error(point)
     return flown.trials
@@ -89,7 +86,7 @@ SEARCHES: Final[Mapping[str, Callable[..., list[Trial]]]] = {
 
 
 class _Flown:
-    """The flights of a search; raises _BudgetSpentError instead of flying one too many."""
+    """The flights of a search; raises BudgetSpentError instead of flying one too many."""
 
     def __init__(self, fly: Callable[[Gains], float]) -> None:
         self._fly = fly
@@ -97,7 +94,7 @@ class _Flown:
 
     def error(self, point: Samples) -> float:
         if len(self.trials) == BUDGET:
-            raise _BudgetSpentError
+            raise BudgetSpentError
         values = np.exp(_LOW + np.clip(point, 0.0, 1.0) * (_HIGH - _LOW)).tolist()
         gains = dict(zip(BOUNDS, values, strict=True))
         self.trials.append(Trial(gains, self._fly(gains)))

@@ -116,7 +116,7 @@ def _start(
 def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flight]) -> str:
     """Source of the start gains, without a full stop; first the flights with these gains that were aborted."""
     source = f"{_ORIGIN[definition.start.kind]} ({format_gains(gains)})"
-    numbers = [flight.number for flight in aborted_by_gains(flights) if dict(flight.gains) == dict(gains)]
+    numbers = [flight.number for flight in aborted_by_gains(flights, gains)]
     if numbers:
         aborted = f"{named_flights(numbers).capitalize()} {'was' if len(numbers) == 1 else 'were'} aborted"
         return (

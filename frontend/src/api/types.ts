@@ -27,6 +27,7 @@ export type {
   OptionInfo,
   PresetInfo,
   Proposal,
+  RepeatGroup,
   Sort,
   SparkCurve,
   Trial,

@@ -60,7 +60,8 @@ export function stillUnderWay(ids: ReadonlySet<number>, underWay: ReadonlySet<nu
 
 /**
  * Abort by trial id. The request is repeated until the worker accepts it or the flight is over. `accepted` are the
- * flights whose abort it has accepted; both forget a flight that is over, because its trial may fly again. `trouble` is the reason why one has not been accepted yet.
+ * flights whose abort it has accepted; both forget a flight that is over, because its trial may fly again. `trouble` is
+ * the reason why one has not been accepted yet.
  */
 export function useAbort(flying: readonly FlyingCampaign[]) {
   const [asked, setAsked] = useState<ReadonlySet<number>>(new Set());

@@ -204,7 +204,7 @@ def _summary(
             f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
             f"{chosen.length:.4g} has the lowest predicted error: {short(chosen.predicted_error)} {unit}."
         )
-    aborted = any(dict(flight.gains) == best.gains for flight in aborted_by_gains(flights))
+    aborted = aborted_by_gains(flights, best.gains)
     why = "is refused by the gate" if refused else "was aborted" if aborted else "did not improve on it"
     return (
         f"{origin} The longer step in the same direction {why}, so the next one is shorter, {chosen.length:.4g} "

@@ -2,7 +2,7 @@ import { Button, Stack } from "@mantine/core";
 import { IconArchive, IconRepeat } from "@tabler/icons-react";
 import { useArchive, useReopen } from "../../api/mutations";
 import { useStatistics } from "../../api/queries";
-import type { Campaign, CampaignStatistics, Trial } from "../../api/types";
+import type { Campaign, CampaignStatistics, RepeatGroup, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { against, count, flightsText, percentChange } from "../../ui/format";
 import { GainList } from "../../ui/gains";
@@ -17,8 +17,6 @@ import classes from "./NextFlight.module.css";
 import { bestOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
 import { confirmationOf, confirmationText, endingOf, VERDICTS } from "./verdict";
-
-type RepeatGroup = CampaignStatistics["groups"][number];
 
 const FURTHER_FLIGHTS = 3;
 

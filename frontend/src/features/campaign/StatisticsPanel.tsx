@@ -1,7 +1,7 @@
 import { Stack } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { useStatistics } from "../../api/queries";
-import type { CampaignStatistics } from "../../api/types";
+import type { CampaignStatistics, RepeatGroup } from "../../api/types";
 import { Aside, toneOf } from "../../ui/Aside";
 import { count, flightNumbers } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
@@ -151,7 +151,7 @@ function Predictions({ record }: { record: CampaignStatistics["track_record"] })
 }
 
 /** Rows that stay in sight: the best and the first gains, and what was flown repeatedly. */
-function isKept({ is_best, is_baseline, trial_numbers }: CampaignStatistics["groups"][number]): boolean {
+function isKept({ is_best, is_baseline, trial_numbers }: RepeatGroup): boolean {
   return is_best || is_baseline || trial_numbers.length > 1;
 }
 

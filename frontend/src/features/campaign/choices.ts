@@ -2,10 +2,10 @@
 
 import type { GainSet } from "../../api/evaluation";
 import type { Problem } from "../../api/problems";
-import type { CampaignStatistics, FlightChoice, GainInfo, Gate, NewTrial, Proposal } from "../../api/types";
+import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal, RepeatGroup } from "../../api/types";
 import { flightsText, gainText, readNumber } from "../../ui/format";
 
-type RepeatGroup = Pick<CampaignStatistics["groups"][number], "trial_numbers">;
+type FlownGains = Pick<RepeatGroup, "trial_numbers">;
 
 export type ChoiceName = FlightChoice["kind"] | "own";
 
@@ -37,7 +37,7 @@ export function isDoubtful({
 }
 
 /** The flights of these gains, whose mean is the prediction of a repeat. */
-export function repeatSource(name: ChoiceName, group: RepeatGroup | undefined): string {
+export function repeatSource(name: ChoiceName, group: FlownGains | undefined): string {
   if (!isRepeat(name) || group === undefined) return "";
   return `${group.trial_numbers.length > 1 ? "mean" : "error"} of ${flightsText(group.trial_numbers)} with these gains`;
 }

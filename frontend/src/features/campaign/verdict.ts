@@ -1,6 +1,6 @@
 /** Texts and decisions about the result of a flight. */
 
-import type { Campaign, CampaignStatistics, Trial, Vehicle } from "../../api/types";
+import type { Campaign, CampaignStatistics, RepeatGroup, Trial, Vehicle } from "../../api/types";
 import { count, flightsText } from "../../ui/format";
 import { gainsInBrackets, inOrder, sameHeld } from "../../ui/gains";
 import { wasFlown } from "../../ui/states";
@@ -166,7 +166,7 @@ export function standingWithout(trial: Trial, trials: readonly Trial[]): string 
   return `Flight ${best.number} is the best. The next gains are computed without flight ${trial.number}.`;
 }
 
-type Repeated = Pick<CampaignStatistics["groups"][number], "errors">;
+type Repeated = Pick<RepeatGroup, "errors">;
 type Variant = "repeat" | "baseline";
 
 /** The flights that are missing until the best and the first gains have each flown twice. */
