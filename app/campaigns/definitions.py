@@ -20,6 +20,7 @@ from app.core.definition import Definition, problems_of_options
 from app.core.errors import InputError, Problem
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
+from app.core.tuning.confirmation import compare_winner
 from app.core.tuning.definition_checks import check_definition
 from app.db.models import CampaignRow, JsonObject, TrialRow
 from app.fleet.schemas import VehicleChoice
@@ -136,7 +137,7 @@ def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:
 def fill_in_donor(session: Session, asked: DefinitionIn) -> DefinitionIn:
     """Return the definition with the donor's trial number, checksum and gains filled in; unchanged without a donor.
 
-    The donor is the best valid flight of its campaign unless a trial is named. Its record and gains are fixed from then
+    The donor is the best flight with the best gains of its campaign unless a trial is named. Its record and gains are fixed from then
     on, whatever class the trial gets later. Raises InputError when there is no such flight, it belongs to another
     experiment or has another window, or its record does not match the checksum in the definition.
     """
@@ -164,7 +165,8 @@ def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
         raise _refused("campaign_id", difference)
     trials = history.trials_of(session, campaign.id)
     if named.trial_number is None:
-        found = history.best_of(trials)
+        now = compare_winner(definition_of(campaign), experiment_of_campaign(campaign), history.flown_gains(trials))
+        found = None if now is None else history.best_of([row for row in trials if row.number in now.winner.numbers])
     else:
         found = next((row for row in trials if row.number == named.trial_number), None)
     if found is None or found.trajectory is None or (not named.checksum and found.state != TrialState.VALID):

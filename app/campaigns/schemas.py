@@ -133,7 +133,7 @@ class CampaignEdit(Request):
 
 class Clone(Request):
     """A new campaign with the same definition, optionally on another vehicle, linked to this one. With `warm_start` it
-    starts from this one's best flight."""
+    starts from this one's best gains."""
 
     name: Name | None = None
     vehicle: VehicleChoice | None = None

@@ -284,6 +284,20 @@ def test_a_clone_on_another_vehicle_starts_from_the_best_flight(
     assert again.json()["definition"]["start"] == start
 
 
+def test_a_warm_start_takes_the_best_gains_and_not_those_of_one_lucky_flight(
+    client: TestClient, database: Database, donor: int
+) -> None:
+    fly(client, database, donor, 1.01, gains=OTHER)
+    fly(client, database, donor, 0.99, gains={"kp": 300, "ki": 20, "kd": 80})
+    campaign = get(client, f"/api/campaigns/{donor}")
+    assert (campaign["best"]["trial_number"], campaign["winner"]["trial_numbers"]) == (4, [2, 3])
+    (card,) = get(client, "/api/campaigns")["items"]
+    clone = client.post(f"/api/campaigns/{donor}/clone", json={"warm_start": True}).json()
+    start = clone["definition"]["start"]
+    assert start["gains"] == OTHER
+    assert start["donor"]["trial_number"] == card["best"]["trial_number"] == 2
+
+
 @pytest.mark.parametrize(
     ("settling_s", "decided", "agreement"),
     [

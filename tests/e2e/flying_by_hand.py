@@ -2,7 +2,7 @@
 
 import re
 
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Response, expect
 
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
@@ -82,33 +82,44 @@ def hold_button(page: Page) -> Locator:
     return page.get_by_role("button", name=re.compile("^(Hold to fly|Keep holding)"))
 
 
-def press(page: Page) -> None:
+def press(dashboard: Dashboard) -> None:
     """Put the finger on the button while the page's clock stands still, on an answer about readiness asked since.
 
     An answer holds for 4 s of that clock, which outruns the server: the jump leaves none from before, and of the two
-    that follow, the first may have been asked earlier.
+    that follow, the first may have been asked earlier. The page asks anew once it has read an answer, so its clock
+    goes on until it has.
     """
+    page = dashboard.page
     page.clock.pause_at(float(page.evaluate("Date.now()")) / 1000 + 5)
-    for _ in range(2):
-        with page.expect_response(re.compile("/readiness$")):
-            page.clock.run_for(ASK_MS + 200)
-    page.clock.run_for(50)
-    expect(hold_button(page)).to_be_enabled()
+    answered: list[Response] = []
+
+    def is_answered() -> bool:
+        page.clock.run_for(ASK_MS // 4)
+        return len(answered) >= 2 and hold_button(page).is_enabled()
+
+    def hear(response: Response) -> None:
+        if response.url.endswith("/readiness"):
+            answered.append(response)
+
+    page.on("response", hear)
+    dashboard.until(is_answered)
+    page.remove_listener("response", hear)
     middle_of(page, hold_button(page))
     page.mouse.down()
     expect(hold_button(page)).to_contain_text("Keep holding")
 
 
-def hold(page: Page, for_ms: int) -> None:
+def hold(dashboard: Dashboard, for_ms: int) -> None:
     """Press, and let the page's own clock run so far, and no further: it is one of `page.clock`."""
-    press(page)
+    page = dashboard.page
+    press(dashboard)
     page.clock.run_for(for_ms)
     page.mouse.up()
     page.clock.resume()
 
 
 def hold_until_it_flies(dashboard: Dashboard, trial_id: int) -> None:
-    hold(dashboard.page, HOLD_MS + 200)
+    hold(dashboard, HOLD_MS + 200)
     dashboard.until(lambda: dashboard.get(f"/trials/{trial_id}")["flight"]["take_off_at"] is not None)
 
 

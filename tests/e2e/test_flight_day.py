@@ -273,13 +273,13 @@ def is_over(dashboard: Dashboard, campaign_id: int) -> bool:
 def see_the_result(dashboard: Dashboard, campaign_id: int) -> None:
     campaign = dashboard.get(f"/campaigns/{campaign_id}")
     assert campaign["outcome"] == "converged"
-    best, trials = campaign["best"], dashboard.trials(campaign_id)
+    best, winner, trials = campaign["best"], campaign["winner"], dashboard.trials(campaign_id)
     valid = [trial for trial in trials if trial["state"] == "valid"]
     assert [trial["state"] for trial in trials[:3]] == ["valid", "aborted", "invalid"]
     assert best["error"] == min(trial["error"] for trial in valid) < 0.8 * valid[0]["error"]
     result = dashboard.panel("Converged")
     expect(result).to_contain_text("Best gains (flight")
-    expect(result).to_contain_text(printed(best["mean"], best["standard_error"]))
+    expect(result).to_contain_text(printed(winner["mean"], winner["standard_error"]))
     dashboard.until(lambda: len((dashboard.trace("errors", "measured") or {"y": []})["y"]) == len(valid))
     measured = dashboard.trace("errors", "measured")
     assert measured is not None
@@ -308,7 +308,7 @@ def open_the_report(dashboard: Dashboard, campaign_id: int) -> None:
     statistics = dashboard.get(f"/campaigns/{campaign_id}/statistics")
     (best,) = [group for group in statistics["groups"] if group["is_best"]]
     expect(report.get_by_role("heading", level=1)).to_have_text(NAME)
-    expect(report.locator(".headline")).to_contain_text(printed(best["mean"], best["standard_error"]))
+    expect(report.locator(".headline")).to_contain_text(printed(winner["mean"], winner["standard_error"]))
     expect(report.locator(".verdict")).to_have_text(statistics["comparison"]["sentence"])
     assert runs_of(report) == [runs_row(trial, statistics["sigma"]) for trial in dashboard.trials(campaign_id)]
     keep(report, "report")
@@ -332,7 +332,7 @@ def see_the_list(dashboard: Dashboard, campaign_id: int) -> None:
     card = dashboard.page.get_by_role("listitem").filter(
         has=dashboard.page.get_by_role("heading", name=NAME, exact=True)
     )
-    expect(card).to_contain_text(printed(best["mean"], best["standard_error"]))
+    expect(card).to_contain_text(printed(winner["mean"], winner["standard_error"]))
     expect(card).to_contain_text("Converged")
     picture(dashboard, "list")
 

@@ -159,7 +159,7 @@ def slow_answers(page: Page) -> Iterator[None]:
 def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
     take_control(dashboard)
     stage(dashboard, len(TRIED))
-    hold(dashboard.page, HOLD_MS - 300)
+    hold(dashboard, HOLD_MS - 300)
     hold_button(dashboard.page).focus()
     for key in ("Enter", "Space"):
         dashboard.page.keyboard.down(key)

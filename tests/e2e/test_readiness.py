@@ -145,7 +145,7 @@ def test_after_a_restart_of_the_drone_no_tick_stands_beside_gains_that_it_no_lon
 
 def test_a_hold_that_the_pages_own_stall_broke_says_so(dashboard: Dashboard, trial_id: int) -> None:
     page = dashboard.page
-    press(page)
+    press(dashboard)
     page.clock.run_for(300)
     page.clock.fast_forward(1500)
     expect(page.get_by_role("status").filter(has_text="Hold interrupted")).to_have_text(

@@ -2,7 +2,7 @@ import { Button, Stack } from "@mantine/core";
 import { IconArchive, IconRepeat } from "@tabler/icons-react";
 import { useArchive, useReopen } from "../../api/mutations";
 import { useStatistics } from "../../api/queries";
-import type { Campaign, CampaignStatistics, RepeatGroup, Trial } from "../../api/types";
+import type { Campaign, CampaignStatistics, RepeatGroup } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { against, count, flightsText, percentChange } from "../../ui/format";
 import { GainList } from "../../ui/gains";
@@ -14,7 +14,6 @@ import { confidenceText, plusMinus } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
 import { CloneForm } from "../campaigns/CloneForm";
 import classes from "./NextFlight.module.css";
-import { bestOf } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
 import { confirmationOf, confirmationText, endingOf, VERDICTS } from "./verdict";
 
@@ -28,14 +27,13 @@ const STANDINGS: Record<NonNullable<Campaign["standing"]>, { word: string; meani
 
 interface Props {
   campaign: Campaign;
-  trials: readonly Trial[];
   onChoose: (trialNumber: number) => void;
   /** Whether another card has the next action. */
   isSecondary: boolean;
 }
 
 /** The campaign's result, and its next actions. */
-export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props) {
+export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
   const archive = useArchive(campaign.id);
   const reopen = useReopen(campaign.id);
   const statistics = useStatistics(campaign.id).data;
@@ -45,7 +43,7 @@ export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props)
   const isCandidate = missing.length > 0;
   const further = isCandidate ? missing.length : FURTHER_FLIGHTS;
   const experiment = campaign.definition.experiment ?? "";
-  const best = bestOf(campaign, trials);
+  const bestFlight = winner === undefined ? null : bestFlightOf(winner);
   const title = campaignStateLabel("finished", campaign.outcome).word;
   const reason = endingOf(campaign, statistics?.comparison ?? null);
   return (
@@ -72,14 +70,14 @@ export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props)
           </Button>
         )}
         <ErrorNotice error={reopen.error} />
-        {best !== null && (
-          <Button variant="default" onClick={() => onChoose(best.number)}>
-            Show flight {best.number}
+        {bestFlight !== null && (
+          <Button variant="default" onClick={() => onChoose(bestFlight)}>
+            Show flight {bestFlight}
           </Button>
         )}
         <PromoteGains campaign={campaign} />
         <Note fz="body">A clone is a new campaign with the same settings.</Note>
-        <CloneForm {...campaign} experiment={experiment} />
+        <CloneForm {...campaign} experiment={experiment} bestFlight={bestFlight} />
         {campaign.actions.includes("archive") && (
           <Button
             variant="subtle"
@@ -96,6 +94,11 @@ export function FinishedCard({ campaign, trials, onChoose, isSecondary }: Props)
       </Stack>
     </Panel>
   );
+}
+
+/** Number of the flight with the lowest error, the earliest of equals. */
+function bestFlightOf({ trial_numbers, errors }: RepeatGroup): number | null {
+  return trial_numbers[errors.indexOf(Math.min(...errors))] ?? null;
 }
 
 interface ResultProps {

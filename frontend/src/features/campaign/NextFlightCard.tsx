@@ -47,7 +47,7 @@ function Step(props: Props & { isSecondary?: boolean }) {
     case "flying":
       return <FlyingCard campaign={campaign} trial={trials.find(({ id }) => id === step.trialId)} step={step} />;
     case "finished":
-      return <FinishedCard campaign={campaign} trials={trials} onChoose={onChoose} isSecondary={isSecondary} />;
+      return <FinishedCard campaign={campaign} onChoose={onChoose} isSecondary={isSecondary} />;
     case "rehearse":
       return <RehearsalCard campaign={campaign} />;
     case "planned":

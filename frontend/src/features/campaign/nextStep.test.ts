@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Campaign, NextFlight, Proposal, Trial } from "../../api/types";
-import { bestOf, flyingStage, nextStep, STAGED, speedOf } from "./nextStep";
+import { flyingStage, nextStep, STAGED, speedOf } from "./nextStep";
 
 const campaign = {
   state: "deciding",
@@ -81,9 +81,4 @@ test("a finished campaign offers no flight", () => {
 
 test("the speed is ten times life unless somebody chose another", () => {
   expect([speedOf("1"), speedOf("10"), speedOf("max"), speedOf("nonsense")]).toEqual([1, 10, null, 10]);
-});
-
-test("the best flight is found among the trials", () => {
-  expect(bestOf(campaign, [trial(6, "valid"), trial(7, "valid")])?.id).toBe(7);
-  expect(bestOf(campaign, [])).toBeNull();
 });

@@ -72,8 +72,3 @@ export function speedOf(value: string): Speed {
   const found = SPEEDS.find((one) => one.value === value);
   return found === undefined ? 10 : found.speed;
 }
-
-/** The trial of the campaign's best flight. */
-export function bestOf(campaign: Campaign, trials: readonly Trial[]): Trial | null {
-  return trials.find((trial) => trial.id === campaign.best?.trial_id) ?? null;
-}

@@ -59,7 +59,7 @@ function More({ campaign }: { campaign: CampaignSummary }) {
       </summary>
       {open && (
         <Stack gap={10} pb={12}>
-          <CloneForm {...campaign} />
+          <CloneForm {...campaign} bestFlight={campaign.best?.trial_number ?? null} />
           {campaign.state === "finished" && (
             <Button
               variant="default"

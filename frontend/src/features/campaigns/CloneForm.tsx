@@ -12,12 +12,14 @@ import { ErrorNotice } from "../../ui/Notices";
 import classes from "./NewCampaign.module.css";
 import { kindsFor, registeredFor } from "./newCampaign";
 
-interface Props extends Pick<Campaign, "id" | "vehicle" | "best"> {
+interface Props extends Pick<Campaign, "id" | "vehicle"> {
   experiment: string;
+  /** Number of the best flight with the best gains. */
+  bestFlight: number | null;
 }
 
 /** Clone with the same settings, on this vehicle or another, from the start gains or this campaign's best. */
-export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props) {
+export function CloneForm({ id: origin, vehicle: own, bestFlight, experiment }: Props) {
   const navigate = useNavigate();
   const ownKey = own.registered ? String(own.id) : own.kind;
   const [vehicle, setVehicle] = useState(ownKey);
@@ -39,11 +41,11 @@ export function CloneForm({ id: origin, vehicle: own, best, experiment }: Props)
         value={vehicle}
         onChange={setVehicle}
       />
-      {best !== null && (
+      {bestFlight !== null && (
         <div className={classes["start"]}>
           <Switch
             size="md"
-            label={`Start from flight ${best.trial_number}`}
+            label={`Start from flight ${bestFlight}`}
             checked={warm}
             onChange={(event) => setWarm(event.currentTarget.checked)}
           />
