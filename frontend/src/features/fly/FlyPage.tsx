@@ -19,7 +19,7 @@ import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
-import { type FlyStep, flyStateLabel, flyStep, isAbortStep } from "./flyScreen";
+import { type FlyStep, flyStateLabel, flyStep, hasLanded, isAbortStep, isAirborneStep } from "./flyScreen";
 import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
@@ -71,14 +71,16 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const readiness = useReadiness(trial.id, vehicle?.id ?? null);
   const isReady = readiness?.is_ready ?? false;
   const isHeld = readiness?.steps.includes("staged") === true;
+  const flightId = trial.flight?.id ?? null;
+  const hasFlown = useLatched(flightId, isAirborneStep(status?.status.step));
   const { word, tone } = flyStateLabel(trial, step, status, {
     quarantined,
     readiness,
-    phase: live?.phase ?? null,
+    hasLanded: hasFlown || hasLanded(live?.phase ?? null),
   });
   const isFlying = step === "flying";
   const isAborting = abortStage(trial.id, abort) === "accepted" || isAbortStep(status?.status.step);
-  const isAborted = useIsAborted(trial.flight?.id ?? null, isFlying && isAborting);
+  const isAborted = useLatched(flightId, isFlying && isAborting);
   const watching = useReadOnlyReason(vehicle);
   const barred = BARRED.has(step) && (quarantined || watching !== null);
   const steps = {
@@ -147,11 +149,11 @@ function Screen({ campaign, trial, vehicle }: Props) {
   );
 }
 
-/** Whether this flight was aborted while the page watched: its later steps on the ground do not tell. */
-function useIsAborted(flightId: number | null, isAborting: boolean): boolean {
-  const aborted = useRef<number | null>(null);
-  if (isAborting) aborted.current = flightId;
-  return flightId !== null && aborted.current === flightId;
+/** Whether something was seen of this flight while the page watched: its later steps on the ground do not tell. */
+function useLatched(flightId: number | null, isSeen: boolean): boolean {
+  const seen = useRef<number | null>(null);
+  if (isSeen) seen.current = flightId;
+  return flightId !== null && seen.current === flightId;
 }
 
 function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure | null; summary: string } {

@@ -2,7 +2,16 @@ import { expect, test } from "vitest";
 import type { Trial } from "../../api/types";
 import type { Loss, Readiness } from "../../live/readiness";
 import { aged, statusFrom } from "../../live/vehicleStatus";
-import { areReadBackSince, flyStateLabel, flyStep, gainTicks, isAbortStep, secondsLeft } from "./flyScreen";
+import {
+  areReadBackSince,
+  flyStateLabel,
+  flyStep,
+  gainTicks,
+  hasLanded,
+  isAbortStep,
+  isAirborneStep,
+  secondsLeft,
+} from "./flyScreen";
 
 type Flight = NonNullable<Trial["flight"]>;
 
@@ -65,10 +74,23 @@ test("the word in flight is the vehicle's own step, and a silent vehicle is neve
 test("after touchdown it restores the safe gains, until the record is stored; it does not start again", () => {
   const trial = { state: "flying", flight } as const;
   const around = { quarantined: false, readiness: null };
-  const word = (phase: string | null) =>
-    flyStateLabel(trial, "flying", statusAt("idle", 0.1), { ...around, phase }).word;
-  const restoring = "Landed, restoring safe gains";
-  expect([word("flying"), word("landed"), word("ended")]).toEqual(["Starting", restoring, restoring]);
+  const word = (hasLanded: boolean) =>
+    flyStateLabel(trial, "flying", statusAt("idle", 0.1), { ...around, hasLanded }).word;
+  expect([word(false), word(true)]).toEqual(["Starting", "Landed, restoring safe gains"]);
+  expect(["flying", "landed", "ended", null].map(hasLanded)).toEqual([false, true, true, false]);
+});
+
+test("a vehicle that refuses to arm has not been in the air", () => {
+  expect(["idle", "arm", "take-off", "record", "land", "abort-land", "disarm", undefined].map(isAirborneStep)).toEqual([
+    false,
+    false,
+    true,
+    true,
+    true,
+    true,
+    false,
+    false,
+  ]);
 });
 
 test("an aborted flight and one whose link is lost end before their record is complete", () => {

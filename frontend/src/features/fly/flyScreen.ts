@@ -75,11 +75,12 @@ function stagedLabel(readiness: Readiness | null): StateLabel {
 interface Around {
   quarantined: boolean;
   readiness: Readiness | null;
-  /** From the event stream. */
-  phase?: string | null;
+  /** Whether it has flown, for a vehicle that is on the ground now. */
+  hasLanded?: boolean;
 }
 
-function hasLanded(phase: string | null): boolean {
+/** Whether the flight is over, by its phase from the event stream. */
+export function hasLanded(phase: string | null): boolean {
   return phase === "landed" || phase === "ended";
 }
 
@@ -88,7 +89,7 @@ export function flyStateLabel(
   trial: Standing,
   step: FlyStep,
   status: Aged | null,
-  { quarantined, readiness, phase = null }: Around,
+  { quarantined, readiness, hasLanded = false }: Around,
 ): StateLabel {
   if (step === "flying" && status !== null) {
     const away = readiness?.losses.map(({ kind }) => AWAY[kind]).find((word) => word !== undefined);
@@ -97,11 +98,18 @@ export function flyStateLabel(
     if (IN_FLIGHT.has(status.status.step)) {
       return { word: stepWord(status.status.step), tone: isAbortStep(status.status.step) ? "bad" : "busy" };
     }
-    if (!quarantined) return { word: hasLanded(phase) ? "Landed, restoring safe gains" : "Starting", tone: "busy" };
+    if (!quarantined) return { word: hasLanded ? "Landed, restoring safe gains" : "Starting", tone: "busy" };
   }
   if (quarantined) return { word: "Quarantined", tone: "bad" };
   if (step === "over" || (step === "judge" && trial.state === "lost")) return trialStateLabel(trial.state);
   return step === "staged" ? stagedLabel(readiness) : WORDS[step];
+}
+
+const AIRBORNE: ReadonlySet<string> = new Set(["take-off", "record", "land", "abort-land"]);
+
+/** Whether the vehicle is in the air in this step. */
+export function isAirborneStep(step: string | undefined): boolean {
+  return step !== undefined && AIRBORNE.has(step);
 }
 
 const ABORTED: ReadonlySet<string> = new Set(["abort-land", "link lost"]);
