@@ -137,9 +137,9 @@ def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:
 def fill_in_donor(session: Session, asked: DefinitionIn) -> DefinitionIn:
     """Return the definition with the donor's trial number, checksum and gains filled in; unchanged without a donor.
 
-    The donor is the best flight with the best gains of its campaign unless a trial is named. Its record and gains are fixed from then
-    on, whatever class the trial gets later. Raises InputError when there is no such flight, it belongs to another
-    experiment or has another window, or its record does not match the checksum in the definition.
+    The donor is the best flight with the best gains of its campaign unless a trial is named. Its record and gains are
+    fixed from then on, whatever class the trial gets later. Raises InputError when there is no such flight, it belongs
+    to another experiment or has another window, or its record does not match the checksum in the definition.
     """
     named = asked.start.donor
     if named is None or asked.start.kind != "campaign":

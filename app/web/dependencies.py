@@ -3,14 +3,16 @@ are spooled while they arrive.
 """
 
 import hashlib
+import json
 import tempfile
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Annotated, BinaryIO, Final, TypeVar
 
 from fastapi import Depends, Header, Path, Query, Request
-from pydantic import BaseModel
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, ValidationError
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
@@ -160,30 +162,48 @@ _CSV: Final = "text/csv"
 _ANY: Final = "application/octet-stream"
 
 _BINARY: Final = {"schema": {"type": "string", "format": "binary"}}
+_RECORD_FIELDS: Final = {
+    "file": {"type": "string", "format": "binary"},
+    "companion": {
+        "type": "string",
+        "format": "binary",
+        "description": "the .log file that Paparazzi writes next to a .data file",
+    },
+}
 REQUEST_BODY: Final = {
     "requestBody": {
         "required": True,
         "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file"],
-                    "properties": {
-                        "file": {"type": "string", "format": "binary"},
-                        "companion": {
-                            "type": "string",
-                            "format": "binary",
-                            "description": "the .log file that Paparazzi writes next to a .data file",
-                        },
-                    },
-                }
-            },
+            "multipart/form-data": {"schema": {"type": "object", "required": ["file"], "properties": _RECORD_FIELDS}},
             _CSV: _BINARY,
             _ANY: _BINARY,
         },
     }
 }
 """Request body of a flight record, for OpenAPI."""
+
+PLANNED_RECORD_BODY: Final = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file", "trial"],
+                    "properties": {
+                        **_RECORD_FIELDS,
+                        "trial": {
+                            "type": "string",
+                            "contentMediaType": "application/json",
+                            "description": "the trial to plan, as JSON: proposal_id, gains or variant; note",
+                        },
+                    },
+                }
+            }
+        },
+    }
+}
+"""Request body of a flight record with the trial that it belongs to, for OpenAPI."""
 
 FILE_BODY: Final = {
     "requestBody": {
@@ -202,11 +222,12 @@ FILE_BODY: Final = {
 @dataclass(frozen=True, slots=True)
 class Upload:
     """A completely received record, and the transaction that may store it; `name` is its file name, empty if not
-    given."""
+    given, and `fields` are the other fields of its form."""
 
     file: BinaryIO
     name: str
     companion: BinaryIO | None
+    fields: Mapping[str, str]
     once: IdempotentRequest
 
     def content(self) -> bytes:
@@ -221,9 +242,23 @@ class Upload:
         self.companion.seek(0)
         return self.companion.read()
 
+    def read_field(self, name: str, kind: type[M]) -> M:
+        """A form field that holds JSON. Raises InputError when it does not, and RequestValidationError that names what
+        is wrong in it."""
+        try:
+            return kind.model_validate(json.loads(self.fields.get(name, "null")))
+        except json.JSONDecodeError as error:
+            problem = Problem(name, f"is not JSON: {error}")
+            raise InputError(
+                f"The form field `{name}` is not JSON.", hint="Correct it.", problems=(problem,)
+            ) from error
+        except ValidationError as error:
+            found = [{**each, "loc": ("body", name, *each["loc"])} for each in error.errors()]
+            raise RequestValidationError(found) from error
 
-_Received = tuple[BinaryIO, str, BinaryIO | None, str]
-"""File, file name, companion file, and the digest of both."""
+
+_Received = tuple[BinaryIO, str, BinaryIO | None, Mapping[str, str], str]
+"""File, file name, companion file, the form's other fields, and the digest of all but the name."""
 
 
 async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyKey = None) -> AsyncIterator[Upload]:
@@ -234,9 +269,9 @@ async def _upload(request: Request, database: CurrentDatabase, key: IdempotencyK
             f"A record of type {kind or 'unknown'} is not accepted here.",
             hint=f"Send the file as `Content-Type: {_ANY}`, or as the form field `file`.",
         )
-    async with arriving(request) as (file, name, companion, digest):
+    async with arriving(request) as (file, name, companion, fields, digest):
         once = IdempotentRequest(database, key, fingerprint(request, f"{request.url.query} {digest}"))
-        yield Upload(file, name, companion, once)
+        yield Upload(file, name, companion, fields, once)
 
 
 @asynccontextmanager
@@ -246,7 +281,7 @@ async def _raw(request: Request) -> AsyncIterator[_Received]:
         async for chunk in request.stream():
             digest.update(chunk)
             await run_in_threadpool(spool.write, chunk)
-        yield spool, "", None, digest.hexdigest()  # type: ignore[misc]  # it reads and seeks as BinaryIO does
+        yield spool, "", None, {}, digest.hexdigest()  # type: ignore[misc]  # it reads and seeks as BinaryIO does
 
 
 @asynccontextmanager
@@ -263,8 +298,10 @@ async def _form(request: Request) -> AsyncIterator[_Received]:
         for each in (part, companion):
             while each is not None and (chunk := await each.read(_CHUNK_BYTES)):
                 digest.update(chunk)
+        fields = {name: value for name, value in form.items() if isinstance(value, str)}
+        digest.update(json.dumps(fields, sort_keys=True).encode())
         beside = None if companion is None else companion.file
-        yield part.file, part.filename or "", beside, digest.hexdigest()
+        yield part.file, part.filename or "", beside, fields, digest.hexdigest()
 
 
 def _part(form: FormData, name: str) -> UploadFile | None:

@@ -119,8 +119,10 @@ class BodyLimitMiddleware:
     def __init__(self, app: ASGIApp, *, upload_bytes: int, refuse: Callable[[GainlineError], Response]) -> None:
         self._app = app
         record = "a flight record has at most 200 000 rows, so downsample or trim a longer one"
+        of_flight = _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs")
         self._uploads = {
-            "/trajectory": _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs"),
+            "/trajectory": of_flight,
+            "/records": of_flight,
             "/controller-checks": _Limit("file", upload_bytes, "`gainline controller check` reads larger logs"),
             "/log-analyses": _Limit("file", upload_bytes, "`gainline analyze` reads larger logs"),
             "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),

@@ -17,8 +17,8 @@ from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
-from app.campaigns.trials.schemas import NewTrial, Trial
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
+from app.campaigns.trials.schemas import Trial, TrialPlan
 from app.campaigns.trials.service import check_flown_gains, create_trial, require_open
 from app.campaigns.trials.views import trajectory_view, trial_view
 from app.common.conflict_checks import check_action
@@ -270,6 +270,21 @@ def import_record(
     return trial_view(session, campaign, row)
 
 
+def plan_and_import(
+    session: Session,
+    campaign_id: int,
+    plan: TrialPlan,
+    flown: Takeoff,
+    context: RequestContext,
+    *,
+    confirmed: bool,
+    invalid: bool,
+) -> Trial:
+    """Plan a trial and import its record. Raises what `create_trial` and `import_record` raise."""
+    planned = create_trial(session, campaign_id, plan, context)
+    return import_record(session, planned.id, flown, context, confirmed=confirmed, invalid=invalid)
+
+
 def import_into_campaign(
     session: Session, campaign: str, flown: Takeoff, *, number: int | None, confirmed: bool, invalid: bool
 ) -> Trial:
@@ -301,7 +316,7 @@ def import_into_campaign(
             f"Campaign {campaign_id} has ended.", hint="Reopen it on its page to import another flight, then try again."
         )
     proposal = proposals.require_fresh_proposal(session, row)
-    planned = create_trial(session, campaign_id, NewTrial(proposal_id=proposal.id))
+    planned = create_trial(session, campaign_id, TrialPlan(proposal_id=proposal.id))
     return import_record(session, planned.id, flown, confirmed=confirmed, invalid=invalid)
 
 

@@ -15,10 +15,12 @@ from app.campaigns.trials.schemas import (
     Trial,
     TrialEdit,
     TrialPhoto,
+    TrialPlan,
 )
 from app.common.schemas import Gate, Page
 from app.web.dependencies import (
     FILE_BODY,
+    PLANNED_RECORD_BODY,
     REQUEST_BODY,
     CurrentSettings,
     CursorText,
@@ -162,20 +164,47 @@ uploads = APIRouter(prefix="/api", tags=["trials"])
 """A router of its own, because the request bodies are not JSON."""
 
 
+TakeoffNumber = Annotated[int | None, Query(ge=1, le=10_000, description="number of the takeoff in a log with several")]
+OtherGains = Annotated[
+    bool, Query(description="accept a log that was flown with other gains; the trial takes the gains in the log")
+]
+Unscored = Annotated[
+    bool, Query(description="accept a record that cannot be scored, for instance because it ends too early")
+]
+
+
+@uploads.post(
+    "/campaigns/{campaign_id}/records", status_code=status.HTTP_201_CREATED, openapi_extra=PLANNED_RECORD_BODY
+)
+def import_flight(
+    record: Record,
+    asking: RequestContextDep,
+    campaign_id: Id,
+    takeoff: TakeoffNumber = None,
+    confirm: OtherGains = False,
+    invalid: Unscored = False,
+) -> Trial:
+    """Plan the trial in the form field `trial` and upload its record, as one operation: nothing is planned when the
+    record is refused."""
+    plan = record.read_field("trial", TrialPlan)
+    flown = records.read_upload(record.content(), name=record.name, takeoff=takeoff, companion=record.read_companion())
+    return record.once(
+        Trial,
+        lambda session: records.plan_and_import(
+            session, campaign_id, plan, flown, asking, confirmed=confirm, invalid=invalid
+        ),
+        ahead=lambda session: service.warm_gate_cache_for_new(session, campaign_id, plan),
+    )
+
+
 @uploads.post("/trials/{trial_id}/trajectory", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
 def upload_trajectory(
     record: Record,
     asking: RequestContextDep,
     trial_id: Id,
-    takeoff: Annotated[
-        int | None, Query(ge=1, le=10_000, description="number of the takeoff in a log with several")
-    ] = None,
-    confirm: Annotated[
-        bool, Query(description="accept a log that was flown with other gains; the trial takes the gains in the log")
-    ] = False,
-    invalid: Annotated[
-        bool, Query(description="accept a record that cannot be scored, for instance because it ends too early")
-    ] = False,
+    takeoff: TakeoffNumber = None,
+    confirm: OtherGains = False,
+    invalid: Unscored = False,
 ) -> Trial:
     """Upload the record of a flight flown elsewhere, or the recovered record of a lost flight.
 

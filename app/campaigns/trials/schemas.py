@@ -19,11 +19,11 @@ class FlightOrder(Request):
     speed: Speed | None = 10.0
 
 
-class NewTrial(Request):
-    """A trial of a proposal, of custom gains, or of a variant: exactly one of the three. With `fly` it is flown at
-    once. Variants: `smaller step`, halfway from the best gains to the proposal; `repeat`, the best gains again;
-    `baseline`, the first flight's gains again. A variant with `gains` is refused when these are not its gains: it then
-    flies what its client has shown, or nothing."""
+class TrialPlan(Request):
+    """A trial of a proposal, of custom gains, or of a variant: exactly one of the three. Variants: `smaller step`,
+    halfway from the best gains to the proposal; `repeat`, the best gains again; `baseline`, the first flight's gains
+    again. A variant with `gains` is refused when these are not its gains: it then flies what its client has shown, or
+    nothing."""
 
     proposal_id: Annotated[int, Field(ge=1, le=2**63 - 1, strict=True)] | None = None
     gains: Annotated[dict[str, Number], Field(max_length=50, examples=[{"kp": 283, "ki": 13, "kd": 82}])] | None = None
@@ -33,6 +33,11 @@ class NewTrial(Request):
         Field(description="reason to fly gains that the gate refuses; simulated vehicles only"),
     ] = None
     note: Text = ""
+
+
+class NewTrial(TrialPlan):
+    """A trial to plan. With `fly` it is flown at once."""
+
     fly: FlightOrder | None = None
 
 

@@ -16,7 +16,7 @@ from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.schemas import Campaign, Variant
-from app.campaigns.trials.schemas import NewTrial, Reopening, Trial, TrialEdit
+from app.campaigns.trials.schemas import Reopening, Trial, TrialEdit, TrialPlan
 from app.campaigns.trials.views import trial_view, trial_views
 from app.campaigns.variants import gains_of
 from app.common.conflict_checks import check_action, check_version
@@ -153,8 +153,8 @@ def get_trial(session: Session, trial_id: int) -> Trial:
     return _seen(session, repository.get_trial(session, trial_id))
 
 
-def create_trial(session: Session, campaign_id: int, new: NewTrial, context: RequestContext = LOCAL_CLI) -> Trial:
-    """Plan a trial; `fly` is not read here.
+def create_trial(session: Session, campaign_id: int, new: TrialPlan, context: RequestContext = LOCAL_CLI) -> Trial:
+    """Plan a trial.
 
     Raises ConflictError for a stale proposal, an unclassified flight, a spent budget, a campaign that is over or not
     ready; GainsError that names what the gate refuses, unless that is overruled; and NotAllowedError when the client
@@ -189,11 +189,11 @@ def reopen_campaign(session: Session, campaign_id: int, asked: Reopening, contex
     """Reopen a finished campaign, and plan trials. Raises what `create_trial` and `campaigns.reopen_campaign` raise."""
     campaigns.reopen_campaign(session, campaign_id, asked.flights, context)
     for variant in asked.plan:
-        create_trial(session, campaign_id, NewTrial(variant=variant), context)
+        create_trial(session, campaign_id, TrialPlan(variant=variant), context)
     return campaigns.get_campaign(session, campaign_id)
 
 
-def warm_gate_cache_for_new(session: Session, campaign_id: int, new: NewTrial) -> None:
+def warm_gate_cache_for_new(session: Session, campaign_id: int, new: TrialPlan) -> None:
     """Run the gate's simulations before the transaction of `create_trial` needs the results, which are cached.
 
     Problems with the trial are reported by `create_trial`.
@@ -215,7 +215,7 @@ def _seen(session: Session, row: TrialRow) -> Trial:
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 
 
-def _chosen(session: Session, campaign: CampaignRow, new: NewTrial) -> tuple[GateDecision, ProposalRow | None]:
+def _chosen(session: Session, campaign: CampaignRow, new: TrialPlan) -> tuple[GateDecision, ProposalRow | None]:
     """The gains that may fly, and the proposal that they come from, if any."""
     own = new.gains if new.variant is None else None
     if sum(given is not None for given in (new.proposal_id, own, new.variant)) != 1:

@@ -16,6 +16,7 @@ import {
   editCampaign,
   finishCampaign,
   flyTrial,
+  importFlight,
   judgeAbort,
   type NewCampaignInput,
   type NewTrial,
@@ -129,19 +130,20 @@ export interface RecordOrder extends RecordFiles {
   invalid?: boolean;
 }
 
-/** Upload the record of a flight made elsewhere; without a planned trial, one is planned first. */
+/** Upload the record of a flight made elsewhere: of a planned trial, or with the trial to plan. */
 export function useUploadRecord(campaignId: number) {
   const settled = useSettled();
   return useMutation({
-    mutationFn: async ({ file, companion, trialId, plan, ...query }: RecordOrder) => {
-      const planned =
-        trialId ?? (await answer(createTrial({ path: { campaign_id: campaignId }, body: plan ?? {} }))).id;
+    mutationFn: ({ file, companion, trialId, plan, ...query }: RecordOrder) => {
+      const files = { file, ...(companion === undefined ? {} : { companion }) };
       return answer(
-        uploadTrajectory({
-          path: { trial_id: planned },
-          query,
-          body: { file, ...(companion === undefined ? {} : { companion }) },
-        }),
+        trialId === undefined
+          ? importFlight({
+              path: { campaign_id: campaignId },
+              query,
+              body: { ...files, trial: JSON.stringify(plan ?? {}) },
+            })
+          : uploadTrajectory({ path: { trial_id: trialId }, query, body: files }),
       );
     },
     onSuccess: settled.trial,

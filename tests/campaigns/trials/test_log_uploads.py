@@ -1,5 +1,7 @@
 """Logs sent in over HTTP: takeoff and gains are found, and gains that were not planned need a person's confirmation."""
 
+import json
+
 import pytest
 from fastapi.testclient import TestClient
 
@@ -44,6 +46,52 @@ def test_a_log_of_other_gains_is_refused_naming_both_sets_and_stores_nothing(cli
     assert set(problems_of(answer)) == {"confirm"}
     after = get(client, f"/api/trials/{trial['id']}")
     assert (after["state"], after["record"], after["read_back"]) == ("planned", None, None)
+
+
+def test_a_record_with_its_trial_is_one_operation_and_a_refused_one_leaves_nothing_planned(
+    client: TestClient, campaign: Json
+) -> None:
+    path = f"/api/campaigns/{campaign['id']}/records"
+    proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
+    form = {"trial": json.dumps({"proposal_id": proposal["id"], "note": "Before noon"})}
+    refused = client.post(path, data=form, files={"file": ("flight.tlog", recorded(f"{TUNED}.tlog"))})
+    assert (refused.status_code, set(problems_of(refused))) == (409, {"confirm"})
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"] == []
+    once = {"Idempotency-Key": "one flight"}
+    answers = [
+        client.post(path, data=form, files={"file": ("flight.tlog", recorded(f"{DEFAULT}.tlog"))}, headers=once)
+        for _ in range(2)
+    ]
+    assert [answer.status_code for answer in answers] == [201, 201]
+    (flown,) = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
+    assert (flown["state"], flown["note"], flown["gains"]) == ("valid", "Before noon", TLOGS[DEFAULT])
+    other = {"trial": json.dumps({"variant": "repeat"})}
+    reused = client.post(path, data=other, files={"file": ("flight.tlog", recorded(f"{DEFAULT}.tlog"))}, headers=once)
+    assert reused.json()["title"] == "Key reused"
+
+
+@pytest.mark.parametrize(
+    ("trial", "field", "reason"),
+    [
+        (None, "trial", "must be an object with fields"),
+        ("{", "trial", "is not JSON"),
+        ('{"gains": {"kp": "many"}}', "trial.gains.kp", "number"),
+        ('{"variant": "repeat", "fly": {"speed": 1}}', "trial.fly", "is not a known field"),
+        ("{}", "proposal_id", "exactly one is required"),
+    ],
+)
+def test_a_trial_that_cannot_be_planned_is_refused_by_field(
+    client: TestClient, campaign: Json, trial: str | None, field: str, reason: str
+) -> None:
+    form = {} if trial is None else {"trial": trial}
+    answer = client.post(
+        f"/api/campaigns/{campaign['id']}/records",
+        data=form,
+        files={"file": ("flight.tlog", recorded(f"{DEFAULT}.tlog"))},
+    )
+    assert answer.status_code == 422
+    assert reason in problems_of(answer)[field]
+    assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"] == []
 
 
 def test_gains_beyond_the_bounds_that_flew_all_the_same_count_and_the_next_ones_stay_inside(

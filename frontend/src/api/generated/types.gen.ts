@@ -663,7 +663,7 @@ export type Classification = {
  * Clone
  *
  * A new campaign with the same definition, optionally on another vehicle, linked to this one. With `warm_start` it
- * starts from this one's best flight.
+ * starts from this one's best gains.
  */
 export type Clone = {
     /**
@@ -2357,10 +2357,7 @@ export type NewCampaignOutput = {
 /**
  * NewTrial
  *
- * A trial of a proposal, of custom gains, or of a variant: exactly one of the three. With `fly` it is flown at
- * once. Variants: `smaller step`, halfway from the best gains to the proposal; `repeat`, the best gains again;
- * `baseline`, the first flight's gains again. A variant with `gains` is refused when these are not its gains: it then
- * flies what its client has shown, or nothing.
+ * A trial to plan. With `fly` it is flown at once.
  */
 export type NewTrial = {
     /**
@@ -5866,6 +5863,79 @@ export type AbortTrialResponses = {
 };
 
 export type AbortTrialResponse = AbortTrialResponses[keyof AbortTrialResponses];
+
+export type ImportFlightData = {
+    body: {
+        file: Blob | File;
+        /**
+         * the .log file that Paparazzi writes next to a .data file
+         */
+        companion?: Blob | File;
+        /**
+         * the trial to plan, as JSON: proposal_id, gains or variant; note
+         */
+        trial: string;
+    };
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Campaign Id
+         */
+        campaign_id: number;
+    };
+    query?: {
+        /**
+         * Takeoff
+         *
+         * number of the takeoff in a log with several
+         */
+        takeoff?: number | null;
+        /**
+         * Confirm
+         *
+         * accept a log that was flown with other gains; the trial takes the gains in the log
+         */
+        confirm?: boolean;
+        /**
+         * Invalid
+         *
+         * accept a record that cannot be scored, for instance because it ends too early
+         */
+        invalid?: boolean;
+    };
+    url: '/api/campaigns/{campaign_id}/records';
+};
+
+export type ImportFlightErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type ImportFlightError = ImportFlightErrors[keyof ImportFlightErrors];
+
+export type ImportFlightResponses = {
+    /**
+     * Successful Response
+     */
+    201: Trial;
+};
+
+export type ImportFlightResponse = ImportFlightResponses[keyof ImportFlightResponses];
 
 export type ListVehiclesData = {
     body?: never;

@@ -10,7 +10,7 @@ import { ErrorNotice } from "../../ui/Notices";
 interface Props {
   upload: RecordUpload;
   trialId?: number;
-  /** Planned first, without a `trialId`; the record can be uploaded once one of them is there. */
+  /** Planned with the record, without a `trialId`; the record can be uploaded once one of them is there. */
   plan?: NewTrial;
 }
 
