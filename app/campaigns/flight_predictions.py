@@ -72,7 +72,7 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
         is_new = not recorded and kept is None
         if is_new:
             recorded |= modelled_flights(definition, history.flown_gains(trials))
-        flights = history.flights_of(session, campaign_id, recorded=recorded)
+        flights = history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else ()
         donor = read_donor(session, definition) if is_new else None
     predicted = predict_repeat(definition, flights, gains)
     if predicted is None:

@@ -27,11 +27,17 @@ def mean_absolute_errors(
     time_s: Samples, values: Samples, set_point: SetPoint, start_s: float, stop_s: float
 ) -> Samples:
     """The same for many records on the same time stamps: (k, n) → (k,)."""
-    inside = (time_s > start_s) & (time_s < stop_s)
-    instants = np.concatenate(([start_s], time_s[inside], [stop_s]))
-    ends = np.array([np.interp((start_s, stop_s), time_s, row) for row in values]).reshape(-1, 2)
-    found = np.concatenate((ends[:, :1], np.compress(inside, values, axis=1), ends[:, 1:]), axis=1)
-    return np.asarray(np.trapezoid(np.abs(set_point(instants) - found), instants) / (stop_s - start_s))
+    first, end = np.searchsorted(time_s, start_s, side="right"), np.searchsorted(time_s, stop_s, side="left")
+    instants = np.concatenate(([start_s], time_s[first:end], [stop_s]))
+    targets, widths = set_point(instants), np.diff(instants, prepend=start_s, append=stop_s)
+    weights = 0.5 * (widths[:-1] + widths[1:]) / (stop_s - start_s)
+    errors, deviation = np.empty(len(values)), np.empty(len(instants))
+    for record, row in enumerate(values):
+        deviation[[0, -1]] = np.interp((start_s, stop_s), time_s, row)
+        deviation[1:-1] = row[first:end]
+        np.abs(np.subtract(targets, deviation, out=deviation), out=deviation)
+        errors[record] = np.dot(deviation, weights)
+    return errors
 
 
 def overshoot(time_s: Samples, values: Samples, set_point: SetPoint) -> float | None:

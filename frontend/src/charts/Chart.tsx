@@ -1,5 +1,5 @@
 import type { Plotly } from "plotly.js-basic-dist-min";
-import { useCallback, useEffect, useRef, useState } from "react";
+import { useCallback, useEffect, useLayoutEffect, useRef, useState } from "react";
 import type { TimeRange } from "../api/queries";
 import { liveNow } from "../live/store";
 import { afterPaint } from "../ui/throttle";
@@ -105,7 +105,7 @@ export function Chart({
     };
   }, [figure, liveTrial, onChoose, onPlace, onWindow, onReset, build, enqueue]);
 
-  useEffect(() => {
+  useLayoutEffect(() => {
     const target = element.current;
     if (target === null || plotly === null || prediction === undefined) return;
     let wanted = true;

@@ -1,4 +1,4 @@
-import { useEffect, useMemo, useState } from "react";
+import { useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { type GainSet, useEvaluation } from "../../api/evaluation";
 import { problemOf, reasonsByField } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
@@ -84,6 +84,10 @@ export function useNextFlight(
         : { gains: isUnpredicted ? null : gains, prediction: predicted, isCurrent: prediction.isCurrent },
     [isProposal, isUnpredicted, gains, predicted, prediction.isCurrent],
   );
+  // An answer is drawn with the card that states it, before the next paint.
+  useLayoutEffect(() => {
+    if (preview?.isCurrent === true) onPreview(preview);
+  }, [onPreview, preview]);
   useEffect(() => onPreview(preview), [onPreview, preview]);
   useEffect(() => () => onPreview(null), [onPreview]);
   const error = isProposal ? null : (prediction.error ?? gate.error);
