@@ -106,6 +106,19 @@ def test_a_flight_under_way_keeps_the_layout(dashboard: Dashboard, states: State
     dashboard.until(lambda: dashboard.get(f"/campaigns/{campaign_id}")["flying"] is None)
 
 
+def test_the_next_flight_takes_the_place_of_the_one_that_was_selected(dashboard: Dashboard, states: States) -> None:
+    campaign_id = states.campaign(seed=6, flights=2)
+    dashboard.open_campaign(campaign_id)
+    dashboard.settled()
+    dashboard.page.keyboard.press("k")
+    expect(dashboard.panel("Flight 1")).to_be_visible()
+    dashboard.choose_speed("Max")
+    dashboard.fly()
+    dashboard.wait_for_flight(3)
+    expect(dashboard.panel("Flight 3")).to_be_visible()
+    expect(dashboard.panel("Flight 1")).to_have_count(0)
+
+
 @pytest.mark.parametrize("state", ["two_flights", "seven_flights", "finished"])
 def test_the_page_states_each_error_and_improvement_once(
     dashboard: Dashboard, campaigns: Campaigns, state: str

@@ -97,6 +97,12 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
   const selection = useSelectedFlights(campaign.id, shown);
   useFlightKeys(trials, shown?.id, ({ number }) => choose(number));
   useEffect(() => () => pointAt(null), []);
+  const { flown } = campaign.trials;
+  const flownBefore = useRef(flown);
+  useEffect(() => {
+    if (flown > flownBefore.current) setChosen(null); // the result of the flight that has landed is shown
+    flownBefore.current = flown;
+  }, [flown]);
   return (
     <>
       <p className="visually-hidden" role="status">

@@ -36,7 +36,7 @@ interface Props {
 export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
   const archive = useArchive(campaign.id);
   const reopen = useReopen(campaign.id);
-  const statistics = useStatistics(campaign.id).data;
+  const { data: statistics, isPending } = useStatistics(campaign.id);
   const groups = statistics?.groups ?? [];
   const [winner, first] = [groups.find(({ is_best }) => is_best), groups.find(({ is_baseline }) => is_baseline)];
   const missing = campaign.standing === "candidate" ? confirmationOf(winner, first) : [];
@@ -59,7 +59,7 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
           </Aside>
         )}
         {isCandidate && <Note fz="body">{confirmationText(missing)}</Note>}
-        {campaign.actions.includes("reopen") && (
+        {campaign.actions.includes("reopen") && !isPending && (
           <Button
             variant={isCandidate && !isSecondary ? "filled" : "default"}
             leftSection={<IconRepeat size={20} aria-hidden />}

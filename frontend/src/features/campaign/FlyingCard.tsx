@@ -1,6 +1,7 @@
 import { Button, Stack } from "@mantine/core";
-import { Link } from "react-router";
+import { Link, useOutletContext } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
+import { type AbortControl, abortStage } from "../../live/flights";
 import { useIsCurrent, useLiveFlight } from "../../live/store";
 import { isSaturated, readingOf } from "../../live/telemetry";
 import { withUnit } from "../../ui/format";
@@ -21,6 +22,8 @@ interface Props {
 
 /** Live values of the flight in progress. The ABORT button is in the header of every page. */
 export function FlyingCard({ campaign, trial, step }: Props) {
+  const abort = useOutletContext<AbortControl>();
+  const isAborting = abortStage(step.trialId, abort) === "accepted";
   const live = useLiveFlight(step.trialId);
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
@@ -39,8 +42,8 @@ export function FlyingCard({ campaign, trial, step }: Props) {
             <dd>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</dd>
           </div>
           <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>Error so far</dt>
-            <dd>{withUnit(live?.errorSoFar, unit)}</dd>
+            <dt>{isAborting ? "Error" : "Error so far"}</dt>
+            <dd>{isAborting ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
           </div>
           <div className={classes["reading"]}>
             <dt>Predicted error</dt>

@@ -56,7 +56,8 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
         {status?.trouble && <p className={classes["bad"]}>{status.trouble}</p>}
         <Note>
           {autopilotTitle(vehicle)} at {String(vehicle.options["address"] ?? "")}
-          {identity !== null && `; pinned: system ${identity.system_id}, version ${identity.version}`}
+          {identity !== null && `; identified as system ${identity.system_id}`}
+          {identity?.version && `, version ${identity.version}`}
           {identity?.uid && `, hardware id ${identity.uid}`}
         </Note>
       </Stack>

@@ -31,7 +31,7 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
           <thead>
             <tr>
               <th scope="col">Purpose</th>
-              <th scope="col">Requested {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
+              <th scope="col">Sent {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
               <th scope="col">Read back</th>
               <th scope="col">Outcome</th>
             </tr>

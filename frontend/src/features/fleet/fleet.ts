@@ -35,7 +35,7 @@ export const ACTS: Record<ActKind, string> = {
   release: "Release from quarantine",
   land: "Land",
   "motors off": "Motors off",
-  "safe gains": "Change safe gains",
+  "safe gains": "Set safe gains",
   control: "Take over control",
 };
 
