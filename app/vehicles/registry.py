@@ -46,8 +46,8 @@ def get_kind(kind: str, *, field: str = "vehicle.kind") -> VehicleKind:
     if kind not in VEHICLE_KINDS:
         raise InputError(
             "There is no such vehicle.",
-            hint=f"Choose one of: {', '.join(VEHICLE_KINDS)}.",
-            problems=(Problem(field, f"unknown kind {kind!r}"),),
+            hint="Choose another.",
+            problems=(Problem(field, f"must be one of {', '.join(VEHICLE_KINDS)}, got {kind!r}"),),
         )
     return VEHICLE_KINDS[kind]
 
