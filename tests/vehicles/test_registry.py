@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import app.vehicles.registry as opening
-from app.core.errors import InputError
+from app.core.errors import InputError, Problem
 from app.core.policy import Gains
 from app.vehicles.base import SafeGainsError, Vehicle, VehicleError, find_mismatch
 from app.vehicles.kinds import Options, VehicleKind
@@ -68,8 +68,8 @@ def test_a_flight_made_elsewhere_cannot_be_flown_here() -> None:
 def test_an_unknown_kind_names_the_field_and_the_choices() -> None:
     with pytest.raises(InputError) as refusal:
         get_kind("balloon")
-    assert refusal.value.problems[0].field == "vehicle.kind"
-    assert "jsbsim, twin, lti, mavlink, import" in refusal.value.hint
+    (problem,) = refusal.value.problems
+    assert problem == Problem("vehicle.kind", "must be one of jsbsim, twin, lti, mavlink, import, got 'balloon'")
 
 
 def test_options_are_completed_with_their_defaults() -> None:
