@@ -79,7 +79,7 @@ def test_given_gains_start_the_campaign_and_the_budget_ends_it(tmp_path: Path) -
     campaign = flown(tmp_path, *RUN_ON_TWIN, "--start", "286,60,81", "--max-flights", "1")
     assert campaign["trials"][0]["gains"] == {"kp": 286, "ki": 60, "kd": 81}
     assert errors(campaign) == [pytest.approx(0.2341, rel=0.01)]
-    assert campaign["stopped_because"].startswith("All 1 flights of the budget have been flown.")
+    assert campaign["stopped_because"].startswith("The budget of 1 flight has been flown.")
 
 
 def test_gains_by_hand_are_flown_in_their_order_until_all_are_flown(tmp_path: Path) -> None:

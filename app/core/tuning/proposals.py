@@ -9,7 +9,7 @@ from typing import Final, Literal
 from app.core.definition import Definition, Flight, aborted_by_gains
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, ModelledExperiment
-from app.core.formatting import format_gains, named_flights, short
+from app.core.formatting import count, format_gains, named_flights, short
 from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import Group, groups_of, pool_scatter
 from app.core.tuning.calibration import known_distribution
@@ -208,7 +208,7 @@ def advise(
         return Advice(kind="stop", gains=proposal.gains if now is None else dict(now.winner.gains), why=verdict.why)
     if now is not None and proposal.kind == "none" and tells_noise:
         budget = definition.stop.max_flights
-        ended = f"{NO_STEP} the budget of {budget} flights is used up. " if len(flights) >= budget else ""
+        ended = f"{NO_STEP} the budget of {count(budget, 'flight')} is used up. " if len(flights) >= budget else ""
         why = f"{proposal.explanation.summary} {ended}{_REPEAT_SHOWS}"
         return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
     if now is None or tells_noise:

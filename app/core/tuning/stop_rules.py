@@ -138,9 +138,12 @@ def _sentence(
     if reason is None and rule.kind == "paper" and failures:
         return f"The last flight did not improve on the best before it by {by}; one more such flight ends the campaign."
     if reason is None:
-        return f"{rule.max_flights - flights} of {rule.max_flights} flights are left."
+        left = rule.max_flights - flights
+        return f"{left} of {rule.max_flights} flights {'is' if left == 1 else 'are'} left."
     sentences: dict[Reason, str] = {
-        "flight budget": f"All {rule.max_flights} flights of the budget have been flown.",
+        "flight budget": "The budget of 1 flight has been flown."
+        if rule.max_flights == 1
+        else f"All {rule.max_flights} flights of the budget have been flown.",
         "not improving": f"The last {failures} consecutive flights did not improve on the best before them by {by}.",
         "nothing better": "The model predicts no improvement over the best flight.",
         "told from noise": "",

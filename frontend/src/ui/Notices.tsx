@@ -33,7 +33,7 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
           <ul>
             {others.map(({ field, reason }) => (
               <li key={`${field} ${reason}`}>
-                <code>{field}</code> {reason}
+                {field === "file" ? "The file" : <code>{field}</code>} {reason}
               </li>
             ))}
           </ul>

@@ -66,7 +66,7 @@ def test_a_line_without_anything_better_ends_the_paper_rule_only() -> None:
 def test_the_budget_rule_counts_flights_only() -> None:
     rule = StopRule(kind="budget", max_flights=4)
     assert not decide_stop(rule, [0.5, 0.5, 0.5]).stop
-    assert decide_stop(rule, [0.5, 0.5, 0.5]).why == "1 of 4 flights are left."
+    assert decide_stop(rule, [0.5, 0.5, 0.5]).why == "1 of 4 flights is left."
     assert decide_stop(rule, [0.5] * 4).reason == "flight budget"
     assert "All 4 flights" in decide_stop(rule, [0.5] * 4).why
 
@@ -80,6 +80,11 @@ def test_the_noise_rule_never_stops_on_errors_but_when_nothing_is_left_to_tell()
     assert (judged.reason, judged.why) == ("told from noise", "Better.")
     spent = decide_stop(rule, [*same, 0.5], "none", because="Unresolved.")
     assert (spent.reason, spent.why) == ("flight budget", "All 4 flights of the budget have been flown. Unresolved.")
+
+
+def test_a_budget_of_one_flight_is_said_in_the_singular() -> None:
+    spent = decide_stop(StopRule(kind="budget", max_flights=1), [0.5])
+    assert spent.why == "The budget of 1 flight has been flown."
 
 
 @pytest.mark.parametrize("kind", ["paper", "noise", "budget"])
@@ -136,7 +141,7 @@ def test_no_rule_ends_a_campaign_before_the_flights_it_was_reopened_for(flown: i
     definition = Definition(stop=StopRule(kind="budget", max_flights=1))
     verdict = evaluate_stop_rule(definition, flights, STEP, open_until_flight=3)
     assert (verdict.stop, verdict.reason) == ((False, None) if flown < 3 else (True, "flight budget"))
-    assert verdict.why.startswith("Reopened for 1 more flight." if flown < 3 else "All 1 flights")
+    assert verdict.why.startswith("Reopened for 1 more flight." if flown < 3 else "The budget of 1 flight")
 
 
 def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:
