@@ -16,6 +16,7 @@ Theme = Literal["light", "dark"]
 Viewport = ViewportSize
 Json = dict[str, Any]
 
+WIDE: Final = Viewport(width=1920, height=1080)
 DESK: Final = Viewport(width=1440, height=900)
 TABLET: Final = Viewport(width=1024, height=768)
 PHONE: Final = Viewport(width=390, height=844)

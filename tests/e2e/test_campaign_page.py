@@ -8,10 +8,9 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import DESK, TABLET, Dashboard, Viewport
+from tests.e2e.dashboard import DESK, TABLET, WIDE, Dashboard
 from tests.e2e.states import States
 
-WIDE = Viewport(width=1920, height=1080)
 SCREENS = {"desk": (DESK, 2.0), "wide": (WIDE, 2.0), "tablet": (TABLET, 2.6)}
 """Sizes, and how many screens the page may take there."""
 

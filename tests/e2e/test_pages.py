@@ -1,6 +1,6 @@
 """Every page in both themes and three sizes: readable by everybody, complete without a network.
 
-With GAINLINE_SCREENSHOTS=1 each is kept as an image in var/screenshots, to be looked at.
+With GAINLINE_SCREENSHOTS=1 each is kept as an image in var/screenshots, to be looked at, and on a wide screen too.
 """
 
 import gzip
@@ -16,13 +16,15 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import FloatRect, Page, expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Theme
+from tests.e2e.dashboard import DESK, PHONE, TABLET, WIDE, Dashboard, Theme
 from tests.e2e.states import States
 
 ROOT = Path(__file__).parents[2]
 SCREENSHOTS = ROOT / "var" / "screenshots"
 README_IMAGE = ROOT / "docs" / "images" / "campaign.png"
-SIZES = {"desk": DESK, "tablet": TABLET, "phone": PHONE}
+SIZES = {"desk": DESK, "tablet": TABLET, "phone": PHONE} | (
+    {"wide": WIDE} if "GAINLINE_SCREENSHOTS" in os.environ else {}
+)
 THEMES: tuple[Theme, ...] = ("light", "dark")
 UI_BYTES_GZIPPED = 250_000
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
