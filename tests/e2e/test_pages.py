@@ -258,6 +258,7 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
             page.mouse.move(0, 0)
     if name in WITH_TABS:
         dashboard.open_tab("Error landscape")
+        dashboard.panel("Error landscape").scroll_into_view_if_needed()  # it is drawn once it is in view
         expect(dashboard.plot("Error landscape")).to_be_visible()
     assert refused == []
 
