@@ -5,7 +5,7 @@ are spooled while they arrive.
 import hashlib
 import json
 import tempfile
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Annotated, BinaryIO, Final, TypeVar
@@ -13,6 +13,7 @@ from typing import Annotated, BinaryIO, Final, TypeVar
 from fastapi import Depends, Header, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
+from pydantic_core import from_json
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
@@ -161,61 +162,33 @@ _CHUNK_BYTES: Final = 2**18
 _CSV: Final = "text/csv"
 _ANY: Final = "application/octet-stream"
 
-_BINARY: Final = {"schema": {"type": "string", "format": "binary"}}
-_RECORD_FIELDS: Final = {
-    "file": {"type": "string", "format": "binary"},
-    "companion": {
-        "type": "string",
-        "format": "binary",
-        "description": "the .log file that Paparazzi writes next to a .data file",
-    },
+_FILE: Final = {"type": "string", "format": "binary"}
+_COMPANION: Final = {**_FILE, "description": "the .log file that Paparazzi writes next to a .data file"}
+_TRIAL: Final = {
+    "type": "string",
+    "contentMediaType": "application/json",
+    "description": "the trial to plan, as JSON: proposal_id, gains or variant; note",
 }
-REQUEST_BODY: Final = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {"schema": {"type": "object", "required": ["file"], "properties": _RECORD_FIELDS}},
-            _CSV: _BINARY,
-            _ANY: _BINARY,
-        },
-    }
-}
+
+
+def _body(
+    fields: Mapping[str, object], *, required: Sequence[str] = ("file",), raw: Sequence[str] = ()
+) -> dict[str, object]:
+    """Request body of a form, or of the file alone in one of the `raw` types."""
+    form = {"type": "object", "required": list(required), "properties": dict(fields)}
+    content = {"multipart/form-data": {"schema": form}} | {kind: {"schema": _FILE} for kind in raw}
+    return {"requestBody": {"required": True, "content": content}}
+
+
+REQUEST_BODY: Final = _body({"file": _FILE, "companion": _COMPANION}, raw=(_CSV, _ANY))
 """Request body of a flight record, for OpenAPI."""
 
-PLANNED_RECORD_BODY: Final = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file", "trial"],
-                    "properties": {
-                        **_RECORD_FIELDS,
-                        "trial": {
-                            "type": "string",
-                            "contentMediaType": "application/json",
-                            "description": "the trial to plan, as JSON: proposal_id, gains or variant; note",
-                        },
-                    },
-                }
-            }
-        },
-    }
-}
+PLANNED_RECORD_BODY: Final = _body(
+    {"file": _FILE, "companion": _COMPANION, "trial": _TRIAL}, required=("file", "trial")
+)
 """Request body of a flight record with the trial that it belongs to, for OpenAPI."""
 
-FILE_BODY: Final = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {"type": "object", "required": ["file"], "properties": {"file": _BINARY["schema"]}}
-            },
-            _ANY: _BINARY,
-        },
-    }
-}
+FILE_BODY: Final = _body({"file": _FILE}, raw=(_ANY,))
 """Request body of one file of any kind, for OpenAPI."""
 
 
@@ -246,15 +219,15 @@ class Upload:
         """A form field that holds JSON. Raises InputError when it does not, and RequestValidationError that names what
         is wrong in it."""
         try:
-            return kind.model_validate(json.loads(self.fields.get(name, "null")))
-        except json.JSONDecodeError as error:
+            return kind.model_validate(from_json(self.fields.get(name, "null")))
+        except ValidationError as error:
+            found = [{**each, "loc": ("body", name, *each["loc"])} for each in error.errors()]
+            raise RequestValidationError(found) from error
+        except ValueError as error:
             problem = Problem(name, f"is not JSON: {error}")
             raise InputError(
                 f"The form field `{name}` is not JSON.", hint="Correct it.", problems=(problem,)
             ) from error
-        except ValidationError as error:
-            found = [{**each, "loc": ("body", name, *each["loc"])} for each in error.errors()]
-            raise RequestValidationError(found) from error
 
 
 _Received = tuple[BinaryIO, str, BinaryIO | None, Mapping[str, str], str]

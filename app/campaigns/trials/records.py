@@ -275,7 +275,7 @@ def plan_and_import(
     campaign_id: int,
     plan: TrialPlan,
     flown: Takeoff,
-    context: RequestContext,
+    context: RequestContext = LOCAL_CLI,
     *,
     confirmed: bool,
     invalid: bool,
@@ -316,8 +316,8 @@ def import_into_campaign(
             f"Campaign {campaign_id} has ended.", hint="Reopen it on its page to import another flight, then try again."
         )
     proposal = proposals.require_fresh_proposal(session, row)
-    planned = create_trial(session, campaign_id, TrialPlan(proposal_id=proposal.id))
-    return import_record(session, planned.id, flown, confirmed=confirmed, invalid=invalid)
+    plan = TrialPlan(proposal_id=proposal.id)
+    return plan_and_import(session, campaign_id, plan, flown, confirmed=confirmed, invalid=invalid)
 
 
 def get_trajectory(session: Session, trial_id: int, points: int) -> TrajectoryOut:

@@ -75,6 +75,7 @@ def test_a_record_with_its_trial_is_one_operation_and_a_refused_one_leaves_nothi
     [
         (None, "trial", "must be an object with fields"),
         ("{", "trial", "is not JSON"),
+        pytest.param("[" * 100_000, "trial", "is not JSON", id="nested too deep"),
         ('{"gains": {"kp": "many"}}', "trial.gains.kp", "number"),
         ('{"variant": "repeat", "fly": {"speed": 1}}', "trial.fly", "is not a known field"),
         ("{}", "proposal_id", "exactly one is required"),

@@ -72,11 +72,11 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const isReady = readiness?.is_ready ?? false;
   const isHeld = readiness?.steps.includes("staged") === true;
   const flightId = trial.flight?.id ?? null;
-  const hasFlown = useLatched(flightId, isAirborneStep(status?.status.step));
+  const wasAirborne = useLatched(flightId, isAirborneStep(status?.status.step));
   const { word, tone } = flyStateLabel(trial, step, status, {
     quarantined,
     readiness,
-    hasLanded: hasFlown || hasLanded(live?.phase ?? null),
+    hasFlown: wasAirborne || hasLanded(live?.phase ?? null),
   });
   const isFlying = step === "flying";
   const isAborting = abortStage(trial.id, abort) === "accepted" || isAbortStep(status?.status.step);

@@ -74,8 +74,8 @@ test("the word in flight is the vehicle's own step, and a silent vehicle is neve
 test("after touchdown it restores the safe gains, until the record is stored; it does not start again", () => {
   const trial = { state: "flying", flight } as const;
   const around = { quarantined: false, readiness: null };
-  const word = (hasLanded: boolean) =>
-    flyStateLabel(trial, "flying", statusAt("idle", 0.1), { ...around, hasLanded }).word;
+  const word = (hasFlown: boolean) =>
+    flyStateLabel(trial, "flying", statusAt("idle", 0.1), { ...around, hasFlown }).word;
   expect([word(false), word(true)]).toEqual(["Starting", "Landed, restoring safe gains"]);
   expect(["flying", "landed", "ended", null].map(hasLanded)).toEqual([false, true, true, false]);
 });

@@ -76,7 +76,7 @@ interface Around {
   quarantined: boolean;
   readiness: Readiness | null;
   /** Whether it has flown, for a vehicle that is on the ground now. */
-  hasLanded?: boolean;
+  hasFlown?: boolean;
 }
 
 /** Whether the flight is over, by its phase from the event stream. */
@@ -89,7 +89,7 @@ export function flyStateLabel(
   trial: Standing,
   step: FlyStep,
   status: Aged | null,
-  { quarantined, readiness, hasLanded = false }: Around,
+  { quarantined, readiness, hasFlown = false }: Around,
 ): StateLabel {
   if (step === "flying" && status !== null) {
     const away = readiness?.losses.map(({ kind }) => AWAY[kind]).find((word) => word !== undefined);
@@ -98,7 +98,7 @@ export function flyStateLabel(
     if (IN_FLIGHT.has(status.status.step)) {
       return { word: stepWord(status.status.step), tone: isAbortStep(status.status.step) ? "bad" : "busy" };
     }
-    if (!quarantined) return { word: hasLanded ? "Landed, restoring safe gains" : "Starting", tone: "busy" };
+    if (!quarantined) return { word: hasFlown ? "Landed, restoring safe gains" : "Starting", tone: "busy" };
   }
   if (quarantined) return { word: "Quarantined", tone: "bad" };
   if (step === "over" || (step === "judge" && trial.state === "lost")) return trialStateLabel(trial.state);
