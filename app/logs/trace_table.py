@@ -134,7 +134,7 @@ def _read(name: str, text: io.TextIOWrapper, columns: Collection[str], may_be_em
 def _description(name: str, line: str, columns: Collection[str]) -> Mapping[str, object]:
     try:
         read: object = json.loads(line.removeprefix("#"))
-    except ValueError:
+    except (ValueError, RecursionError):
         read = None
     if not line.startswith("#") or not isinstance(read, dict):
         raise _malformed(name, 1, "description", "must be # and a JSON object", columns)

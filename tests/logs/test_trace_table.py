@@ -40,6 +40,11 @@ def test_an_empty_field_is_nan_where_a_signal_may_be_absent() -> None:
         ((), "line 1, description: must be # and a JSON object"),
         ((HEADER, "0,1,2"), "line 1, description: must be # and a JSON object"),
         (("# [1]", HEADER, "0,1,2"), "line 1, description: must be # and a JSON object"),
+        pytest.param(
+            ("#" + "[" * 100_000, HEADER, "0,1,2"),
+            "line 1, description: must be # and a JSON object",
+            id="nested too deep",
+        ),
         ((DESCRIPTION,), "line 2, z_m: column is missing"),
         ((DESCRIPTION, "t_s,z_m", "0,1"), "line 2, thrust: column is missing"),
         ((DESCRIPTION, HEADER + ",z_m", "0,1,2,3"), "line 2, z_m: column appears twice"),
