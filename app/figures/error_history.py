@@ -365,7 +365,7 @@ class ErrorsFigure:
         ]
         if proposal is not None and proposal.predicted_error is not None:
             rows.append(
-                (proposal.number, "next", None, None, proposal.predicted_error, *_ends(proposal.interval), None)
+                (proposal.number, "proposed", None, None, proposal.predicted_error, *_ends(proposal.interval), None)
             )
         return Table(
             (

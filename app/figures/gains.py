@@ -17,7 +17,7 @@ GAP = 0.09
 
 @dataclass(frozen=True, slots=True)
 class GainsFigure:
-    """Table columns: `flight`, then one per gain in its own unit; the proposal is the row `next`.
+    """Table columns: `flight`, then one per gain in its own unit; the proposal is the row `proposed`.
 
     Every trace carries `meta`: `role` (flown, best, next) and `gain`. A page puts other gains in the place of `next`.
     """
@@ -140,7 +140,7 @@ class GainsFigure:
             for flight in self.history.flights
         ]
         if self.history.proposal is not None:
-            rows.append(("next", *(self.history.proposal.gains[gain.name] for gain in self.history.gains)))
+            rows.append(("proposed", *(self.history.proposal.gains[gain.name] for gain in self.history.gains)))
         columns = (
             Column("flight", "Flight"),
             *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in self.history.gains),

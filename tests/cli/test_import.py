@@ -51,7 +51,7 @@ def test_other_gains_are_refused_where_nobody_can_be_asked_and_nothing_is_planne
 ) -> None:
     result = run(settings, TUNED_LOG, "--campaign", "Garage")
     assert result.exit_code == 1
-    assert "kp 1624, ki 1356, kd 195; trial 1 was planned with kp 283, ki 13, kd 82" in result.stderr
+    assert "kp 1624, ki 1356, kd 195, not with the planned kp 283, ki 13, kd 82" in result.stderr
     assert "--yes confirms it" in result.stderr
     assert get(client, f"/api/campaigns/{campaign['id']}/trials")["total"] == 0
 

@@ -167,6 +167,6 @@ def test_the_table_lists_every_flight_with_its_running_best_and_the_next_one_las
         (1, "valid", 0.3, 0.01, None, None, None, 0.3),
         (2, "invalid", None, None, None, None, None, None),
         (3, "valid", 0.2, 0.01, 0.21, 0.19, 0.23, 0.2),
-        (4, "next", None, None, 0.12, 0.1, 0.14, None),
+        (4, "proposed", None, None, 0.12, 0.1, 0.14, None),
     )
     assert {len(row) for row in card.table.rows} == {len(card.table.columns)}

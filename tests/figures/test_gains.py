@@ -38,7 +38,7 @@ def test_the_panel_does_not_reach_below_a_bound() -> None:
 def test_the_table_ends_with_the_proposed_row() -> None:
     card = GainsFigure(history(flight(1, 0.3), proposal=proposal(2))).compute()
     assert card.table is not None
-    assert card.table.rows == (("1", 281, 10, 80), ("next", 500, 200, 90))
+    assert card.table.rows == (("1", 281, 10, 80), ("proposed", 500, 200, 90))
 
 
 def test_without_flights_and_proposal_the_card_says_so() -> None:

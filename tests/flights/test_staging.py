@@ -461,4 +461,4 @@ def test_a_window_that_its_flight_plan_does_not_fit_is_refused_before_it_is_stag
     refused = client.post(f"/api/trials/{planned['id']}/stage")
     assert refused.status_code == 409
     assert "a scored window of at most 42.6 s; the campaign's is 60 s" in refused.json()["detail"]
-    assert "plan_time_s" in refused.json()["hint"]
+    assert "“Paparazzi: time limit of the flight plan's takeoff”" in refused.json()["hint"]

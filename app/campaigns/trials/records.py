@@ -73,9 +73,8 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
         return
     if not confirmed:
         raise UnconfirmedError(
-            f"The log was flown with {format_gains(flown.gains)}; trial {row.number} was planned with "
-            f"{format_gains(row.gains)}.",
-            hint="Choose the log of this trial, or confirm that the trial takes the gains in the log.",
+            f"The log was flown with {format_gains(flown.gains)}, not with the planned {format_gains(row.gains)}.",
+            hint="Choose the log of this flight, or confirm that the trial takes the gains in the log.",
             problems=(Problem("confirm", f"the log was flown with {format_gains(flown.gains)}"),),
         )
     row.read_back = dict(flown.gains)
@@ -256,7 +255,7 @@ def import_record(
         return trial_view(session, campaign, row)
     if fleet.can_fly(campaign.vehicle):
         raise ConflictError(
-            f"Trial {row.number} is flown from here, by {campaign.vehicle.title}.",
+            f"This campaign is flown from here, by {campaign.vehicle.title}; it takes no records of other flights.",
             hint="Fly it, or choose a campaign whose vehicle is “Flown elsewhere”.",
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)

@@ -246,15 +246,22 @@ def offset_sensitivity(experiment: Experiment) -> float:
 def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy: bool) -> str:
     if not of and not agreeing + disagreeing:
         return "No prediction has been tested by a flight yet."
-    parts = [f"{inside} of {of} flights ended inside their predicted interval"] if of else []
-    if agreeing + disagreeing:
+    parts = []
+    if of == 1:
+        parts.append(f"the only predicted flight ended {'inside' if inside else 'outside'} its interval")
+    elif of:
+        parts.append(f"{inside} of {of} flights ended inside their predicted interval")
+    if agreeing + disagreeing == 1:
+        parts.append(f"the only change of the error had the {'predicted' if agreeing else 'opposite'} sign")
+    elif agreeing + disagreeing:
         parts.append(f"{agreeing} of {agreeing + disagreeing} changed the error in the predicted direction")
     ending = (
         ""
         if trustworthy
         else "; the gradient is not trustworthy: most flights changed the error in the other direction"
     )
-    return f"{', '.join(parts)}{ending}."
+    counted = ", ".join(parts)
+    return f"{counted[:1].upper()}{counted[1:]}{ending}."
 
 
 _AT_ONCE: Final = 8

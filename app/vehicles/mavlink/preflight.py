@@ -309,9 +309,13 @@ def evaluate_distance(watched: GroundObservation, *, radius_m: float, plan_radiu
         name="home",
         title="Distance from HOME",
         passed=passed,
-        found="waiting for a position" if away_m is None else f"{away_m:.1f} m, plus radius_m of {radius_m:g} m",
-        needed=f"{plan_radius_m:g} m or less in total, because its flight plan lands it there (plan_radius_m)",
-        hint="" if passed else "Move it closer to the place where it was switched on, or reduce radius_m.",
+        found="waiting for a position"
+        if away_m is None
+        else f"{away_m:.1f} m, plus the {radius_m:g} m that it may move from its start",
+        needed=f"{plan_radius_m:g} m or less in total: beyond it the flight plan lands it",
+        hint=""
+        if passed
+        else "Move it closer to the place where it was switched on, or reduce its “Maximum distance from the start”.",
     )
 
 
@@ -324,10 +328,11 @@ def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
         title="Flight time",
         passed=passed,
         found=f"{needed_s:g} s for the record and the command to land",
-        needed=f"{plan_time_s:g} s or less, because its flight plan lands it then (plan_time_s)",
+        needed=f"{plan_time_s:g} s or less: after it the flight plan lands it",
         hint=""
         if passed
-        else "Raise the time limit of Takeoff in its flight plan, then plan_time_s; or choose a shorter window.",
+        else "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then its setting "
+        "“Paparazzi: time limit of the flight plan's takeoff”.",
     )
 
 

@@ -147,6 +147,23 @@ def test_the_record_counts_flights_inside_their_interval_and_predicted_direction
     )
 
 
+@pytest.mark.parametrize(
+    ("error", "sentence"),
+    [
+        (
+            0.32,
+            "The only predicted flight ended inside its interval, the only change of the error had the predicted sign.",
+        ),
+        (
+            0.6,
+            "The only predicted flight ended outside its interval, the only change of the error had the opposite sign.",
+        ),
+    ],
+)
+def test_the_record_of_one_predicted_flight_is_told_in_the_singular(error: float, sentence: str) -> None:
+    assert track_record(flights_of(0.5, error, predicted=0.3)).sentence == sentence
+
+
 def test_the_gradient_is_not_trustworthy_once_three_flights_went_the_other_way_and_fewer_its_own() -> None:
     assert track_record(flights_of(0.5, 0.6, 0.6, predicted=0.3)).trustworthy
     record = track_record(flights_of(0.5, 0.6, 0.6, 0.6, predicted=0.3))

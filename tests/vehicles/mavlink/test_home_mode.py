@@ -162,8 +162,8 @@ def test_it_is_not_flown_so_far_from_home_that_its_plan_would_act_before_the_tri
         [item] = [each for each in vehicle.check() if each.name == "home"]
         assert item.passed is passes
         assert (item.found, item.needed) == (
-            f"{abs(away_m):.1f} m, plus radius_m of 5 m",
-            "8 m or less in total, because its flight plan lands it there (plan_radius_m)",
+            f"{abs(away_m):.1f} m, plus the 5 m that it may move from its start",
+            "8 m or less in total: beyond it the flight plan lands it",
         )
 
 

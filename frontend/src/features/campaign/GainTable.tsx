@@ -14,7 +14,7 @@ export interface GainEntry {
 interface Props {
   rows: readonly GainRow[];
   /** Whose gains the first column shows. */
-  from: "Best" | "Safe";
+  from: "Best gains" | "Safe gains";
   unit: string;
   titles: Readonly<Record<string, string>>;
   /** Makes the next gains inputs. */
@@ -25,7 +25,7 @@ interface Props {
 export function GainTable({ rows, from, unit, titles, entry }: Props) {
   return (
     <table className={classes["gains"]}>
-      <caption className="visually-hidden">{from} gains and next</caption>
+      <caption className="visually-hidden">{from} and next</caption>
       <thead>
         <tr>
           <th scope="col">Gain{unit && ` (${unit})`}</th>

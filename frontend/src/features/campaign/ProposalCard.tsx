@@ -57,7 +57,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable
           rows={chosen.rows}
-          from={campaign.best === null ? "Safe" : "Best"}
+          from={campaign.best === null ? "Safe gains" : "Best gains"}
           unit={units.gains}
           titles={titles}
           entry={chosen.entry}
