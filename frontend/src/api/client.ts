@@ -1,7 +1,7 @@
 /** Setup of the generated client: same origin, an idempotency key for every POST, problem documents as errors. */
 
-import { controlHeader } from "./control";
 import { client } from "./generated/client.gen";
+import { controlHeader } from "./leases";
 import { ApiError, problemFrom } from "./problems";
 
 client.setConfig({ baseUrl: "" });

@@ -1,11 +1,11 @@
-/** Operator leases of vehicles: taken, renewed while the tab is open, released. */
+/** Requests for operator leases of vehicles: taken, renewed while the tab is open, released. */
 
 import { useMutation, useQueryClient } from "@tanstack/react-query";
-import { useEffect, useSyncExternalStore } from "react";
+import { useEffect } from "react";
 import { answer } from "./client";
 import { giveUpControl, takeControl } from "./generated";
+import { dropLease, holdLease, leasesNow, type OwnLease } from "./leases";
 import { problemOf } from "./problems";
-import { Store } from "./store";
 import { useVehicleChanged } from "./vehicles";
 
 const RENEW_MS = 5000;
@@ -65,54 +65,4 @@ export function useReleaseControl(vehicleId: number) {
     onSuccess: () => dropLease(vehicleId),
     onSettled: () => changed(vehicleId),
   });
-}
-
-export interface OwnLease {
-  operator: string;
-  token: string;
-}
-
-const KEY = "gainline-control";
-
-function isLease(value: unknown): value is OwnLease {
-  if (typeof value !== "object" || value === null) return false;
-  const { operator, token } = value as Record<string, unknown>;
-  return typeof operator === "string" && typeof token === "string";
-}
-
-function remembered(): Map<number, OwnLease> {
-  const kept: unknown = JSON.parse(sessionStorage.getItem(KEY) ?? "{}");
-  const entries = Object.entries(typeof kept === "object" && kept !== null ? kept : {});
-  return new Map(entries.flatMap(([id, lease]) => (isLease(lease) ? [[Number(id), lease]] : [])));
-}
-
-const leases = new Store<ReadonlyMap<number, OwnLease>>(remembered());
-
-function keep(next: ReadonlyMap<number, OwnLease>): void {
-  sessionStorage.setItem(KEY, JSON.stringify(Object.fromEntries(next)));
-  leases.set(next);
-}
-
-function holdLease(vehicleId: number, lease: OwnLease): void {
-  keep(new Map([...leases.get(), [vehicleId, lease]]));
-}
-
-function dropLease(vehicleId: number): void {
-  keep(new Map([...leases.get()].filter(([id]) => id !== vehicleId)));
-}
-
-function leasesNow(): ReadonlyMap<number, OwnLease> {
-  return leases.get();
-}
-
-export function useOwnLease(vehicleId: number | null): OwnLease | null {
-  return useSyncExternalStore(leases.subscribe, () =>
-    vehicleId === null ? null : (leases.get().get(vehicleId) ?? null),
-  );
-}
-
-/** The header that proves control of a vehicle; empty without a lease. */
-export function controlHeader(vehicleId: number): Record<string, string> {
-  const lease = leases.get().get(vehicleId);
-  return lease === undefined ? {} : { "X-Gainline-Control": lease.token };
 }

@@ -2,7 +2,6 @@
 
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
-import { controlHeader } from "./control";
 import {
   checkVehicle,
   connectVehicle,
@@ -17,6 +16,7 @@ import {
   restoreSafeGains,
   type VehicleEdit,
 } from "./generated";
+import { controlHeader } from "./leases";
 import { useVehicleChanged } from "./vehicles";
 
 const SHOWN = 20;

@@ -3,7 +3,6 @@
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useNavigate } from "react-router";
 import { answer } from "./client";
-import { controlHeader } from "./control";
 import {
   archiveCampaign,
   type Campaign,
@@ -27,6 +26,7 @@ import {
   type Trial,
   uploadTrajectory,
 } from "./generated";
+import { controlHeader } from "./leases";
 import type { RecordFiles } from "./records";
 
 function useSettled() {

@@ -3,8 +3,8 @@
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { answer } from "./client";
-import { controlHeader } from "./control";
 import { landVehicle, stageTrial, stopMotors, type Trial, takeOffTrial, unstageTrial } from "./generated";
+import { controlHeader } from "./leases";
 import { problemOf } from "./problems";
 
 type Act = typeof stageTrial | typeof takeOffTrial | typeof unstageTrial;

@@ -1,6 +1,6 @@
 import { IconAlertTriangle, IconAntennaBars5, IconAntennaBarsOff, IconBattery3, IconUser } from "@tabler/icons-react";
 import { Link } from "react-router";
-import { useOwnLease } from "../api/control";
+import { useOwnLease } from "../api/leases";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { useVehicleStatus } from "../live/store";

@@ -3,8 +3,8 @@
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { answer } from "../api/client";
-import { controlHeader, useOwnLease } from "../api/control";
 import { getReadiness } from "../api/generated";
+import { controlHeader, useOwnLease } from "../api/leases";
 import type { TrialReadiness } from "../api/types";
 import { momentNow, useConnection, useMoment } from "./store";
 import { type Moment, secondsBetween } from "./vehicleStatus";

@@ -1,9 +1,8 @@
-import { Box, Button, FileButton, Group, SegmentedControl, Skeleton, TextInput, Title } from "@mantine/core";
+import { Box, Button, Group, SegmentedControl, Skeleton, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "react-router";
-import { useImportBundle } from "../../api/files";
 import { useCampaigns, useCatalogue } from "../../api/queries";
 import type { Sort } from "../../api/types";
 import { SelectField } from "../../ui/Fields";
@@ -15,6 +14,7 @@ import { CampaignCard } from "./CampaignCard";
 import classes from "./CampaignsPage.module.css";
 import { STATE_FILTERS, type StateFilter, statesFor } from "./campaignList";
 import { FirstCampaign } from "./FirstCampaign";
+import { ImportBundle } from "./ImportBundle";
 
 const SORTS: { value: Sort; label: string }[] = [
   { value: "-updated", label: "Recently updated" },
@@ -113,22 +113,5 @@ export function CampaignsPage() {
         </Box>
       )}
     </>
-  );
-}
-
-/** Import of a campaign bundle from another installation. */
-export function ImportBundle() {
-  const imported = useImportBundle();
-  return (
-    <div>
-      <FileButton accept=".zip" onChange={(file) => file && imported.mutate(file)}>
-        {(props) => (
-          <Button {...props} variant="default" loading={imported.isPending}>
-            Import bundle
-          </Button>
-        )}
-      </FileButton>
-      <ErrorNotice error={imported.error} />
-    </div>
   );
 }

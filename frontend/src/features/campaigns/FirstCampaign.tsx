@@ -5,8 +5,8 @@ import { useCreateCampaign } from "../../api/mutations";
 import { useCatalogue } from "../../api/queries";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
-import { ImportBundle } from "./CampaignsPage";
 import classes from "./FirstCampaign.module.css";
+import { ImportBundle } from "./ImportBundle";
 import { firstPreset } from "./newCampaign";
 
 const STEPS = [

@@ -1,6 +1,7 @@
 import { Button, Text, TextInput } from "@mantine/core";
 import { IconUserCheck } from "@tabler/icons-react";
-import { useOwnLease, useReleaseControl, useTakeControl } from "../../api/control";
+import { useReleaseControl, useTakeControl } from "../../api/control";
+import { useOwnLease } from "../../api/leases";
 import type { Vehicle } from "../../api/types";
 import { ErrorNotice } from "../../ui/Notices";
 import { useOperatorName } from "../../ui/usePreferences";
