@@ -26,12 +26,13 @@ controller = typer.Typer(no_args_is_help=True, help="Check the replica of the au
 app.add_typer(controller, name="controller")
 
 
-def _begins_otherwise(target: Path | None, beginning: bytes) -> bool:
+def _begins_otherwise(target: Path | None, *beginnings: bytes) -> bool:
     """Whether a file exists that is not empty and begins otherwise, such as a log that was to be read."""
     if target is None or not target.is_file():
         return False
     with target.open("rb") as stream:
-        return stream.read(len(beginning)) not in {beginning, b""}
+        head = stream.read(max(map(len, beginnings)))
+    return bool(head) and not head.startswith(beginnings)
 
 
 def _spare_recording(target: Path | None) -> Path | None:
@@ -45,8 +46,8 @@ def _spare_recording(target: Path | None) -> Path | None:
 
 
 def _spare_other_parameters(target: Path | None) -> Path | None:
-    """Refuse to write gains over a file that does not begin with some."""
-    if _begins_otherwise(target, b"PSC_"):
+    """Refuse to write gains over a file that does not begin as one of them does."""
+    if _begins_otherwise(target, b"# Gainline", b"<!-- Gainline", b"PSC_"):
         raise typer.BadParameter(
             f"{target} exists and was not written by this command, so it is not overwritten. Name another file."
         )
@@ -343,14 +344,18 @@ def import_log(
 def analyze(
     log: Annotated[
         Path,
-        typer.Argument(metavar="LOG", show_default=False, help="ArduCopter's .bin log of a flight."),
+        typer.Argument(
+            metavar="LOG",
+            show_default=False,
+            help="ArduCopter's .bin log, or Paparazzi's .data (a .log next to it is read too) or .tlog of takeoffs.",
+        ),
     ],
     params: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
             show_default=False,
-            help="Write the proposed gains as a .param file.",
+            help="Write the proposed gains: a .param file for ArduCopter, a section of an airframe file for Paparazzi.",
             callback=_spare_other_parameters,
         ),
     ] = None,

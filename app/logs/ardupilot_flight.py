@@ -21,9 +21,8 @@ from app.core.control.ardupilot_parameters import (
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
-from app.logs.dataflash import is_dataflash, parameters_in, read_tables
+from app.logs.dataflash import parameters_in, read_tables
 from app.logs.flight_parts import LONGEST_INTERVAL_S, SHORTEST_PART_S, Manoeuvres, Part, Rows, find_parts, jumps
-from app.logs.readers import HEAD_BYTES, READERS
 
 _WANTED: Final = frozenset({"PSCD", "PSCZ", "CTUN", "ATT", "MODE", "EV", "ERR", "PARM"})
 _LOOP: Final = ("PD", "VD", "AD", "DVD", "DAD", "TVD")
@@ -121,7 +120,6 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
 
     Raises TrajectoryError naming the message or parameter that is missing, or InputError for one not supported.
     """
-    _require_dataflash(stream, name)
     tables = read_tables(contents(stream), _WANTED)
     logged = _logged(tables, name)
     history = _parameter_history(tables)
@@ -266,15 +264,6 @@ def _require_gains(given: Parameters, name: str) -> None:
             raise _refused(name, each, f"is missing, and {newer} of release 4.7 too")
         if given[each] <= 0.0:
             raise _refused(name, each, f"must be positive, got {given[each]:g}")
-
-
-def _require_dataflash(stream: BinaryIO, name: str) -> None:
-    stream.seek(0)
-    head = stream.read(HEAD_BYTES)
-    if not is_dataflash(head):
-        kind = next((f" ({reader.title})" for reader in READERS if reader.recognises(head)), "")
-        other = f"is another kind of log{kind}" if kind else "is not a log" if head else "is empty"
-        raise _refused(name, "file", f"{other}: only ArduPilot's .bin logs can be analysed")
 
 
 def _refused(name: str, field: str, reason: str) -> TrajectoryError:

@@ -9,6 +9,7 @@ from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
 from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
+from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS, PARAMETERS, ardupilot_log
 
@@ -34,13 +35,14 @@ def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_pa
     document, parameters = tmp_path / "steps.json", tmp_path / "gains.param"
     result = analyze(steps, "--json", document, "--params", parameters)
     assert result.exit_code == 0, result.output
-    assert "hover throttle 0.365, thrust slope 1.00 ± 0.01, lag of the motors 0 ± 3 ms" in result.output
+    assert "hover throttle 0.365, thrust slope 1.00 ± 0.01, motor lag 0 ± 3 ms" in " ".join(result.output.split())
     for name in ("As flown", "Proposed", "ArduCopter's default gains", "P = hover throttle, I = 2 P", "3, 8, 0.5, 3"):
         assert name in result.output
     found = json.loads(document.read_text())
-    gains = found["proposed"]["gains"]
-    assert found["proposed"]["prediction"]["error_m"] < 0.2 * found["assessments"][0]["prediction"]["error_m"]
-    assert found["vehicle"]["mean"]["thrust_slope"] == pytest.approx(1.0, abs=0.01)
+    numbers = found["numbers"]
+    gains = numbers["proposed"]["gains"]
+    assert numbers["proposed"]["error_m"] < 0.2 * numbers["assessments"][0]["error_m"]
+    assert numbers["vehicle"]["thrust_slope"]["mean"] == pytest.approx(1.0, abs=0.01)
     assert found["answer"] in " ".join(result.output.split())
     lines = lines_of(parameters)
     assert {line.split(",")[0]: float(line.split(",")[1]) for line in lines} == pytest.approx(gains)
@@ -64,7 +66,7 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
 
 def test_the_document_alone_can_be_printed(steps: Path) -> None:
     result = analyze(steps, "--json", "-")
-    assert json.loads(result.stdout)["file"] == "steps.bin"
+    assert json.loads(result.stdout)["file_name"] == "steps.bin"
 
 
 def test_gains_may_replace_gains_but_nothing_else(steps: Path, tmp_path: Path) -> None:
@@ -73,6 +75,7 @@ def test_gains_may_replace_gains_but_nothing_else(steps: Path, tmp_path: Path) -
     assert analyze(steps, "--params", earlier).exit_code == 0
     assert lines_of(earlier)[0] == "PSC_POSZ_P,3"
     assert "# PSC_POSZ_P was 1" in earlier.read_text()
+    assert analyze(steps, "--params", earlier).exit_code == 0
     before = steps.read_bytes()
     refused = analyze(steps, "--params", steps)
     assert refused.exit_code == 2
@@ -87,7 +90,7 @@ def test_a_wrong_hover_throttle_is_told(tmp_path: Path) -> None:
     path.write_bytes(ardupilot_log(flight, parameters={**PARAMETERS, "MOT_THST_HOVER": 0.3}))
     result = analyze(path)
     assert result.exit_code == 0, result.output
-    assert "MOT_THST_HOVER was 0.300 in flight: 0.400 would fit better." in result.output
+    assert "hover throttle 0.400, but MOT_THST_HOVER was 0.300" in " ".join(result.output.split())
 
 
 def test_a_flight_with_the_throttle_at_its_limit_for_a_moment_says_so(tmp_path: Path) -> None:
@@ -95,7 +98,7 @@ def test_a_flight_with_the_throttle_at_its_limit_for_a_moment_says_so(tmp_path: 
     flight.segments[0].throttle[60:63] = 1.0
     path = tmp_path / "limit.bin"
     path.write_bytes(ardupilot_log(flight))
-    assert "at a limit in 2\u00a0% of the rows." in analyze(path).output
+    assert "throttle at a limit in 2 % of the samples." in " ".join(analyze(path).output.split())
 
 
 def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> None:
@@ -103,7 +106,7 @@ def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> No
     path.write_bytes(ardupilot_log(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3)))
     result = analyze(path)
     assert result.exit_code == 0
-    assert "does not suffice to propose gains" in result.output
+    assert "is not sufficient to propose gains" in " ".join(result.output.split())
     refused = analyze(path, "--params", parameters)
     assert refused.exit_code == 1
     assert "No parameter file was written" in refused.output
@@ -115,7 +118,6 @@ def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> No
     [
         ("arducopter_takeoff.bin", "holds altitude for 4.8 s only"),
         ("px4_takeoff.ulg", "another kind of log (PX4's log)"),
-        ("paparazzi_283_13_82.tlog", "another kind of log (MAVLink telemetry log)"),
     ],
 )
 def test_the_other_recorded_logs_are_refused_with_the_reason(name: str, reason: str, tmp_path: Path) -> None:
@@ -124,6 +126,25 @@ def test_the_other_recorded_logs_are_refused_with_the_reason(name: str, reason: 
     result = analyze(path)
     assert result.exit_code == 1
     assert reason in result.output
+
+
+def test_takeoffs_under_paparazzi_give_a_section_of_the_airframe_file(tmp_path: Path) -> None:
+    path, section = tmp_path / "takeoff.tlog", tmp_path / "gains.xml"
+    path.write_bytes(recorded("paparazzi_283_13_82.tlog"))
+    result = analyze(path, "--params", section)
+    assert result.exit_code == 0, result.output
+    assert "1 takeoff analysed over 32.6 s, mean distance from 3 m 0.330 m" in " ".join(result.output.split())
+    assert '<define name="HOVER_KP" value="' in section.read_text()
+    assert analyze(path, "--params", section).exit_code == 0
+
+
+def test_the_log_file_beside_a_data_file_is_read_too(tmp_path: Path) -> None:
+    path = write(tmp_path, Flight(gains={"kp": 283, "ki": 13, "kd": 82}, loop_log=False))
+    assert "As flown" in analyze(path).output
+    path.with_suffix(".log").unlink()
+    alone = analyze(path)
+    assert alone.exit_code == 1
+    assert "does not contain the values of kp, ki, kd" in alone.output
 
 
 def test_files_that_cannot_be_read_or_written_are_named(steps: Path, tmp_path: Path) -> None:

@@ -60,10 +60,29 @@ def test_a_log_that_is_dropped_gives_gains_to_load(page_of_analysis: Dashboard, 
     assert [line.split(",")[1] for line in lines] == proposed[1:5]
 
 
+def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(page_of_analysis: Dashboard) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"))
+    article = page.get_by_role("article", name="Analysis of takeoff.tlog")
+    expect(article).to_contain_text("Mean distance from 3 m: 0.330 m flown.", timeout=60_000)
+    expect(article).to_contain_text("hover throttle 0.63")
+    rows = article.get_by_role("region", name="Gains compared").locator("tbody tr")
+    expect(rows).to_have_count(2)
+    assert "Predicted with the proposed gains" in {
+        one["meta"]["line"] for one in dashboard.traces("The takeoff and its prediction")
+    }
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download parameter file").click()
+    assert download.value.suggested_filename == "takeoff.xml"
+    content = Path(download.value.path()).read_text()
+    kp = rows.nth(1).locator("td").all_inner_texts()[1]
+    assert f'<define name="HOVER_KP" value="{kp}"/>' in content
+
+
 def test_a_log_that_cannot_be_analysed_is_refused_and_the_next_one_is_not(page_of_analysis: Dashboard) -> None:
     dashboard, page = page_of_analysis, page_of_analysis.page
-    choose(dashboard, "takeoff.tlog.bin", recorded("paparazzi_283_13_82.tlog"))
-    expect(page.get_by_role("alert")).to_contain_text("only ArduPilot's .bin logs can be analysed")
+    choose(dashboard, "takeoff.bin", recorded("px4_takeoff.ulg"))
+    expect(page.get_by_role("alert")).to_contain_text("is another kind of log (PX4's log)")
     choose(dashboard, "flight.bin", ardupilot_log(simulated_flight(GUSTY)))
     expect(page.get_by_role("article", name="Analysis of flight.bin")).to_be_visible(timeout=60_000)
     expect(page.get_by_role("alert")).to_have_count(0)

@@ -1,12 +1,16 @@
 """Log analyses over HTTP, with the recorded logs."""
 
+from xml.etree import ElementTree
+
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
+from pymavlink.dialects.v20 import ardupilotmega
 
 from app.figures.theme import PALETTES
 from tests.builders import problems_of
-from tests.logs.recorded import recorded
+from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
+from tests.logs.recorded import Telemetry, recorded
 
 PATH = "/api/log-analyses"
 
@@ -20,12 +24,15 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
     assert answer.status_code == 200, answer.text
     found = answer.json()
     assert found["file_name"] == "steps.bin"
-    assert found["vehicle"]["thrust_slope"]["mean"] == pytest.approx(1.0, abs=0.01)
-    assert found["vehicle"]["assumed_hover_throttle"] == pytest.approx(0.39)
-    assert found["proposed"]["error_m"] < 0.2 * found["assessments"][0]["error_m"]
-    assert found["insufficient"] is None
+    numbers = found["numbers"]
+    assert numbers["vehicle"]["thrust_slope"]["mean"] == pytest.approx(1.0, abs=0.01)
+    assert numbers["vehicle"]["assumed_hover_throttle"] == pytest.approx(0.39)
+    assert numbers["proposed"]["error_m"] < 0.2 * numbers["assessments"][0]["error_m"]
+    assert found["autopilot"] == "ArduCopter"
+    assert found["proposes"]
     assert found["answer"].startswith("Mean deviation: 23.4 mm measured.")
-    assert "PSC_POSZ_P,3\n" in found["parameter_file"]
+    assert found["parameter_file"]["name"] == "steps.param"
+    assert "PSC_POSZ_P,3\n" in found["parameter_file"]["content"]
     assert found["figures"].keys() == {"light", "dark"}
     drawn = found["figures"]["dark"]["figure"]["data"]
     assert [(one["meta"]["panel"], one["meta"]["line"]) for one in drawn] == [
@@ -53,11 +60,7 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
     ("name", "reason"),
     [
         ("arducopter_takeoff.bin", "holds altitude for 4.8 s only; 6 s are needed"),
-        ("px4_takeoff.ulg", "is another kind of log (PX4's log): only ArduPilot's .bin logs can be analysed"),
-        (
-            "paparazzi_283_13_82.tlog",
-            "is another kind of log (MAVLink telemetry log): only ArduPilot's .bin logs can be analysed",
-        ),
+        ("px4_takeoff.ulg", "is another kind of log (PX4's log)"),
     ],
 )
 def test_a_log_that_cannot_be_analysed_is_refused_with_the_reason(client: TestClient, name: str, reason: str) -> None:
@@ -67,6 +70,51 @@ def test_a_log_that_cannot_be_analysed_is_refused_with_the_reason(client: TestCl
 
 
 def test_a_file_that_is_no_log_is_refused(client: TestClient) -> None:
-    assert problems_of(send(client, "notes.bin", b"hello")) == {
-        "file": "is not a log: only ArduPilot's .bin logs can be analysed"
-    }
+    answer = send(client, "notes.bin", b"hello")
+    assert problems_of(answer) == {"file": "is not a log"}
+    assert problems_of(send(client, "empty.bin", b"")) == {"file": "is empty"}
+    assert answer.json()["hint"].startswith(
+        "Use ArduCopter's .bin log, or Paparazzi's .data or .tlog log of a takeoff."
+    )
+
+
+def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(client: TestClient) -> None:
+    found = send(client, "flight.tlog", recorded("paparazzi_283_13_82.tlog")).json()
+    assert (found["autopilot"], found["proposes"]) == ("Paparazzi", True)
+    assert found["gains"]["columns"] == ["Gains", "kp", "ki", "kd", "Flown", "Predicted", "90 % interval", "Gate"]
+    assert [row[0] for row in found["gains"]["rows"]] == ["As flown", "Proposed"]
+    assert found["gains"]["rows"][0][:5] == ["As flown", "283", "13", "82", "0.330 m"]
+    proposed = found["numbers"]["proposed"]
+    assert found["parameter_file"]["name"] == "flight.xml"
+    section = ElementTree.fromstring(found["parameter_file"]["content"])
+    defined = {each.attrib["name"]: float(each.attrib["value"]) for each in section}
+    assert defined == {f"HOVER_{name.upper()}": value for name, value in proposed["gains"].items()}
+    drawn = found["figures"]["light"]["figure"]["data"]
+    assert [(one["meta"]["panel"], one["meta"]["line"]) for one in drawn] == [
+        (1, "Set point"),
+        (1, "Flown"),
+        (1, "Predicted with the proposed gains"),
+        (2, "Flown"),
+        (2, "Predicted with the proposed gains"),
+    ]
+
+
+def test_a_ground_log_needs_its_companion_for_the_gains(client: TestClient) -> None:
+    data = data_of(Flight(gains={"kp": 283, "ki": 13, "kd": 82}, loop_log=False))
+    alone = send(client, "flight.data", data.encode())
+    assert problems_of(alone) == {"file": "does not contain the values of kp, ki, kd"}
+    assert "Add the .log file of the same name" in alone.json()["hint"]
+    files = {"file": ("flight.data", data.encode()), "companion": ("flight.log", COMPANION.encode())}
+    answer = client.post(PATH, files=files)
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["gains"]["rows"][0][:4] == ["As flown", "283", "13", "82"]
+
+
+def test_a_telemetry_log_of_another_autopilot_is_refused(client: TestClient) -> None:
+    log = Telemetry(ardupilotmega, autopilot=3, system=1)
+    log.parameter("PSC_POSZ_P", 1.0)
+    log.heartbeat()
+    log.fly(20.0, to_m=3.0)
+    answer = send(client, "copter.tlog", log.content)
+    assert answer.status_code == 422
+    assert problems_of(answer)["file"].startswith("is a telemetry log of an autopilot with the gains PSC_")

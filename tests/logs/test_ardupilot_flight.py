@@ -273,16 +273,3 @@ def test_a_log_that_was_cut_off_is_read_as_far_as_it_goes_or_refused(share: floa
         assert refusal(content)[0] == "PSCD"
     else:
         assert spans_s(read(content))[0][0] == 10.0
-
-
-@pytest.mark.parametrize("name", ["px4_takeoff.ulg", "paparazzi_283_13_82.tlog"])
-def test_another_kind_of_log_is_named(name: str) -> None:
-    field, reason = refusal(recorded(name))
-    assert field == "file"
-    assert "only ArduPilot's .bin logs can be analysed" in reason
-    assert {"px4_takeoff.ulg": "PX4's log", "paparazzi_283_13_82.tlog": "MAVLink telemetry log"}[name] in reason
-
-
-def test_a_file_that_is_no_log_is_refused() -> None:
-    assert refusal(b"")[1].startswith("is empty")
-    assert refusal(b"hello\n" * 100)[1].startswith("is not a log")

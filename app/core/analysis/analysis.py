@@ -163,11 +163,12 @@ def _is_better(proposed: Assessment, present: Assessment) -> bool:
 
 _BETTER: Final = 0.95
 _NONE_BETTER: Final = (
-    "Keep the gains flown: they have the margin, and no others are predicted to deviate less by more than 5 %."
+    "Keep the gains flown: their margin is sufficient, and no other gains are predicted to reduce the error by more "
+    "than 5 %."
 )
 _NONE_ALLOWED: Final = (
-    "No gains within the documented ranges keep the margin on this vehicle. Shorten its lags first: the motors', and "
-    "the filters of the accelerometer and the acceleration controller."
+    "No gains within the documented ranges reach the required margin on this vehicle. Reduce its lags first: motors, "
+    "accelerometer filter, acceleration controller filters."
 )
 
 
@@ -280,8 +281,8 @@ def _insufficient(estimate: CopterEstimate) -> str | None:
     if known_to <= _LARGEST_SLOPE_DEVIATION:
         return None
     return (
-        f"The log does not suffice to propose gains: the thrust slope is known to ±{known_to:.2f} only, "
-        f"and ±{_LARGEST_SLOPE_DEVIATION} is needed. {_FLY}"
+        f"The log is not sufficient to propose gains: the thrust slope is known only to ±{known_to:.2f}; "
+        f"±{_LARGEST_SLOPE_DEVIATION} is needed. {_FLY}"
     )
 
 

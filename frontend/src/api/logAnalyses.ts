@@ -3,9 +3,13 @@
 import { useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
 import { analyzeLog } from "./generated";
+import type { RecordFiles } from "./records";
 
-export type { AssessedGains, LogAnalysis } from "./generated";
+export type { LogAnalysis } from "./generated";
+
+/** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
+export const ANALYSED_FILES = ".bin,.tlog,.data,.log";
 
 export function useAnalyzeLog() {
-  return useMutation({ mutationFn: (file: File) => answer(analyzeLog({ body: { file } })) });
+  return useMutation({ mutationFn: (files: RecordFiles) => answer(analyzeLog({ body: { ...files } })) });
 }

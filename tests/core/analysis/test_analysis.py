@@ -60,7 +60,7 @@ def test_too_much_gust_for_the_slope_says_what_to_fly() -> None:
     found = analyze(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3))
     assert found.proposed is None
     assert found.insufficient is not None
-    assert "does not suffice" in found.insufficient
+    assert "is not sufficient" in found.insufficient
     assert "climb 2 m" in found.insufficient
 
 

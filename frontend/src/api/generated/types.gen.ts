@@ -142,50 +142,6 @@ export type Advice = {
 };
 
 /**
- * AssessedGains
- *
- * What the model predicts for a gain set in the same manoeuvre and weather.
- */
-export type AssessedGains = {
-    /**
-     * Name
-     */
-    name: string;
-    /**
-     * Gains
-     */
-    gains: {
-        [key: string]: number | number;
-    };
-    /**
-     * Error M
-     */
-    error_m: number;
-    /**
-     * Low M
-     *
-     * lower end of the 90 % interval of a single flight
-     */
-    low_m: number;
-    /**
-     * High M
-     */
-    high_m: number;
-    /**
-     * Activity
-     *
-     * throttle activity relative to the gains flown
-     */
-    activity: number;
-    /**
-     * Margin
-     *
-     * factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most critical of the vehicles that the log allows; 0: less than 1, 8: at least 8
-     */
-    margin: number;
-};
-
-/**
  * BestTrial
  *
  * The valid trial with the lowest error, and the mean of all flights of its gains with its standard error, null
@@ -1185,7 +1141,7 @@ export type EstimatedValue = {
 /**
  * EstimatedVehicle
  *
- * The vehicle behind the log.
+ * The ArduCopter that the log fits.
  */
 export type EstimatedVehicle = {
     hover_throttle: EstimatedValue;
@@ -1457,6 +1413,34 @@ export type FittedParameter = {
      * Prior Sd
      */
     prior_sd: number;
+};
+
+/**
+ * FittedValue
+ *
+ * A parameter of the model with its standard error.
+ */
+export type FittedValue = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Title
+     */
+    title: string;
+    /**
+     * Unit
+     */
+    unit: string;
+    /**
+     * Value
+     */
+    value: number;
+    /**
+     * Standard Error
+     */
+    standard_error: number;
 };
 
 /**
@@ -1811,6 +1795,98 @@ export type GainInfo = {
 };
 
 /**
+ * GainsInManoeuvre
+ *
+ * A gain set in the same manoeuvre and weather.
+ */
+export type GainsInManoeuvre = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Error M
+     *
+     * predicted mean distance between reference and altitude
+     */
+    error_m: number;
+    /**
+     * Low M
+     *
+     * lower end of the 90 % interval of a single flight
+     */
+    low_m: number;
+    /**
+     * High M
+     */
+    high_m: number;
+    /**
+     * Activity
+     *
+     * throttle activity relative to the gains flown
+     */
+    activity: number;
+    /**
+     * Margin
+     *
+     * factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most critical of the vehicles that the log allows; 0: less than 1, 8: at least 8
+     */
+    margin: number;
+};
+
+/**
+ * GainsInTakeoff
+ *
+ * A gain set in another takeoff to 3 m.
+ */
+export type GainsInTakeoff = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Gains
+     */
+    gains: {
+        [key: string]: number | number;
+    };
+    /**
+     * Error M
+     *
+     * predicted mean distance between reference and altitude
+     */
+    error_m: number;
+    /**
+     * Low M
+     *
+     * lower end of the 90 % interval of a single flight
+     */
+    low_m: number;
+    /**
+     * High M
+     */
+    high_m: number;
+    /**
+     * Flown Error M
+     *
+     * mean error of the takeoffs with these gains in the log
+     */
+    flown_error_m: number | null;
+    /**
+     * Refusal
+     *
+     * why the gate refuses these gains; empty: it does not
+     */
+    refusal: string;
+};
+
+/**
  * GainsPrediction
  *
  * What is predicted for gains: their error with its interval, the curve, and the edges of its band. From the
@@ -1831,6 +1907,22 @@ export type GainsPrediction = {
     curve: PredictedCurve | null;
     lower: PredictedCurve | null;
     upper: PredictedCurve | null;
+};
+
+/**
+ * GainsTable
+ *
+ * Gain sets compared, in words: the sets flown, the proposed one, and others.
+ */
+export type GainsTable = {
+    /**
+     * Columns
+     */
+    columns: Array<string>;
+    /**
+     * Rows
+     */
+    rows: Array<Array<string>>;
 };
 
 /**
@@ -2242,7 +2334,7 @@ export type LeaseRequest = {
 /**
  * LogAnalysis
  *
- * What a log tells about the altitude control of its vehicle. `assessments` begins with the gains flown.
+ * The answer of a log.
  */
 export type LogAnalysis = {
     /**
@@ -2250,34 +2342,43 @@ export type LogAnalysis = {
      */
     file_name: string;
     /**
+     * Autopilot
+     */
+    autopilot: 'ArduCopter' | 'Paparazzi';
+    /**
      * Answer
      */
     answer: string;
-    behaviour: LoggedBehaviour;
-    vehicle: EstimatedVehicle;
-    proposed: AssessedGains | null;
     /**
-     * Insufficient
+     * Proposes
      *
-     * why nothing is proposed
+     * whether gains are proposed; if not, `answer` says why
      */
-    insufficient: string | null;
+    proposes: boolean;
     /**
-     * Assessments
-     */
-    assessments: Array<AssessedGains>;
-    /**
-     * At Limit
+     * Flight
      *
-     * proposed gains at an end of the range that was searched
+     * how the altitude was controlled
      */
-    at_limit: Array<string>;
+    flight: Array<string>;
     /**
-     * Parameter File
+     * Vehicle
      *
-     * the proposed gains as a ground station loads them
+     * the fitted vehicle
      */
-    parameter_file: string | null;
+    vehicle: Array<string>;
+    gains: GainsTable;
+    /**
+     * Notes
+     *
+     * how to read the table, and what to heed
+     */
+    notes: Array<string>;
+    parameter_file: ParameterFile | null;
+    /**
+     * Numbers
+     */
+    numbers: ManoeuvreNumbers | TakeoffNumbers;
     /**
      * Figures
      *
@@ -2324,6 +2425,27 @@ export type LoggedBehaviour = {
      * share of the rows with the throttle at a limit
      */
     saturated_share: number;
+};
+
+/**
+ * ManoeuvreNumbers
+ *
+ * The analysis of an ArduCopter's log. `assessments` begins with the gains flown.
+ */
+export type ManoeuvreNumbers = {
+    behaviour: LoggedBehaviour;
+    vehicle: EstimatedVehicle;
+    /**
+     * Assessments
+     */
+    assessments: Array<GainsInManoeuvre>;
+    proposed: GainsInManoeuvre | null;
+    /**
+     * At Limit
+     *
+     * proposed gains at an end of the range that was searched
+     */
+    at_limit: Array<string>;
 };
 
 /**
@@ -2641,6 +2763,22 @@ export type PageVehicle = {
      * Next Cursor
      */
     next_cursor: string | null;
+};
+
+/**
+ * ParameterFile
+ *
+ * The proposed gains as a ground station or an airframe takes them.
+ */
+export type ParameterFile = {
+    /**
+     * Name
+     */
+    name: string;
+    /**
+     * Content
+     */
+    content: string;
 };
 
 /**
@@ -3360,6 +3498,69 @@ export type System = {
      * Database Revision
      */
     database_revision: string;
+};
+
+/**
+ * TakeoffNumbers
+ *
+ * The analysis of a log of takeoffs under Paparazzi. `assessments` begins with the gains of the best takeoff.
+ */
+export type TakeoffNumbers = {
+    /**
+     * Window S
+     *
+     * scored time from the command on
+     */
+    window_s: number;
+    /**
+     * Takeoffs
+     *
+     * numbers of those analysed
+     */
+    takeoffs: Array<number>;
+    /**
+     * Best
+     *
+     * number of the takeoff with the lowest error
+     */
+    best: number;
+    /**
+     * Error M
+     *
+     * its mean distance from 3 m
+     */
+    error_m: number;
+    /**
+     * Rise Time S
+     */
+    rise_time_s: number | null;
+    /**
+     * Settling Time S
+     */
+    settling_time_s: number | null;
+    /**
+     * Overshoot M
+     */
+    overshoot_m: number | null;
+    /**
+     * Steady State Error M
+     */
+    steady_state_error_m: number | null;
+    /**
+     * Vehicle
+     */
+    vehicle: Array<FittedValue>;
+    /**
+     * Residual M
+     *
+     * altitude that the model does not explain, rms
+     */
+    residual_m: number;
+    /**
+     * Assessments
+     */
+    assessments: Array<GainsInTakeoff>;
+    proposed: GainsInTakeoff | null;
 };
 
 /**

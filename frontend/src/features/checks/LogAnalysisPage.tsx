@@ -2,7 +2,8 @@ import { Anchor, Button, FileButton, Group, Skeleton, Text, Title, useComputedCo
 import { IconDownload, IconFileUpload } from "@tabler/icons-react";
 import { useRef, useState } from "react";
 import { Link } from "react-router";
-import { type LogAnalysis, useAnalyzeLog } from "../../api/logAnalyses";
+import { ANALYSED_FILES, type LogAnalysis, useAnalyzeLog } from "../../api/logAnalyses";
+import { recordOf } from "../../api/records";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { DataTable } from "../../ui/DataTable";
 import { ErrorNotice } from "../../ui/Notices";
@@ -11,7 +12,6 @@ import { Panel } from "../../ui/Panel";
 import row from "../../ui/RowCard.module.css";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./Checks.module.css";
-import { behaviourOf, gainsTable, vehicleOf } from "./logAnalysis";
 
 const FIGURE_HEIGHT_PX = 560;
 const ROW_PX = 37;
@@ -22,8 +22,9 @@ export function LogAnalysisPage() {
   const [over, setOver] = useState(false);
   const resetFile = useRef<() => void>(null);
   const { mutate, data, error, variables, isPending } = useAnalyzeLog();
-  const analyze = (file: File | null | undefined) => {
-    if (file && !isPending) mutate(file);
+  const analyze = (files: readonly File[]) => {
+    const chosen = recordOf(files);
+    if (chosen && !isPending) mutate(chosen);
     resetFile.current?.();
   };
   return (
@@ -38,12 +39,12 @@ export function LogAnalysisPage() {
       onDrop={(event) => {
         event.preventDefault();
         setOver(false);
-        analyze(event.dataTransfer.files[0]);
+        analyze([...event.dataTransfer.files]);
       }}
     >
       <Title order={1}>Log analysis</Title>
       {isPending && (
-        <Panel title={variables.name}>
+        <Panel title={variables.file.name}>
           <p aria-live="polite">Analysing the log. This takes about 10 seconds.</p>
           <Skeleton height={280} mt={12} radius="md" aria-hidden />
         </Panel>
@@ -54,11 +55,12 @@ export function LogAnalysisPage() {
         className={over ? classes["over"] : ""}
       >
         <Text maw="90ch" lh={1.45} mb={10}>
-          Drop ArduCopter's .bin log of a flight here or choose it. In GUIDED, LOITER, ALT_HOLD or AUTO the vehicle
-          should climb and descend by about 2 m with a few seconds of hover between. The file is not stored.
+          Drop ArduCopter's .bin log here or choose it: in GUIDED, LOITER, ALT_HOLD or AUTO the vehicle should climb and
+          descend by about 2 m with a few seconds of hover between. Or Paparazzi's .data and .log files, or its .tlog,
+          of takeoffs to 3 m. The files are not stored.
         </Text>
         <Group gap={10} mt={12} mb={10}>
-          <FileButton accept=".bin" onChange={analyze} resetRef={resetFile}>
+          <FileButton multiple accept={ANALYSED_FILES} onChange={analyze} resetRef={resetFile}>
             {(props) => (
               <Button {...props} loading={isPending} leftSection={<IconFileUpload size={20} aria-hidden />}>
                 Choose log
@@ -80,35 +82,34 @@ export function LogAnalysisPage() {
 }
 
 function Result({ analysis }: { analysis: LogAnalysis }) {
-  const { file_name, answer, proposed, at_limit, parameter_file, figures } = analysis;
+  const { file_name, answer, proposes, flight, vehicle, gains, notes, parameter_file, figures } = analysis;
   const figure = figures[useComputedColorScheme("light")];
-  const table = gainsTable(analysis);
+  const columns = gains.columns.map((title) => ({ name: title, title, unit: "", digits: null }));
   return (
     <article className={classes["check"]} aria-label={`Analysis of ${file_name}`}>
       <Panel title={file_name}>
-        <p className={classes["sentence"]} data-passed={proposed !== null || undefined}>
+        <p className={classes["sentence"]} data-passed={proposes || undefined}>
           {answer}
         </p>
-        <Facts title="Flight" facts={behaviourOf(analysis)} />
-        <Facts title="Vehicle" facts={vehicleOf(analysis)} />
-        <DataTable table={table} label="Gains compared" height={ROW_PX * (table.rows.length + 1)} />
+        <Facts title="Flight" facts={flight} />
+        <Facts title="Vehicle" facts={vehicle} />
+        <DataTable
+          table={{ columns, rows: gains.rows }}
+          label="Gains compared"
+          height={ROW_PX * (gains.rows.length + 1)}
+        />
         <ul className={page["notes"]}>
-          <li>Deviations are predicted for the same manoeuvre in the same weather, other parameters as flown.</li>
-          <li>Activity is that of the throttle, relative to the gains flown; a proposal has at most 1.5.</li>
-          <li>
-            The margin is the factor on P and I of the acceleration controller at which the loop rings with 30 ms more
-            lag; a proposal has at least 2.
-          </li>
-          {at_limit.length > 0 && <li>At an end of the range searched: {at_limit.join(", ")}.</li>}
-          {proposed && <li>Load the gains on the ground. Fly them first at a safe height, ready to take over.</li>}
+          {notes.map((note) => (
+            <li key={note}>{note}</li>
+          ))}
         </ul>
         {parameter_file !== null && (
           <Button
             component="a"
             mt="sm"
             variant="default"
-            href={`data:text/plain;charset=utf-8,${encodeURIComponent(parameter_file)}`}
-            download={`${file_name.replace(/\.bin$/i, "")}.param`}
+            href={`data:text/plain;charset=utf-8,${encodeURIComponent(parameter_file.content)}`}
+            download={parameter_file.name}
             leftSection={<IconDownload size={18} aria-hidden />}
           >
             Download parameter file

@@ -1,0 +1,187 @@
+"""The answer of an ArduCopter's log, for a person: its facts, table, notes, parameter file and figure."""
+
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Final
+
+from app.core.analysis.analysis import Analysis, Assessment
+from app.core.analysis.margin import EXTRA_LAG_S, LARGEST_MARGIN, REQUIRED_MARGIN
+from app.core.analysis.proposal import LARGEST_ACTIVITY
+from app.core.formatting import format_gains, percent
+from app.core.records.trajectory import Samples
+from app.figures.panels import Line, Panel, Plot
+from app.log_analyses.schemas import (
+    EstimatedValue,
+    EstimatedVehicle,
+    GainsInManoeuvre,
+    GainsTable,
+    LogAnswer,
+    LoggedBehaviour,
+    ManoeuvreNumbers,
+    ParameterFile,
+)
+
+_HOVER_DIFFERENCE: Final = 0.1
+_LEAST_SPREAD: Final = 0.01
+_FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysedManoeuvres:
+    """An analysis, the log's file name, and the hover throttle that the autopilot assumed."""
+
+    analysis: Analysis
+    file_name: str
+    assumed_hover_throttle: float
+
+    @property
+    def answer(self) -> LogAnswer:
+        """The answer in facts and numbers."""
+        analysis = self.analysis
+        content = analysis.parameter_file(self.file_name)
+        name = f"{PurePath(self.file_name).stem}.param"
+        return LogAnswer(
+            file_name=self.file_name,
+            autopilot="ArduCopter",
+            answer=analysis.answer,
+            proposes=analysis.proposed is not None,
+            flight=_flight(analysis),
+            vehicle=self._vehicle(),
+            gains=_table(analysis),
+            notes=_notes(analysis),
+            parameter_file=None if content is None else ParameterFile(name=name, content=content),
+            numbers=self._numbers(),
+        )
+
+    @property
+    def plot(self) -> Plot:
+        """The flight beside its prediction: altitude, deviation from the reference, throttle."""
+        analysis = self.analysis
+        shown, gains = analysis.response, (analysis.proposed or analysis.assessments[0]).gains
+        which = f"Predicted with the {'proposed' if analysis.proposed else 'same'} gains"
+        time_s = _rounded(shown.time_s)
+
+        def panel(y_title: str, digits: int, flown: Samples, predicted: Samples, *more: Line) -> Panel:
+            lines = (
+                Line(name="Flown", style="measured", x=time_s, y=_rounded(flown)),
+                Line(name=which, style="model", x=time_s, y=_rounded(predicted)),
+            )
+            return Panel(y_title=y_title, digits=digits, lines=(*more, *lines))
+
+        reference = Line(name="Reference", style="goal", x=time_s, y=_rounded(shown.reference_m))
+        flown_mm, predicted_mm = (1e3 * (each - shown.reference_m) for each in (shown.flown_m, shown.predicted_m))
+        return Plot(
+            title="The flight and its prediction",
+            summary=f"Altitude, deviation and throttle as flown, and as predicted with {format_gains(gains)}.",
+            x_title="Time in the flight (s)",
+            panels=(
+                panel("Altitude (m)", 2, shown.flown_m, shown.predicted_m, reference),
+                panel("Deviation (mm)", 1, flown_mm, predicted_mm),
+                panel("Throttle", 3, shown.flown_throttle, shown.predicted_throttle),
+            ),
+        )
+
+    def _vehicle(self) -> list[str]:
+        estimate, assumed = self.analysis.estimate, self.assumed_hover_throttle
+        mean, deviation = estimate.mean, estimate.deviation
+        is_off = abs(mean.hover_throttle / assumed - 1.0) > _HOVER_DIFFERENCE
+        return [
+            f"hover throttle {mean.hover_throttle:.3f}" + (f", but MOT_THST_HOVER was {assumed:.3f}" if is_off else ""),
+            f"thrust slope {mean.thrust_slope:.2f} ± {max(deviation.thrust_slope, _LEAST_SPREAD):.2f}",
+            f"motor lag {1e3 * mean.motor_lag_s:.0f} ± {1e3 * deviation.motor_lag_s:.0f} ms",
+            f"drag {mean.drag_1_s:.2f} ± {max(deviation.drag_1_s, _LEAST_SPREAD):.2f} 1/s",
+            f"{estimate.residual_m_s2:.2f} m/s² of acceleration unexplained",
+        ]
+
+    def _numbers(self) -> ManoeuvreNumbers:
+        analysis = self.analysis
+        mean, deviation = analysis.estimate.mean, analysis.estimate.deviation
+        values = {
+            each: EstimatedValue(mean=getattr(mean, each), deviation=getattr(deviation, each)) for each in _FITTED
+        }
+        return ManoeuvreNumbers(
+            behaviour=LoggedBehaviour.model_validate(analysis.behaviour, from_attributes=True),
+            vehicle=EstimatedVehicle(
+                **values,
+                assumed_hover_throttle=self.assumed_hover_throttle,
+                residual_m_s2=analysis.estimate.residual_m_s2,
+            ),
+            assessments=[_assessed(each) for each in analysis.assessments],
+            proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
+            at_limit=list(analysis.at_limit),
+        )
+
+
+def _flight(analysis: Analysis) -> list[str]:
+    behaviour = analysis.behaviour
+    return [
+        f"{behaviour.duration_s:.0f} s analysed",
+        f"reference moves by {behaviour.reference_range_m:.1f} m",
+        f"mean deviation {_mm(behaviour.error_m)}, maximum {_mm(behaviour.largest_deviation_m)}",
+        f"mean throttle {behaviour.throttle_mean:.3f}",
+        *(
+            [f"throttle at a limit in {percent(behaviour.saturated_share)} of the samples"]
+            * (behaviour.saturated_share > 0.0)
+        ),
+    ]
+
+
+def _table(analysis: Analysis) -> GainsTable:
+    flown, *others = analysis.assessments
+    listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
+    names = [name.removeprefix("PSC_") for name in flown.gains]
+    return GainsTable(
+        columns=["Gains", *names, "Predicted error", "90 % interval", "Throttle activity", "Margin"],
+        rows=[_row(each) for each in listed],
+    )
+
+
+def _row(each: Assessment) -> list[str]:
+    low, high = each.prediction.low_m, each.prediction.high_m
+    margin = "< 1" if not each.margin else f"{each.margin:.1f}" if each.margin < LARGEST_MARGIN else "> 8"
+    return [
+        each.name,
+        *(f"{value:g}" for value in each.gains.values()),
+        _mm(each.prediction.error_m),
+        f"{1e3 * low:.1f} … {_mm(high)}",
+        f"{each.activity:.2f}",
+        margin,
+    ]
+
+
+def _notes(analysis: Analysis) -> list[str]:
+    return [
+        "Errors are predicted for the same manoeuvre in the same weather, with all other parameters as flown.",
+        f"Throttle activity is relative to the gains flown; a proposal has at most {LARGEST_ACTIVITY:g}.",
+        _MARGIN,
+        *([f"At the limit of the search range: {', '.join(analysis.at_limit)}."] if analysis.at_limit else []),
+        *([_LOAD] if analysis.proposed else []),
+    ]
+
+
+_MARGIN: Final = (
+    "The margin is the factor by which P and I of the acceleration controller can be raised before the loop rings, "
+    f"with {1e3 * EXTRA_LAG_S:.0f} ms of extra lag; a proposal has at least {REQUIRED_MARGIN:g}."
+)
+_LOAD: Final = "Load the gains on the ground. Fly them first at a safe height, ready to take over."
+
+
+def _assessed(each: Assessment) -> GainsInManoeuvre:
+    prediction = each.prediction
+    return GainsInManoeuvre(
+        name=each.name,
+        gains=dict(each.gains),
+        error_m=prediction.error_m,
+        low_m=prediction.low_m,
+        high_m=prediction.high_m,
+        activity=each.activity,
+        margin=each.margin,
+    )
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.1f} mm"
+
+
+def _rounded(values: Samples) -> tuple[float, ...]:
+    return tuple(round(value, 5) for value in values.tolist())

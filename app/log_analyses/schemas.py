@@ -1,0 +1,140 @@
+"""What a log tells about the altitude control of its vehicle: for a person and, in numbers, for scripts."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.common.schemas import FigureCard, Gains, Schema
+from app.figures.theme import ThemeName
+
+
+class LoggedBehaviour(Schema):
+    """How the altitude loop behaved in the flight."""
+
+    duration_s: Annotated[float, Field(description="time analysed")]
+    error_m: Annotated[float, Field(description="mean distance between reference and altitude")]
+    largest_deviation_m: float
+    reference_range_m: float
+    throttle_mean: float
+    saturated_share: Annotated[float, Field(description="share of the rows with the throttle at a limit")]
+
+
+class EstimatedValue(Schema):
+    """A fitted quantity and its standard deviation."""
+
+    mean: float
+    deviation: Annotated[float, Field(description="standard deviation")]
+
+
+class EstimatedVehicle(Schema):
+    """The ArduCopter that the log fits."""
+
+    hover_throttle: EstimatedValue
+    assumed_hover_throttle: Annotated[float, Field(description="MOT_THST_HOVER in flight")]
+    thrust_slope: EstimatedValue
+    motor_lag_s: EstimatedValue
+    drag_1_s: EstimatedValue
+    residual_m_s2: Annotated[float, Field(description="acceleration that throttle and climb rate do not explain, rms")]
+
+
+class AssessedGains(Schema):
+    """What the model predicts for a gain set: the error, with the 90 % interval of a single flight."""
+
+    name: str
+    gains: Gains
+    error_m: Annotated[float, Field(description="predicted mean distance between reference and altitude")]
+    low_m: Annotated[float, Field(description="lower end of the 90 % interval of a single flight")]
+    high_m: float
+
+
+class GainsInManoeuvre(AssessedGains):
+    """A gain set in the same manoeuvre and weather."""
+
+    activity: Annotated[float, Field(description="throttle activity relative to the gains flown")]
+    margin: Annotated[
+        float,
+        Field(
+            description="factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most "
+            "critical of the vehicles that the log allows; 0: less than 1, 8: at least 8"
+        ),
+    ]
+
+
+class GainsInTakeoff(AssessedGains):
+    """A gain set in another takeoff to 3 m."""
+
+    flown_error_m: Annotated[float | None, Field(description="mean error of the takeoffs with these gains in the log")]
+    refusal: Annotated[str, Field(description="why the gate refuses these gains; empty: it does not")]
+
+
+class ManoeuvreNumbers(Schema):
+    """The analysis of an ArduCopter's log. `assessments` begins with the gains flown."""
+
+    behaviour: LoggedBehaviour
+    vehicle: EstimatedVehicle
+    assessments: list[GainsInManoeuvre]
+    proposed: GainsInManoeuvre | None
+    at_limit: Annotated[list[str], Field(description="proposed gains at an end of the range that was searched")]
+
+
+class FittedValue(Schema):
+    """A parameter of the model with its standard error."""
+
+    name: str
+    title: str
+    unit: str
+    value: float
+    standard_error: float
+
+
+class TakeoffNumbers(Schema):
+    """The analysis of a log of takeoffs under Paparazzi. `assessments` begins with the gains of the best takeoff."""
+
+    window_s: Annotated[float, Field(description="scored time from the command on")]
+    takeoffs: Annotated[list[int], Field(description="numbers of those analysed")]
+    best: Annotated[int, Field(description="number of the takeoff with the lowest error")]
+    error_m: Annotated[float, Field(description="its mean distance from 3 m")]
+    rise_time_s: float | None
+    settling_time_s: float | None
+    overshoot_m: float | None
+    steady_state_error_m: float | None
+    vehicle: list[FittedValue]
+    residual_m: Annotated[float, Field(description="altitude that the model does not explain, rms")]
+    assessments: list[GainsInTakeoff]
+    proposed: GainsInTakeoff | None
+
+
+class GainsTable(Schema):
+    """Gain sets compared, in words: the sets flown, the proposed one, and others."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+class ParameterFile(Schema):
+    """The proposed gains as a ground station or an airframe takes them."""
+
+    name: str
+    content: str
+
+
+class LogAnswer(Schema):
+    """The answer of a log without its figure."""
+
+    file_name: str
+    autopilot: Literal["ArduCopter", "Paparazzi"]
+    answer: str
+    proposes: Annotated[bool, Field(description="whether gains are proposed; if not, `answer` says why")]
+    flight: Annotated[Sequence[str], Field(description="how the altitude was controlled")]
+    vehicle: Annotated[Sequence[str], Field(description="the fitted vehicle")]
+    gains: GainsTable
+    notes: Annotated[Sequence[str], Field(description="how to read the table, and what to heed")]
+    parameter_file: ParameterFile | None
+    numbers: ManoeuvreNumbers | TakeoffNumbers
+
+
+class LogAnalysis(LogAnswer):
+    """The answer of a log."""
+
+    figures: Annotated[dict[ThemeName, FigureCard], Field(description="by theme")]

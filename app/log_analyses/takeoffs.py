@@ -1,0 +1,219 @@
+"""The answer of a log of takeoffs under Paparazzi, for a person: its facts, table, notes, airframe section, figure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Final
+
+from app.core.analysis.takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
+from app.core.errors import Problem, TrajectoryError
+from app.core.experiments.base import FittedParameter
+from app.core.experiments.takeoff import Takeoff as Experiment
+from app.core.formatting import count, format_gains, number, plus_minus
+from app.core.records.trajectory import Trajectory
+from app.figures.panels import Line, Panel, Plot, Style
+from app.figures.scale import thinned
+from app.log_analyses.schemas import (
+    FittedValue,
+    GainsInTakeoff,
+    GainsTable,
+    LogAnswer,
+    ParameterFile,
+    TakeoffNumbers,
+)
+from app.logs.takeoffs import Takeoff
+
+_IDENTIFIED_SHARE: Final = 0.5
+"""A log identifies a parameter whose standard error is less than this share of the prior's."""
+_SHOWN_S: Final = 8.0
+_SHOWN_M: Final = (-0.4, 0.4)
+_POINTS: Final = 1500
+
+
+def logged_takeoffs(found: Sequence[Takeoff], *, name: str) -> list[LoggedTakeoff]:
+    """The takeoffs whose gains the log contains. Raises TrajectoryError if it is of another autopilot, or none does."""
+    names = set(Experiment.space.names)
+    if other := next((each for each in found if each.gain_names and set(each.gain_names) != names), None):
+        raise TrajectoryError(
+            f"{name} cannot be analysed.",
+            hint="Use the vehicle's own log: the .bin file of an ArduCopter.",
+            problems=(
+                Problem("file", f"is a telemetry log of an autopilot with the gains {', '.join(other.gain_names)}"),
+            ),
+        )
+    known = [
+        LoggedTakeoff(number=each.number, gains=each.gains, trajectory=each.trajectory) for each in found if each.gains
+    ]
+    if not known:
+        raise TrajectoryError(
+            f"{name} cannot be analysed.",
+            hint="Add the .log file of the same name to Paparazzi's .data file; start a telemetry log before the "
+            "ground station connects.",
+            problems=(Problem("file", f"does not contain the values of {', '.join(Experiment.space.names)}"),),
+        )
+    return known
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysedTakeoffs:
+    """An analysis, and the log's file name."""
+
+    analysis: TakeoffAnalysis
+    file_name: str
+
+    @property
+    def answer(self) -> LogAnswer:
+        """The answer in facts and numbers."""
+        analysis = self.analysis
+        return LogAnswer(
+            file_name=self.file_name,
+            autopilot="Paparazzi",
+            answer=analysis.answer,
+            proposes=analysis.proposed is not None,
+            flight=_flight(analysis),
+            vehicle=_vehicle(analysis),
+            gains=_table(analysis),
+            notes=_notes(analysis),
+            parameter_file=self._airframe_section(),
+            numbers=_numbers(analysis),
+        )
+
+    @property
+    def plot(self) -> Plot:
+        """The best takeoff beside its prediction: altitude, and deviation from 3 m."""
+        analysis = self.analysis
+        gains = (analysis.proposed or analysis.assessments[0]).gains
+        best, predicted = analysis.best.trajectory, analysis.predicted
+        goal_m = float(Experiment().set_point(best.time_s[-1:])[0])
+        which = f"Predicted with the {'proposed' if analysis.proposed else 'same'} gains"
+
+        def line(name: str, style: Style, record: Trajectory, offset_m: float) -> Line:
+            shown = (record.time_s >= 0.0) & (record.time_s <= analysis.window_s)
+            x, y = thinned(record.time_s[shown], record["altitude_m"][shown] - offset_m, _POINTS)
+            return Line(name=name, style=style, x=tuple(x), y=tuple(y))
+
+        def lines(offset_m: float) -> tuple[Line, ...]:
+            return line("Flown", "measured", best, offset_m), line(which, "model", predicted, offset_m)
+
+        goal = Line(name="Set point", style="goal", x=(0.0, analysis.window_s), y=(goal_m, goal_m))
+        return Plot(
+            title="The takeoff and its prediction",
+            summary=f"Altitude and deviation from {goal_m:g} m as flown, and as predicted with {format_gains(gains)}.",
+            x_title="Time since the command (s)",
+            panels=(
+                Panel(y_title="Altitude (m)", digits=2, lines=(goal, *lines(0.0))),
+                Panel(y_title="Deviation (m)", digits=3, y_range=_SHOWN_M, lines=lines(goal_m)),
+            ),
+            x_range=(0.0, min(_SHOWN_S, analysis.window_s)),
+        )
+
+    def _airframe_section(self) -> ParameterFile | None:
+        """The proposed gains as a section of an airframe file; None without a proposal."""
+        if self.analysis.proposed is None:
+            return None
+        flown = format_gains(self.analysis.assessments[0].gains)
+        file_name = self.file_name.replace("--", "-")
+        lines = [
+            f"<!-- Gainline, from {file_name}, flown with {flown}. Fly first with free space, ready to take over. -->",
+            '<section name="GUIDANCE_V" prefix="GUIDANCE_V_">',
+            *(
+                f'  <define name="HOVER_{name.upper()}" value="{value:g}"/>'
+                for name, value in self.analysis.proposed.gains.items()
+            ),
+            "</section>",
+        ]
+        return ParameterFile(name=f"{PurePath(self.file_name).stem}.xml", content="\n".join((*lines, "")))
+
+
+def _flight(analysis: TakeoffAnalysis) -> list[str]:
+    error = f"mean distance from 3 m {number(analysis.best.error)} m"
+    facts = [
+        f"{count(len(analysis.numbers), 'takeoff')} analysed over {analysis.window_s:g} s",
+        error if len(analysis.numbers) == 1 else f"{error} in the best, number {analysis.best.number}",
+    ]
+    response = analysis.response
+    if response is None:
+        return facts
+    settling_s = response.settling_time_s
+    return [
+        *facts,
+        f"rise time {number(response.rise_time_s, 2)} s",
+        "did not settle" if settling_s is None else f"settling time {number(settling_s, 2)} s",
+        f"overshoot {number(response.overshoot, 2)} m",
+        f"steady-state error {number(response.steady_state_error)} m",
+    ]
+
+
+def _vehicle(analysis: TakeoffAnalysis) -> list[str]:
+    identified = [each for each in analysis.fitted if each.standard_error < _IDENTIFIED_SHARE * each.prior_sd]
+    return [*map(_fitted, identified), f"{analysis.residual_m:.3f} m of altitude unexplained"]
+
+
+def _fitted(each: FittedParameter) -> str:
+    unit = "" if each.unit == "1" else each.unit
+    return f"{each.title.lower()} {plus_minus(each.value, each.standard_error, unit)}".rstrip()
+
+
+def _table(analysis: TakeoffAnalysis) -> GainsTable:
+    flown, *others = analysis.assessments
+    listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
+    return GainsTable(
+        columns=["Gains", *flown.gains, "Flown", "Predicted", "90 % interval", "Gate"],
+        rows=[_row(each) for each in listed],
+    )
+
+
+def _row(each: AssessedGains) -> list[str]:
+    return [
+        each.name,
+        *(f"{value:g}" for value in each.gains.values()),
+        f"{number(each.flown_error_m)} m" if each.flown_error_m is not None else number(None),
+        f"{number(each.predicted_error_m)} m",
+        f"{number(each.interval.lower)} … {number(each.interval.upper)} m",
+        "refused" if each.refusal else "passed",
+    ]
+
+
+def _notes(analysis: TakeoffAnalysis) -> list[str]:
+    refused = [each for each in analysis.assessments if each.refusal]
+    return [
+        f"Errors are the mean distance from 3 m in the first {analysis.window_s:g} s of a takeoff to 3 m.",
+        *(f"The gate refuses {format_gains(each.gains)}: {each.refusal}" for each in refused),
+        *([_LOAD] if analysis.proposed else []),
+    ]
+
+
+_LOAD: Final = (
+    "Set the gains in the airframe file or in the ground station's settings, on the ground. Fly them first with free "
+    "space around, ready to take over."
+)
+
+
+def _numbers(analysis: TakeoffAnalysis) -> TakeoffNumbers:
+    response = analysis.response
+    return TakeoffNumbers(
+        window_s=analysis.window_s,
+        takeoffs=list(analysis.numbers),
+        best=analysis.best.number,
+        error_m=analysis.best.error or 0.0,
+        rise_time_s=None if response is None else response.rise_time_s,
+        settling_time_s=None if response is None else response.settling_time_s,
+        overshoot_m=None if response is None else response.overshoot,
+        steady_state_error_m=None if response is None else response.steady_state_error,
+        vehicle=[FittedValue.model_validate(each, from_attributes=True) for each in analysis.fitted],
+        residual_m=analysis.residual_m,
+        assessments=[_assessed(each) for each in analysis.assessments],
+        proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
+    )
+
+
+def _assessed(each: AssessedGains) -> GainsInTakeoff:
+    return GainsInTakeoff(
+        name=each.name,
+        gains=dict(each.gains),
+        error_m=each.predicted_error_m,
+        low_m=each.interval.lower,
+        high_m=each.interval.upper,
+        flown_error_m=each.flown_error_m,
+        refusal=each.refusal,
+    )
