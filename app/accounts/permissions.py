@@ -93,7 +93,7 @@ UNLOCK_HINT: Final = (
 _FOR_SCRIPTS: Final = "Send the token that `gainline unlock --script` prints as `Authorization: Bearer TOKEN`."
 
 STAGED_BY_SCRIPT: Final = (
-    "A script can propose gains and stage the flight; the operator then holds the button on the fly page."
+    "A script can propose gains and stage the flight; the operator then holds the button on the fly screen."
 )
 
 
@@ -124,7 +124,8 @@ def _describe_permission(act: Permission, vehicle: str) -> str:
 
 def _exposed(act: Permission, vehicle: str) -> NotAllowedError:
     return NotAllowedError(
-        f"{_describe_permission(act, vehicle)}, and this server is reachable over the network, without user accounts.",
+        f"{vehicle} cannot be commanded from this server: {_describe_permission(act, 'it')}, and other devices can "
+        "reach the server.",
         hint="Start the server with --host 127.0.0.1 on the computer that has the link to the vehicle.",
     )
 
@@ -140,7 +141,7 @@ def _elsewhere(act: Permission, caller: Caller, vehicle: str) -> NotAllowedError
 
 def _no_key_elsewhere(caller: Caller) -> NotAllowedError:
     return NotAllowedError(
-        f"The request came {caller.because}. Reading is allowed from there; everything else needs this server's token.",
+        f"This browser has read-only access, because the request came {caller.because}.",
         hint=UNLOCK_HINT,
         script_hint=_FOR_SCRIPTS,
     )
@@ -154,7 +155,7 @@ def _locked(act: Permission, vehicle: str) -> NotAllowedError:
             script_hint=STAGED_BY_SCRIPT,
         )
     return NotAllowedError(
-        f"{vehicle} is a real vehicle, and the request has no key that permits commanding it.",
+        f"{vehicle} is a real vehicle, and this browser is not unlocked for it.",
         hint=f"{UNLOCK_HINT} Abort and land need no key.",
         script_hint=f"{_FOR_SCRIPTS} Abort and land need no key.",
     )

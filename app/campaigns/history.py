@@ -224,7 +224,7 @@ def set_trial_state(row: TrialRow, to: TrialState, *, reason: str | None = None)
 
     Raises ConflictError when the transition is not in the table.
     """
-    row.state = check_transition(TRIAL_TRANSITIONS, row.state, to, f"Trial {row.number}")
+    row.state = check_transition(TRIAL_TRANSITIONS, row.state, to, f"Flight {row.number}")
     if reason is not None:
         row.reason = reason
 

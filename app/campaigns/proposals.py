@@ -126,7 +126,7 @@ def fresh_proposal(session: Session, campaign: CampaignRow, proposal_id: int) ->
         raise NotFoundError("proposal", proposal_id, hint="Get the campaign's proposal and use its id.")
     if is_stale(session, campaign, row, history.trials_of(session, campaign.id)):
         raise ConflictError(
-            f"Proposal {proposal_id} is stale: the campaign's flights or its definition have changed.",
+            "This proposal is out of date: the campaign's flights or settings have changed.",
             hint="Wait for the new proposal, then decide again.",
         )
     return row

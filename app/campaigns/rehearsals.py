@@ -11,6 +11,7 @@ from app.campaigns.definitions import definition_of
 from app.campaigns.schemas import Rehearsal, RehearsalState
 from app.common.errors import ConflictError
 from app.common.states import Outcome, TrialState
+from app.core.formatting import count
 from app.db.models import CampaignRow
 from app.fleet import service as fleet
 
@@ -37,15 +38,19 @@ def rehearsal_result(trials: Sequence[RehearsalTrial], outcome: Outcome | None) 
     """
     flown = [trial for trial in trials if trial.state in history.FLOWN]
     if (spoilt := next((trial for trial in flown if trial.state in _FAILED_STATES), None)) is not None:
-        return "failed", f"flight {spoilt.number} is {spoilt.state}"
+        return (
+            "failed",
+            f"flight {spoilt.number} {'was' if spoilt.state == TrialState.ABORTED else 'is'} {spoilt.state}",
+        )
     if (refused := next((trial for trial in flown if not trial.gate_passed), None)) is not None:
         return "failed", f"the gate refused the gains of flight {refused.number} and was overruled"
     valid = sum(trial.state == TrialState.VALID for trial in flown)
     ended_by_rule = outcome is not None and outcome != Outcome.STOPPED
     if valid >= FLIGHTS or (valid and ended_by_rule):
-        return "passed", f"{valid} valid {'flight' if valid == 1 else 'flights'}, nothing aborted, invalid or refused"
+        return "passed", f"{count(valid, 'valid flight')}, nothing aborted, invalid or refused"
     if outcome is not None:
-        return "failed", f"it was stopped after {valid} valid flights; {FLIGHTS} are required"
+        when = f"after {count(valid, 'valid flight')}" if valid else "before a valid flight"
+        return "failed", f"it was stopped {when}; {FLIGHTS} are required"
     return "under way", f"{valid} of {FLIGHTS} valid flights"
 
 
@@ -80,8 +85,8 @@ def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
     if not is_rehearsal_satisfied(result):
         where = "on its simulation" if result.campaign_id is None else f"in campaign {result.campaign_id}"
         raise ConflictError(
-            f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal: "
-            f"{result.reason}.",
+            f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal "
+            f"({result.reason}).",
             hint=f"Rehearse it {where} first: fly {FLIGHTS} valid flights, or fly it until its stop rule "
             "ends it, with no aborted or invalid flight.",
         )

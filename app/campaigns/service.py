@@ -291,7 +291,7 @@ def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
 def _require_no_flight(session: Session, row: CampaignRow) -> None:
     if (flight := history.flight_under_way(session, row.id)) is not None:
         raise BusyError(
-            f"Campaign {row.id} has a flight under way (trial {flight.trial_id}).",
+            f"Flight {flight.trial.number} of this campaign is in progress.",
             hint="Wait until it has ended, or abort it.",
         )
 
@@ -305,11 +305,15 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     row = repository.get_campaign(session, campaign_id)
     now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))
     if now is None or now.comparison is None:
-        raise _not_shown(row, "no gains are better than its first gains")
+        raise ConflictError(
+            "The best gains so far are the first flight's, so there is nothing to set.", hint="Fly other gains first."
+        )
     compared = now.comparison
     if compared.verdict != "better":
-        raise _not_shown(
-            row, f"the comparison of {format_gains(now.winner.gains)} with its first gains is {compared.verdict}"
+        raise ConflictError(
+            f"The best gains cannot become the safe gains: the comparison of {format_gains(now.winner.gains)} with the "
+            f"first gains is {compared.verdict}.",
+            hint="Fly the best gains and the first gains again until the verdict is “better”.",
         )
     gains = dict(now.winner.gains)
     promote_gains(session, row.vehicle, gains, version=asked.version, reason=_because(row, now, asked), context=context)
@@ -323,13 +327,6 @@ def _because(row: CampaignRow, now: ComparisonState, asked: Promotion) -> str:
     assert now.comparison.confidence is not None
     sure = percent(now.comparison.confidence)
     return f"{asked.statement} (campaign {row.id}, {named_flights(now.winner.numbers)}: better, {sure} confidence)"
-
-
-def _not_shown(row: CampaignRow, why: str) -> ConflictError:
-    return ConflictError(
-        f"No gains of campaign {row.id} can be promoted: {why}.",
-        hint="Fly the best gains and the first gains again until the verdict is “better”.",
-    )
 
 
 _NAME_ROOM: Final = 100

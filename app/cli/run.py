@@ -32,7 +32,7 @@ from app.core.clock import REAL_TIME
 from app.core.definition import Definition
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
-from app.core.formatting import format_gains, number
+from app.core.formatting import format_gains, named_flights, number
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS
 from app.db.migrate import migrate
@@ -312,7 +312,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
     best = history.best_of(display.trials)
     rows = [
         (
-            f"run {trial.number}",
+            f"flight {trial.number}",
             number(trial.error, 4),
             number(trial.predicted_error, 4),
             *(f"{trial.gains[name]:g}" for name in names),
@@ -325,9 +325,9 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
         )
         for trial, kind in zip(display.trials, display.kinds, strict=True)
     ]
-    out.print(table(("run #", f"error ({unit})", f"predicted ({unit})", *names, "step", ""), rows, title=file.name))
-    if overruled := [str(trial.number) for trial in display.trials if trial.overrule_reason]:
-        out.print(f"Gate overruled: flight {', '.join(overruled)}.")
+    out.print(table(("flight", f"error ({unit})", f"predicted ({unit})", *names, "step", ""), rows, title=file.name))
+    if overruled := [trial.number for trial in display.trials if trial.overrule_reason]:
+        out.print(f"Gate overruled: {named_flights(overruled)}.")
     out.print(f"Stopped: {stopped_because}")
     if best is not None:
         out.print(f"Best: {_error(best.error, unit)} with {format_gains(best.gains)}, flight {best.number}.")

@@ -1,18 +1,63 @@
 """State machines as data: checks of transitions, actions and versions."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import StrEnum
-from typing import TypeVar
+from types import MappingProxyType
+from typing import Final, TypeVar
 
 from app.common.errors import ConflictError, Problem
 
 S = TypeVar("S", bound=StrEnum)
 
+_LABELS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "captured": "waiting for review",
+        "deciding": "between flights",
+        "draft": "in preparation",
+        "flying": "in flight",
+    }
+)
+"""States that a person knows by another word."""
+
+_REFUSALS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "abort": "cannot be aborted",
+        "archive": "cannot be archived",
+        "cancel": "cannot be cancelled",
+        "check": "cannot be checked",
+        "classify": "cannot be reviewed",
+        "connect": "cannot be connected",
+        "define": "cannot be changed",
+        "delete": "cannot be deleted",
+        "disconnect": "cannot be disconnected",
+        "edit": "cannot be edited",
+        "finish": "cannot be ended",
+        "fly": "cannot be flown",
+        "judge": "cannot be reviewed",
+        "judge abort": "has no abort to review",
+        "land": "cannot be commanded to land",
+        "motors off": "cannot be commanded to stop its motors",
+        "parameters": "cannot be asked for its parameters",
+        "plan": "takes no further flight",
+        "propose": "gets no proposal",
+        "release": "cannot be released",
+        "reopen": "cannot be reopened",
+        "restore": "cannot be sent its safe gains",
+        "retry": "cannot be retried",
+        "stage": "cannot be staged",
+        "take-off": "cannot take off",
+        "unstage": "cannot be unstaged",
+        "upload": "takes no record",
+    }
+)
+
 
 def check_transition(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str) -> S:
     """Return the new state. Raises ConflictError when the table has no transition to it from `state`."""
     if to not in moves[state]:
-        raise ConflictError(f"{what} is {state} and cannot become {to}.", hint=_look_again(sorted(moves[state])))
+        raise ConflictError(
+            f"{what} is {_label(state)} and cannot change to “{_label(to)}”.", hint=_look_again(sorted(moves[state]))
+        )
     return to
 
 
@@ -20,8 +65,9 @@ def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, wha
     """Raise ConflictError when `action` is not possible in `state`."""
     if state not in actions[action]:
         raise ConflictError(
-            f"{what} is {state}; “{action}” is possible only while it is {_or(actions[action])}.",
-            hint="Reload it: its state has changed, or another step must come first.",
+            f"{what} {_REFUSALS[action]}: it is {_label(state)}.",
+            hint=f"This is possible only while it is {_or(actions[action])}. Reload it: its state has changed, or "
+            "another step must come first.",
         )
 
 
@@ -38,12 +84,12 @@ def check_version(sent: int, held: int, what: str, differences: Mapping[str, tup
     if sent == held:
         return
     problems = tuple(
-        Problem(field, f"is now {_short(now)}; you sent {_short(wanted)}")
+        Problem(field, f"is now {_short(now)}; you entered {_short(wanted)}")
         for field, (now, wanted) in differences.items()
         if now != wanted
     )
     raise ConflictError(
-        f"{what} was changed by another client (current version {held}, you edited version {sent}).",
+        f"{what} has been changed elsewhere since you opened it.",
         hint="Reload it, review the changes, then repeat your edit.",
         problems=(Problem("version", f"is {held}, got {sent}"), *problems),
     )
@@ -54,10 +100,18 @@ def _short(value: object) -> str:
     return text if len(text) <= 80 else f"{text[:78]}…”"
 
 
-def _or(states: frozenset[S]) -> str:
-    *others, last = sorted(states)
-    return f"{', '.join(others)} or {last}" if others else last
+def _label(state: str) -> str:
+    return _LABELS.get(state, state)
+
+
+def _or(states: Iterable[str], last_by: str = " or ", others_by: str = ", ") -> str:
+    *others, last = sorted(map(_label, states))
+    return f"{others_by.join(others)}{last_by}{last}" if others else last
 
 
 def _look_again(possible: list[S]) -> str:
-    return f"Reload it; from here it can become {', '.join(possible)}." if possible else "This state is final."
+    return (
+        f"Reload it; from here it can change to “{_or(possible, '” or “', '”, “')}”."
+        if possible
+        else "This state is final."
+    )

@@ -192,8 +192,9 @@ def _log_sentence(checked: LogCheck) -> str:
     if not commands.rows:
         return "Nothing could be compared: the loop was not in control in this log."
     if not commands.passed:
+        verb = "is" if commands.different == 1 else "are"
         return (
-            f"The replica differs: {grouped(commands.different)} of {grouped(commands.rows)} commands are not "
+            f"The replica differs: {grouped(commands.different)} of {grouped(commands.rows)} commands {verb} not "
             f"reproduced, the first at {commands.first_different_s:.3f} s."
         )
     if simulation is not None and not simulation.passed:

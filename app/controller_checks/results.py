@@ -180,8 +180,9 @@ def _trace_sentence(results: tuple[SignalResult, ...], overlay: Overlay, rows: N
     if not rows.size:
         return f"The replica agrees: all {total} {unit} are {met} in all {len(results)} signals."
     names = ", ".join(name for name, wrong in overlay.differs.items() if wrong[rows[0]])
+    verb = "is" if len(rows) == 1 else "are"
     return (
-        f"The replica differs: {grouped(len(rows))} of {total} {unit} are not {met}, the first at "
+        f"The replica differs: {grouped(len(rows))} of {total} {unit} {verb} not {met}, the first at "
         f"{overlay.time_s[rows[0]]:.3f} s in {names}."
     )
 

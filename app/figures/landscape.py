@@ -73,7 +73,7 @@ class LandscapeFigure:
     title: ClassVar[str] = "Error landscape of the model"
 
     def not_ready(self) -> str | None:
-        return None if self.landscape.slices else "Nothing to draw: no gain is free."
+        return None if self.landscape.slices else "Nothing to draw: fewer than two gains are free."
 
     def compute(self) -> Card:
         palette, slices = PALETTES[self.theme], self.landscape.slices

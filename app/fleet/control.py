@@ -101,12 +101,12 @@ def require_control(row: VehicleRow, context: RequestContext) -> str:
     if not context.from_our_page:
         raise NotAllowedError(
             f"{row.name} is a real vehicle: only its operator can start the takeoff, in the browser.",
-            hint="Hold the button on the flight's fly page.",
+            hint="Hold the button on the flight's fly screen.",
             script_hint=STAGED_BY_SCRIPT,
         )
     operator = require_not_controlled_by_other(row, context)
     if not operator:
-        raise ConflictError(f"No operator is in control of {row.name}.", hint="Take control on the fly page first.")
+        raise ConflictError(f"No operator is in control of {row.name}.", hint="Take control on the fly screen first.")
     return operator
 
 

@@ -5,14 +5,15 @@ Registration is in `registration`, requests beside flights in `commands`, operat
 
 from collections.abc import Mapping
 from datetime import datetime
-from typing import TypedDict
+from types import MappingProxyType
+from typing import Final, TypedDict
 
 from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import check_action, check_transition
 from app.common.errors import BusyError, ConflictError, InputError, Problem
 from app.common.schemas import Page, decode_cursor, encode_cursor
-from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, VehicleState
+from app.common.states import VEHICLE_ACTIONS, VEHICLE_TRANSITIONS, ActKind, VehicleState
 from app.core.policy import Gains
 from app.db.models import VehicleRow
 from app.db.types import utc_now
@@ -146,15 +147,29 @@ def require_window_fits(row: VehicleRow, window_s: float) -> None:
         )
 
 
+_ACTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        ActKind.CONNECT: "it is being connected",
+        ActKind.DISCONNECT: "it is being disconnected",
+        ActKind.CHECK: "its gains are being checked",
+        ActKind.RESTORE: "its safe gains are being restored",
+        ActKind.PARAMETERS: "its parameters are being read",
+        ActKind.RELEASE: "it is being released",
+        ActKind.LAND: "it is being commanded to land",
+        ActKind.MOTORS_OFF: "its motors are being commanded off",
+    }
+)
+
+
 def require_idle(session: Session, row: VehicleRow) -> None:
     """Raise BusyError while the vehicle has a flight or an act under way, because requests do not queue."""
     if (flight := repository.flight_under_way(session, row.id)) is not None:
         raise BusyError(
-            f"{row.name} already has a flight: trial {flight.trial.number} of campaign {flight.campaign_id}.",
+            f"{row.name} already has a flight: flight {flight.trial.number} of campaign {flight.campaign_id}.",
             hint="Wait until it has landed, or abort it; flights do not queue.",
         )
     if (act := repository.act_under_way(session, row.id)) is not None:
-        raise BusyError(f"{row.name} is busy: “{act.kind}” is in progress.", hint="Wait until that has finished.")
+        raise BusyError(f"{row.name} is busy: {_ACTS.get(act.kind, act.kind)}.", hint="Wait until that has finished.")
 
 
 def set_vehicle_state(row: VehicleRow, to: VehicleState) -> None:

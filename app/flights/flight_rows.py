@@ -189,10 +189,10 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     may_take_off, reason = _clearance(flight)
     if not may_take_off:
         why = reason or "its takeoff has not been requested"
-        raise ConflictError(f"Trial {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
+        raise ConflictError(f"Flight {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
     if mismatch := find_mismatch(trial.read_back or {}, trial.gains):
         raise ConflictError(
-            f"Trial {trial.number} must not fly: the vehicle does not hold its gains: {mismatch}.",
+            f"Flight {trial.number} must not fly: the vehicle does not hold its gains: {mismatch}.",
             hint="Stage it again. If this happens again, check the vehicle's link.",
         )
     set_trial_state(trial, TrialState.FLYING, reason="")

@@ -40,23 +40,23 @@ _BY_HAND: Final = "If it does not descend, use its own remote control."
 LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
     {
         "worker away": LossText(
-            what="The worker does not answer. Nothing can be commanded.",
-            way_on="Gainline restarts its own worker within seconds. Start a separate one with gainline worker. Then "
-            "stage the flight again.",
-            what_in_flight="The worker does not answer.",
-            way_on_in_flight="If it has ended, the vehicle is landing now; otherwise the flight continues. If in "
-            "doubt, use the vehicle's own remote control.",
+            what="The worker is not responding. Nothing can be commanded.",
+            way_on="Gainline restarts its own worker within seconds; a separate one is started with `gainline worker`. "
+            "Then stage the flight again.",
+            what_in_flight="The worker is not responding.",
+            way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to it is "
+            "lost, the flight continues. If in doubt, use the vehicle's own remote control.",
         ),
         "not connected": LossText(
             what="The vehicle is not connected.",
             way_on="Connect it on its page, then stage the flight again.",
-            what_in_flight="The process that has the link has ended.",
+            what_in_flight="Gainline's connection to the vehicle has ended.",
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "process silent": LossText(
-            what="The process that has the link does not answer.",
-            way_on="Wait until it answers. If it does not, restart the worker and stage the flight again.",
-            what_in_flight="The process that has the link does not answer.",
+            what="Gainline's connection to the vehicle is not responding: commands do not reach it.",
+            way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
+            what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach it.",
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "link silent": LossText(
@@ -97,10 +97,10 @@ _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
 )
 _IN_FLIGHT: Final = STEPS.index("in flight")
 _WITHOUT_LINK: Final = LossText(
-    what="The worker does not answer. Nothing can be flown.",
-    way_on="Gainline restarts its own worker within seconds. Start a separate one with gainline worker.",
-    what_in_flight="The worker does not answer.",
-    way_on_in_flight="If it has ended, the simulated flight is lost.",
+    what="The worker is not responding. Nothing can be flown.",
+    way_on="Gainline restarts its own worker within seconds; a separate one is started with `gainline worker`.",
+    what_in_flight="The worker is not responding.",
+    way_on_in_flight="If the worker has stopped, the simulated flight is lost.",
 )
 
 

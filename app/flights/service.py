@@ -70,7 +70,7 @@ def _request_trial_flight(
     session: Session, trial_id: int, mode: FlightMode, speed: float | None, context: RequestContext
 ) -> Trial:
     row = history.trial_row(session, trial_id)
-    check_action(TRIAL_ACTIONS, mode, row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, mode, row.state, f"Flight {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     trials.require_open(session, campaign, HISTORY_TRIAL_STATES)
     judged = check_own_gains(session, campaign, row.gains, overrule=row.overrule_reason or None)
@@ -98,7 +98,7 @@ def request_flight(
     if mode == "fly" and fleet.needs_staging(vehicle):
         raise NotAllowedError(
             f"{vehicle.name} is a real vehicle: only its operator can start the takeoff, in the browser.",
-            hint="Stage the trial; its operator then starts the takeoff on the fly page.",
+            hint="Stage the trial; its operator then starts the takeoff on the fly screen.",
         )
     rehearsals.require_rehearsed(session, campaign)
     fleet.require_window_fits(vehicle, experiment_of_campaign(campaign).window_s)
@@ -154,7 +154,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
     NotAllowedError otherwise.
     """
     row = history.trial_row(session, trial_id)
-    check_action(TRIAL_ACTIONS, "take-off", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "take-off", row.state, f"Flight {row.number}")
     campaign, flight = campaigns.get_row(session, row.campaign_id), _staged(session, row)
     if flight.take_off_at is not None:
         raise ConflictError(f"The takeoff of trial {row.number} has already been requested.", hint="Watch the flight.")
@@ -176,7 +176,7 @@ def unstage_trial(session: Session, trial_id: int) -> Trial:
     Raises ConflictError when nothing is staged.
     """
     row = history.trial_row(session, trial_id)
-    check_action(TRIAL_ACTIONS, "unstage", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "unstage", row.state, f"Flight {row.number}")
     _staged(session, row).stand_down = "unstaged by the operator"
     return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
 
@@ -184,10 +184,10 @@ def unstage_trial(session: Session, trial_id: int) -> Trial:
 def _staged(session: Session, row: TrialRow) -> FlightRow:
     flight = history.latest_flights(session, [row.id]).get(row.id)
     if flight is None or flight.mode != "stage" or flight.state != FlightState.RUNNING:
-        raise ConflictError(f"Trial {row.number} flies without staging.", hint="Watch it, or abort it.")
+        raise ConflictError(f"Flight {row.number} flies without staging.", hint="Watch it, or abort it.")
     if flight.stand_down:
         raise ConflictError(
-            f"Trial {row.number} is being unstaged: {flight.stand_down}.", hint="Wait until it is planned again."
+            f"Flight {row.number} is being unstaged: {flight.stand_down}.", hint="Wait until it is planned again."
         )
     return flight
 
@@ -204,12 +204,12 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
         raise ConflictError(
-            f"Trial {row.number} is {row.state}, and the worker that flies it does not answer.",
+            f"Flight {row.number} is {row.state}, and the worker that flies it is not responding.",
             hint="Abort again. If a vehicle is in the air, use its own remote control now.",
         )
     if flight is not None:
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight has already ended.")
     raise ConflictError(
-        f"Trial {row.number} is {row.state}: there is no flight to abort.",
+        f"Flight {row.number} is {row.state}: there is no flight to abort.",
         hint="Reload the trial.",
     )

@@ -40,7 +40,7 @@ _ENDED: Final = (
     "own remote control now."
 )
 NOT_ANSWERING: Final = (
-    "The process that has its link does not answer: commands do not reach the vehicle. If it flies, use its own "
+    "Gainline's connection to it is not responding: commands do not reach the vehicle. If it flies, use its own "
     "remote control now."
 )
 MAX_UNANSWERED_ORDERS: Final = 50

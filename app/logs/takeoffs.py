@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from app.core.errors import Problem, TrajectoryError
-from app.core.formatting import format_gains
+from app.core.formatting import format_gains, times
 from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
 from app.logs.base import GainSets
@@ -187,7 +187,7 @@ def _usable(log: FlightLog) -> tuple[Samples, Mapping[str, Samples]]:
 def _where_looked(log: FlightLog) -> str:
     if log.in_air is None:
         return f"in {_RISE_S[-1]:g} s{'' if log.armed is None else ' while it was armed'}"
-    return f"while it was in the air ({len(log.in_air)} times, from the autopilot's status)"
+    return f"while it was in the air ({times(len(log.in_air))}, from the autopilot's status)"
 
 
 def _flights(log: FlightLog, time_s: Samples, altitude_m: Samples) -> Iterator[tuple[int, int]]:

@@ -12,6 +12,7 @@ from typing import BinaryIO, Final
 
 import numpy as np
 
+from app.core.formatting import count, times
 from app.core.records.trajectory import Samples
 from app.logs.base import Contents, Table, contents, numbers, refused
 from app.logs.takeoffs import Setting
@@ -60,10 +61,10 @@ def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], parameters: C
         raise refused(f"is damaged: {error}", HINT) from error
     changes = ((time_us / 1e6, name, value) for time_us, name, value in log.changed_parameters)
     values = [*((-np.inf, name, value) for name, value in log.initial_parameters.items()), *changes]
-    notes = [f"{sieve.damages} damaged sections skipped"] if sieve.damages else []
+    notes = [f"{count(sieve.damages, 'damaged section')} skipped"] if sieve.damages else []
     if log.dropouts:
         lost_s = sum(each.duration for each in log.dropouts) / 1000
-        notes.append(f"the logger dropped data {len(log.dropouts)} times, {lost_s:.2f} s in total")
+        notes.append(f"the logger dropped data {times(len(log.dropouts))}, {lost_s:.2f} s in total")
     return ULogTables(
         topics={each.name: each.data for each in log.data_list},
         settings=tuple(Setting(at_s, name, float(value)) for at_s, name, value in values if np.isfinite(value)),

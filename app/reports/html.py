@@ -32,7 +32,7 @@ _STATES: Final = {
     "draft": "Not flown yet",
     "ready": "Not flown yet",
     "flying": "Not finished: a flight is in progress",
-    "deciding": "Not finished: between two flights",
+    "deciding": "Not finished: between flights",
     "finished": "Finished",
     "archived": "Finished and archived",
 }

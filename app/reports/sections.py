@@ -105,8 +105,8 @@ class Report:
 
 _STARTS: Final = {
     "default": "the vehicle's default gains",
-    "simplex": "the optimum of the simple model (simplex)",
-    "given": "given gains",
+    "simplex": "best gains on the model (simplex)",
+    "given": "custom gains",
     "campaign": "the best of another campaign",
 }
 
@@ -158,7 +158,7 @@ def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, .
         Fact(f"Bounds of {name}", f"{gain(low)} … {gain(high)}") for name, (low, high) in definition.bounds.items()
     ]
     first, later = short_percent(definition.first_step_fraction), short_percent(definition.step_fraction)
-    facts.append(Fact("Largest step", f"{first} of each gain's range until a flight is valid, then {later}"))
+    facts.append(Fact("Maximum step", f"{first} of each gain's range until a flight is valid, then {later}"))
     if experiment.output == "altitude_m":
         facts.append(Fact("Gate ceiling", f"{definition.ceiling_m:g} m"))
     facts.append(Fact("Stop rule", _stop(definition.stop)))
@@ -211,8 +211,8 @@ _ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
 _CAUSES: Final[Mapping[AbortCause, str]] = {
     "limit": "(A limit was exceeded: it counts against the gains.)",
     "operator": "(Aborted by the operator without a reason: it does not count against the gains.)",
-    "behaved badly": "(The operator reported that the vehicle behaved badly: it counts against the gains.)",
-    "something else": "(The operator had another reason: it does not count against the gains.)",
+    "behaved badly": "(Cause given by the operator: vehicle behaviour. It counts against the gains.)",
+    "something else": "(Cause given by the operator: something else. It does not count against the gains.)",
 }
 
 
@@ -225,7 +225,7 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
             yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} Refused by the gate: {refused}")
         if trial.read_back is not None and trial.read_back != trial.gains:
-            sentence = f"Planned {gains(trial.gains)}; the vehicle read back {gains(trial.read_back)}."
+            sentence = f"Planned {gains(trial.gains)}; read back from the vehicle: {gains(trial.read_back)}."
             yield Anomaly(trial.number, "Different gains read back", sentence)
         for glitch in trial.glitches:
             yield Anomaly(trial.number, "Glitch in the record", glitch.sentence)

@@ -201,7 +201,7 @@ JSBSIM: Final = VehicleKind(
         VehicleOption("wind_from_deg", "Direction the wind comes from, clockwise from north", "°", 0.0, 0.0, 360.0),
         VehicleOption("gust_m_s", "Gusts in each direction, root mean square", "m/s", 0.0, 0.0, 3.0),
         VehicleOption("altitude_noise_m", "Noise of the measured altitude, standard deviation", "m", 0.0, 0.0, 0.1),
-        VehicleOption("battery_sag", "Share of the voltage lost under full load", "of full", 0.0, 0.0, 0.2),
+        VehicleOption("battery_sag", "Share of the voltage lost under full load", "of the voltage", 0.0, 0.0, 0.2),
     ),
     open=opener("jsbsim", JsbsimFlight),
     find_conflicts=_cannot_lift,

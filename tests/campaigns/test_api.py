@@ -150,7 +150,7 @@ def test_two_people_editing_one_campaign_get_a_conflict_that_says_what_changed(c
     assert client.patch(path, json={"version": 1, "name": "Anna's"}).status_code == 200
     answer = client.patch(path, json={"version": 1, "name": "Ben's"})
     assert answer.status_code == 409
-    assert problems_of(answer) == {"version": "is 2, got 1", "name": "is now “Anna's”; you sent “Ben's”"}
+    assert problems_of(answer) == {"version": "is 2, got 1", "name": "is now “Anna's”; you entered “Ben's”"}
     assert get(client, path)["name"] == "Anna's"
 
 
@@ -164,7 +164,7 @@ def test_what_is_asked_for_cannot_change_while_a_flight_is_asked_for(client: Tes
         client.delete(f"{path}?version=1"),
     ):
         assert answer.status_code == 409
-        assert "flight under way" in answer.json()["detail"]
+        assert "of this campaign is in progress" in answer.json()["detail"]
     assert client.patch(path, json={"version": 1, "name": "Still possible"}).status_code == 200
     claim(database)
 
@@ -233,7 +233,7 @@ def test_reclassing_a_flight_recomputes_what_came_after(client: TestClient, data
     assert get(client, f"{path}/proposal")["state"] == "computing"
     refused = client.post(f"{path}/trials", json={"proposal_id": before["id"]})
     assert refused.status_code == 409
-    assert "stale" in refused.json()["detail"]
+    assert "out of date" in refused.json()["detail"]
     run_jobs(database)
     after = get(client, f"{path}/proposal")["proposal"]
     assert after["history_digest"] != before["history_digest"]

@@ -30,7 +30,7 @@ def test_gains_that_flew_better_become_the_safe_ones_and_the_act_says_from_which
 ) -> None:
     vehicle = create_connected(client, database)
     campaign = create_campaign_on(client, database, vehicle)
-    assert "no gains are better" in promote(client, campaign)["detail"]
+    assert "nothing to set" in promote(client, campaign)["detail"]
     create_flown_trial(client, database, campaign["id"], 3.0)
     best = create_flown_trial(client, database, campaign["id"], 1.0)
     assert get(client, f"/api/campaigns/{campaign['id']}/statistics")["comparison"]["verdict"] == "better"
@@ -54,7 +54,7 @@ def test_gains_that_are_not_shown_to_be_better_stay_what_they_are(client: TestCl
     land(database, lift_off(database), create_record(0.99))
     refused = promote(client, campaign)
     assert refused["status"] == 409
-    assert "with its first gains is unresolved" in refused["detail"]
+    assert "with the first gains is unresolved" in refused["detail"]
     assert seen(client, vehicle)["safe_gains"] == DEFAULT_GAINS
 
 

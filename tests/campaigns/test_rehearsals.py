@@ -84,7 +84,7 @@ def test_a_real_vehicle_is_staged_only_after_three_flights_on_its_simulation(
     assert "stage" not in planned["actions"]
     refused = client.post(f"/api/trials/{planned['id']}/stage")
     assert refused.status_code == 409
-    assert "has not passed its rehearsal: it has not been flown on a simulation" in refused.json()["detail"]
+    assert "has not passed its rehearsal (it has not been flown on a simulation)" in refused.json()["detail"]
     assert "Rehearse it on its simulation first: fly 3 valid flights" in refused.json()["hint"]
 
     rehearsal = rehearse(client, campaign)
@@ -113,7 +113,7 @@ def test_a_spoilt_one_is_flown_anew(client: TestClient, database: Database, camp
     create_trial(client, rehearsal["id"], fly={"speed": None})
     land(database, lift_off(database), create_record(ending="aborted", reason="too high", until_s=4.0))
     failed = again(client, campaign)
-    assert (failed["rehearsal"]["state"], failed["rehearsal"]["reason"]) == ("failed", "flight 1 is aborted")
+    assert (failed["rehearsal"]["state"], failed["rehearsal"]["reason"]) == ("failed", "flight 1 was aborted")
     assert failed["next_action"] == "Rehearse on a simulation"
     assert rehearse(client, campaign)["id"] != rehearsal["id"]
     assert again(client, campaign)["rehearsal"]["state"] == "under way"

@@ -184,7 +184,8 @@ def test_a_campaign_that_is_not_finished_is_not_reopened(client: TestClient, dat
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     answer = client.post(f"/api/campaigns/{campaign['id']}/reopen")
     assert answer.status_code == 409
-    assert "“reopen” is possible only while it is finished" in answer.json()["detail"]
+    assert "cannot be reopened: it is" in answer.json()["detail"]
+    assert answer.json()["hint"].startswith("This is possible only while it is finished.")
 
 
 def test_what_an_operator_stopped_stays_stopped_by_the_operator(client: TestClient, database: Database) -> None:

@@ -36,4 +36,4 @@ def test_a_log_shorter_than_the_window_does_not_count_and_says_why(client: TestC
     campaign = create_ready_campaign(client, database, vehicle="import", definition=SHORT)
     flown = create_imported_trial(client, campaign["id"], create_csv(until_s=10.0), invalid=True)
     assert (flown["state"], flown["error"]) == ("invalid", None)
-    assert flown["reason"] == "time_s must cover 0 … 12 s from the command on, got 0 … 10 s"
+    assert flown["reason"] == "the record covers 0 … 10 s; 0 … 12 s after the command are needed"

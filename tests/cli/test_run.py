@@ -100,8 +100,8 @@ def test_gains_by_hand_are_flown_in_their_order_until_all_are_flown(tmp_path: Pa
 def test_the_table_has_a_row_for_each_run(tmp_path: Path) -> None:
     result = gainline(*RUN_ON_TWIN, "--max-flights", "2")
     assert result.exit_code == 0
-    assert [line.split()[:5] for line in result.stdout.splitlines() if line.startswith(" run 1")] == [
-        ["run", "1", "0.5235", "0.3264", "283"]
+    assert [line.split()[:5] for line in result.stdout.splitlines() if line.startswith(" flight 1")] == [
+        ["flight", "1", "0.5235", "0.3264", "283"]
     ]
 
 

@@ -81,7 +81,7 @@ def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains
     result = gainline(*RUN, "--vehicle", VEHICLE, "--set", "simulated=true", "--json", str(out))
     assert result.exit_code == 1
     printed = " ".join(result.output.split())
-    assert "run 1" in printed
+    assert "flight 1" in printed
     assert "Stopped: an error occurred: The battery is below 10.2 V." in printed
     assert "The safe gains are restored and read back: kp 283, ki 13, kd 82." in printed
     document = json.loads(out.read_text())

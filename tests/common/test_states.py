@@ -87,7 +87,7 @@ def test_only_the_moves_of_the_domain_exist(machine: str, start: StrEnum, to: St
     if (start.value, to.value) in listed(text):
         assert check_transition(moves, start, to, "It") == to
     else:
-        with pytest.raises(ConflictError, match=f"It is {start} and cannot become {to}"):
+        with pytest.raises(ConflictError, match=r"^It is .* and cannot change to “"):
             check_transition(moves, start, to, "It")
 
 
@@ -126,4 +126,4 @@ def test_an_edit_of_an_outdated_version_names_what_changed() -> None:
     with pytest.raises(ConflictError) as caught:
         check_version(2, 3, "It", {"name": ("new", "mine"), "note": ("same", "same")})
     assert [problem.field for problem in caught.value.problems] == ["version", "name"]
-    assert caught.value.problems[1].reason == "is now “new”; you sent “mine”"
+    assert caught.value.problems[1].reason == "is now “new”; you entered “mine”"

@@ -118,7 +118,7 @@ def test_only_what_differs_is_listed_with_its_change_against_the_first(client: T
     gains = {one["title"]: (one["values"], one["changes"]) for one in found["gains"]}
     assert gains == {"kp": ([283, 300], [0, 17]), "ki": ([13, 60], [0, 47])}
     (hover,) = found["settings"]
-    assert (hover["title"], hover["unit"], hover["values"]) == ("Hover throttle", "of full", [0.61, 0.65])
+    assert (hover["title"], hover["unit"], hover["values"]) == ("Hover throttle", "of full throttle", [0.61, 0.65])
     assert hover["changes"] == [0, pytest.approx(0.04)]
     assert found["verdict"] is None
     assert found["notes"][0].startswith("One vehicle with different settings.")

@@ -120,7 +120,7 @@ def test_a_difference_beyond_the_tolerance_is_found_in_a_run_of_arducopter(clien
     lines[1002] = ",".join(row)
     check = send(client, "spoilt.csv", "\n".join(lines)).json()
     assert check["passed"] is False
-    assert "steps are not within the tolerances, the first at 2.500 s in throttle" in check["sentence"]
+    assert "steps is not within the tolerances, the first at 2.500 s in throttle" in check["sentence"]
 
 
 def test_a_check_of_an_earlier_version_is_one_of_paparazzi(client: TestClient, database: Database) -> None:
@@ -177,7 +177,7 @@ def test_numbers_are_those_of_the_command(client: TestClient, tmp_path: Path) ->
 def test_a_difference_is_named_measured_and_marked_where_it_is(client: TestClient) -> None:
     check = send(client, "spoilt.csv", spoilt(line=1002, column="thrust", value="123")).json()
     assert check["passed"] is False
-    assert "1 of 8\N{NARROW NO-BREAK SPACE}192 steps are not exact, the first at 1.953 s in thrust" in check["sentence"]
+    assert "1 of 8\N{NARROW NO-BREAK SPACE}192 steps is not exact, the first at 1.953 s in thrust" in check["sentence"]
     found = {signal["name"]: signal for signal in check["signals"]}
     assert (found["thrust"]["verdict"], found["thrust"]["different"]) == ("differs", 1)
     assert found["thrust"]["first_different_s"] == pytest.approx(1000 / 512, abs=1e-6)

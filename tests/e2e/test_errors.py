@@ -392,7 +392,7 @@ def test_an_unreachable_server_is_reported_with_the_fate_of_the_request(
     dashboard.page.context.set_offline(True)
     create.click()
     alert = dashboard.page.get_by_role("alert")
-    expect(alert).to_contain_text("The server cannot be reached.")
+    expect(alert).to_contain_text("The server is not responding.")
     expect(alert).to_contain_text("may or may not have been received")
     expect(alert).to_contain_text("updates automatically")
     dashboard.page.context.set_offline(False)

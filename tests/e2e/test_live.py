@@ -43,7 +43,7 @@ def is_live(dashboard: Dashboard) -> None:
 
 def is_away(dashboard: Dashboard) -> None:
     """A message, with the time up to which the page is right, and the page without its colours."""
-    expect(dashboard.page.get_by_text("Server unreachable", exact=True)).to_be_visible()
+    expect(dashboard.page.get_by_text("Server not responding", exact=True)).to_be_visible()
     notice = dashboard.page.get_by_role("status").filter(has_text="The server is not responding.")
     expect(notice.locator("time")).to_be_visible()
     expect(dashboard.page.locator("main[data-stale]")).to_be_visible()
@@ -130,7 +130,7 @@ def test_a_restarted_server_is_shown_and_its_changes_arrive_automatically(
     other.button("More pages").click()
     other.page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
     expect(heading(other, "Jobs")).to_be_visible()
-    expect(other.page.get_by_role("alert")).to_contain_text("The server cannot be reached.")
+    expect(other.page.get_by_role("alert")).to_contain_text("The server is not responding.")
     own_server.start()
     is_live(dashboard)
     rename(dashboard, campaign_id, "After")
@@ -144,10 +144,10 @@ def test_a_restarted_server_is_shown_and_its_changes_arrive_automatically(
 def test_a_killed_worker_is_shown_until_it_is_back(dashboard: Dashboard, shared_server: Server) -> None:
     dashboard.open("/")
     with killed_worker(shared_server):
-        expect(dashboard.page.get_by_text("No worker is running.")).to_be_visible()
+        expect(dashboard.page.get_by_text("The worker is not responding.")).to_be_visible()
         expect(dashboard.page.get_by_text("Nothing can be flown or computed until it is back.")).to_be_visible()
     is_live(dashboard)
-    expect(dashboard.page.get_by_text("No worker is running.")).to_have_count(0)
+    expect(dashboard.page.get_by_text("The worker is not responding.")).to_have_count(0)
 
 
 def bar_of_a_flight(dashboard: Dashboard, campaign_id: int) -> Locator:
@@ -163,7 +163,7 @@ def test_without_a_worker_a_flight_in_the_air_is_not_called_paused(
 ) -> None:
     expect(bar_of_a_flight(dashboard, states.campaign())).to_be_visible()
     with killed_worker(shared_server):
-        notice = dashboard.page.get_by_role("status").filter(has_text="No worker is running.")
+        notice = dashboard.page.get_by_role("status").filter(has_text="The worker is not responding.")
         expect(notice).to_contain_text("If it has ended, the simulated flight is lost.")
     is_live(dashboard)
 

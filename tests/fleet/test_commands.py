@@ -119,7 +119,7 @@ def test_a_second_request_is_refused_and_the_same_one_sent_again_is_harmless(
     assert (again.status_code, again.json()) == (202, first.json())
     other = client.post(f"/api/vehicles/{vehicle['id']}/restore")
     assert other.status_code == 409
-    assert other.json()["detail"] == "Drone is busy: “check” is in progress."
+    assert other.json()["detail"] == "Drone is busy: its gains are being checked."
     finish_act(database)
     assert client.post(f"/api/vehicles/{vehicle['id']}/restore").status_code == 202
 
@@ -130,7 +130,7 @@ def test_nothing_is_asked_beside_a_flight_and_no_flight_beside_an_act(client: Te
     trial = create_trial(client, campaign["id"])
     client.post(f"/api/vehicles/{vehicle['id']}/check")
     refused = client.post(f"/api/trials/{trial['id']}/stage")
-    assert (refused.status_code, refused.json()["detail"]) == (409, "Drone is busy: “check” is in progress.")
+    assert (refused.status_code, refused.json()["detail"]) == (409, "Drone is busy: its gains are being checked.")
     finish_act(database)
     assert client.post(f"/api/trials/{trial['id']}/stage").status_code == 202
     beside = client.post(f"/api/vehicles/{vehicle['id']}/check")
@@ -385,7 +385,7 @@ def test_a_vehicle_with_a_link_is_asked_nothing_but_to_be_let_go_over_a_server_t
         for vehicle, kind, body in asked:
             refused = network.post(f"/api/vehicles/{vehicle['id']}/{kind}", json=body)
             assert refused.status_code == 403, kind
-            assert "is a real vehicle, and this server is reachable over the network" in refused.json()["detail"]
+            assert "it is a real vehicle, and other devices can reach the server" in refused.json()["detail"]
         edit = {"version": met["version"], "safe_gains": {"kp": 300, "ki": 13, "kd": 82}, "statement": "Ada says so"}
         assert network.patch(f"/api/vehicles/{met['id']}", json=edit).status_code == 403
         assert network.post(f"/api/vehicles/{met['id']}/disconnect").status_code == 403

@@ -79,7 +79,7 @@ def test_a_vehicle_with_a_link_is_registered_only_where_nobody_else_reaches_the_
     with TestClient(create_app(exposed), base_url="http://127.0.0.1:8000", client=HERE) as client:
         refused = client.post("/api/vehicles", json={"name": "Drone", "kind": "mavlink", "options": {}, **SEEN})
         assert (refused.status_code, refused.json()["title"]) == (403, "Not allowed")
-        assert "is reachable over the network" in refused.json()["detail"]
+        assert "other devices can reach the server" in refused.json()["detail"]
         refused = client.post(
             "/api/vehicles", json={"name": "Drone", "kind": "mavlink", "options": {"simulated": True}}
         )
@@ -190,7 +190,7 @@ def test_an_edit_of_an_outdated_version_is_a_conflict(client: TestClient) -> Non
     assert client.patch(path, json={"version": 1, "battery": "blue 2"}).json()["version"] == 2
     late = client.patch(path, json={"version": 1, "battery": "red 1", "name": "Drone"})
     assert late.status_code == 409
-    assert problems_of(late) == {"version": "is 2, got 1", "battery": "is now “blue 2”; you sent “red 1”"}
+    assert problems_of(late) == {"version": "is 2, got 1", "battery": "is now “blue 2”; you entered “red 1”"}
     assert seen(client, vehicle)["battery"] == "blue 2"
 
 
@@ -207,7 +207,7 @@ def test_safe_gains_change_with_a_statement_and_only_while_the_vehicle_is_at_res
         put_into(state, database, vehicle)
         refused = client.patch(path, json=asked)
         assert refused.status_code == 409
-        assert f"is {state}; “edit” is possible only while it is" in refused.json()["detail"]
+        assert "cannot be edited: it is" in refused.json()["detail"]
     put_into(VehicleState.QUARANTINED, database, vehicle)
     assert client.patch(path, json=asked).json()["safe_gains"] == better
     act = get(client, f"{path}/acts")["items"][0]

@@ -243,7 +243,7 @@ def test_one_vehicle_has_one_flight_whoever_asks(client: TestClient, database: D
     create_trial(client, first, fly={"speed": None})
     refused = client.post(f"/api/campaigns/{second}/trials", json={"gains": DEFAULT_GAINS, "fly": {}})
     assert (refused.status_code, refused.json()["title"]) == (409, "Vehicle busy")
-    assert f"trial 1 of campaign {first}" in refused.json()["detail"]
+    assert f"flight 1 of campaign {first}" in refused.json()["detail"]
     assert get(client, f"/api/campaigns/{second}/trials")["items"] == []  # the trial was not planned either
     land(database, lift_off(database), create_record())
     create_trial(client, second, fly={"speed": None})

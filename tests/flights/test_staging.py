@@ -150,7 +150,7 @@ def test_a_rehearsal_that_is_found_bad_while_its_vehicle_is_staged_keeps_it_on_t
     body = {"version": flown["version"], "outcome": "invalid", "reason": "it flew with the wrong mass"}
     assert client.post(f"/api/trials/{flown['id']}/classify", json=body).status_code == 200
     status, sentence = take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
-    assert (status, sentence.endswith("has not passed its rehearsal: flight 2 is invalid.")) == (409, True)
+    assert (status, sentence.endswith("has not passed its rehearsal (flight 2 is invalid).")) == (409, True)
     assert is_wanted(database, staged) == (False, None)
     assert trial(client, staged)["flight"]["take_off_at"] is None
 
@@ -196,7 +196,7 @@ def test_real_vehicles_fly_only_from_a_server_that_nobody_else_reaches(
         assert client.post(f"/api/trials/{planned['id']}/stage", headers=headers).status_code == 202
         stage_claimed(database)
         status, sentence = take_off(network, planned, headers)
-        assert (status, "is reachable over the network" in sentence) == (403, True)
+        assert (status, "other devices can reach the server" in sentence) == (403, True)
 
 
 def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_again(
@@ -210,7 +210,7 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
     headers = {**OUR_PAGE, **control_header(client, real)}
     assert take_off(client, staged, headers) == (
         409,
-        f"Trial {staged['number']} is being unstaged: unstaged by the operator.",
+        f"Flight {staged['number']} is being unstaged: unstaged by the operator.",
     )
     with database.write() as session:
         outcome = FlightOutcome(withdrawn=True, problem="unstaged by the operator", restored=DEFAULT_GAINS)

@@ -67,13 +67,13 @@ def test_a_gain_that_is_changed_in_flight_ends_the_record() -> None:
 
 def test_dropouts_are_reported() -> None:
     flown = read_takeoff(io.BytesIO(small_log(after=message("O", struct.pack("<H", 300)))))
-    assert "the logger dropped data 1 times, 0.30 s in total" in flown.notes
+    assert "the logger dropped data once, 0.30 s in total" in flown.notes
 
 
 def test_after_damage_reading_goes_on_at_the_next_mark() -> None:
     mark = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
     flown = read_takeoff(io.BytesIO(small_log(after=b"\0\0\0damage" + mark)))
-    assert "1 damaged sections skipped" in flown.notes
+    assert "1 damaged section skipped" in flown.notes
     assert flown.trajectory["altitude_m"].max() == pytest.approx(3.0, abs=0.01)
 
 

@@ -87,7 +87,10 @@ def test_the_report_says_what_the_api_says(client: TestClient, campaign: Json) -
     assert measured(best["mean"], best["standard_error"], "m") in page.said
     assert statistics["comparison"]["sentence"] in page.said
     first = statistics["groups"][0]
-    assert f"First gains (flight 1): {measured(first['mean'], first['standard_error'], 'm')}; the best" in page.said
+    assert (
+        f"First gains (flight 1): {measured(first['mean'], first['standard_error'], 'm')}; the error with the best"
+        in page.said
+    )
     assert "± is the standard deviation of one flight" in page.said
     assert statistics["track_record"]["sentence"] in page.said
     assert campaign["definition_digest"] in page.said

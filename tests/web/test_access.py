@@ -212,7 +212,7 @@ def test_a_scripts_token_stages_a_real_vehicle_and_does_not_take_it_off(
     without_cookie = stranger.post(path, headers={**OUR_PAGE, **control_header(client, real)})
     assert without_cookie.status_code == 403
     refused = client.post(path, headers={**OUR_PAGE, **control_header(client, real)})
-    assert (refused.status_code, "The worker does not answer" in refused.json()["detail"]) == (409, True), "may, but"
+    assert (refused.status_code, "The worker is not responding" in refused.json()["detail"]) == (409, True), "may, but"
 
 
 def test_from_another_device_one_looks_and_changes_nothing_without_a_key(

@@ -11,7 +11,6 @@ from sqlalchemy import text
 
 from app.common import errors
 from app.common.settings import Settings
-from app.common.states import VehicleState
 from app.core.errors import GainlineError
 from app.db.session import Database
 from app.main import create_app
@@ -259,4 +258,4 @@ def test_a_vehicle_that_is_not_quarantined_cannot_be_released(client: TestClient
     create_ready_campaign(client, database)
     answer = client.post("/api/vehicles/1/release", json={"statement": "looks well"})
     assert answer.status_code == 409
-    assert VehicleState.QUARANTINED in answer.json()["detail"]
+    assert "only while it is quarantined" in answer.json()["hint"]

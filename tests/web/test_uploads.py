@@ -66,11 +66,11 @@ def test_a_record_that_ends_too_early_is_kept_only_when_somebody_says_so(client:
     asked = send(client, trial["id"], short)
     assert (asked.status_code, asked.json()["title"]) == (409, "Confirmation needed")
     assert set(problems_of(asked)) == {"invalid"}
-    assert "must cover 0 … 32.6 s from the command on, got 0 … 20 s" in asked.json()["detail"]
+    assert "the record covers 0 … 20 s; 0 … 32.6 s after the command are needed" in asked.json()["detail"]
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "planned"
     answer = send(client, trial["id"], short, invalid=True)
     assert (answer.status_code, answer.json()["state"], answer.json()["error"]) == (201, "invalid", None)
-    assert "must cover 0 … 32.6 s" in answer.json()["reason"]
+    assert "0 … 32.6 s after the command are needed" in answer.json()["reason"]
     assert answer.json()["record"]["samples"] == 1001
 
 

@@ -27,7 +27,7 @@ from app.common.errors import ConflictError, InputError, NotFoundError, Problem,
 from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, CampaignState, Ending, TrialState
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Experiment
-from app.core.formatting import format_gains
+from app.core.formatting import count, format_gains
 from app.core.policy import Gains
 from app.core.records.glitches import find_glitches, repaired
 from app.core.records.step_response import StepResponse, step_response
@@ -109,7 +109,9 @@ def score(experiment: Experiment, trajectory: Trajectory, *, accept_gaps: bool =
     try:
         error = experiment.error(trajectory, accept_gaps=accept_gaps)
     except TrajectoryError as found:
-        refusal = "; ".join(f"{problem.field} {problem.reason}" for problem in found.problems) or found.message
+        named = {"time_s": "the record", experiment.output: f"the {experiment.output.partition('_')[0]}"}
+        refusal = "; ".join(f"{named.get(each.field, each.field)} {each.reason}" for each in found.problems)
+        refusal = refusal or found.message
     flown = trajectory.channels.get(experiment.output)
     return Score(
         error=error,
@@ -244,7 +246,7 @@ def import_record(
     row = repository.get_trial(session, trial_id)
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
-    check_action(TRIAL_ACTIONS, "upload", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "upload", row.state, f"Flight {row.number}")
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
         settle_gains(session, campaign, row, flown, confirmed=confirmed)
@@ -298,7 +300,7 @@ def import_into_campaign(
     if number is not None:
         chosen = [trial for trial in trials if trial.number == number]
         if not chosen:
-            raise NotFoundError("trial", number, hint=f"Campaign {campaign_id} has {len(trials)} trials.")
+            raise NotFoundError("trial", number, hint=f"Campaign {campaign_id} has {count(len(trials), 'trial')}.")
     else:
         waits = {TrialState.LOST} if fleet.can_fly(row.vehicle) else TRIAL_ACTIONS["upload"]
         chosen = [trial for trial in trials if trial.state in waits]

@@ -33,11 +33,11 @@ def classify_trial(
     check_version(
         classification.version,
         row.version,
-        f"Trial {row.number}",
+        f"Flight {row.number}",
         {"outcome": (row.state, outcome), "reason": (row.reason, classification.reason)},
     )
-    check_action(TRIAL_ACTIONS, "classify", row.state, f"Trial {row.number}")
-    check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "classify", row.state, f"Flight {row.number}")
+    check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Flight {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
     set_trial_state(row, outcome, reason=classification.reason)
@@ -58,13 +58,13 @@ def judge_abort(
     campaign = campaigns.get_row(session, row.campaign_id)
     require_may(Permission.REVIEW, campaign.vehicle, context)
     check_version(
-        judgement.version, row.version, f"Trial {row.number}", {"cause": (row.abort_cause or "", judgement.cause)}
+        judgement.version, row.version, f"Flight {row.number}", {"cause": (row.abort_cause or "", judgement.cause)}
     )
-    check_action(TRIAL_ACTIONS, "judge abort", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "judge abort", row.state, f"Flight {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
     if row.abort_cause == "limit":
         raise ConflictError(
-            f"Trial {row.number} was aborted automatically because a limit was exceeded: it counts against its gains.",
+            f"Flight {row.number} was aborted automatically because a limit was exceeded: it counts against its gains.",
             hint="If the measurement is wrong, mark it invalid.",
         )
     row.abort_cause = judgement.cause
@@ -78,7 +78,7 @@ def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> fl
     flight."""
     if row.ending == "aborted":
         raise InputError(
-            f"Trial {row.number} cannot be valid: its record ends at the abort.",
+            f"Flight {row.number} cannot be valid: its record ends at the abort.",
             hint="Mark it aborted or leave it invalid, and fly the gains again.",
             problems=(Problem("outcome", "cannot be valid: the flight was aborted"),),
         )
@@ -90,7 +90,7 @@ def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> fl
     if judged is None or judged.error is None:
         reason = judged.refusal if judged is not None else "it has no record"
         raise InputError(
-            f"Trial {row.number} cannot be valid: it cannot be scored.",
+            f"Flight {row.number} cannot be valid: it cannot be scored.",
             hint="Leave it invalid and fly the gains again.",
             problems=(Problem("outcome", reason),),
         )

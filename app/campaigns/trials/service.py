@@ -114,7 +114,7 @@ KINDS: Final[dict[Variant, TrialKind]] = {"smaller step": "shorter step", "repea
 def cancel_trial(session: Session, trial_id: int) -> Trial:
     """Cancel a trial before its lift-off. Raises ConflictError when it is too late for that."""
     row = repository.get_trial(session, trial_id)
-    check_action(TRIAL_ACTIONS, "cancel", row.state, f"Trial {row.number}")
+    check_action(TRIAL_ACTIONS, "cancel", row.state, f"Flight {row.number}")
     flight = repository.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, problem="the trial was cancelled")
@@ -205,7 +205,7 @@ def warm_gate_cache_for_new(session: Session, campaign_id: int, new: TrialPlan) 
 def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:
     """Change a trial's note. Raises ConflictError when another client changed the trial first."""
     row = repository.get_trial(session, trial_id)
-    check_version(edit.version, row.version, f"Trial {row.number}", {"note": (row.note, edit.note)})
+    check_version(edit.version, row.version, f"Flight {row.number}", {"note": (row.note, edit.note)})
     row.note = edit.note
     row.version += 1
     return _seen(session, row)

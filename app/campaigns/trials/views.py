@@ -222,7 +222,7 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
     match row.state:
         case TrialState.VALID if row.error is not None:
             compared = _compared(row.error, field.best_before(row.number), unit)
-            outcome = f" {_once_more(again)}" if again else f": {compared}"
+            outcome = f", {_once_more(again)}" if again else f": {compared}"
             return f"{row.error:.3f} {unit}{outcome}{_against_prediction(row, field, unit)}."
         case TrialState.ABORTED:
             return f"Aborted: {row.reason}"
@@ -232,13 +232,13 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
             return f"Lost: {row.reason}"
         case TrialState.CAPTURED:
             doubt = f"; the measurement is doubtful: {row.reason}" if row.reason else ""
-            return f"Landed and recorded{_glitches(row)}{doubt}. Review it: does it count?"
+            return f"Landed and recorded{_glitches(row)}{doubt}. Review the flight."
         case _:
             return ""
 
 
 def _once_more(again: Sequence[int]) -> str:
-    return f"with the gains of {named_flights(again)} again"
+    return f"repeating the gains of {named_flights(again)}"
 
 
 def _glitches(row: TrialRow) -> str:

@@ -325,4 +325,5 @@ def _wrap_case(product: Product, wraps: Counts) -> tuple[str, str]:
         return case, f"It overflows with the {case}."
     name, step, value = wrapped[0]
     case = f"{name}, {step * STEP_S:.2f} s after the start: {product.gain}·({product.error}) = {grouped(value)}"
-    return case, f"Simulated {case}. It also overflows in {len(wrapped) - 1} of {len(_STARTS) - 1} other starts."
+    also = f" It also overflows in {len(wrapped) - 1} of {len(_STARTS) - 1} other starts." if len(wrapped) > 1 else ""
+    return case, f"Simulated {case}.{also}"

@@ -83,16 +83,14 @@ def _problem(trajectory: Trajectory, channel: str) -> Problem | None:
             return Problem(name, f"is not a finite number at sample {int(np.argmin(np.isfinite(column)))}")
     if (np.diff(time_s) <= 0.0).any():
         late = int(np.argmax(np.diff(time_s) <= 0.0)) + 1
-        return Problem(
-            "time_s", f"must increase, but is {time_s[late]:g} s after {time_s[late - 1]:g} s at sample {late}"
-        )
+        return Problem("time_s", f"does not increase: {time_s[late]:g} s after {time_s[late - 1]:g} s at sample {late}")
     return None
 
 
 def _uncovered(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
     if not time_s.size or time_s[0] > start_s + MAX_GAP_S or time_s[-1] < stop_s - MAX_GAP_S:
         covered = f"{time_s[0]:g} … {time_s[-1]:g} s" if time_s.size else "nothing"
-        return Problem("time_s", f"must cover {start_s:g} … {stop_s:g} s from the command on, got {covered}")
+        return Problem("time_s", f"covers {covered}; {start_s:g} … {stop_s:g} s after the command are needed")
     return None
 
 
@@ -102,5 +100,7 @@ def _gap(time_s: Samples, start_s: float, stop_s: float) -> Problem | None:
     gaps = np.diff(time_s[first : last + 1])
     if gaps.size and gaps.max() > MAX_GAP_S + _STAMP_RESOLUTION_S:
         at = first + int(np.argmax(gaps))
-        return Problem("time_s", f"has a gap of {gaps.max():.3g} s after {time_s[at]:.3f} s, more than {MAX_GAP_S:g} s")
+        return Problem(
+            "time_s", f"has a gap of {gaps.max():.3g} s after {time_s[at]:.3f} s; {MAX_GAP_S:g} s is allowed"
+        )
     return None

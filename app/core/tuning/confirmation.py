@@ -9,6 +9,7 @@ again and are left out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Final, Literal
 
 from app.core.definition import Definition, Flight
@@ -16,6 +17,7 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import confidence_text, count, format_gains, percent, plus_minus, short, times
 from app.core.statistics.comparisons import (
     Comparison,
+    FlightsToDecide,
     Group,
     PooledScatter,
     compare,
@@ -25,6 +27,8 @@ from app.core.statistics.comparisons import (
     smallest_difference,
 )
 from app.core.tuning.strategy import Proposal
+
+_NONE_BETTER: Final = MappingProxyType({0: "No other gains were flown.", 1: "The other gain set flown is not better."})
 
 SCATTER_NOT_KNOWN: Final = (
     "The flight-to-flight scatter under this autopilot is unknown, so the difference cannot be tested. Fly one of "
@@ -171,7 +175,7 @@ def _confirm_baseline(
     if left > 0 and _is_worth_a_step(definition, now, left, proposal):
         return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
     tried = len(now.groups) - 1
-    found = f"None of the other sets flown ({tried}) is better." if tried else "No other set was flown."
+    found = _NONE_BETTER.get(tried, f"None of the other {tried} gain sets flown is better.")
     obstacle = "" if left <= 0 else _no_prospect(definition, experiment, now, left, proposal)
     return Confirmation(phase="decided", why=f"{verdict_sentence(experiment, now)} {found} {obstacle}".strip())
 
@@ -187,7 +191,7 @@ def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
         return Confirmation(phase="repeat", why=f"{why}{_missing(comparison)}")
     why = (
         f"The first flight's gains are flown again: they were flown {times(now.baseline.size)}, the best gains "
-        f"{times(now.winner.size)}. A vehicle that has changed meanwhile would look like better gains."
+        f"{times(now.winner.size)}. Otherwise a change in the vehicle could be mistaken for better gains."
     )
     return Confirmation(phase="baseline", why=f"{why}{_missing(comparison)}")
 
@@ -269,10 +273,15 @@ def _missing(comparison: Comparison) -> str:
     return f" Unresolved so far. {_deciding(comparison)}" if comparison.verdict == "unresolved" else ""
 
 
+def _shares(further: FlightsToDecide) -> str:
+    shares = ((further.first, "with the best gains"), (further.second, "with the first gains"))
+    return ", ".join(f"{flights} {whose}" for flights, whose in shares if flights)
+
+
 def _deciding(comparison: Comparison) -> str:
     if comparison.further is None:
         return "Even 100 more flights would not resolve it."
     return (
         f"If the difference persists, {count(comparison.further.total, 'more flight')} would resolve it: "
-        f"{comparison.further.first} of the winner, {comparison.further.second} of the first gains."
+        f"{_shares(comparison.further)}."
     )

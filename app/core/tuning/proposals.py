@@ -120,8 +120,8 @@ def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flig
     if numbers:
         aborted = f"{named_flights(numbers).capitalize()} {'was' if len(numbers) == 1 else 'were'} aborted"
         return (
-            f"{aborted} because of the vehicle's behaviour with these gains. Fly them again only if you know why; "
-            f"otherwise use custom gains. They are {source}"
+            f"{aborted} because of the vehicle's behaviour with these gains: {source}. Fly them again only if you know "
+            "the cause; otherwise use custom gains"
         )
     return f"The {'next' if flights else 'first'} flight uses {source}"
 
@@ -152,7 +152,7 @@ def _confirmed(
     gate = check_policy(definition, experiment, space, group.gains, flights, spread=spread)
     if not gate.passed:
         return again(now.winner, "none", Explanation(summary=f"{wanted.why} {_refused(group, gate)}"))
-    lesson = "Whether the winner is better than the first gains."
+    lesson = "Whether the best gains are better than the first."
     return again(group, wanted.phase, Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson))
 
 

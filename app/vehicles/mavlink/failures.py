@@ -115,7 +115,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "the record incomplete 3 s after its end, by the ground's clock",
             "land",
             "invalid",
-            "The vehicle's clock is slower than its clock_speed.",
+            "The vehicle's clock is slower than the clock speed in its settings.",
         ),
         Failure.TAKEN_OVER: Response(
             "a manual mode, in heartbeats that agree",

@@ -197,7 +197,10 @@ def find_lost_position(watch: TrialObservation, limits: Limits, now_s: float) ->
     if now_s - watch.accepted_s > limits.lost_s and watch.received_s - watch.accepted_s > limits.lost_s:
         why = f"None of its positions was plausible for {limits.lost_s:g} s."
     elif watch.late_since_s is not None and watch.advanced_s - watch.late_since_s > limits.lost_s:
-        why = f"Its positions arrive more than {FRESH_S:g} s late, or its clock is slower than its clock_speed."
+        why = (
+            f"Its positions arrive more than {FRESH_S:g} s late, or its clock is slower than the clock speed in its "
+            "settings."
+        )
     elif has_unreliable_position(watch):
         why = "Its position jumps back and forth."
     return Finding(failure=Failure.LOST_POSITION, why=why) if why else None

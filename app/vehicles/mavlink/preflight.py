@@ -89,10 +89,9 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
     makes = sorted(radio.link.other_makes)
     others = f" Other autopilots were received, by MAV_AUTOPILOT: {makes}." if makes else ""
     raise VehicleError(
-        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title} "
-        f"(dialect {radio.profile.dialect.name}).{others}",
-        hint="Check that the vehicle is on, that it sends to this computer's port, and that its option `autopilot` is "
-        "correct.",
+        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title}.{others}",
+        hint="Check that the vehicle is on, that it sends to this computer's port, and that the right autopilot is "
+        "selected.",
     )
 
 

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from app.core.errors import TrajectoryError
+from app.core.formatting import count
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import Samples, Trajectory
@@ -169,5 +170,5 @@ def reason_of(trial: Trial) -> str:
     else:
         reason = f"{RESPONSES[trial.failure].text} {trial.why}"
     dropped = trial.watch.glitches if trial.failure is not Failure.GLITCHES else 0
-    flag = f"{dropped} of its samples jumped and were dropped." if dropped else ""
+    flag = f"{count(dropped, 'sample')} jumped and {'was' if dropped == 1 else 'were'} dropped." if dropped else ""
     return " ".join(part for part in (reason, flag) if part)

@@ -43,6 +43,6 @@ describe("a browser with read-only access", () => {
   });
 
   it("is told of everything on a device that has not opened a link", () => {
-    expect(readOnlyReason(STRANGER, null)).toBe(`This device has read-only access. ${HINT}`);
+    expect(readOnlyReason(STRANGER, null)).toBe(`This browser has read-only access. ${HINT}`);
   });
 });

@@ -53,7 +53,7 @@ export interface WatchedVehicle {
 /** Why a browser has read-only access to the vehicle, or to the server if null. Null if it may act. */
 export function readOnlyReason(access: Access, vehicle: WatchedVehicle | null): string | null {
   if (vehicle === null) {
-    return access.may_change ? null : sentences("This device has read-only access.", access.hint);
+    return access.may_change ? null : sentences("This browser has read-only access.", access.hint);
   }
   const wayOn = vehicle.registered ? wayToCommand(access, vehicle.is_real) : null;
   if (wayOn === null) return null;

@@ -27,7 +27,7 @@ export class ApiError extends Error {
 
 const UNREACHABLE: Problem = {
   status: 0,
-  title: "The server cannot be reached.",
+  title: "The server is not responding.",
   detail: "The request may or may not have been received.",
   hint: "Check that Gainline is running and that the network is up. The page updates automatically. Before you try again, see whether the request took effect.",
   problems: [],
@@ -185,7 +185,9 @@ export function formProblem(error: unknown, labels: Readonly<Record<string, stri
   if (otherProblems(problem, fields).length > 0) return problem;
   const reasons = reasonsByField(problem, fields);
   const marked = fields.filter((field) => reasons[field] !== undefined).map((field) => labels[field]);
-  return { ...problem, title: `Correct the marked fields: ${[...new Set(marked)].join(", ")}.`, detail: "", hint: "" };
+  const names = [...new Set(marked)];
+  const title = `Correct the marked ${names.length === 1 ? "field" : "fields"}: ${names.join(", ")}.`;
+  return { ...problem, title, detail: "", hint: "" };
 }
 
 /** Whether to retry a failed read: an unreachable server may return, a refusal is final. */

@@ -55,7 +55,7 @@ async function send(vehicleId: number, order: VehicleCommand): Promise<CommandAn
     return {
       order,
       accepted: false,
-      sentence: problem === null ? "" : `${problem.title}: ${problem.detail} ${problem.hint}`,
+      sentence: problem === null ? "" : `${problem.title.replace(/\.$/, "")}. ${problem.detail} ${problem.hint}`,
     };
   }
 }

@@ -118,8 +118,8 @@ export function AppFrame() {
         </div>
         {abort.trouble !== null && (
           <p className={classes["trouble"]} role="alert">
-            <strong>The abort could not be sent.</strong> {abort.trouble} It is retried until the worker confirms it. If
-            a vehicle is in the air, use its own remote control now.
+            <strong>The abort is not confirmed.</strong> {abort.trouble} It is sent again until the worker confirms it.
+            If a vehicle is in the air, use its own remote control now.
           </p>
         )}
         <VehicleStrip />

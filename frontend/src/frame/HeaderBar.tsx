@@ -16,9 +16,9 @@ import { Time } from "../ui/Time";
 import classes from "./Frame.module.css";
 
 function describe({ state, worker }: Connection) {
-  if (state === "away") return { text: "Server unreachable", Icon: IconPlugConnectedX, bad: true };
+  if (state === "away") return { text: "Server not responding", Icon: IconPlugConnectedX, bad: true };
   if (state === "connecting") return { text: "Connecting", Icon: IconRefresh, bad: false };
-  if (!worker) return { text: "Worker unreachable", Icon: IconPlugConnectedX, bad: true };
+  if (!worker) return { text: "Worker not responding", Icon: IconPlugConnectedX, bad: true };
   return { text: "Live", Icon: IconPlugConnected, bad: false };
 }
 
@@ -47,8 +47,8 @@ export function ConnectionNotice({ flying }: { flying: readonly FlyingCampaign[]
   if (state === "live" && !worker) {
     return (
       <p className={classes["notice"]} role="status">
-        <strong>No worker is running.</strong> {withoutWorker(flying)} The server restarts its own worker within
-        seconds; start a separate one with <code>gainline worker</code>.
+        <strong>The worker is not responding.</strong> {withoutWorker(flying)} The server restarts its own worker within
+        seconds; a separate one is started with <code>gainline worker</code>.
       </p>
     );
   }
@@ -62,9 +62,9 @@ const ON_GROUND: ReadonlySet<string> = new Set(["staging", "staged"]);
 function withoutWorker(flying: readonly FlyingCampaign[]): string {
   const inTheAir = flying.filter(({ trialId }) => !ON_GROUND.has(liveNow(trialId)?.phase ?? ""));
   if (inTheAir.some(({ hasLink }) => hasLink)) {
-    return "If it has ended, the vehicle is landing now; otherwise the flight continues. If in doubt, use the vehicle's own remote control.";
+    return "If the worker has stopped, the vehicle is landing now; if only the connection to it is lost, the flight continues. If in doubt, use the vehicle's own remote control.";
   }
-  if (inTheAir.length > 0) return "If it has ended, the simulated flight is lost.";
+  if (inTheAir.length > 0) return "If the worker has stopped, the simulated flight is lost.";
   return "Nothing can be flown or computed until it is back.";
 }
 

@@ -6,7 +6,7 @@ test("an abort is under way only once the worker has accepted it", () => {
   const asked = { ...none, asked: new Set([7]) };
   expect(abortStage(7, none)).toBe("none");
   expect(abortStage(7, asked)).toBe("sending");
-  expect(abortStage(7, { ...asked, trouble: "The worker does not answer." })).toBe("not sent");
+  expect(abortStage(7, { ...asked, trouble: "The worker does not answer." })).toBe("not confirmed");
   expect(abortStage(7, { ...asked, accepted: new Set([7]) })).toBe("accepted");
 });
 

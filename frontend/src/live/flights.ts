@@ -48,7 +48,7 @@ async function askToAbort(trialId: number): Promise<string | null> {
     const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
     return accepted ? null : sentence;
   } catch (error) {
-    return problemOf(error)?.detail.replace(/^Trial (?=\d)/, "Flight ") ?? "";
+    return problemOf(error)?.detail ?? "";
   }
 }
 
@@ -98,18 +98,18 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
 
 export type AbortControl = ReturnType<typeof useAbort>;
 
-/** How far an abort has come. not sent: it was refused or not received, and is repeated. */
-export type AbortStage = "none" | "sending" | "not sent" | "accepted";
+/** How far an abort has come. not confirmed: it was refused, or perhaps not received, and is repeated. */
+export type AbortStage = "none" | "sending" | "not confirmed" | "accepted";
 
 export function abortStage(trialId: number, { asked, accepted, trouble }: Omit<AbortControl, "press">): AbortStage {
   if (!asked.has(trialId)) return "none";
   if (accepted.has(trialId)) return "accepted";
-  return trouble === null ? "sending" : "not sent";
+  return trouble === null ? "sending" : "not confirmed";
 }
 
 export const ABORT_LABELS: Record<AbortStage, string> = {
   none: "ABORT",
   sending: "ABORTING",
-  "not sent": "NOT SENT",
+  "not confirmed": "NOT CONFIRMED",
   accepted: "ABORTING",
 };

@@ -80,7 +80,7 @@ test("a vehicle that is gone or being sought is not current, however new the new
   expect(linkText(aged(heard({ state: "gone", packet_age_s: null }), after(0)))).toBe("link lost");
   expect(linkText(aged(heard({ state: "connecting", packet_age_s: null }), after(0)))).toBe("connecting");
   const still = aged(heard({ state: "not answering" }), after(0));
-  expect([still.isCurrent, linkText(still)]).toEqual([false, "process not responding"]);
+  expect([still.isCurrent, linkText(still)]).toEqual([false, "commands blocked"]);
   expect(linkText(null)).toBe("no data");
   expect(ageText(null)).toBe("no data");
 });

@@ -94,7 +94,7 @@ export function linkText(one: Aged | null): string {
     case "gone":
       return one.linkAgeS === null ? "link lost" : `link lost for ${ageText(one.linkAgeS)}`;
     case "not answering":
-      return "process not responding";
+      return "commands blocked";
     case "connected":
       return one.isCurrent || one.linkAgeS === null ? ageText(one.linkAgeS) : `no data for ${ageText(one.linkAgeS)}`;
   }

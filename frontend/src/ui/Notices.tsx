@@ -21,8 +21,21 @@ export function FailureNotice({ reason }: { reason: string }) {
   return <ProblemNotice problem={{ status: 0, title: reason, detail: "", hint: "", problems: [] }} shown={[]} />;
 }
 
+/** What the server's names stand for on a page. */
+const LABELS: Readonly<Record<string, string>> = {
+  altitude_m: "The altitude",
+  definition: "The definition",
+  file: "The file",
+  gains: "The gains",
+  name: "The name",
+  note: "The note",
+  outcome: "The flight",
+  safe_gains: "The safe gains",
+  time_s: "The record",
+};
+
 function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly string[] }) {
-  const others = otherProblems(problem, shown);
+  const others = otherProblems(problem, shown).filter(({ field }) => field !== "version");
   return (
     <div className={classes["trouble"]} role="alert">
       <IconAlertTriangle size={20} aria-hidden />
@@ -33,7 +46,7 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
           <ul>
             {others.map(({ field, reason }) => (
               <li key={`${field} ${reason}`}>
-                {field === "file" ? "The file" : <code>{field}</code>} {reason}
+                {LABELS[field] ?? <code>{field}</code>} {reason}
               </li>
             ))}
           </ul>

@@ -14,13 +14,13 @@ export const EXPLANATIONS = explained({
     question: "What is the error?",
     answer: [
       "How far the flight was from its set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. F-16: the integral of |reference − pitch|.",
-      "Lower is better. Zero is impossible because climbing takes time: the reference trajectory itself scores 0.091 m.",
+      "Lower is better. Zero is impossible because climbing takes time: under Paparazzi, over 32.6 s, the reference trajectory itself scores 0.091 m.",
     ],
   },
   altitude: {
-    question: "What does the altitude count from?",
+    question: "What is the altitude measured from?",
     answer: [
-      "On the ground it is the vehicle's own altitude, whose zero may lie above or below the ground. From the takeoff command on it counts from the ground on which the vehicle stood.",
+      "On the ground it is the vehicle's own altitude, whose zero may lie above or below the ground. From the takeoff command on, it is measured from the ground where the vehicle stood.",
     ],
   },
   errorSoFar: {
@@ -32,7 +32,7 @@ export const EXPLANATIONS = explained({
   predicted: {
     question: "What is the predicted error?",
     answer: [
-      "The error that the model predicts for a flight with these gains, corrected by the flights so far. Before the first flight there is no correction.",
+      "The error that the model predicts for a flight with these gains, corrected by the flights so far. Before the first valid flight the model alone is often too uncertain; then no prediction is shown.",
     ],
   },
   interval: {
@@ -52,7 +52,7 @@ export const EXPLANATIONS = explained({
   trustRegion: {
     question: "What is the trust region?",
     answer: [
-      "The largest step from the best gains flown. It grows when predictions hold, and shrinks when a flight contradicts its prediction or is aborted.",
+      "The largest step from the best gains flown. It grows when a prediction holds, and shrinks when the error is above its interval or a flight is aborted because of its gains.",
     ],
   },
   fitted: {
@@ -70,7 +70,8 @@ export const EXPLANATIONS = explained({
   gate: {
     question: "What does the gate check?",
     answer: [
-      "Integer overflow in the autopilot's 32-bit arithmetic is checked exactly. Altitude, divergence, oscillation and aborts are checked in simulated flights that cover the uncertainty of the vehicle's parameters.",
+      "Bounds and step size, always. For takeoffs with a model also integer overflow in the autopilot's 32-bit arithmetic, exactly, and altitude, divergence, oscillation and aborts in simulated flights that cover the uncertainty of the vehicle's parameters.",
+      "ArduCopter and PX4 have no model yet, so no simulation checks their gains.",
     ],
   },
   glitch: {
@@ -89,7 +90,7 @@ export const EXPLANATIONS = explained({
   threshold: {
     question: "What does the next flight have to beat?",
     answer: [
-      "The threshold of the paper's stop rule: the best error minus the minimum improvement of this campaign (Settings, Stop rule). A flight above it counts as no improvement; two in a row end the campaign.",
+      "With the stop rule “No improvement”: the best error less the improvement threshold (Settings, Stop rule). Two consecutive flights above it, repeats not counted, end the campaign. Other stop rules have no such line.",
       "The band shows how far the error of another flight with the best gains could vary by chance. A result inside it is not a resolvable change.",
     ],
   },
@@ -152,7 +153,7 @@ export const EXPLANATIONS = explained({
   safeGains: {
     question: "What are safe gains?",
     answer: [
-      "The gains written to the vehicle when it connects, after every flight and on every abort, and then read back. The operator is responsible for those of a real vehicle.",
+      "The gains written to the vehicle at every connection after the first, after every flight and on every abort, and then read back. The first connection only compares them. The operator is responsible for the safe gains of a real vehicle.",
     ],
   },
   linkAge: {

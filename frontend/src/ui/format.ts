@@ -54,6 +54,11 @@ export function count(number: number, noun: string): string {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
+/** "2 with the best gains, 1 with the first", without those of which there are none. */
+export function sharesText(...shares: readonly (readonly [amount: number, what: string])[]): string {
+  return shares.flatMap(([amount, what]) => (amount > 0 ? [`${amount} ${what}`] : [])).join(", ");
+}
+
 /** More runs of flight numbers than this are counted instead of listed. */
 const LISTED = 5;
 

@@ -141,14 +141,14 @@ def test_the_report_says_which_aborts_count(client: TestClient, database: Databa
     path = f"/api/campaigns/{campaign['id']}/report.html"
     assert "Aborted by the operator without a reason: it does not count against the gains" in client.get(path).text
     assert judge(client, trial, "behaved badly") == 200
-    assert "The operator reported that the vehicle behaved badly: it counts against the gains." in client.get(path).text
+    assert "Cause given by the operator: vehicle behaviour. It counts against the gains." in client.get(path).text
 
 
 @pytest.mark.parametrize(
     ("ending", "reason", "asked", "on_request"),
     [
         ("aborted", "enough", {"enough"}, True),
-        ("aborted", "enough 4 of its samples jumped and were dropped.", {"enough"}, True),
+        ("aborted", "enough 4 samples jumped and were dropped.", {"enough"}, True),
         ("aborted", "Motors off was requested: people below.", {"people below"}, True),
         ("aborted", "A safety limit was exceeded. It rose to 4.6 m.", {"enough"}, False),
         ("aborted", "A safety limit was exceeded. It rose to 4.6 m. Motors off was requested: hot.", {"hot"}, False),

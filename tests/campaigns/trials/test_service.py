@@ -166,7 +166,7 @@ def test_trials_come_page_by_page_with_the_best_before_each(client: TestClient, 
     rest = get(client, f"{path}?limit=2&cursor={first['next_cursor']}")
     assert (first["total"], rest["total"], rest["next_cursor"]) == (3, 3, None)
     assert [trial["number"] for trial in first["items"] + rest["items"]] == [1, 2, 3]
-    assert "with the gains of flight 2 again" in rest["items"][0]["verdict"]
+    assert "repeating the gains of flight 2" in rest["items"][0]["verdict"]
     assert client.get(f"{path}?cursor=nonsense").status_code == 422
     assert client.get(f"{path}?limit=201").status_code == 422
 

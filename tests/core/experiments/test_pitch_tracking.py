@@ -106,7 +106,7 @@ def test_a_stored_flight_is_scored_on_its_own_time_stamps() -> None:
     assert TRUTH.error(run.as_stored()) == pytest.approx(3.38180, abs=1e-4)
     assert (TRUTH.set_point(run.time_s) == 0.0).all()
     short = Trajectory(run.time_s[:2000], {"pitch_error_rad": run["pitch_error_rad"][:2000]}, "model", "simulation")
-    with pytest.raises(TrajectoryError, match="must cover 0 … 60 s"):
+    with pytest.raises(TrajectoryError, match="0 … 60 s after the command are needed"):
         TRUTH.error(short)
 
 

@@ -55,12 +55,10 @@ def test_a_step_without_a_resolvable_improvement_ends_a_campaign_without_a_winne
     found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.499))
     assert found.phase == "decided"
     assert "would reduce the error by 0.001 m, less than the 0.008 m that 11 flights" in found.why
-    assert "No other set was flown." in found.why
+    assert "No other gains were flown." in found.why
     tried = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
     assert tried.phase == "decided"
-    assert (
-        "None of the other sets flown (1) is better. No further step is flown: the strategy proposes none." in tried.why
-    )
+    assert "The other gain set flown is not better. No further step is flown: the strategy proposes none." in tried.why
 
 
 def test_the_winner_and_the_baseline_are_flown_again_in_turn_until_it_is_decided() -> None:

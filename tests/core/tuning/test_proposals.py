@@ -108,8 +108,7 @@ def test_without_a_valid_flight_the_start_gains_are_proposed() -> None:
     again = next_proposal(Definition(), [aborted])
     assert same(start, replace(again, explanation=start.explanation))
     assert again.explanation.summary.startswith(
-        "Flight 1 was aborted because of the vehicle's behaviour with these gains. Fly them again only if you know "
-        "why; otherwise use custom gains. They are the vehicle's default gains ("
+        "Flight 1 was aborted because of the vehicle's behaviour with these gains: the vehicle's default gains ("
     )
     excused = next_proposal(Definition(), [replace(aborted, against_gains=False)])
     assert excused.explanation.summary.startswith("The next flight uses the vehicle's default gains (")

@@ -699,7 +699,10 @@ def test_positions_that_fall_behind_are_no_positions() -> None:
     walk.tempo = 0.3
     walk.pass_s(1.5)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
-    assert walk.trial.why == "Its positions arrive more than 0.5 s late, or its clock is slower than its clock_speed."
+    assert (
+        walk.trial.why
+        == "Its positions arrive more than 0.5 s late, or its clock is slower than the clock speed in its settings."
+    )
 
 
 @pytest.mark.parametrize("gap_s", [0.0, 0.3, 0.45, 0.52, 0.6, 1.0])

@@ -193,7 +193,8 @@ def _summary(
     flights: Sequence[Flight],
 ) -> str:
     unit = experiment.error_unit
-    origin = f"The best flight so far is {base.number} ({format_gains(base.gains)}), error {short(base.error)} {unit}."
+    best_so_far = f"flight {base.number} ({format_gains(base.gains)}), error {short(base.error)} {unit}"
+    origin = f"The best flight so far is {best_so_far}."
     if chosen is None:
         may = " and pass the gate" if refused else ""
         return (
@@ -202,7 +203,7 @@ def _summary(
     if chosen is best:
         return (
             f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
-            f"{chosen.length:.4g} has the lowest predicted error: {short(chosen.predicted_error)} {unit}."
+            f"a step of {chosen.length:.4g} gives the lowest predicted error: {short(chosen.predicted_error)} {unit}."
         )
     aborted = aborted_by_gains(flights, best.gains)
     why = "is refused by the gate" if refused else "was aborted" if aborted else "did not improve on it"

@@ -72,7 +72,9 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           </Button>
         )}
         {stage !== STAGED && (
-          <Note fz="body">ABORT or the Space key ends the flight immediately and restores the safe gains.</Note>
+          <Note fz="body">
+            ABORT or Space ends the flight immediately: the safe gains are sent and the vehicle lands.
+          </Note>
         )}
       </Stack>
     </Panel>

@@ -27,7 +27,9 @@ export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
   const summary =
     refused === 0
       ? `${count(gate.checks.length, "check")} passed`
-      : `${refused} of ${gate.checks.length} checks failed`;
+      : gate.checks.length === 1
+        ? "1 check failed"
+        : `${refused} of ${gate.checks.length} checks failed`;
   return (
     <details className={classes["more"]} open={refused > 0}>
       <summary>{summary}</summary>
@@ -121,7 +123,7 @@ export function GateRefusal({ problem, offers, onUse }: RefusalProps) {
 /** Explains why the offered values can be below those that the refusal names: several limits apply at once. */
 function OfferNote({ several, above, besides }: { several: boolean; above: boolean; besides: readonly string[] }) {
   const nearest = several ? "The closest values to yours that satisfy" : "The closest value to yours that satisfies";
-  const limits = above ? "the limit above and these:" : "these limits (using them repeats the simulated flights):";
+  const limits = above ? "the limit above and these:" : "these limits (the simulated checks are then repeated):";
   return (
     <>
       <p className={classes["offerNote"]}>

@@ -3,7 +3,7 @@ import { IconAlertTriangle } from "@tabler/icons-react";
 import { useStatistics } from "../../api/queries";
 import type { CampaignStatistics, RepeatGroup } from "../../api/types";
 import { Aside, toneOf } from "../../ui/Aside";
-import { count, flightNumbers } from "../../ui/format";
+import { count, flightNumbers, sharesText } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
@@ -91,8 +91,8 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
         {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>
-            {count(more, "more flight")} needed: {further?.best ?? 0} with the best gains, {further?.baseline ?? 0} with
-            the first
+            {count(more, "more flight")} needed:{" "}
+            {sharesText([further?.best ?? 0, "with the best gains"], [further?.baseline ?? 0, "with the first"])}
           </strong>
         )}
       </p>

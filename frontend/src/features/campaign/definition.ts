@@ -1,7 +1,7 @@
 /** A campaign's settings as titles and values. */
 
 import type { Campaign, Catalogue, Definition, OptionInfo } from "../../api/types";
-import { percentText, unitAfter } from "../../ui/format";
+import { count, percentText, unitAfter } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 
 const STARTS = {
@@ -50,7 +50,7 @@ function named(things: readonly Described[] | undefined, name: string): string {
 }
 
 function stopText(stop: Definition["stop"]): string {
-  const most = `${stop?.max_flights} flights`;
+  const most = count(stop?.max_flights ?? 0, "flight");
   switch (stop?.kind) {
     case "budget":
       return `After ${most}`;

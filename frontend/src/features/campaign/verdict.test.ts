@@ -55,7 +55,7 @@ test("a candidate is confirmed by the flights that it lacks", () => {
   expect(confirmationOf(flown(1), flown(1))).toEqual(["repeat", "baseline"]);
   expect(confirmationOf(flown(2), flown(3))).toEqual([]);
   expect(confirmationText(["repeat"])).toBe(
-    "The best and the first gains have to fly at least twice each: 1 more flight with the best gains.",
+    "The best and the first gains must each be flown at least twice: 1 more flight with the best gains.",
   );
 });
 
@@ -140,7 +140,7 @@ test("what a class would change is said before: which flight is the best then, a
   );
   const repeat = { ...trial(5, "valid", 0.19), gains: third.gains } as Trial;
   expect(consequenceOf(third, [...all, repeat], "invalid")).toBe(
-    "Flight 3 is the best. Without it, the best gains stay, then known from flight 5 only, and the next gains are recomputed.",
+    "Flight 3 is the best. Without it, the best gains stay the same, based on flight 5 alone, and the next gains are recomputed.",
   );
   expect(consequenceOf(first, all, "invalid")).toBe(
     "Flight 3 remains the best. The next gains are recomputed without flight 1.",

@@ -151,7 +151,7 @@ export function consequenceOf(trial: Trial, trials: readonly Trial[], outcome: T
   if (best?.id === trial.id) {
     const same = others.filter(({ state, gains }) => state === "valid" && sameHeld(gains, trial.gains));
     const change = sameHeld(other.gains, trial.gains)
-      ? `the best gains stay, then known from ${flightsText(same.map(({ number }) => number))} only`
+      ? `the best gains stay the same, based on ${flightsText(same.map(({ number }) => number))} alone`
       : `flight ${other.number} becomes the best`;
     return `Flight ${trial.number} is the best. Without it, ${change}, and the next gains are recomputed.`;
   }
@@ -183,7 +183,7 @@ export function confirmationText(plan: readonly Variant[]): string {
     return flights === 0 ? [] : [`${count(flights, "more flight")} with the ${gains} gains`];
   };
   const parts = [...of("repeat", "best"), ...of("baseline", "first")];
-  return `The best and the first gains have to fly at least twice each: ${parts.join(" and ")}.`;
+  return `The best and the first gains must each be flown at least twice: ${parts.join(" and ")}.`;
 }
 
 /** Why the campaign ended, without the verdict, which is shown beside it. */
@@ -203,10 +203,14 @@ export function promotable(
     return { possible: false, why: `The best gains are the safe gains of ${name}.` };
   const verdict = winner?.verdict ?? null;
   if (verdict === "better") return { possible: true, why: "" };
-  const because = verdict === null ? "no gains are better than the first yet" : `their verdict is “${verdict}”`;
+  if (verdict === null)
+    return {
+      possible: false,
+      why: "The best gains so far are the first flight's, so there is nothing to set. Fly other gains first.",
+    };
   return {
     possible: false,
-    why: `The best gains cannot become the safe gains of ${name}: ${because}. Fly the best and the first gains again until the verdict is “better”.`,
+    why: `The best gains cannot become the safe gains of ${name}: their verdict is “${verdict}”. Fly the best and the first gains again until the verdict is “better”.`,
   };
 }
 

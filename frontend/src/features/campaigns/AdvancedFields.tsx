@@ -86,7 +86,7 @@ const STOPS: Record<StopKind, { label: string; line: string }> = {
   },
   paper: {
     label: "No improvement",
-    line: "Ends after two consecutive flights that are not clearly better than the best, as in the paper.",
+    line: "Ends after two consecutive flights that improve on the best by less than the threshold, as in the paper.",
   },
   budget: { label: "Flight budget", line: "Ends after the maximum number of flights." },
 };

@@ -10,9 +10,12 @@ import { ImportBundle } from "./ImportBundle";
 import { firstPreset } from "./newCampaign";
 
 const STEPS = [
-  ["Fly", "The vehicle takes off with its current gains. The score is the mean altitude error over 32.6\u00a0s."],
+  [
+    "Fly",
+    "The vehicle takes off with its default gains. The error is the mean distance from 3\u00a0m over 32.6\u00a0s.",
+  ],
   ["Learn", "The flight is compared with a simple model, and the difference corrects the next prediction."],
-  ["Step", "The model evaluates many gain sets in about a second and proposes the best. You see why, and decide."],
+  ["Step", "Gainline evaluates many gain sets on the model and proposes the best. You see why, and decide."],
 ] as const;
 
 /** Empty list: explains campaigns, and creates the first one with one click. */

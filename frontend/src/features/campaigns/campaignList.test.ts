@@ -26,7 +26,7 @@ test("a difference within the noise is no progress that could be claimed", () =>
 
 test("before anybody knows how much flights scatter, a difference may be chance", () => {
   expect(progress(summary(0.0933, 0.3267, 2, "not known yet"))).toBe(
-    "71\u00a0% below the first flight, significance not known yet",
+    "71\u00a0% below the first flight, verdict not known yet",
   );
 });
 

@@ -29,6 +29,6 @@ export function progress({ best, first_error, flights, verdict }: CampaignSummar
   if (best === null || change === null || flights < 2) return null;
   if (verdict === null) return "no improvement yet";
   if (verdict === "unresolved") return "unresolved vs. the first flight";
-  if (verdict === "not known yet") return `${against(change, "the first flight")}, significance not known yet`;
+  if (verdict === "not known yet") return `${against(change, "the first flight")}, verdict not known yet`;
   return against(change, "the first flight");
 }

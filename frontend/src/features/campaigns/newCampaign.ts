@@ -96,7 +96,8 @@ function presetFor(catalogue: Catalogue, experiment: string, vehicle: string): P
 
 function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
   const title = catalogue.experiments.find(({ name }) => name === experiment)?.title ?? experiment;
-  return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${vehicle}`;
+  const kind = catalogue.vehicle_kinds.find(({ name }) => name === vehicle)?.title;
+  return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${kind ?? vehicle}`;
 }
 
 /** The preset that one click creates: the simulated takeoff. */

@@ -25,14 +25,14 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
   const navigate = useNavigate();
   return (
     <Panel
-      title={brief ? "Check another recording" : "Check that the model’s controller matches your vehicle"}
+      title={brief ? "Check another recording" : "Check that the replica matches your vehicle’s controller"}
       className={over ? classes["over"] : ""}
     >
       {!brief && (
         <Text maw="90ch" lh={1.45} mb={10}>
           The method requires an exact replica of the controller. Upload a recorded run of the autopilot's vertical
-          loop. It is replayed through the replica in the model, and every signal is compared, bit for bit where the
-          recording allows it.
+          loop. It is replayed through Gainline’s replica of the controller and every signal is compared: bit for bit
+          for Paparazzi, within tolerances for the others.
         </Text>
       )}
       <Text maw="90ch" lh={1.45} mb={10}>

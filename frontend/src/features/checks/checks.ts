@@ -20,13 +20,13 @@ export const RECORDINGS = [
   {
     autopilot: "PX4",
     types: [".ulg", ".csv", ".gz"],
-    text: "the .ulg log of a flight, or a trace with a row for every estimate of position, .csv or .csv.gz",
+    text: "the .ulg log of a flight, or a trace with a row for every position estimate, .csv or .csv.gz",
   },
 ] as const;
 
 export const KINDS: Record<ControllerCheckSummary["kind"], string> = {
   log: "Flight log",
-  trace: "Recording of every control step",
+  trace: "Step-by-step trace",
 };
 
 export function checkStateLabel(passed: boolean): StateLabel {

@@ -6,7 +6,7 @@ import type { ComparedFlight, FlightComparison, FlightDifference, FlightPair } f
 import type { FigureCard } from "../../api/types";
 import type { PlotlyFigure } from "../../charts/traces";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";
-import { count, gainText, NOTHING } from "../../ui/format";
+import { count, gainText, NOTHING, sharesText } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import { ScrollTable } from "../../ui/ScrollTable";
@@ -169,7 +169,8 @@ function Against({ pair, first, unit }: { pair: FlightPair | null; first: string
       )}
       {further && (
         <small className={classes["small"]}>
-          needs {count(further.trial, "more flight")} with its gains and {further.against} with those of {first}
+          needs more flights:{" "}
+          {sharesText([further.trial, "with its gains"], [further.against, `with those of ${first}`])}
         </small>
       )}
     </>

@@ -133,7 +133,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           <Checkbox
             size="md"
             label={LABELS.safe_gains_confirmed}
-            description="Confirms exactly these gains: a change of one of them clears it."
+            description="Confirms exactly these gains. Changing any of them clears the confirmation."
             checked={form.confirmed}
             error={reasons["safe_gains_confirmed"]}
             onChange={(event) => set({ confirmed: event.currentTarget.checked })}

@@ -4,7 +4,7 @@ import { useState } from "react";
 import { useReadOnlyReason } from "../../api/access";
 import { useRelease } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
-import { useVehicleCommands } from "../../api/vehicleCommands";
+import { useVehicleCommands, type VehicleCommand } from "../../api/vehicleCommands";
 import { useVehicleStatus } from "../../live/store";
 import type { Aged } from "../../live/vehicleStatus";
 import { ErrorNotice } from "../../ui/Notices";
@@ -88,12 +88,14 @@ export function MotorsOff({ vehicle, status, orders, watching = false }: Props) 
   );
 }
 
+const COMMANDS: Record<VehicleCommand, string> = { land: "Land", "motors off": "Motors off" };
+
 /** Result of the last command, as an alert. */
 export function CommandResult({ orders: { said } }: { orders: ReturnType<typeof useVehicleCommands> }) {
   if (said === null) return null;
   return (
     <p className={classes["said"]} data-bad={!said.accepted || undefined} role="alert">
-      {said.accepted ? said.sentence : `Not sent: ${said.order}. ${said.sentence}`}
+      {said.accepted ? said.sentence : `${COMMANDS[said.order]} not confirmed. ${said.sentence}`}
     </p>
   );
 }

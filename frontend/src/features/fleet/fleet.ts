@@ -42,8 +42,8 @@ export const ACTS: Record<ActKind, string> = {
 export const PURPOSES: Record<GivenGains["purpose"], string> = {
   flight: "Flight",
   "restore after flight": "Safe gains after flight",
-  connect: "Check at connection",
-  restore: "Safe gains restored",
+  connect: "Safe gains at connection",
+  restore: "Safe gains, on request",
   release: "Safe gains at release",
 };
 

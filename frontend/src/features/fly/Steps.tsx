@@ -149,7 +149,8 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
   if (wantsRehearsal(campaign)) {
     return (
       <p className={classes["say"]}>
-        {vehicle.name} is a real vehicle, and this campaign has not passed its rehearsal: {campaign.rehearsal.reason}.{" "}
+        {vehicle.name} is a real vehicle, and this campaign has not passed its rehearsal yet (
+        {campaign.rehearsal.reason}).{" "}
         <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
           Rehearse first
         </Anchor>
@@ -235,7 +236,7 @@ function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; 
 const ABORT_SAYS: Record<AbortStage, string> = {
   none: "Ends the flight immediately: sends safe gains and Land until the vehicle confirms.",
   sending: "Sending the abort to the worker.",
-  "not sent": "The abort could not be sent. It is retried until the worker confirms it.",
+  "not confirmed": "The abort is not confirmed. It is sent again until the worker confirms it.",
   accepted: "Sending safe gains and Land until the vehicle confirms.",
 };
 

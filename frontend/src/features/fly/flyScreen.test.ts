@@ -108,7 +108,7 @@ test("without the worker it is not known whether the link is lost", () => {
   const readiness = { steps: [], lost: [], losses: [{ kind: "worker away", what: "", way_on: "" }], is_ready: false };
   const said = { quarantined: false, readiness: readiness as Readiness };
   expect(flyStateLabel({ state: "flying", flight }, "flying", statusAt("record", 4), said)).toEqual({
-    word: "Worker unreachable",
+    word: "Worker not responding",
     tone: "bad",
   });
 });

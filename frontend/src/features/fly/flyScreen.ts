@@ -61,8 +61,8 @@ const IN_FLIGHT: ReadonlySet<string> = new Set([
 
 /** What is lost between this page and the vehicle's link: whether the link itself is, cannot be known then. */
 const AWAY: Readonly<Partial<Record<Loss["kind"], string>>> = {
-  "server away": "Server unreachable",
-  "worker away": "Worker unreachable",
+  "server away": "Server not responding",
+  "worker away": "Worker not responding",
 };
 
 function stagedLabel(readiness: Readiness | null): StateLabel {

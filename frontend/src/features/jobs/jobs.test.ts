@@ -57,7 +57,7 @@ test("a job is named after what it does and leads to where that is seen", () => 
   expect(jobTitle(JOB, new Map())).toBe("table1");
   expect(jobLink(JOB)).toBe("/reproductions#table1");
   const proposal: Job = { ...JOB, kind: "proposal", name: "", campaign_id: 4, campaign_name: "Twin, session 1" };
-  expect(jobTitle(proposal, titles)).toBe("Next gains");
+  expect(jobTitle(proposal, titles)).toBe("Proposal");
   expect(jobLink(proposal)).toBeNull();
   expect(jobTitle({ ...proposal, kind: "landscape", name: "campaign 4" }, titles)).toBe("Error landscape");
 });

@@ -46,7 +46,7 @@ export function progressText({ state, done_share: share, doing, remaining_s: lef
 
 /** Title of a job. `titles` are those of the reproductions by name. */
 export function jobTitle({ kind, name }: Job, titles: ReadonlyMap<string, string>): string {
-  if (kind === "proposal") return "Next gains";
+  if (kind === "proposal") return "Proposal";
   if (kind === "landscape") return "Error landscape";
   if (kind === "reproduction") return titles.get(name) ?? name;
   return name === "" ? kind : `${kind} ${name}`;
