@@ -56,7 +56,8 @@ def check_transition(moves: Mapping[S, frozenset[S]], state: S, to: S, what: str
     """Return the new state. Raises ConflictError when the table has no transition to it from `state`."""
     if to not in moves[state]:
         raise ConflictError(
-            f"{what} is {_label(state)} and cannot change to “{_label(to)}”.", hint=_look_again(sorted(moves[state]))
+            f"{what} is {state_label(state)} and cannot change to “{state_label(to)}”.",
+            hint=_look_again(sorted(moves[state])),
         )
     return to
 
@@ -65,7 +66,7 @@ def check_action(actions: Mapping[str, frozenset[S]], action: str, state: S, wha
     """Raise ConflictError when `action` is not possible in `state`."""
     if state not in actions[action]:
         raise ConflictError(
-            f"{what} {_REFUSALS[action]}: it is {_label(state)}.",
+            f"{what} {_REFUSALS[action]}: it is {state_label(state)}.",
             hint=f"This is possible only while it is {_or(actions[action])}. Reload it: its state has changed, or "
             "another step must come first.",
         )
@@ -100,12 +101,13 @@ def _short(value: object) -> str:
     return text if len(text) <= 80 else f"{text[:78]}…”"
 
 
-def _label(state: str) -> str:
+def state_label(state: str) -> str:
+    """The word that a person knows a state by."""
     return _LABELS.get(state, state)
 
 
 def _or(states: Iterable[str], last_by: str = " or ", others_by: str = ", ") -> str:
-    *others, last = sorted(map(_label, states))
+    *others, last = sorted(map(state_label, states))
     return f"{others_by.join(others)}{last_by}{last}" if others else last
 
 

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from markupsafe import Markup
 
 from app.campaigns.schemas import Campaign
+from app.common.conflict_checks import state_label
 from app.common.schemas import Interval
 from app.core import formatting
 from app.figures.base import Card, Cell, Column
@@ -129,6 +131,9 @@ def _policy(*scripts: Markup) -> str:
     )
 
 
+_CHOICES: Final = MappingProxyType({"manual": "custom gains", "shorter step": "smaller step"})
+
+
 def _environment() -> "Environment":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -137,6 +142,8 @@ def _environment() -> "Environment":
     )
     environment.filters |= {
         "instant": _instant,
+        "choice": lambda kind: _CHOICES.get(kind, kind),
+        "trial_state": state_label,
         "plus_minus": formatting.measured,
         "number": formatting.number,
         "interval": _interval,

@@ -1,5 +1,6 @@
 import { IconAlertTriangleFilled, IconCircle, IconCircleCheckFilled, IconCircleXFilled } from "@tabler/icons-react";
 import type { Readiness, ReadinessStep } from "../../live/readiness";
+import { withCode } from "../../ui/Notices";
 import classes from "./ReadinessStepper.module.css";
 
 /** Every step, in order. */
@@ -49,7 +50,7 @@ export function ReadinessLosses({ losses }: Pick<Readiness, "losses">) {
     <p key={kind} role="alert" className={classes["loss"]}>
       <IconAlertTriangleFilled size={20} aria-hidden />
       <span>
-        <strong>{what}</strong> {way_on}
+        <strong>{what}</strong> {withCode(way_on)}
       </span>
     </p>
   ));

@@ -113,6 +113,11 @@ function ThisBrowser() {
   );
 }
 
+const WORKER: Record<System["worker"], string> = {
+  running: "Running",
+  "not answering": "Not responding",
+  absent: "Not running",
+};
 const SCARCE_BYTES = 1e9;
 
 /** Version and resources of the server, for bug reports. */
@@ -122,7 +127,7 @@ function About({ system }: { system: System }) {
     <Panel title="This server">
       <dl className={fleet["facts"]}>
         <LabelledValue title="Version" value={system.version} />
-        <LabelledValue title="Worker" value={system.worker} bad={system.worker !== "running"} />
+        <LabelledValue title="Worker" value={WORKER[system.worker]} bad={system.worker !== "running"} />
         <LabelledValue title="Database" value={`revision ${system.database_revision}`} />
         <LabelledValue title="Data size" value={bytesText(system.data_bytes)} />
         <LabelledValue
