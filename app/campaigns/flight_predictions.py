@@ -2,10 +2,12 @@
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from typing import Final
+
+from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of
@@ -13,6 +15,7 @@ from app.campaigns.proposals import read_donor
 from app.campaigns.schemas import GainsPrediction, PredictedCurve
 from app.common.schemas import Interval
 from app.common.states import TrialState
+from app.core.definition import Definition
 from app.core.experiments import experiment_of
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
@@ -20,6 +23,7 @@ from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, 
 from app.core.tuning.gate import space_of
 from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import Proposal, band_channels
+from app.db.models import CampaignRow, TrialRow
 from app.db.session import Database
 from app.figures.scale import thin_by_bends, thinned
 
@@ -63,34 +67,65 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
     NotFoundError, and GainsError when they are not the campaign's gains or no controller can hold them.
     """
     with database.read() as session:
-        campaign = repository.get_campaign(session, campaign_id)
-        definition, trials = definition_of(campaign), history.trials_of(session, campaign_id)
-        gains = space_of(definition).complete(asked)
-        digest = history.history_digest(session, campaign, definition, trials)
-        recorded = {row.number for row in trials if row.state == TrialState.VALID and row.gains == gains}
-        kept = cache.find(digest)
-        is_new = not recorded and kept is None
-        if is_new:
-            recorded |= modelled_flights(definition, history.flown_gains(trials))
+        question = _question(session, repository.get_campaign(session, campaign_id), asked)
+        kept = cache.find(question.digest)
+        is_new = not question.flown and kept is None
+        recorded = question.flown | (
+            modelled_flights(question.definition, history.flown_gains(question.trials)) if is_new else set()
+        )
         flights = history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else ()
-        donor = read_donor(session, definition) if is_new else None
-    predicted = predict_repeat(definition, flights, gains)
+        donor = read_donor(session, question.definition) if is_new else None
+    predicted = predict_repeat(question.definition, flights, question.gains)
     if predicted is None:
         fitted = cache.get(
-            digest, lambda: flight_predictor(definition, flights, donor) if kept is None else kept.predictor
+            question.digest,
+            lambda: flight_predictor(question.definition, flights, donor) if kept is None else kept.predictor,
         )
-        predicted = None if fitted.predictor is None else fitted.predictor.predict(gains)
-    return _view(gains, predicted, experiment_of(definition).output, corrected=history.is_corrected(trials))
+        predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
+    return _view(question, predicted)
 
 
-def _view(gains: Gains, predicted: Proposal | None, output: str, *, corrected: bool) -> GainsPrediction:
+def predict_planned(session: Session, cache: PredictorCache, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
+    """The same within a transaction, which fits no model: without one that is kept, only repeats are predicted."""
+    question = _question(session, campaign, gains)
+    flights = history.flights_of(session, campaign.id, recorded=question.flown) if question.flown else ()
+    predicted = predict_repeat(question.definition, flights, question.gains)
+    kept = cache.find(question.digest)
+    if predicted is None and kept is not None and kept.predictor is not None:
+        predicted = kept.predictor.predict(question.gains)
+    return _view(question, predicted)
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """A complete gain set in a campaign's history; `flown` are the numbers of the valid flights with these gains."""
+
+    definition: Definition
+    trials: Sequence[TrialRow]
+    gains: Gains
+    digest: str
+    flown: set[int]
+
+
+def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Question:
+    definition, trials = definition_of(campaign), history.trials_of(session, campaign.id)
+    gains = space_of(definition).complete(asked)
+    digest = history.history_digest(session, campaign, definition, trials)
+    flown = {row.number for row in trials if row.state == TrialState.VALID and row.gains == gains}
+    return _Question(definition, trials, gains, digest, flown)
+
+
+def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
+    gains, output = question.gains, experiment_of(question.definition).output
     error = None if predicted is None else predicted.predicted_error
     if predicted is None or error is None or not math.isfinite(error):  # a model may diverge
         return GainsPrediction(
             gains=dict(gains), predicted_error=None, interval=None, curve=None, lower=None, upper=None
         )
     interval = predicted.interval
-    predicts = is_informative(None if interval is None else interval.lower, corrected=corrected)
+    predicts = is_informative(
+        None if interval is None else interval.lower, corrected=history.is_corrected(question.trials)
+    )
     lower, upper = (_edge(predicted.predicted, channel) for channel in band_channels(output))
     return GainsPrediction(
         gains=dict(gains),

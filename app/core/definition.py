@@ -106,7 +106,7 @@ class Flight:
 
     `outcome` is `valid` or `aborted`; invalid and lost flights are left out. An aborted flight has no error.
     `against_gains` is false if a person aborted the flight for another reason than the vehicle's behaviour. `predicted`
-    is None for gains that no proposal contained.
+    is None for gains whose error was not predicted when their flight was planned.
     """
 
     number: int

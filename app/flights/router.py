@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Depends, status
 from starlette.concurrency import run_in_threadpool
 
-from app.campaigns.trials import service as trials
+from app.campaigns.trials.router import TrialPredictorDep
 from app.campaigns.trials.schemas import Abort, AbortAnswer, FlightOrder, NewTrial, Trial
 from app.flights import service
 from app.flights.schemas import TrialReadiness
@@ -13,12 +13,14 @@ router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_on
 
 
 @router.post("/campaigns/{campaign_id}/trials", status_code=status.HTTP_201_CREATED)
-def create_trial(act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: NewTrial) -> Trial:
+def create_trial(
+    act: IdempotentPost, asking: RequestContextDep, predictor: TrialPredictorDep, campaign_id: Id, body: NewTrial
+) -> Trial:
     """Plan a trial of the proposal, a variant or custom gains and, with `fly`, request its flight at once."""
     return act(
         Trial,
-        lambda session: service.plan_trial(session, campaign_id, body, asking),
-        ahead=lambda session: trials.warm_gate_cache_for_new(session, campaign_id, body),
+        lambda session: service.plan_trial(session, campaign_id, body, asking, predict=predictor.predict),
+        ahead=lambda session: predictor.prepare(session, campaign_id, body),
     )
 
 

@@ -37,9 +37,16 @@ def warm_gate_cache(session: Session, trial_id: int) -> None:
         check_own_gains(session, campaigns.get_row(session, row.campaign_id), row.gains)
 
 
-def plan_trial(session: Session, campaign_id: int, new: NewTrial, context: RequestContext = LOCAL_CLI) -> Trial:
+def plan_trial(
+    session: Session,
+    campaign_id: int,
+    new: NewTrial,
+    context: RequestContext = LOCAL_CLI,
+    *,
+    predict: trials.Predict | None = None,
+) -> Trial:
     """Plan a trial and, with `fly`, request its flight. Raises as `create_trial` and `fly_trial` do."""
-    trial = trials.create_trial(session, campaign_id, new, context)
+    trial = trials.create_trial(session, campaign_id, new, context, predict=predict)
     if new.fly is None:
         return trial
     campaign, row = campaigns.get_row(session, campaign_id), history.trial_row(session, trial.id)

@@ -19,7 +19,7 @@ from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.campaigns.trials.schemas import Trial, TrialPlan
-from app.campaigns.trials.service import check_flown_gains, create_trial, require_open
+from app.campaigns.trials.service import Predict, check_flown_gains, create_trial, require_open
 from app.campaigns.trials.views import trajectory_view, trial_view
 from app.common.conflict_checks import check_action
 from app.common.data_folder import log_of_trial, telemetry_log
@@ -280,9 +280,10 @@ def plan_and_import(
     *,
     confirmed: bool,
     invalid: bool,
+    predict: Predict | None = None,
 ) -> Trial:
     """Plan a trial and import its record. Raises what `create_trial` and `import_record` raise."""
-    planned = create_trial(session, campaign_id, plan, context)
+    planned = create_trial(session, campaign_id, plan, context, predict=predict)
     return import_record(session, planned.id, flown, context, confirmed=confirmed, invalid=invalid)
 
 

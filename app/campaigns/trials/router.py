@@ -2,11 +2,12 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Response, status
+from fastapi import APIRouter, Depends, Query, Request, Response, status
 from fastapi.responses import FileResponse
 
 from app.campaigns.schemas import Campaign, ConsideredGains
 from app.campaigns.trials import photos, records, reviews, service
+from app.campaigns.trials.predictions import TrialPredictor
 from app.campaigns.trials.schemas import (
     AbortJudgement,
     Classification,
@@ -22,6 +23,7 @@ from app.web.dependencies import (
     FILE_BODY,
     PLANNED_RECORD_BODY,
     REQUEST_BODY,
+    CurrentDatabase,
     CurrentSettings,
     CursorText,
     Id,
@@ -33,6 +35,13 @@ from app.web.dependencies import (
     Writer,
     json_only,
 )
+
+
+async def _trial_predictor(request: Request, database: CurrentDatabase) -> TrialPredictor:
+    return TrialPredictor(database, request.app.state.predictors)
+
+
+TrialPredictorDep = Annotated[TrialPredictor, Depends(_trial_predictor)]
 
 router = APIRouter(prefix="/api", tags=["trials"], dependencies=[Depends(json_only)])
 
@@ -51,10 +60,18 @@ def evaluate_gate(session: Reader, campaign_id: Id, body: ConsideredGains) -> Ga
 
 @router.post("/campaigns/{campaign_id}/reopen")
 def reopen_campaign(
-    act: IdempotentPost, asking: RequestContextDep, campaign_id: Id, body: Reopening | None = None
+    act: IdempotentPost,
+    asking: RequestContextDep,
+    predictor: TrialPredictorDep,
+    campaign_id: Id,
+    body: Reopening | None = None,
 ) -> Campaign:
     """Reopen a finished campaign for more flights."""
-    return act(Campaign, lambda session: service.reopen_campaign(session, campaign_id, body or Reopening(), asking))
+    asked = body or Reopening()
+    return act(
+        Campaign,
+        lambda session: service.reopen_campaign(session, campaign_id, asked, asking, predict=predictor.predict),
+    )
 
 
 @router.get("/trials/{trial_id}")
@@ -179,6 +196,7 @@ Unscored = Annotated[
 def import_flight(
     record: Record,
     asking: RequestContextDep,
+    predictor: TrialPredictorDep,
     campaign_id: Id,
     takeoff: TakeoffNumber = None,
     confirm: OtherGains = False,
@@ -191,9 +209,9 @@ def import_flight(
     return record.once(
         Trial,
         lambda session: records.plan_and_import(
-            session, campaign_id, plan, flown, asking, confirmed=confirm, invalid=invalid
+            session, campaign_id, plan, flown, asking, confirmed=confirm, invalid=invalid, predict=predictor.predict
         ),
-        ahead=lambda session: service.warm_gate_cache_for_new(session, campaign_id, plan),
+        ahead=lambda session: predictor.prepare(session, campaign_id, plan),
     )
 
 

@@ -3,8 +3,7 @@
 Every gain set passes the gate before it becomes a trial; an operator may overrule some of its refusals.
 """
 
-from collections.abc import Collection
-from contextlib import suppress
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,12 +14,12 @@ from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.history import set_flight_state, set_trial_state
-from app.campaigns.schemas import Campaign, Variant
+from app.campaigns.schemas import Campaign, GainsPrediction, Variant
 from app.campaigns.trials.schemas import Reopening, Trial, TrialEdit, TrialPlan
 from app.campaigns.trials.views import trial_view, trial_views
 from app.campaigns.variants import gains_of
 from app.common.conflict_checks import check_action, check_version
-from app.common.errors import ConflictError, GainlineError, InputError, Problem
+from app.common.errors import ConflictError, InputError, Problem
 from app.common.schemas import Gate, Page, decode_cursor, encode_cursor
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
@@ -153,8 +152,19 @@ def get_trial(session: Session, trial_id: int) -> Trial:
     return _seen(session, repository.get_trial(session, trial_id))
 
 
-def create_trial(session: Session, campaign_id: int, new: TrialPlan, context: RequestContext = LOCAL_CLI) -> Trial:
-    """Plan a trial.
+Predict = Callable[[Session, CampaignRow, Gains], GainsPrediction]
+"""What is predicted for gains that no proposal contains."""
+
+
+def create_trial(
+    session: Session,
+    campaign_id: int,
+    new: TrialPlan,
+    context: RequestContext = LOCAL_CLI,
+    *,
+    predict: Predict | None = None,
+) -> Trial:
+    """Plan a trial. Without `predict`, only the gains of a proposal have a prediction.
 
     Raises ConflictError for a stale proposal, an unclassified flight, a spent budget, a campaign that is over or not
     ready; GainsError that names what the gate refuses, unless that is overruled; and NotAllowedError when the client
@@ -165,6 +175,7 @@ def create_trial(session: Session, campaign_id: int, new: TrialPlan, context: Re
     require_open(session, campaign, BUDGETED_TRIAL_STATES)
     judged, proposal = _chosen(session, campaign, new)
     gains = judged.gains
+    predicted_error, interval = _predicted(session, campaign, gains, proposal, predict)
     number = repository.next_number(session, campaign_id)
     row = TrialRow(
         campaign_id=campaign_id,
@@ -173,8 +184,8 @@ def create_trial(session: Session, campaign_id: int, new: TrialPlan, context: Re
         gains=gains,
         kind=_kind(session, campaign, gains, proposal) if new.variant is None else KINDS[new.variant],
         proposal_id=None if proposal is None else proposal.id,
-        predicted_error=None if proposal is None else proposal.predicted_error,
-        predicted_interval=None if proposal is None else proposal.interval,
+        predicted_error=predicted_error,
+        predicted_interval=interval,
         gate=judged.gate,
         overrule_reason=judged.overrule_reason,
         note=new.note,
@@ -185,21 +196,32 @@ def create_trial(session: Session, campaign_id: int, new: TrialPlan, context: Re
     return trial_view(session, campaign, row)
 
 
-def reopen_campaign(session: Session, campaign_id: int, asked: Reopening, context: RequestContext) -> Campaign:
+def _predicted(
+    session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None, predict: Predict | None
+) -> tuple[float | None, JsonObject | None]:
+    """Predicted error and interval, as stored."""
+    if proposal is not None:
+        return proposal.predicted_error, proposal.interval
+    if predict is None:
+        return None, None
+    found = predict(session, campaign, gains)
+    return found.predicted_error, None if found.interval is None else found.interval.model_dump(mode="json")
+
+
+def reopen_campaign(
+    session: Session, campaign_id: int, asked: Reopening, context: RequestContext, *, predict: Predict | None = None
+) -> Campaign:
     """Reopen a finished campaign, and plan trials. Raises what `create_trial` and `campaigns.reopen_campaign` raise."""
     campaigns.reopen_campaign(session, campaign_id, asked.flights, context)
     for variant in asked.plan:
-        create_trial(session, campaign_id, TrialPlan(variant=variant), context)
+        create_trial(session, campaign_id, TrialPlan(variant=variant), context, predict=predict)
     return campaigns.get_campaign(session, campaign_id)
 
 
-def warm_gate_cache_for_new(session: Session, campaign_id: int, new: TrialPlan) -> None:
-    """Run the gate's simulations before the transaction of `create_trial` needs the results, which are cached.
-
-    Problems with the trial are reported by `create_trial`.
-    """
-    with suppress(GainlineError):
-        _chosen(session, campaigns.get_row(session, campaign_id), new)
+def find_gains(session: Session, campaign_id: int, new: TrialPlan) -> Gains:
+    """The gains that a new trial would fly. Raises as `create_trial` does for them."""
+    judged, _ = _chosen(session, campaigns.get_row(session, campaign_id), new)
+    return judged.gains
 
 
 def edit_trial(session: Session, trial_id: int, edit: TrialEdit) -> Trial:

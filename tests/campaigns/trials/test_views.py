@@ -33,8 +33,10 @@ def test_gains_flown_again_on_purpose_are_not_held_against_the_best(client: Test
         again = create_trial(client, campaign["id"], gains=first["gains"])
         upload(client, again["id"], create_csv(settling_s))
     second, third = (get(client, f"/api/trials/{number}") for number in (2, 3))
-    assert second["verdict"] == f"{second['error']:.3f} m, repeating the gains of flight 1."
-    assert third["verdict"] == f"{third['error']:.3f} m, repeating the gains of flights 1, 2."
+    for flight, earlier in ((second, "flight 1"), (third, "flights 1, 2")):
+        predicted = f"; {flight['predicted_error']:.3f} m was predicted."
+        assert flight["verdict"] == f"{flight['error']:.3f} m, repeating the gains of {earlier}{predicted}"
+    assert second["predicted_error"] == pytest.approx(first["error"])
 
 
 def test_a_flight_is_compared_with_the_best_before_it_and_the_first_as_far_as_the_scatter_allows(
