@@ -161,8 +161,7 @@ def next_flight_view(session: Session, row: CampaignRow) -> NextFlight:
 
 
 def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow]) -> Proposal:
-    best = history.best_of(trials)
-    now = best.gains if best is not None else campaign.vehicle.safe_gains
+    now = _present_gains(campaign, trials)
     stop = row.stop_verdict
     verdict = StopVerdict(
         stop=stop["stop"], reason=stop["reason"] or "", sentence=stop["why"], threshold=stop["threshold"]
@@ -189,6 +188,14 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
         stale=is_stale(session, campaign, row, trials),
         computed_at=row.computed_at,
     )
+
+
+def _present_gains(campaign: CampaignRow, trials: Sequence[TrialRow]) -> Mapping[str, float]:
+    """The gains that a step starts from: the best within the bounds, else the best, else the vehicle's safe ones."""
+    if (within := standing_within_bounds_of(campaign, trials)) is not None:
+        return within.winner.gains
+    best = history.best_of(trials)
+    return campaign.vehicle.safe_gains if best is None else best.gains
 
 
 def _choices(campaign: CampaignRow, row: ProposalRow, trials: Sequence[TrialRow], advice: Advice) -> list[FlightChoice]:

@@ -106,6 +106,22 @@ def test_gains_beyond_the_bounds_that_flew_all_the_same_count_and_the_next_ones_
     assert found["proposal"]["gains"]["ki"] <= 1073
 
 
+def test_a_step_starts_from_the_best_gains_within_the_bounds(
+    client: TestClient, database: Database, campaign: Json, trial: Json
+) -> None:
+    """The best flight, ki 1356, lies beyond the bounds: neither repeats nor changes are of its gains."""
+    client.post(path_of(trial), content=recorded("paparazzi_283_13_82.tlog"), headers=ANY)
+    run_jobs(database)
+    second = create_trial(client, campaign["id"])
+    client.post(f"{path_of(second)}?confirm=true", content=recorded(f"{TUNED}.tlog"), headers=ANY)
+    run_jobs(database)
+    proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
+    repeat = next(each["gains"] for each in proposal["choices"] if each["kind"] == "repeat")
+    assert repeat == TLOGS["paparazzi_283_13_82"]
+    assert {name: change["now"] for name, change in proposal["changes"].items()} == repeat
+    assert get(client, f"/api/campaigns/{campaign['id']}")["best"]["gains"] == TLOGS[TUNED]
+
+
 def test_confirmed_gains_become_the_trial_s_and_what_was_predicted_for_others_goes(
     client: TestClient, trial: Json
 ) -> None:

@@ -14,7 +14,7 @@ export interface GainEntry {
 interface Props {
   rows: readonly GainRow[];
   /** Whose gains the first column shows. */
-  from: "Best gains" | "Safe gains";
+  from: "Best gains" | "Best in bounds" | "Safe gains";
   unit: string;
   titles: Readonly<Record<string, string>>;
   /** Makes the next gains inputs. */

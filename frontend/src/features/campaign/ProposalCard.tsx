@@ -6,6 +6,7 @@ import { offersOf } from "../../api/problems";
 import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
 import { useConnection } from "../../live/store";
+import { flightsText } from "../../ui/format";
 import { sameHeld } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
@@ -48,7 +49,11 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isRefused = chosen.isChecked && chosen.gate?.passed === false;
   const groups = useStatistics(campaign.id).data?.groups ?? [];
   const group = groups.find(({ gains }) => chosen.gains !== null && sameHeld(gains, chosen.gains));
-  const isBestAgain = isRepeat(chosen.name) && group?.is_best === true;
+  const present = Object.fromEntries(chosen.rows.map(({ name, now }) => [name, now]));
+  const reference = groups.find(({ gains }) => sameHeld(gains, present));
+  const isBestAgain = isRepeat(chosen.name) && group !== undefined && group === reference;
+  const outside = groups.find(({ is_best }) => is_best);
+  const isBestOutside = outside !== undefined && reference !== undefined && outside !== reference;
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
@@ -57,16 +62,22 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable
           rows={chosen.rows}
-          from={campaign.best === null ? "Safe gains" : "Best gains"}
+          from={campaign.best === null ? "Safe gains" : isBestOutside ? "Best in bounds" : "Best gains"}
           unit={units.gains}
           titles={titles}
           entry={chosen.entry}
         />
+        {isBestOutside && (
+          <Note>
+            The best gains, of {flightsText(outside.trial_numbers)}, are outside the bounds. Steps and repeats use the
+            best gains within them.
+          </Note>
+        )}
         {isEvaluated && (
           <PredictedError
             predicted={chosen.predicted}
             isCurrent={chosen.isPredicted}
-            best={isBestAgain ? null : (groups.find(({ is_best }) => is_best)?.mean ?? null)}
+            best={isBestAgain ? null : (reference?.mean ?? null)}
             source={repeatSource(chosen.name, group)}
             unit={units.error}
             hasModel={hasModel}
