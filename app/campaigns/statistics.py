@@ -149,7 +149,7 @@ def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
     amount = plus_minus(found.difference, found.standard_error, unit, sign="+")
     sentence = (
         f"{'The vehicle has drifted' if is_resolved else 'No drift resolved'}: from flight {found.first_number} to "
-        f"{found.last_number} the error with the same gains changed by {amount} "
+        f"{found.last_number} the trend of the error with the same gains is {amount} "
         f"({confidence_text(found.confidence)} confidence)."
     )
     return Drift(

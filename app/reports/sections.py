@@ -195,7 +195,7 @@ def _start(start: Start) -> str:
 
 
 def _stop(stop: StopRule) -> str:
-    most = f"at most {count(stop.max_flights, 'flight')}"
+    most = f"at most {count(stop.max_flights, 'flight')}, invalid ones not counted"
     match stop.kind:
         case "paper":
             rule = f"two consecutive flights less than {short_percent(stop.improvement)} better than the best; {most}"

@@ -105,7 +105,7 @@ def test_one_sentence_says_how_the_error_with_the_same_gains_has_changed(
     assert (drift["first_trial"], drift["last_trial"], drift["resolved"]) == (1, 4, True)
     assert drift["difference"] == pytest.approx(climb_error(1.0) - climb_error(1.9), rel=1e-2)
     assert drift["sentence"].startswith(
-        "The vehicle has drifted: from flight 1 to 4 the error with the same gains changed by −0."
+        "The vehicle has drifted: from flight 1 to 4 the trend of the error with the same gains is −0."
     )
     assert " m (" in drift["sentence"]
     assert [note for note in found["notes"] if "flight number" in note or "drift" in note] == [drift["sentence"]]

@@ -187,7 +187,7 @@ def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
     if now.looks and comparison.verdict != "unresolved":
         return Confirmation(phase="decided", why=sentence)
     if now.winner.size <= now.baseline.size:
-        why = f"The best gains are flown again{_only_once(now)}."
+        why = f"The best gains are flown again{_only_once(now) or ', to show whether they are better than the first'}."
         return Confirmation(phase="repeat", why=f"{why}{_missing(comparison)}")
     why = (
         f"The first flight's gains are flown again: they were flown {times(now.baseline.size)}, the best gains "

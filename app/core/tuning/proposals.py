@@ -144,6 +144,7 @@ def _confirmed(
     spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
 
     def again(group: Group, kind: Kind, why: Explanation) -> Proposal:
+        why = replace(why, fitted=proposal.explanation.fitted)
         return replace(repeat_proposal(experiment, flights, group, now.scatter, kind, why), spread=spread)
 
     if wanted.phase == "decided":

@@ -2,7 +2,7 @@ import { Button, Chip, Stack, Text, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { useClassify, useJudgeAbort } from "../../api/mutations";
 import { problemOf, reasonsByField } from "../../api/problems";
-import type { Trial } from "../../api/types";
+import type { Campaign, Trial } from "../../api/types";
 import { ErrorNotice } from "../../ui/Notices";
 import classes from "./Verdict.module.css";
 import {
@@ -21,13 +21,15 @@ interface Props {
   trial: Trial;
   /** All trials of the campaign, for the consequences of a review. */
   trials: readonly Trial[];
+  campaign: Pick<Campaign, "state" | "outcome"> | undefined;
 }
 
 /** Review of a flight: the suggested class first, undo in one tap, and a reason to mark it invalid. */
-export function FlightReview({ trial, trials }: Props) {
+export function FlightReview({ trial, trials, campaign }: Props) {
   const [asking, setAsking] = useState(false);
   const [reason, setReason] = useState(trial.state === "lost" ? trial.reason : "");
   const classify = useClassify();
+  const isEndedByRule = campaign?.state === "finished" && campaign.outcome !== "stopped";
   const suggestion = suggestedClass(trial);
   const others = otherClasses(trial).sort((one, other) => rank(one, suggestion) - rank(other, suggestion));
   if (others.length === 0) return null;
@@ -54,7 +56,8 @@ export function FlightReview({ trial, trials }: Props) {
       >
         <p>
           The record of an invalid flight is kept, but not used for any computation.{" "}
-          <strong>{consequenceOf(trial, trials, "invalid")}</strong> Why is it invalid?
+          <strong>{consequenceOf(trial, trials, "invalid")}</strong>
+          {isEndedByRule && " The campaign reopens if its stop rule is then no longer met."} Why is it invalid?
         </p>
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
           <div className={classes["chips"]}>

@@ -165,7 +165,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Text>
       )}
       <Group gap="10px 14px" data-review>
-        <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
+        <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} campaign={campaign} />
         {campaign && <RetryGains campaign={campaign} trial={trial} />}
         {trial.record !== null && (
           <Button
@@ -222,7 +222,9 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
               flight {trial_number} ({against === "first" ? "first" : best})
               {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
               {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
-              <small>{standard_error === null ? "(no repeat flights yet)" : "(± standard error)"}</small>
+              <small>
+                {standard_error === null ? "(no repeat flights yet)" : "(means of the gain sets, ± standard error)"}
+              </small>
             </span>
           </li>
         );

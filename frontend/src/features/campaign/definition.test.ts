@@ -41,7 +41,9 @@ test("every setting that a proposal depends on is said in words", () => {
     Seed: "3",
     "Definition digest": "0123456789ab",
   });
-  expect(rows["Stop rule"]).toBe("Two consecutive flights less than 5\u00a0% better than the best, or 7 flights");
+  expect(rows["Stop rule"]).toBe(
+    "Two consecutive flights less than 5\u00a0% better than the best, or 7 flights, invalid ones not counted",
+  );
 });
 
 test("a warm start and a stop on noise are said in words", () => {
@@ -56,7 +58,7 @@ test("a warm start and a stop on noise are said in words", () => {
   };
   expect(Object.fromEntries(settingsOf({ ...campaign, definition }, catalogue))).toMatchObject({
     Start: "[900 200 200], flight 2 of campaign 4",
-    "Stop rule": "No resolvable improvement at 95\u00a0% confidence, or 12 flights",
+    "Stop rule": "No resolvable improvement at 95\u00a0% confidence, or 12 flights, invalid ones not counted",
     "Minimum battery voltage": "10.8 V after a flight",
   });
 });

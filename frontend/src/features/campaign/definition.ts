@@ -50,7 +50,7 @@ function named(things: readonly Described[] | undefined, name: string): string {
 }
 
 function stopText(stop: Definition["stop"]): string {
-  const most = count(stop?.max_flights ?? 0, "flight");
+  const most = `${count(stop?.max_flights ?? 0, "flight")}, invalid ones not counted`;
   switch (stop?.kind) {
     case "budget":
       return `After ${most}`;

@@ -15,18 +15,18 @@ const summary = (
     verdict,
   }) as unknown as CampaignSummary;
 
-test("progress is told against the first flight", () => {
-  expect(progress(summary(0.0933, 0.3267, 5, "better"))).toBe("71\u00a0% below the first flight");
+test("progress is told against the first gains", () => {
+  expect(progress(summary(0.0933, 0.3267, 5, "better"))).toBe("71\u00a0% below the first gains");
   expect(progress(summary(0.3267, 0.3267, 3))).toBe("no improvement yet");
 });
 
 test("a difference within the noise is no progress that could be claimed", () => {
-  expect(progress(summary(0.32, 0.3267, 5, "unresolved"))).toBe("unresolved vs. the first flight");
+  expect(progress(summary(0.32, 0.3267, 5, "unresolved"))).toBe("unresolved vs. the first gains");
 });
 
 test("before anybody knows how much flights scatter, a difference may be chance", () => {
   expect(progress(summary(0.0933, 0.3267, 2, "not known yet"))).toBe(
-    "71\u00a0% below the first flight, verdict not known yet",
+    "71\u00a0% below the first gains, verdict not known yet",
   );
 });
 

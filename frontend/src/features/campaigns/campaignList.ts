@@ -28,7 +28,7 @@ export function progress({ best, first_error, flights, verdict }: CampaignSummar
   const change = percentChange(best?.mean, first_error);
   if (best === null || change === null || flights < 2) return null;
   if (verdict === null) return "no improvement yet";
-  if (verdict === "unresolved") return "unresolved vs. the first flight";
-  if (verdict === "not known yet") return `${against(change, "the first flight")}, verdict not known yet`;
-  return against(change, "the first flight");
+  if (verdict === "unresolved") return "unresolved vs. the first gains";
+  if (verdict === "not known yet") return `${against(change, "the first gains")}, verdict not known yet`;
+  return against(change, "the first gains");
 }

@@ -21,10 +21,11 @@ export function LogAnalysisPage() {
   useTitle("Log analysis");
   const [over, setOver] = useState(false);
   const resetFile = useRef<() => void>(null);
-  const { mutate, data, error, variables, isPending } = useAnalyzeLog();
+  const [shown, setShown] = useState<LogAnalysis | null>(null);
+  const { mutate, error, variables, isPending } = useAnalyzeLog();
   const analyze = (files: readonly File[]) => {
     const chosen = recordOf(files);
-    if (chosen && !isPending) mutate(chosen);
+    if (chosen && !isPending) mutate(chosen, { onSuccess: setShown });
     resetFile.current?.();
   };
   return (
@@ -49,9 +50,9 @@ export function LogAnalysisPage() {
           <Skeleton height={280} mt={12} radius="md" aria-hidden />
         </Panel>
       )}
-      {data && <Result analysis={data} />}
+      {shown && <Result analysis={shown} />}
       <Panel
-        title={data ? "Analyse another log" : "Better altitude gains from one log"}
+        title={shown ? "Analyse another log" : "Better altitude gains from one log"}
         className={over ? classes["over"] : ""}
       >
         <Text maw="90ch" lh={1.45} mb={10}>

@@ -34,7 +34,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
         <dl className={`${classes["facts"]} numbers`}>
           {isLinked && <Fact title="Link" value={linkText(status)} />}
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
-          {held !== "" && <Fact title="Current gains" value={held} />}
+          {vehicle.registered && held !== "" && <Fact title="Current gains" value={held} />}
           <Fact title={`Safe ${names.join(", ")}`} value={gainsInBrackets(vehicle.safe_gains)} />
           {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "no operator"} />}
         </dl>

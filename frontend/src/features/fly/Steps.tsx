@@ -310,7 +310,7 @@ function FlightReviewCard({ campaign, trial }: FlightReviewCardProps) {
       {trial.state !== "captured" && <p className={classes["say"]}>{sentenceOf(trial)}</p>}
       <AbortCause trial={trial} />
       <Stack gap={8}>
-        <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} />
+        <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} campaign={campaign} />
       </Stack>
       <FlightNotes trial={trial} />
       <div className={classes["onward"]}>
