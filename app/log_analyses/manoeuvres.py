@@ -154,7 +154,11 @@ def _notes(analysis: Analysis) -> list[str]:
         "Errors are predicted for the same manoeuvre in the same weather, with all other parameters as flown.",
         f"Throttle activity is relative to the gains flown; a proposal has at most {LARGEST_ACTIVITY:g}.",
         _MARGIN,
-        *([f"At the limit of the search range: {', '.join(analysis.at_limit)}."] if analysis.at_limit else []),
+        *(
+            [f"At the limit of the search range, the documented one: {', '.join(analysis.at_limit)}."]
+            if analysis.at_limit
+            else []
+        ),
         *([_LOAD] if analysis.proposed else []),
     ]
 

@@ -195,7 +195,7 @@ def rules(flight: LoggedFlight) -> dict[str, dict[str, float]]:
     return {
         "ArduCopter's default gains": _with_names((1.0, 5.0, 0.5, 1.0)),
         f"P = {'0.1 ' if flight.has_newer_names else ''}hover throttle, I = 2 P": by_hover,
-        **{", ".join(f"{value:g}" for value in flight.named(gains).values()): gains for gains in fixed},
+        **{f"Fixed set {', '.join(f'{value:g}' for value in flight.named(gains).values())}": gains for gains in fixed},
     }
 
 

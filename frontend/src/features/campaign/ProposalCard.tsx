@@ -83,7 +83,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             hasModel={hasModel}
           />
         )}
-        {chosen.predicted?.interval && isEvaluated && isRepeat(chosen.name) && (
+        {chosen.predicted?.interval && isEvaluated && isRepeat(chosen.name) && groups.length > 0 && (
           <PriorScatter campaignId={campaign.id} />
         )}
         <FlightWindow definition={campaign.definition} />
@@ -180,6 +180,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
         <Button variant="default" loading={create.isPending} disabled={!isReady} onClick={() => create.mutate(trial)}>
           Plan flight {number}
         </Button>
+        <Note>Upload the record of a flight with these gains, or plan the flight now and upload its record later.</Note>
         <ErrorNotice error={create.error} />
       </>
     );
