@@ -26,7 +26,7 @@ from app.logs.takeoffs import Takeoff
 _IDENTIFIED_SHARE: Final = 0.5
 """A log identifies a parameter whose standard error is less than this share of the prior's."""
 _SHOWN_S: Final = 8.0
-_SHOWN_M: Final = (-0.4, 0.4)
+_SHOWN_M: Final = (-0.25, 0.25)
 _POINTS: Final = 1500
 
 

@@ -18,6 +18,7 @@ import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
+import classes from "./NextFlight.module.css";
 import { speedOf } from "./nextStep";
 import { OverruleGate } from "./OverruleGate";
 import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
@@ -57,7 +58,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
-      <Stack gap={14}>
+      <Stack gap={12}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable
@@ -164,6 +165,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
     <Button
       fullWidth
       size="lg"
+      className={isMain ? (classes["main"] ?? "") : ""}
       variant={isMain && isAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
       loading={create.isPending}

@@ -223,7 +223,7 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
               {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
               {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
               <small>
-                {standard_error === null ? "(no repeat flights yet)" : "(means of the gain sets, ± standard error)"}
+                {standard_error === null ? "(no repeat flights yet)" : "(means, ± standard error)"}
               </small>
             </span>
           </li>
