@@ -17,7 +17,7 @@ from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, gain, gains, number, short_percent
+from app.core.formatting import count, gain, gains, number, short_percent, without_word
 from app.core.policy import Gain
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow, TrialRow
@@ -210,7 +210,7 @@ def _stop(stop: StopRule) -> str:
 _ENDINGS = {"aborted": "Aborted", "invalid": "Not counted", "lost": "Lost"}
 _CAUSES: Final[Mapping[AbortCause, str]] = {
     "limit": "(A limit was exceeded: it counts against the gains.)",
-    "operator": "(Aborted by the operator without a reason: it does not count against the gains.)",
+    "operator": "(No cause was given. It does not count against the gains.)",
     "behaved badly": "(Cause given by the operator: vehicle behaviour. It counts against the gains.)",
     "something else": "(Cause given by the operator: something else. It does not count against the gains.)",
 }
@@ -220,7 +220,7 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
     """Flights that do not count, glitches, overruled gates, deviating read-backs, and failed flight requests."""
     for trial in trials:
         if (kind := _ENDINGS.get(trial.state)) is not None:
-            yield Anomaly(trial.number, kind, f"{trial.reason or 'No reason was given.'}{_counting(trial)}")
+            yield Anomaly(trial.number, kind, f"{_reason(trial, kind)}{_counting(trial)}")
         if trial.overrule_reason:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
             yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} Refused by the gate: {refused}")
@@ -232,8 +232,9 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
         if trial.glitches and trial.repaired_error is not None:
             repaired = f"Without the glitches the error would be {number(trial.repaired_error)} {error_unit}."
             yield Anomaly(trial.number, "Glitch in the record", repaired)
-        if trial.flight is not None and trial.flight.problem:
-            yield Anomaly(trial.number, "Vehicle problem", trial.flight.problem)
+        if trial.flight is not None and trial.flight.problem and not (kind and trial.flight.problem == trial.reason):
+            kind = _ENDINGS.get(trial.flight.state, "Vehicle problem")
+            yield Anomaly(trial.number, kind, without_word(trial.flight.problem, kind))
 
 
 def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
@@ -245,6 +246,10 @@ def of_records(damaged: Iterable[int]) -> Iterator[Anomaly]:
             "The stored record does not match its checksum. The curve shown is the coarse copy made at landing, and "
             "the error is the one computed then. Restore the record from an earlier backup.",
         )
+
+
+def _reason(trial: Trial, kind: str) -> str:
+    return without_word(trial.reason, kind) or "No reason was given."
 
 
 def _counting(trial: Trial) -> str:

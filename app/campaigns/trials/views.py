@@ -20,7 +20,7 @@ from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTI
 from app.core.definition import Flight
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Scatter
-from app.core.formatting import named_flights, percent
+from app.core.formatting import named_flights, percent, without_word
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
@@ -225,16 +225,22 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
             outcome = f", {_once_more(again)}" if again else f": {compared}"
             return f"{row.error:.3f} {unit}{outcome}{_against_prediction(row, field, unit)}."
         case TrialState.ABORTED:
-            return f"Aborted: {row.reason}"
+            return _ended("Aborted", row.reason)
         case TrialState.INVALID:
             return f"Does not count: {row.reason}"
         case TrialState.LOST:
-            return f"Lost: {row.reason}"
+            return _ended("Lost", row.reason)
         case TrialState.CAPTURED:
             doubt = f"; the measurement is doubtful: {row.reason}" if row.reason else ""
             return f"Landed and recorded{_glitches(row)}{doubt}. Review the flight."
         case _:
             return ""
+
+
+def _ended(word: str, reason: str) -> str:
+    """`Aborted: too high`; `Aborted by the operator` for a reason that begins with the word."""
+    rest = without_word(reason, word)
+    return f"{word}: {rest}" if rest == reason else f"{word} {rest}".rstrip()
 
 
 def _once_more(again: Sequence[int]) -> str:

@@ -136,10 +136,32 @@ def test_an_abort_from_before_its_cause_was_recorded_counts_until_its_operator_s
     assert trust(client, campaign) == 1.0
 
 
+def test_an_abort_is_reported_once_without_repeating_the_word(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    assert aborted(client, database, campaign, on_request=True)["verdict"] == "Aborted by the operator"
+    said = aborted(client, database, campaign, on_request=False)["verdict"]
+    assert said == "Aborted: A safety limit was exceeded."
+    report = client.get(f"/api/campaigns/{campaign['id']}/report.html").text
+    assert '<td class="text">Aborted</td><td class="text">by the operator (No cause was given.' in report
+    assert "Vehicle problem" not in report
+
+
+def test_an_aborted_flight_that_is_marked_invalid_stays_an_abort_in_the_report(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    trial = aborted(client, database, campaign, on_request=True)
+    judged = {"version": trial["version"], "outcome": "invalid", "reason": "gust"}
+    assert client.post(f"/api/trials/{trial['id']}/classify", json=judged).status_code == 200
+    report = client.get(f"/api/campaigns/{campaign['id']}/report.html").text
+    assert '<td class="text">Not counted</td><td class="text">gust</td>' in report
+    assert '<td class="text">Aborted</td><td class="text">by the operator</td>' in report
+
+
 def test_the_report_says_which_aborts_count(client: TestClient, database: Database, campaign: Json) -> None:
     trial = aborted(client, database, campaign, on_request=True)
     path = f"/api/campaigns/{campaign['id']}/report.html"
-    assert "Aborted by the operator without a reason: it does not count against the gains" in client.get(path).text
+    assert "by the operator (No cause was given. It does not count against the gains.)" in client.get(path).text
     assert judge(client, trial, "behaved badly") == 200
     assert "Cause given by the operator: vehicle behaviour. It counts against the gains." in client.get(path).text
 
