@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 from markupsafe import Markup
 
 from app.campaigns.schemas import Campaign
+from app.campaigns.trials.schemas import Trial
 from app.common.conflict_checks import state_label
 from app.common.schemas import Interval
 from app.core import formatting
@@ -146,6 +147,7 @@ def _environment() -> "Environment":
         "trial_state": state_label,
         "plus_minus": formatting.measured,
         "number": formatting.number,
+        "settling_time": _settling_time,
         "interval": _interval,
         "gain": formatting.gain,
         "gains": formatting.gains,
@@ -163,6 +165,13 @@ def _environment() -> "Environment":
 
 def _interval(span: Interval | None) -> str:
     return formatting.NOTHING if span is None else f"{formatting.number(span.lower)} … {formatting.number(span.upper)}"
+
+
+def _settling_time(trial: Trial) -> str:
+    """`1.34`; of a complete flight without one, that it did not settle."""
+    if trial.settling_time_s is None and trial.steady_state_error_m is not None:
+        return "not settled"
+    return formatting.number(trial.settling_time_s, 2)
 
 
 def _instant(at: datetime | None) -> str:

@@ -19,7 +19,7 @@ from fastapi.testclient import TestClient
 from app.core.formatting import measured
 from app.db.session import Database
 from app.reports import pdf, router, sections
-from tests.builders import Json, create_ready_campaign, get
+from tests.builders import Json, create_ready_campaign, create_record, create_trial, get, land, lift_off, run_jobs
 from tests.campaigns.test_landscapes import card_of, run_landscapes
 from tests.campaigns.trials.test_photos import JPEG, add, png
 from tests.reports.conftest import NAME, REASON
@@ -180,6 +180,14 @@ def drawn(client: TestClient, campaign: Json) -> Json:
     assert found is not None
     figures: Json = json.loads(found[1])
     return figures
+
+
+def test_a_flight_that_does_not_settle_is_said_not_to(client: TestClient, database: Database, campaign: Json) -> None:
+    assert "not settled" not in read(client, campaign).cells
+    create_trial(client, campaign["id"], gains={"kp": 283, "ki": 13, "kd": 106}, fly={"speed": None})
+    land(database, lift_off(database), create_record(30.0))
+    run_jobs(database)
+    assert read(client, campaign).cells.count("not settled") == 1
 
 
 def test_a_campaign_that_has_not_flown_has_a_report_too(client: TestClient, database: Database) -> None:
