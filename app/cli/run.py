@@ -35,6 +35,7 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, named_flights, number
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS
+from app.core.tuning.predictions import is_informative
 from app.db.migrate import migrate
 from app.db.models import ProposalRow, TrialRow
 from app.db.session import Database
@@ -314,7 +315,7 @@ def _print(out: Console, file: CampaignFile, experiment: Experiment, display: _D
         (
             f"flight {trial.number}",
             number(trial.error, 4),
-            number(trial.predicted_error, 4),
+            number(trial.predicted_error if _predicts(trial, display.trials) else None, 4),
             *(f"{trial.gains[name]:g}" for name in names),
             kind,
             "best"
@@ -363,9 +364,9 @@ def _document(
                 "gains": trial.gains,
                 "outcome": trial.state.value,
                 "error": trial.error,
-                "predicted_error": trial.predicted_error,
+                "predicted_error": trial.predicted_error if _predicts(trial, display.trials) else None,
                 "reason": trial.reason,
-                "predicted_interval": trial.predicted_interval,
+                "predicted_interval": trial.predicted_interval if _predicts(trial, display.trials) else None,
                 "overrule_reason": trial.overrule_reason,
             }
             for trial, kind in zip(display.trials, display.kinds, strict=True)
@@ -373,6 +374,12 @@ def _document(
         "best": None if best is None else best.number,
         "stopped_because": stopped_because,
     }
+
+
+def _predicts(trial: TrialRow, trials: Sequence[TrialRow]) -> bool:
+    """Whether the trial's prediction says anything, as in the API."""
+    lower = None if trial.predicted_interval is None else trial.predicted_interval["lower"]
+    return is_informative(lower, corrected=history.is_corrected(trials, trial.number))
 
 
 def _describe_outcome(trial: TrialRow) -> str:

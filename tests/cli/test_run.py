@@ -4,6 +4,7 @@ Expected errors are bounds: of the project's reference measurement and of the pa
 """
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -100,9 +101,15 @@ def test_gains_by_hand_are_flown_in_their_order_until_all_are_flown(tmp_path: Pa
 def test_the_table_has_a_row_for_each_run(tmp_path: Path) -> None:
     result = gainline(*RUN_ON_TWIN, "--max-flights", "2")
     assert result.exit_code == 0
-    assert [line.split()[:5] for line in result.stdout.splitlines() if line.startswith(" flight 1")] == [
-        ["flight", "1", "0.5235", "0.3264", "283"]
-    ]
+    first, second = (line.split()[:5] for line in result.stdout.splitlines() if re.match(r" flight \d", line))
+    assert first == ["flight", "1", "0.5235", "–", "283"], "an interval down to zero predicts nothing"
+    assert float(second[3]) > 0.0
+
+
+def test_the_first_flight_has_no_prediction_that_says_nothing(tmp_path: Path) -> None:
+    first, second = flown(tmp_path, *RUN_ON_TWIN, "--max-flights", "2")["trials"]
+    assert (first["predicted_error"], first["predicted_interval"]) == (None, None)
+    assert second["predicted_interval"]["lower"] < second["predicted_error"]
 
 
 def test_json_can_go_to_standard_output_alone() -> None:
