@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from rich.console import Console
 from rich.markup import escape
@@ -15,8 +15,8 @@ from rich.table import Table
 
 from app.cli.console import console, show_error, table, write_json
 from app.common.errors import InputError
-from app.controller_checks.check import AUTOPILOTS, examine_file
-from app.controller_checks.paparazzi import LogCheck, check_log, parse_gains
+from app.controller_checks.check import AUTOPILOTS, autopilot_of, examine_file
+from app.controller_checks.paparazzi import PAPARAZZI, LogCheck, check_log, parse_gains
 from app.controller_checks.results import Result as CheckResult
 from app.core.control.loop_log import TIME_TOLERANCE_S, TOLERANCES, CommandCheck
 from app.core.formatting import format_gains
@@ -172,11 +172,21 @@ def _check(file: Path, given: Mapping[str, float] | None) -> LogCheck:
             beside = file.with_suffix(".log")
             companion = opened.enter_context(beside.open("rb")) if beside != file and beside.is_file() else None
             data = opened.enter_context(file.open("rb"))
+            _refuse_other_autopilots(file, data)
             return check_log(data, name=file.name, companion=companion, given=given)
     except OSError as error:
         raise InputError(
             f"{file} could not be read: {error.strerror or error}.", hint="Use a readable Paparazzi .data file."
         ) from error
+
+
+def _refuse_other_autopilots(file: Path, data: BinaryIO) -> None:
+    other = autopilot_of(data)
+    if other is not None and other is not PAPARAZZI:
+        raise InputError(
+            f"{file} is a recording of {other.title}; this command reads those of Paparazzi.",
+            hint=f"Compare it with the replica of {other.title}: gainline controller replay {file}",
+        )
 
 
 def _print(out: Console, file: Path, checked: LogCheck) -> None:

@@ -29,21 +29,24 @@ def examine(
     stream: BinaryIO, *, name: str, companion: BinaryIO | None = None, given: Mapping[str, float] | None = None
 ) -> Result:
     """Check a log or a trace, whichever the content is. Raises InputError that names what cannot be read."""
-    stream.seek(0)
-    head = stream.read(_HEAD_BYTES)
-    stream.seek(0)
-    beginning = Beginning(head, _unzipped(head))
-    for autopilot in AUTOPILOTS.values():
-        if autopilot.recognises(beginning):
-            return autopilot.examine(
-                Recording(stream=stream, beginning=beginning, name=name, companion=companion, given=given)
-            )
-    reason = "is empty" if not head else "is neither a log nor a trace of a loop that Gainline has a replica of"
+    beginning = _beginning_of(stream)
+    if (autopilot := _recognised(beginning)) is not None:
+        return autopilot.examine(
+            Recording(stream=stream, beginning=beginning, name=name, companion=companion, given=given)
+        )
+    reason = (
+        "is empty" if not beginning.raw else "is neither a log nor a trace of a loop that Gainline has a replica of"
+    )
     raise InputError(
         f"{name} is not a recording of the vertical loop.",
         hint=f"Use {'; '.join(each.recordings for each in AUTOPILOTS.values())}.",
         problems=(Problem("file", reason),),
     )
+
+
+def autopilot_of(stream: BinaryIO) -> Autopilot | None:
+    """The autopilot whose recording this is; None if it is of none."""
+    return _recognised(_beginning_of(stream))
 
 
 def examine_content(content: bytes, *, name: str, companion: bytes | None, given: Mapping[str, float] | None) -> Result:
@@ -61,6 +64,17 @@ def examine_file(path: Path) -> Result:
         raise InputError(
             f"{path} could not be read: {error.strerror or error}.", hint="Give a readable recording of the loop."
         ) from error
+
+
+def _beginning_of(stream: BinaryIO) -> Beginning:
+    stream.seek(0)
+    head = stream.read(_HEAD_BYTES)
+    stream.seek(0)
+    return Beginning(head, _unzipped(head))
+
+
+def _recognised(beginning: Beginning) -> Autopilot | None:
+    return next((each for each in AUTOPILOTS.values() if each.recognises(beginning)), None)
 
 
 def _unzipped(head: bytes) -> bytes:

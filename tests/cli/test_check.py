@@ -1,5 +1,6 @@
 """`gainline controller check`: Paparazzi's own loop logs against the replica."""
 
+import gzip
 import json
 from pathlib import Path
 
@@ -49,6 +50,17 @@ def test_a_calm_flight_without_gains_asks_for_them(tmp_path: Path) -> None:
     assert result.exit_code == 1
     assert "--gains KP,KI,KD" in result.stderr
     assert check(calm, "--gains", "283,13,82").exit_code == 0
+
+
+def test_logs_of_other_autopilots_are_sent_to_the_command_that_reads_them(tmp_path: Path) -> None:
+    recordings = Path("tests/data")
+    log = tmp_path / "steps.bin"
+    log.write_bytes(gzip.decompress((recordings / "logs" / "arducopter_steps.bin.gz").read_bytes()))
+    trace = recordings / "px4_loop" / "default_steps_push.csv.gz"
+    result = check(log, trace)
+    assert result.exit_code == 1
+    assert f"gainline controller replay {log}" in result.stderr
+    assert f"gainline controller replay {trace}" in result.stderr
 
 
 def test_what_cannot_be_checked_is_said_in_words(tmp_path: Path) -> None:
