@@ -1,10 +1,10 @@
 """`gainline import`, `report`, `bundle`, `unbundle`: flight logs in, reports out, and whole campaigns in and out."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import typer
 from rich.console import Console
@@ -163,13 +163,30 @@ def unbundle(file: Path, settings: Settings) -> None:
 Format = Literal["html", "pdf"]
 
 
-def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format | None) -> None:
-    """Write the report; a server may run meanwhile. Without `kind` the format follows from the file's extension, else
-    HTML.
+_FORMATS: Final[Mapping[str, Format]] = {".html": "html", ".htm": "html", ".pdf": "pdf"}
 
-    Raises InputError when the file cannot be written, UnavailableError when no program to print a PDF is installed.
+
+def _format_of(out: Path | None) -> Format:
+    """The format that the file's extension names; HTML without a file."""
+    if out is None:
+        return "html"
+    if (found := _FORMATS.get(out.suffix.lower())) is None:
+        raise InputError(
+            f"The report was not written: the format of {out.name} is unknown.",
+            problems=(Problem("--out", "must end in .html, .htm or .pdf"),),
+            hint="Change the extension, or choose the format with --format html or --format pdf.",
+        )
+    return found
+
+
+def report(campaign: str, settings: Settings, *, out: Path | None, kind: Format | None) -> None:
+    """Write the report; a server may run meanwhile. Without `kind` the format follows from the file's extension;
+    without a file too it is HTML.
+
+    Raises InputError when the format is unknown or the file cannot be written, UnavailableError when no program to
+    print a PDF is installed.
     """
-    chosen: Format = kind or ("pdf" if out is not None and out.suffix.lower() == ".pdf" else "html")
+    chosen = kind or _format_of(out)
     with _open_database(settings) as database, database.read() as session:
         found = report_of(session, campaigns.find_by_id_or_name(session, campaign))
     html = render(found, chart_library(settings.ui_dir)).html

@@ -42,6 +42,18 @@ def test_a_pdf_is_asked_for_by_the_files_name_and_refused_in_words_where_nothing
     assert not (tmp_path / "garage.pdf").exists()
 
 
+def test_a_report_in_a_file_of_an_unknown_format_is_refused_unless_the_format_is_given(
+    settings: Settings, campaign: Json, tmp_path: Path
+) -> None:
+    out = tmp_path / "garage.txt"
+    refused = run(settings, "report", "Garage", "--out", out)
+    assert (refused.exit_code, out.exists()) == (1, False)
+    assert "--out: must end in .html, .htm or .pdf" in refused.stderr
+    assert "--format html" in refused.stderr
+    assert run(settings, "report", "Garage", "--out", out, "--format", "html").exit_code == 0
+    assert campaign["definition_digest"] in out.read_text(encoding="utf-8")
+
+
 def test_a_campaign_goes_out_and_comes_in(
     client: TestClient, settings: Settings, campaign: Json, tmp_path: Path
 ) -> None:
