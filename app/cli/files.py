@@ -63,11 +63,11 @@ def _open_database(settings: Settings) -> Iterator[Database]:
 
 
 def unreadable_error(file: Path, error: OSError, needed: str) -> InputError:
-    """Error for an input file that cannot be opened or read; `needed` names the kind of file."""
+    """Error for an input file that cannot be opened or read; `needed` names the kind of file with its
+    article."""
     return InputError(
         f"{file} could not be read: {error.strerror or error}.",
-        problems=(Problem("FILE", "cannot be read"),),
-        hint=f"Use a {needed} that this user can read.",
+        hint=f"Give {needed} that this user can read.",
     )
 
 
@@ -86,7 +86,7 @@ def _read(file: Path, takeoff: int | None) -> Takeoff:
             )
             return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
     except OSError as error:
-        raise unreadable_error(file, error, "log") from error
+        raise unreadable_error(file, error, "a log") from error
 
 
 def _store(database: Database, campaign: str, trial: int | None, flown: Takeoff, *, yes: bool) -> Trial:
@@ -151,7 +151,7 @@ def unbundle(file: Path, settings: Settings) -> None:
             with database.write() as session:
                 made = store_bundle(session, opened, settings.data_dir)
     except OSError as error:
-        raise unreadable_error(file, error, "bundle") from error
+        raise unreadable_error(file, error, "a bundle") from error
     out = console()
     out.print(
         f"Campaign {made.id}, {escape(made.name)}: {count(made.trials.flown, 'flight')} on {escape(made.vehicle.name)}."

@@ -150,7 +150,8 @@ def test_the_log_file_beside_a_data_file_is_read_too(tmp_path: Path) -> None:
 def test_files_that_cannot_be_read_or_written_are_named(steps: Path, tmp_path: Path) -> None:
     missing = analyze(tmp_path / "missing.bin")
     assert missing.exit_code == 1
-    assert "could not be read" in missing.output
+    assert "missing.bin could not be read: No such file or directory." in missing.output
+    assert "FILE" not in missing.output
     nowhere = analyze(steps, "--params", tmp_path / "none" / "gains.param")
     assert nowhere.exit_code == 1
     assert "could not be written" in nowhere.output
