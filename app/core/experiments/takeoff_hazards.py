@@ -156,12 +156,12 @@ def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: flo
     highest_m = float(runs.reports[worst, HIGHEST_M])
     case = _case(parameters, runs.models[worst], float(runs.reports[worst, HIGHEST_STEP]), "highest")
     passed = baseline or highest_m <= ceiling_m
-    sentence = f"The highest of {len(runs.models)} simulated takeoffs rises to {highest_m:.2f} m, " + (
-        f"with {case}; at most {ceiling_m:g} m is allowed."
+    sentence = f"The highest of {len(runs.models)} simulated takeoffs rises to {highest_m:.2f} m" + (
+        f", with {case}; at most {ceiling_m:.2f} m is allowed."
         if not passed
-        else f"{ceiling_m:g} m is allowed."
+        else f"; {ceiling_m:.2f} m is allowed."
         if highest_m <= ceiling_m
-        else f"beyond {ceiling_m:g} m; every flight is compared with these gains, so they are allowed."
+        else f", beyond {ceiling_m:.2f} m; every flight is compared with these gains, so they are allowed."
     )
     return Check("altitude", passed, sentence, worst=highest_m, limit=ceiling_m, case=case)
 
