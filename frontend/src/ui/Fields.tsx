@@ -2,7 +2,7 @@ import { InputBase, type InputBaseProps, Switch, TextInput, type TextInputProps 
 import { IconChevronDown } from "@tabler/icons-react";
 import { useState } from "react";
 import type { OptionInfo } from "../api/types";
-import { readNumber, typed, unitAfter } from "./format";
+import { readNumber, stopped, typed, unitAfter } from "./format";
 
 /** A number, or text that is not a number yet. */
 export type NumberEntry = number | string;
@@ -40,7 +40,7 @@ export function NumberField({
       autoComplete="off"
       placeholder={empty === undefined ? undefined : typed(empty)}
       value={shown}
-      error={wrong ?? error}
+      error={wrong ?? (typeof error === "string" ? stopped(error) : error)}
       rightSection={suffix?.trim()}
       onChange={(event) => {
         setText(event.currentTarget.value);

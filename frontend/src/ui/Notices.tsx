@@ -1,5 +1,6 @@
 import { IconAlertTriangle, IconEye, IconLockOpen } from "@tabler/icons-react";
 import { formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
+import { stopped } from "./format";
 import classes from "./Notices.module.css";
 
 interface Props {
@@ -46,7 +47,7 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
           <ul>
             {others.map(({ field, reason }) => (
               <li key={`${field} ${reason}`}>
-                {LABELS[field] ?? <code>{field}</code>} {reason}
+                {LABELS[field] ?? <code>{field}</code>} {stopped(reason)}
               </li>
             ))}
           </ul>

@@ -11,6 +11,7 @@ import {
   NOTHING,
   percentChange,
   readNumber,
+  stopped,
   typed,
   typedGain,
   unitAfter,
@@ -133,4 +134,9 @@ test("an error of more than twice another is a multiple of it", () => {
     "80\u00a0% above the best",
     "59\u00a0% below the best",
   ]);
+});
+
+test("a reason ends with one full stop", () => {
+  const reasons = ["is a log of another autopilot", "is too long.", "Which one?"];
+  expect(reasons.map(stopped)).toEqual(["is a log of another autopilot.", "is too long.", "Which one?"]);
 });

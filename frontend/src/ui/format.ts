@@ -38,6 +38,11 @@ export function gainText(value: number): string {
   return text.replace(/^-/, "−");
 }
 
+/** A text as a sentence: with a full stop, unless it ends with a punctuation mark. */
+export function stopped(text: string): string {
+  return /^$|[.!?…:]["”)]?$/.test(text) ? text : `${text}.`;
+}
+
 /** Local date and time; with the year if it is not the current one. */
 export function localTime(iso: string | null | undefined, now: Date = new Date()): string {
   if (!iso) return NOTHING;
