@@ -109,9 +109,9 @@ export function bytesText(bytes: number): string {
 
 export type Reading = { value: number; reason?: undefined } | { value?: undefined; reason: string };
 
-const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)$/;
+const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 
-/** Parse `text`, or return the reason why it is not a number, or not a whole one. No exponents, commas or spaces. */
+/** Parse `text`, or return the reason why it is not a number, or not a whole one. No commas or spaces. */
 export function readNumber(text: string, isWhole = false): Reading {
   const trimmed = text.trim().replace(/^−/, "-");
   if (trimmed === "") return { reason: "Enter a number." };
@@ -128,10 +128,12 @@ export function readNumber(text: string, isWhole = false): Reading {
   return { value: value === 0 ? 0 : value };
 }
 
-/** A number as input text, without an exponent. */
+/** A number as input text, without an exponent where twenty decimals hold it exactly. */
 export function typed(value: number): string {
   const text = String(value);
-  return text.includes("e") ? value.toFixed(20).replace(/\.?0+$/, "") : text;
+  if (!text.includes("e")) return text;
+  const decimal = value.toFixed(20).replace(/\.?0+$/, "");
+  return Number(decimal) === value ? decimal : text;
 }
 
 /** A computed gain as input text, to six significant digits. */
