@@ -105,14 +105,16 @@ TWIN: Final = VehicleKind(
         VehicleOption("hover_throttle", "Hover throttle", "of full throttle", 0.61, 0.3, 0.95),
         VehicleOption("motor_lag_s", "Motor lag", "s", 0.05, 0.0, 0.3),
         VehicleOption("start_latency_s", "Start latency", "s", 0.3, 0.0, 2.0),
-        VehicleOption("drag_1_s", "Drag", "1/s", 0.0, 0.0, 1.0),
+        VehicleOption("drag_1_s", "Drag", "per s", 0.0, 0.0, 1.0),
         VehicleOption("quadratic_share", "Share of the thrust that grows with the command's square", "", 0.0, 0.0, 1.0),
-        VehicleOption("ground_effect", "Ground effect: extra thrust on the ground", "of thrust", 0.0, 0.0, 0.5),
+        VehicleOption(
+            "ground_effect", "Ground effect: extra thrust on the ground, as a share of the thrust", "", 0.0, 0.0, 0.5
+        ),
         VehicleOption("ground_effect_height_m", "Height over which the ground effect fades", "m", 0.4, 0.1, 2.0),
         VehicleOption(
             "measurement_delay_s", "Delay of the altitude and climb rate that the loop uses", "s", 0.0, 0.0, 0.1
         ),
-        VehicleOption("battery_sag", "Share of the thrust lost evenly over 33 s", "of thrust", 0.0, 0.0, 0.1),
+        VehicleOption("battery_sag", "Share of the thrust lost evenly over 33 s", "", 0.0, 0.0, 0.1),
     ),
     open=opener("twin", TwinFlight),
     find_conflicts=_cannot_lift,
