@@ -97,10 +97,10 @@ test("a failed connection states its reason until a newer request", () => {
   expect(connectFailure([act("connect"), failed])).toBe("");
 });
 
-test("a registered vehicle without a link is not connected; what is flown elsewhere never is", () => {
+test("a registered vehicle without a link is not connected; what is flown elsewhere has no link", () => {
   const words = (seen: Partial<Vehicle>): string => vehicleStateLabel(seen as Vehicle).word;
   expect(words({ state: "disconnected", registered: true })).toBe("Not connected");
-  expect(words({ state: "disconnected", registered: false })).toBe("Flown elsewhere");
+  expect(words({ state: "disconnected", registered: false })).toBe("No link");
   expect(words({ state: "ready", registered: false })).toBe("Ready");
   expect(words({ state: "quarantined", registered: true })).toBe("Quarantined");
 });

@@ -23,7 +23,7 @@ const STATES: Record<VehicleState, StateLabel> = {
 
 /** A shared vehicle has no permanent connection. */
 export function vehicleStateLabel({ state, registered }: Vehicle): StateLabel {
-  return !registered && state === "disconnected" ? { word: "Flown elsewhere", tone: "quiet" } : STATES[state];
+  return !registered && state === "disconnected" ? { word: "No link", tone: "quiet" } : STATES[state];
 }
 
 export const ACTS: Record<ActKind, string> = {
