@@ -33,14 +33,17 @@ const REHEARSAL: Partial<Record<RehearsalState, StateLabel>> = {
   failed: { word: "Rehearsal failed", tone: "bad" },
 };
 
+/** `canFly`: whether Gainline can fly the vehicle, rather than import its records. */
 export function campaignStateLabel(
   state: CampaignState,
   outcome: string | null,
   rehearsal: RehearsalState = "not needed",
+  canFly = true,
 ): StateLabel {
   if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
   const mayFly = state === "ready" || state === "deciding";
-  return (mayFly && REHEARSAL[rehearsal]) || CAMPAIGN[state];
+  if (mayFly && REHEARSAL[rehearsal]) return REHEARSAL[rehearsal];
+  return state === "ready" && !canFly ? { word: "Ready", tone: "quiet" } : CAMPAIGN[state];
 }
 
 const TRIAL: Record<TrialState, StateLabel> = {

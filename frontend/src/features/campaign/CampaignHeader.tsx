@@ -38,7 +38,14 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         </Anchor>
       </Group>
       <div className={classes["facts"]}>
-        <StateBadge words={campaignStateLabel(campaign.state, campaign.outcome, campaign.rehearsal.state)} />
+        <StateBadge
+          words={campaignStateLabel(
+            campaign.state,
+            campaign.outcome,
+            campaign.rehearsal.state,
+            campaign.vehicle.can_fly,
+          )}
+        />
         <span>{count(campaign.trials.flown, "flight")}</span>
         <details className={classes["settings"]}>
           <summary>Settings</summary>

@@ -23,7 +23,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
     <li className={classes["card"]}>
       <div className={classes["top"]}>
         <VehicleBadge isReal={vehicle.is_real} />
-        <StateBadge words={campaignStateLabel(state, outcome, rehearsal)} />
+        <StateBadge words={campaignStateLabel(state, outcome, rehearsal, vehicle.can_fly)} />
       </div>
       <h2 className={classes["name"]}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
