@@ -118,8 +118,8 @@ def grouped(amount: int, separator: str = " ") -> str:
 
 
 def format_gains(gains: Mapping[str, float]) -> str:
-    """`kp 283, ki 13, kd 82`."""
-    return ", ".join(f"{name} {value:g}" for name, value in gains.items())
+    """`kp 283, ki 13, kd −82`, for sentences."""
+    return ", ".join(f"{name} {_true_minus(f'{value:g}')}" for name, value in gains.items())
 
 
 def number(value: float | None, digits: int = 3) -> str:

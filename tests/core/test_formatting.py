@@ -4,6 +4,7 @@ from app.core.formatting import (
     allowed_range,
     count,
     decimals,
+    format_gains,
     gain,
     gains,
     grouped,
@@ -16,6 +17,7 @@ from app.core.formatting import (
     short,
     short_percent,
     signed,
+    without_word,
 )
 
 
@@ -92,3 +94,9 @@ def test_a_table_has_true_minus_signs_and_dashes() -> None:
 def test_a_whole_gain_is_in_full_and_any_other_has_four_digits() -> None:
     assert [gain(12345.0), gain(-0.123456)] == ["12345", "−0.1235"]
     assert gains({"kp": 283.0, "ki": 1.5}) == "kp 283, ki 1.5"
+    assert format_gains({"kp": -50.0, "ki": 1.5}) == "kp −50, ki 1.5"
+
+
+def test_a_reason_does_not_repeat_the_word_of_the_state_before_it() -> None:
+    reasons = ("aborted by the operator", "Aborted", "too high", "abortedly")
+    assert [without_word(reason, "Aborted") for reason in reasons] == ["by the operator", "", "too high", "abortedly"]
