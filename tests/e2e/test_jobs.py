@@ -69,7 +69,7 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     assert (job["attempts"], job["problem"]["title"]) == (3, "The worker stopped 3 times during this job.")
     expect(first).to_contain_text(job["problem"]["title"])
     expect(first).to_contain_text(job["problem"]["hint"])
-    first.get_by_text(f"Log of job {job_id}").click()
+    first.get_by_role("button", name=f"Log of job {job_id}").click()
     lines = first.get_by_role("listitem")
     expect(lines.first).to_contain_text("job started")
     expect(lines.filter(has_text="the computing process died")).to_have_count(3)
@@ -97,6 +97,6 @@ def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, empty_
     expect(page.get_by_text("No failed jobs.")).to_be_visible()
     filters.get_by_text("Finished", exact=True).click()
     [job] = dashboard.get("/jobs")["items"]
-    log = page.get_by_text(f"Log of job {job['id']}")
+    log = page.get_by_role("button", name=f"Log of job {job['id']}")
     log.click()
     expect(page.get_by_text("reproduction stored")).to_be_visible()

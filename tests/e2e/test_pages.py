@@ -187,7 +187,7 @@ def overflow(dashboard: Dashboard, page: str) -> list[str]:
 
 
 def open_everything(dashboard: Dashboard) -> None:
-    for button in dashboard.page.locator("button[aria-expanded=false]:not([aria-haspopup]):visible").all():
+    for button in dashboard.page.locator("button[aria-expanded=false]:not([aria-haspopup]):visible").element_handles():
         button.evaluate("one => { one.dataset.openedByTest = '' }")
         button.click()
     dashboard.page.evaluate(

@@ -31,11 +31,10 @@ export function useJobs(state: readonly JobState[], limit = JOBS_PAGE) {
 }
 
 /** The worker's log of a job; refetched with the jobs. */
-export function useJobLog(jobId: number, enabled: boolean) {
+export function useJobLog(jobId: number) {
   return useQuery({
     queryKey: ["jobs", "log", jobId],
     queryFn: () => answer(getJobLog({ path: { job_id: jobId } })),
-    enabled,
   });
 }
 

@@ -41,18 +41,20 @@ export function JobTable({ label, jobs, titles }: JobTableProps) {
   );
 }
 
-/** Rows of a job: what it is, its campaign, state and times; below them its progress, failure and log. */
+/** Rows of a job: what it is, its campaign, state and times; below them its progress, failure and log, if any. */
 function JobRows({ job, titles }: { job: Job; titles: ReadonlyMap<string, string> }) {
   const cancel = useCancelJob();
   const retry = useRetryJob();
+  const [isLogOpen, setLogOpen] = useState(false);
   const title = jobTitle(job, titles);
   const link = jobLink(job);
+  const refusal = cancel.error ?? retry.error;
+  const hasMore = isLogOpen || isUnderWay(job) || job.problem !== null || refusal !== null;
   return (
     <tbody data-state={job.state}>
       <tr>
         <th scope="row">
-          {link === null ? title : <Linked to={link}>{title}</Linked>}
-          <small className="numbers">Job {job.id}</small>
+          {link === null ? title : <Linked to={link}>{title}</Linked>} <small className="numbers">Job {job.id}</small>
         </th>
         <td>
           {job.campaign_id !== null && (
@@ -70,6 +72,16 @@ function JobRows({ job, titles }: { job: Job; titles: ReadonlyMap<string, string
           {job.finished_at !== null && job.started_at !== null && between(job.started_at, job.finished_at)}
         </td>
         <td className={classes["actions"]}>
+          {job.started_at !== null && (
+            <Button
+              variant="subtle"
+              aria-label={`Log of job ${job.id}`}
+              aria-expanded={isLogOpen}
+              onClick={() => setLogOpen(!isLogOpen)}
+            >
+              Log
+            </Button>
+          )}
           {job.actions.includes("cancel") && (
             <Button
               variant="default"
@@ -92,20 +104,22 @@ function JobRows({ job, titles }: { job: Job; titles: ReadonlyMap<string, string
           )}
         </td>
       </tr>
-      <tr>
-        <td colSpan={COLUMNS.length}>
-          {isUnderWay(job) && <JobProgress job={job} title={`Progress of job ${job.id}: ${title}`} />}
-          {job.problem !== null && (
-            <Aside tone={job.state === "failed" ? "bad" : undefined} fz="body">
-              <strong>{job.problem.title}</strong>
-              {job.problem.detail && <p>{job.problem.detail}</p>}
-              {job.problem.hint && <Text c="dimmed">{job.problem.hint}</Text>}
-            </Aside>
-          )}
-          <ErrorNotice error={cancel.error ?? retry.error} />
-          <JobLog job={job} />
-        </td>
-      </tr>
+      {hasMore && (
+        <tr>
+          <td colSpan={COLUMNS.length}>
+            {isUnderWay(job) && <JobProgress job={job} title={`Progress of job ${job.id}: ${title}`} />}
+            {job.problem !== null && (
+              <Aside tone={job.state === "failed" ? "bad" : undefined} fz="body">
+                <strong>{job.problem.title}</strong>
+                {job.problem.detail && <p>{job.problem.detail}</p>}
+                {job.problem.hint && <Text c="dimmed">{job.problem.hint}</Text>}
+              </Aside>
+            )}
+            <ErrorNotice error={refusal} />
+            {isLogOpen && <JobLog job={job} />}
+          </td>
+        </tr>
+      )}
     </tbody>
   );
 }
@@ -136,17 +150,15 @@ export function JobProgress({ job, title }: { job: Job; title: string }) {
   );
 }
 
-/** The worker's log of a job, loaded when it is opened. */
+/** The worker's log of a job. */
 function JobLog({ job }: { job: Job }) {
-  const [open, setOpen] = useState(false);
-  const { data: log, error } = useJobLog(job.id, open);
+  const { data: log, error } = useJobLog(job.id);
   return (
-    <details onToggle={(event) => setOpen(event.currentTarget.open)}>
-      <summary>Log of job {job.id}</summary>
+    <>
       <ErrorNotice error={error} />
       {log?.lines.length === 0 && (
         <Note fz="small" mb={6}>
-          {job.started_at === null ? "Not started yet." : "The log was deleted."}
+          The log was deleted.
         </Note>
       )}
       {log !== undefined && log.total > log.lines.length && (
@@ -159,7 +171,7 @@ function JobLog({ job }: { job: Job }) {
           <Line key={`${line.at} ${line.message}`} line={line} />
         ))}
       </ol>
-    </details>
+    </>
   );
 }
 
