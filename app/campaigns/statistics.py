@@ -29,6 +29,9 @@ _SURE: Final = 0.9
 _NO_OPTIMISM: Final = 0.05
 """Smaller optimism, as a share of a standard error, is not mentioned."""
 
+_LEAST_OPTIMISM: Final = 1e-9
+"""Smaller optimism, in units of the error, is what the numerical integral leaves of zero."""
+
 
 def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistics:
     """Statistics of a campaign. Raises NotFoundError."""
@@ -40,9 +43,8 @@ def campaign_statistics(session: Session, campaign_id: int) -> CampaignStatistic
     scatter = pool_scatter((), experiment.scatter) if now is None else now.scatter
     expected = 0.0
     if now is not None and scatter.reported is not None:
-        expected = optimism(
-            [group.mean for group in now.groups], [group.standard_error(scatter) for group in now.groups]
-        )
+        bias = optimism([group.mean for group in now.groups], [group.standard_error(scatter) for group in now.groups])
+        expected = bias if bias >= _LEAST_OPTIMISM else 0.0
     record = predictions.track_record(flights)
     drift = None if now is None or scatter.identical else _drift(experiment, now)
     return CampaignStatistics(

@@ -68,6 +68,13 @@ def test_repeats_form_a_group_with_mean_and_standard_error(client: TestClient, d
     assert group == {"mean": best["mean"], "standard_error": pytest.approx(sigma, rel=1e-3), "n": 1}
 
 
+def test_a_best_far_below_all_others_is_not_optimistic_at_all(client: TestClient, database: Database) -> None:
+    campaign = create_ready_campaign(client, database, definition=LONG)
+    fly(client, database, campaign["id"], 2.4, gains=DEFAULT)
+    fly(client, database, campaign["id"], 1.0, gains=OTHER)
+    assert get(client, f"/api/campaigns/{campaign['id']}/statistics")["optimism"] == 0.0
+
+
 def test_a_campaign_without_a_flight_has_the_prior_scatter_only(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     found = get(client, f"/api/campaigns/{campaign['id']}/statistics")
