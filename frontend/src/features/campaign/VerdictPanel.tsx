@@ -222,9 +222,7 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
               flight {trial_number} ({against === "first" ? "first" : best})
               {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
               {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
-              <small>
-                {standard_error === null ? "(no repeat flights yet)" : "(means, ± standard error)"}
-              </small>
+              <small>{standard_error === null ? "(no repeat flights yet)" : "(means, ± standard error)"}</small>
             </span>
           </li>
         );
