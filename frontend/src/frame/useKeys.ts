@@ -2,7 +2,10 @@ import { useEffect } from "react";
 import { type Command, commandOf } from "./keys";
 
 function isTyping(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && target.matches("input, textarea, select, [contenteditable]");
+  return (
+    target instanceof HTMLElement &&
+    target.matches("input:not([type=checkbox], [type=radio]), textarea, select, [contenteditable]")
+  );
 }
 
 /** Carry out a command when its key is pressed, unless the user types. The key then has no other effect, but for an act
