@@ -43,16 +43,6 @@ export function intervalText(interval: Interval, unit: string): string {
   return `${rangeText(interval, unit)} (${percent(interval.confidence)})`;
 }
 
-/** A prediction in a line: the number, then its interval. */
-export function predictedText(
-  value: number | null | undefined,
-  interval: Interval | null | undefined,
-  unit: string,
-): string {
-  const text = withUnit(value, unit);
-  return isNumber(value) && interval ? `${text}, ${intervalText(interval, unit)}` : text;
-}
-
 /** `90 %`. */
 export function percent(share: number): string {
   return percentText(100 * share, share > 0.99 && share < 1 ? 1 : 0);

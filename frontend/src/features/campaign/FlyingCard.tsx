@@ -8,7 +8,7 @@ import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
-import { percent, predictedText } from "../../ui/uncertainty";
+import { intervalText, percent } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import classes from "./NextFlight.module.css";
@@ -47,7 +47,10 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           </div>
           <div className={classes["reading"]}>
             <dt>Predicted error</dt>
-            <dd>{predictedText(trial?.predicted_error, trial?.predicted_interval, unit)}</dd>
+            <dd>
+              {withUnit(trial?.predicted_error, unit)}{" "}
+              {trial?.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}
+            </dd>
           </div>
           <div className={classes["reading"]} data-stale={isStale || undefined}>
             <dt>Time</dt>

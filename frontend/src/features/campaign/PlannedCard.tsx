@@ -3,10 +3,10 @@ import { IconPlaneDeparture } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
-import { gainText } from "../../ui/format";
+import { gainText, withUnit } from "../../ui/format";
 import { ErrorNotice, FailureNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
-import { predictedText } from "../../ui/uncertainty";
+import { intervalText } from "../../ui/uncertainty";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import { FlightWindow } from "./FlightWindow";
@@ -45,7 +45,10 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           {trial.predicted_error !== null && (
             <div className={classes["reading"]} data-row>
               <dt>Predicted error</dt>
-              <dd>{predictedText(trial.predicted_error, trial.predicted_interval, unit)}</dd>
+              <dd>
+                {withUnit(trial.predicted_error, unit)}{" "}
+                {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}
+              </dd>
             </div>
           )}
         </dl>
