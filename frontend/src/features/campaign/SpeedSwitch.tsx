@@ -19,6 +19,7 @@ export function SpeedSwitch({ value, onChange }: { value: string; onChange: (val
       <SegmentedControl
         aria-labelledby="speed-label"
         size="md"
+        flex="none"
         value={value}
         onChange={onChange}
         data={SPEEDS.map(({ value: name, label }) => ({ value: name, label }))}
