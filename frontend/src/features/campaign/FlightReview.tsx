@@ -17,6 +17,8 @@ import {
 
 const WORDS = { valid: "Mark valid", aborted: "Mark aborted", invalid: "Mark invalid" } as const;
 
+const showWhole = (form: HTMLFormElement | null) => form?.scrollIntoView({ block: "nearest" });
+
 interface Props {
   trial: Trial;
   /** All trials of the campaign, for the consequences of a review. */
@@ -48,6 +50,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
     const refused = reasonsByField(problemOf(classify.error), ["reason"])["reason"];
     return (
       <form
+        ref={showWhole}
         className={classes["classify"]}
         onSubmit={(event) => {
           event.preventDefault();
@@ -75,7 +78,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
           error={refused}
           onChange={(event) => setReason(event.currentTarget.value)}
         />
-        <div className={classes["inSight"]}>
+        <div className={classes["answers"]}>
           <Button type="submit" color="red" disabled={reason.trim() === ""} loading={classify.isPending}>
             Mark invalid
           </Button>
