@@ -53,6 +53,14 @@ test("the altitude limit is shown within the axis, and nothing changes without o
   expect(withLimit(without)).toBe(without);
 });
 
+test("the only flight of a legend entry, once it is chosen, has its own entry alone", () => {
+  const legend: Trace = { meta: { role: "legend", standing: "earlier" } };
+  const other: Trace = { meta: { role: "flight", trial: 3, standing: "earlier" } };
+  expect(withChosen([...traces, legend], 1).at(-1)?.["visible"]).toBe(false);
+  expect(withChosen([...traces, legend], 2).at(-1)).toEqual(legend);
+  expect(withChosen([...traces, other, legend], 1).at(-1)).toEqual(legend);
+});
+
 test("a chosen flight stands out and the others step back", () => {
   const drawn = withChosen(traces, 1);
   expect(drawn[1]).toMatchObject({ line: { width: 3.5 } });

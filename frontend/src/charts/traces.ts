@@ -126,12 +126,17 @@ const FADED = 0.22;
 /** Roles of a flight's own curves. */
 const CURVES = new Set(["flight", "deviation"]);
 
-/** Highlight the selected flight and fade the others; set point, prediction and live curve are unchanged. */
+/** Highlight the selected flight and fade the others; a legend entry that only it has gives way to its own. Set point, prediction and live curve are unchanged. */
 export function withChosen(traces: readonly Trace[], trial: number | null): Trace[] {
   if (trial === null || !traces.some((trace) => trace.meta?.role === "flight" && trace.meta.trial === trial)) {
     return [...traces];
   }
+  const flights = traces.filter(({ meta }) => meta?.role === "flight");
+  const standing = flights.find(({ meta }) => meta?.trial === trial)?.meta?.standing;
+  const isAlone = flights.filter(({ meta }) => meta?.standing === standing).length === 1;
   return traces.map((trace) => {
+    const { role, standing: own } = trace.meta ?? {};
+    if (isAlone && role === "legend" && own === standing) return { ...trace, visible: false };
     if (!CURVES.has(trace.meta?.role ?? "")) return trace;
     return trace.meta?.trial === trial
       ? { ...trace, line: { ...trace.line, width: 3.5 }, ...(trace.meta?.role === "flight" && { showlegend: true }) }
