@@ -126,7 +126,10 @@ const FADED = 0.22;
 /** Roles of a flight's own curves. */
 const CURVES = new Set(["flight", "deviation"]);
 
-/** Highlight the selected flight and fade the others; a legend entry that only it has gives way to its own. Set point, prediction and live curve are unchanged. */
+/**
+ * Highlight the selected flight and fade the others; a legend entry that only it has gives way to its own. Set point,
+ * prediction and live curve are unchanged.
+ */
 export function withChosen(traces: readonly Trace[], trial: number | null): Trace[] {
   if (trial === null || !traces.some((trace) => trace.meta?.role === "flight" && trace.meta.trial === trial)) {
     return [...traces];

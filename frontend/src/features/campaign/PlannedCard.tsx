@@ -12,7 +12,7 @@ import { FlightMarkers } from "./FlightMarkers";
 import { FlightWindow } from "./FlightWindow";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
-import { speedOf } from "./nextStep";
+import { speedOf, watched } from "./nextStep";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 
 interface Props {
@@ -62,7 +62,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
                 leftSection={<IconPlaneDeparture size={22} aria-hidden />}
                 loading={fly.isPending}
                 disabled={!trial.actions.includes("fly")}
-                onClick={() => fly.mutate({ trialId: trial.id, speed: speedOf(speed) })}
+                onClick={() => watched(fly.mutateAsync({ trialId: trial.id, speed: speedOf(speed) }))}
               >
                 Fly flight {trial.number}
               </Button>

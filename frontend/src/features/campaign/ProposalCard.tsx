@@ -19,7 +19,7 @@ import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
-import { speedOf } from "./nextStep";
+import { speedOf, watched } from "./nextStep";
 import { OverruleGate } from "./OverruleGate";
 import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
@@ -189,7 +189,8 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   }
   return (
     <>
-      {!needs_staging && button(`Fly flight ${number}`, true, () => create.mutate({ ...trial, ...order }))}
+      {!needs_staging &&
+        button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
       {registered ? (
         button("Open fly screen", needs_staging, () => create.mutate(trial))
       ) : (
@@ -198,7 +199,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
       {isChecked && gate?.passed === false && !is_real && (
         <OverruleGate
           pending={create.isPending}
-          onFly={(overrule) => create.mutate({ ...trial, overrule, ...(needs_staging ? {} : order) })}
+          onFly={(overrule) => watched(create.mutateAsync({ ...trial, overrule, ...(needs_staging ? {} : order) }))}
         />
       )}
       <ErrorNotice error={create.error} />

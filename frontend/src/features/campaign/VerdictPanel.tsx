@@ -21,7 +21,7 @@ import { useHasModel } from "../../ui/units";
 import { FlightMarkers, PredictionResult } from "./FlightMarkers";
 import { FlightNotes, type NotePin } from "./FlightNotes";
 import { AbortCause, FlightReview } from "./FlightReview";
-import { speedOf } from "./nextStep";
+import { speedOf, watched } from "./nextStep";
 import { PromoteGains } from "./PromoteGains";
 import { useSpeed } from "./SpeedSwitch";
 import { comparison } from "./useSelectedFlights";
@@ -281,7 +281,7 @@ function RetryGains({ campaign, trial }: { campaign: Campaign; trial: Trial }) {
         variant="default"
         leftSection={<IconRepeat size={18} aria-hidden />}
         loading={create.isPending}
-        onClick={() => create.mutate({ gains: trial.gains, ...order })}
+        onClick={() => watched(create.mutateAsync({ gains: trial.gains, ...order }))}
       >
         Fly these gains again
       </Button>

@@ -68,6 +68,14 @@ export const SPEEDS: readonly { value: string; label: string; speed: Speed }[] =
   { value: "max", label: "Max", speed: null },
 ];
 
+/** Shows the top of the page, where the flight is watched, once it has begun; a refusal is told where it was ordered. */
+export function watched(flight: Promise<unknown>): void {
+  flight.then(
+    () => window.scrollTo({ top: 0 }),
+    () => undefined,
+  );
+}
+
 export function speedOf(value: string): Speed {
   const found = SPEEDS.find((one) => one.value === value);
   return found === undefined ? 10 : found.speed;
