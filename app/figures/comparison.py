@@ -69,8 +69,8 @@ class ComparisonFigure:
             self._difference(palette, index, flight, curve) for index, flight, curve in self._differences(recorded)
         ]
         for _, flight, curve in [recorded[place] for place in outside]:
-            label = flight.label
-            traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.trial_id, text=label))
+            label, unit = flight.label, self.data.output_unit
+            traces.append(off_scale(label, curve, low, high, palette.bad, trial=flight.trial_id, text=label, unit=unit))
         layout = self._layout(palette, low, high)
         return ready(self, traces, layout, summary=self._summary(len(outside)), table=self._table(recorded))
 

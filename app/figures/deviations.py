@@ -7,8 +7,8 @@ import numpy as np
 
 from app.figures import theme
 from app.figures.base import Trace
-from app.figures.data import Curve, FlightData
-from app.figures.overlays import off_scale, part_off_scale
+from app.figures.data import Curve, FlightData, Range
+from app.figures.overlays import Side, leaves_upward, off_scale, part_off_scale
 from app.figures.theme import Palette
 
 NEAR: Final = 0.05
@@ -57,17 +57,16 @@ def deviation_limit(curves: Sequence[Curve], set_point: Curve) -> float:
 
 
 def off_scale_deviations(
-    palette: Palette, flights: Sequence[FlightData], set_point: Curve, limit: float, *, opening_s: float
+    palette: Palette, flights: Sequence[FlightData], set_point: Curve, limit: float, *, unit: str, opening_s: float
 ) -> list[Trace]:
     """Marks at the edge of the panel for flights that leave it after the climb, labelled where there is room.
 
     They are at the largest deviation until `opening_s`, or of the whole flight if it leaves the panel only later.
     """
     peaks = sorted(_peaks(flights, set_point, limit, opening_s), key=lambda peak: peak[:2])
-    marks, free_s = list[Trace](), 0.0
+    marks, taken = list[Trace](), dict[bool, list[Range]]()
     for time_s, number, deviation in peaks:
-        has_room = time_s >= free_s
-        free_s = time_s + LABEL_S if has_room else free_s
+        labels = taken.setdefault(leaves_upward(deviation.values, -limit, limit), [])
         marks.append(
             off_scale(
                 str(number),
@@ -78,11 +77,25 @@ def off_scale_deviations(
                 role="off scale deviation",
                 trial=number,
                 text=f"Deviation of flight {number}",
-                in_print=has_room,
+                unit=unit,
+                digits=2,
+                side=_side(time_s, opening_s, labels),
                 yaxis="y2",
             )
         )
     return marks
+
+
+def _side(time_s: float, opening_s: float, labels: list[Range]) -> Side | None:
+    """Where a mark's label fits into the chart and beside the `labels` at the same edge, to which it is added."""
+    sides: dict[Side, float] = {"right": 0.0, "center": LABEL_S / 2, "left": LABEL_S}
+    for side, before_s in sides.items():
+        own = Range(time_s - before_s, time_s + (LABEL_S - before_s))
+        is_inside = own.low >= 0.0 and own.high <= max(opening_s, time_s)
+        if is_inside and all(own.high <= other.low or own.low >= other.high for other in labels):
+            labels.append(own)
+            return side
+    return None
 
 
 def _peaks(

@@ -4,7 +4,7 @@ flights that leave the scale, and for many flights the envelope that represents 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from app.figures.scale import thin_by_bends, thinned
 from app.figures.theme import Palette
 
 GLITCH_POINTS: Final = 60
+Side = Literal["left", "center", "right"]
+"""Where a label is, seen from its mark."""
 
 
 def band_traces(palette: Palette, band: Band | None) -> list[Trace]:
@@ -139,6 +141,16 @@ def part_off_scale(curve: Curve, low: float, high: float, opening_s: float) -> C
     return None
 
 
+def leaves_upward(values: Samples, low: float, high: float) -> bool:
+    """Whether what leaves the scale `low` … `high` is farther above than below it."""
+    return bool(values.max() - high >= low - values.min())
+
+
+def _signed(value: float, digits: int) -> str:
+    """A number with a true minus."""
+    return f"{value:.{digits}f}".replace("-", "−")
+
+
 def off_scale(
     label: str,
     curve: Curve,
@@ -148,23 +160,28 @@ def off_scale(
     *,
     trial: int,
     text: str,
+    unit: str,
     role: str = "off scale",
-    in_print: bool = True,
+    digits: int = 1,
+    side: Side | None = "center",
     **more: object,
 ) -> Trace:
-    """A triangle at the edge where a flight leaves the scale `low` … `high`, labelled with its peak value."""
+    """A triangle at the edge where a flight leaves the scale `low` … `high`, labelled with its peak value.
+
+    The label is to the `side` of the triangle; there is none for None.
+    """
     values = curve.values
-    up = bool(values.max() - high >= low - values.min())
+    up = leaves_upward(values, low, high)
     peak = int(values.argmax() if up else values.argmin())
-    name = f"{text} reaches {values[peak]:.2f} at {curve.time_s[peak]:.1f} s"
+    name = f"{text} reaches {_signed(values[peak], 2)} {unit} at {curve.time_s[peak]:.1f} s"
     return scatter(
         name,
         ([round(float(curve.time_s[peak]), 3)], [high if up else low]),
         role=role,
         about={"trial": trial},
-        mode="markers+text" if in_print else "markers",
-        text=[f"{label} {'↑' if up else '↓'} {values[peak]:.1f}" if in_print else ""],
-        textposition="bottom center" if up else "top center",
+        mode="markers" if side is None else "markers+text",
+        text=["" if side is None else f"{label} {'↑' if up else '↓'} {_signed(values[peak], digits)}\u00a0{unit}"],
+        textposition=f"{'bottom' if up else 'top'} {side or 'center'}",
         marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
         textfont={"color": colour},
         showlegend=False,

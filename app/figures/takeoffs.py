@@ -95,11 +95,17 @@ class TrajectoriesFigure:
         for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
             label, text = str(flight.number), f"Flight {flight.number}"
             part = part_off_scale(curve, low, high, OPENING_S[1]) or curve
-            traces.append(off_scale(label, part, low, high, palette.bad, trial=flight.number, text=text))
+            unit = self.history.output_unit
+            traces.append(off_scale(label, part, low, high, palette.bad, trial=flight.number, text=text, unit=unit))
         leaving = []
         if is_step(history.set_point):
             leaving = off_scale_deviations(
-                palette, drawn, history.set_point, self._deviation_limit, opening_s=OPENING_S[1]
+                palette,
+                drawn,
+                history.set_point,
+                self._deviation_limit,
+                unit=history.output_unit,
+                opening_s=OPENING_S[1],
             )
         traces += leaving
         layout = theme.layout(

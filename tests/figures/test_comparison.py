@@ -60,7 +60,7 @@ def test_below_each_flight_stands_against_the_first_as_far_as_both_were_recorded
 def test_a_wild_flight_is_marked_and_does_not_flatten_the_others() -> None:
     card = card_of(ComparisonFigure(compared(climb(0.2), climb(0.3), climb(0.25), climb(40.0))))
     assert layout(card)["yaxis"]["range"][1] < 5.0
-    assert trace(card, "off scale", trial=13)["text"] == ["D ↑ 43.0"]
+    assert trace(card, "off scale", trial=13)["text"] == ["D ↑ 43.0\u00a0m"]
     assert "1 off scale" in card.summary
 
 

@@ -169,11 +169,31 @@ def test_a_deviation_that_leaves_its_panel_after_the_climb_is_marked_at_the_edge
     limit = layout(card)["yaxis2"]["range"][1]
     first, second = (trace(card, "off scale deviation", trial=number) for number in (1, 2))
     assert (first["x"], first["y"], first["yaxis"]) == ([pytest.approx(2.0, abs=0.01)], [limit], "y2")
-    assert (first["text"], first["mode"]) == (["1 ↑ 0.8"], "markers+text")
-    assert first["hovertemplate"].startswith("Deviation of flight 1 reaches 0.81")
-    assert (second["text"], second["mode"]) == ([""], "markers")
+    assert (first["text"], first["mode"]) == (["1 ↑ 0.81\u00a0m"], "markers+text")
+    assert first["hovertemplate"].startswith("Deviation of flight 1 reaches 0.81 m at")
+    assert (second["text"], second["textposition"]) == (["2 ↑ 0.80\u00a0m"], "bottom left")
     assert {one["meta"]["trial"] for one in traces(card) if one["meta"]["role"] == "off scale deviation"} == {1, 2}
     assert card.summary.endswith("Deviation of 2 off scale, marked at the edge.")
+
+
+@pytest.mark.parametrize(
+    ("at_s", "side"), [(4.0, "top right"), (7.3, "top center"), (7.9, "top left"), (20.0, "top left")]
+)
+def test_a_deviations_label_stays_within_the_panel_with_its_unit_and_a_true_minus(at_s: float, side: str) -> None:
+    dip = np.minimum(3.0, 2.0 * TIME_S) - 0.9 * (np.abs(TIME_S - at_s) < 0.05)
+    low = replace(flight(1, 0.4), curve=Curve(TIME_S, dip))
+    card = TrajectoriesFigure(history(low, flight(2, 0.3), flight(3, 0.1))).compute()
+    mark = trace(card, "off scale deviation", trial=1)
+    assert (mark["text"], mark["textposition"]) == (["1 ↓ −0.90\u00a0m"], side)
+
+
+def test_labels_at_opposite_edges_have_room_at_the_same_time() -> None:
+    wave = lambda by_m: Curve(TIME_S, np.minimum(3.0, 2.0 * TIME_S) + by_m * (np.abs(TIME_S - 4.0) < 0.05))  # noqa: E731
+    off = [replace(flight(number, 0.4), curve=wave(by_m)) for number, by_m in ((1, 0.9), (2, -0.9), (3, 0.8), (4, 0.7))]
+    card = TrajectoriesFigure(history(*off, flight(5, 0.1), flight(6, 0.2))).compute()
+    marks = [trace(card, "off scale deviation", trial=number) for number in (1, 2, 3, 4)]
+    assert [mark["textposition"] for mark in marks[:3]] == ["bottom right", "top right", "bottom left"]
+    assert (marks[3]["text"], marks[3]["mode"]) == ([""], "markers")
 
 
 def test_an_error_around_zero_is_its_own_deviation() -> None:
@@ -197,7 +217,7 @@ def test_one_wild_flight_is_marked_at_the_edge_and_does_not_flatten_the_others()
     low, high = layout(card)["yaxis"]["range"]
     assert low == pytest.approx(-0.2, abs=0.1)
     assert 3.2 < high < 4.0
-    assert trace(card, "off scale", trial=2)["text"] == ["2 ↑ 12.0"]
+    assert trace(card, "off scale", trial=2)["text"] == ["2 ↑ 12.0\u00a0m"]
     assert "1 off scale" in card.summary
 
 
@@ -211,7 +231,7 @@ def test_a_flight_that_leaves_the_scale_in_the_visible_part_is_marked_there() ->
     assert layout(card)["yaxis"]["range"][1] < 5.0
     mark = trace(card, "off scale", trial=2)
     assert mark["x"] == [pytest.approx(5.1, abs=0.1)]
-    assert mark["text"] == ["2 ↑ 5.5"]
+    assert mark["text"] == ["2 ↑ 5.5\u00a0m"]
 
 
 def test_the_table_gives_the_same_curves_in_numbers() -> None:
