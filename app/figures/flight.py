@@ -25,6 +25,10 @@ _OUTPUT_SHARE: Final = 2.0
 
 _NAME_PX: Final = 70
 """Length of an event's name."""
+_NEAR: Final = 0.04
+"""Distance of two lines that leaves no room for a name between them, as a share of the record."""
+_FIRST_NAME: Final = 0.025
+"""Room for the first event's name before the command, as a share of the record."""
 _NOTE_LETTERS: Final = 36
 """Longer notes are shortened to fit into the output's panel."""
 
@@ -139,7 +143,8 @@ class FlightFigure:
             )
         for place, panel in enumerate(record.panels, start=2 + self._has_deviation):
             axes[f"yaxis{place}"] = theme.titled(palette, panel.title, domain=places[place - 1], nticks=4)
-        begin = float(curve.time_s[0]) - 0.01 * float(goal.time_s[-1])
+        lasts_s = float(goal.time_s[-1])
+        begin = min(float(curve.time_s[0]), -_FIRST_NAME * lasts_s) - 0.01 * lasts_s
         axes["xaxis"] = theme.titled(
             palette,
             "Time since the command (s)",
@@ -163,7 +168,7 @@ class FlightFigure:
                 *(_mark(note, palette.prediction) for note in record.notes),
             ],
             annotations=[
-                *(_name(palette, event, index) for index, event in enumerate(record.events)),
+                *_names(palette, record.events, lasts_s),
                 *(_note(palette, note, places[0][0]) for note in record.notes),
             ],
             margin=dict(theme.SIGNED_MARGIN_PX),
@@ -259,9 +264,22 @@ def _mark(event: FlightEvent, colour: str) -> dict[str, object]:
     }
 
 
-def _name(palette: Palette, event: FlightEvent, index: int) -> dict[str, object]:
-    """The event's name along its line, below that of the one before it, which may be close."""
-    return _along(event.time_s, event.name, palette.dim, y=1, yanchor="top", yshift=-_NAME_PX * index)
+def _names(palette: Palette, events: Sequence[FlightEvent], lasts_s: float) -> list[dict[str, object]]:
+    """The events' names along their lines: the first at the left of its line, the others at the right, over the curves.
+
+    Each one that is near the one before it at the same side is below that.
+    """
+    names: list[dict[str, object]] = []
+    below = 0
+    for index, event in enumerate(events):
+        if index == 0:
+            beside: dict[str, object] = {"xanchor": "right"}
+        else:
+            is_near = index > 1 and event.time_s - events[index - 1].time_s < _NEAR * lasts_s
+            below = below + 1 if is_near else 0
+            beside = {"bgcolor": palette.surface, "yshift": -_NAME_PX * below}
+        names.append(_along(event.time_s, event.name, palette.dim, **{"y": 1, "yanchor": "top", **beside}))
+    return names
 
 
 def _note(palette: Palette, note: FlightEvent, bottom: float) -> dict[str, object]:

@@ -79,6 +79,15 @@ def test_events_stand_on_the_time_line() -> None:
     assert [one["x0"] for one in drawn["shapes"]] == [0.0, 0.4]
 
 
+def test_names_of_near_events_stand_neither_on_each_other_nor_on_the_next_line() -> None:
+    events = tuple(FlightEvent(at, name) for at, name in ((0.0, "Command"), (0.4, "Lift-off"), (0.6, "Abort")))
+    drawn = layout(FlightFigure(replace(RECORD, events=events)).compute())
+    command, lift_off, abort = drawn["annotations"]
+    assert (command["xanchor"], lift_off["xanchor"], lift_off["yshift"]) == ("right", "left", 0)
+    assert abort["yshift"] < -60
+    assert drawn["xaxis"]["range"][0] < -0.02 * RECORD.set_point.time_s[-1]
+
+
 def test_throttle_is_marked_where_it_is_saturated_but_not_at_rest_before_it_starts() -> None:
     command = np.full_like(TIME_S, 0.6)
     command[TIME_S < 0.5] = 0.0
