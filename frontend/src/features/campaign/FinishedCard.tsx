@@ -124,7 +124,8 @@ function Result({ campaign, winner, first, comparison }: ResultProps) {
       {change !== null && comparison !== null && (
         <>
           <p>
-            First gains ({flightsText(first.trial_numbers)}): {plusMinus(first.mean, first.standard_error, unit)}
+            First gains ({flightsText(first.trial_numbers)}):{" "}
+            <span className="quantity">{plusMinus(first.mean, first.standard_error, unit)}</span>
           </p>
           <p>
             {against(change, "the first gains")} ·{" "}

@@ -87,7 +87,8 @@ function Verdict({ comparison, unit }: { comparison: CampaignStatistics["compari
         {confidence !== null && <small>{confidenceText(confidence)} confidence</small>}
       </p>
       <p className="numbers">
-        {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}
+        <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}
+        {difference < 0 ? "lower" : "higher"}
         {verdict === "not known yet" && <strong className={classes["more"]}>Fly one of the two gain sets again</strong>}
         {verdict === "unresolved" && more !== null && (
           <strong className={classes["more"]}>

@@ -221,7 +221,8 @@ function TrialComparisons({ trial, best, unit }: { trial: Trial; best: string; u
               {asked ? `These gains: ${VERDICTS[verdict].toLowerCase()}` : <strong>{VERDICTS[verdict]}</strong>} vs.
               flight {trial_number} ({against === "first" ? "first" : best})
               {confidence !== null && `, ${confidenceText(confidence)} confidence`}:{" "}
-              {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}{" "}
+              <span className="quantity">{plusMinus(Math.abs(difference), standard_error, unit)}</span>{" "}
+              {difference < 0 ? "lower" : "higher"}{" "}
               <small>{standard_error === null ? "(no repeat flights yet)" : "(means, ± standard error)"}</small>
             </span>
           </li>
@@ -260,8 +261,8 @@ function Glitches({ trial, unit }: { trial: Trial; unit: string }) {
       </ul>
       {trial.repaired_error !== null && trial.repaired_error !== undefined && (
         <p className="numbers">
-          Error as recorded {plusMinus(trial.error, null, unit)}, with the glitches interpolated{" "}
-          {plusMinus(trial.repaired_error, null, unit)}.
+          Error as recorded <span className="quantity">{plusMinus(trial.error, null, unit)}</span>, with the glitches
+          interpolated <span className="quantity">{plusMinus(trial.repaired_error, null, unit)}</span>.
         </p>
       )}
     </Aside>
