@@ -42,12 +42,12 @@ AT_START: Final = {app.common.errors.SchemaError, app.common.errors.AlreadyRunni
 FRAMEWORK: Final = ("400", "404", "405", "invalid", "foreign", "unexpected")
 """Responses that do not come from the application's own code."""
 OWN_WORDS: Final[dict[object, str]] = {
-    LinkDownError: "It is retried until the worker confirms it. If a vehicle is in the air, use its own remote control"
+    LinkDownError: "It is sent again until the worker confirms it. If a vehicle is in the air, use its own remote"
 }
 """What to do, where the page does not repeat the API's hint: its banner says how a worker is started again."""
 OF_FORMS: Final[dict[object, str]] = {
-    InputError: "Correct the marked fields: bounds of kp.",
-    "invalid": "Correct the marked fields: Maximum flights.",
+    InputError: "Correct the marked field: bounds of kp.",
+    "invalid": "Correct the marked field: Maximum flights.",
 }
 """What a form says instead of the API's sentence and hint, because every reason stands at its field."""
 RETRIED_MS: Final = 40_000

@@ -164,7 +164,7 @@ def test_without_a_worker_a_flight_in_the_air_is_not_called_paused(
     expect(bar_of_a_flight(dashboard, states.campaign())).to_be_visible()
     with killed_worker(shared_server):
         notice = dashboard.page.get_by_role("status").filter(has_text="The worker is not responding.")
-        expect(notice).to_contain_text("If it has ended, the simulated flight is lost.")
+        expect(notice).to_contain_text("If the worker has stopped, the simulated flight is lost.")
     is_live(dashboard)
 
 

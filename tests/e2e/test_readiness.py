@@ -233,6 +233,6 @@ def test_every_loss_in_every_state_is_shown_as_the_server_says_it(dashboard: Das
             page.clock.run_for(1100)
             expected = ["done" if s in shown.steps else "lost" if s in shown.lost else "open" for s in STEPS]
             dashboard.until(partial(is_shown, page, expected))
-            expect(losses(page)).to_have_text([f"{loss.what} {loss.way_on}" for loss in shown.losses])
+            expect(losses(page)).to_have_text([f"{loss.what} {loss.way_on}".replace("`", "") for loss in shown.losses])
             expect(hold_button(page)).to_be_enabled(enabled=shown.is_ready)
     page.unroute(re.compile("/readiness$"))

@@ -188,8 +188,11 @@ def test_a_deviations_label_stays_within_the_panel_with_its_unit_and_a_true_minu
 
 
 def test_labels_at_opposite_edges_have_room_at_the_same_time() -> None:
-    wave = lambda by_m: Curve(TIME_S, np.minimum(3.0, 2.0 * TIME_S) + by_m * (np.abs(TIME_S - 4.0) < 0.05))  # noqa: E731
-    off = [replace(flight(number, 0.4), curve=wave(by_m)) for number, by_m in ((1, 0.9), (2, -0.9), (3, 0.8), (4, 0.7))]
+    def bumped(by_m: float) -> Curve:
+        return Curve(TIME_S, np.minimum(3.0, 2.0 * TIME_S) + by_m * (np.abs(TIME_S - 4.0) < 0.05))
+
+    bumps = ((1, 0.9), (2, -0.9), (3, 0.8), (4, 0.7))
+    off = [replace(flight(number, 0.4), curve=bumped(by_m)) for number, by_m in bumps]
     card = TrajectoriesFigure(history(*off, flight(5, 0.1), flight(6, 0.2))).compute()
     marks = [trace(card, "off scale deviation", trial=number) for number in (1, 2, 3, 4)]
     assert [mark["textposition"] for mark in marks[:3]] == ["bottom right", "top right", "bottom left"]
