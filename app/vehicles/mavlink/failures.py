@@ -77,7 +77,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "no packet for 1 s, or three heartbeats missed",
             "repeat land",
             "invalid",
-            "The link was lost in flight. Land was repeated; the vehicle's own failsafe takes over.",
+            "The link was lost in flight. Land was repeated; without a link only the vehicle's own failsafe or flight "
+            "plan lands it.",
         ),
         Failure.ENVELOPE: Response(
             "a limit of altitude, position, speed or oscillation, or the vehicle's own fence",

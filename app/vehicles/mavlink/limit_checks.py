@@ -124,7 +124,7 @@ def find_duplicate(watch: TrialObservation) -> Finding | None:
 
 def find_link(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     if now_s - watch.received_s > limits.silent_s:
-        return Finding(failure=Failure.LINK, why=f"Nothing was received for {limits.silent_s:g} s.")
+        return Finding(failure=Failure.LINK, why=f"Nothing was received for more than {limits.silent_s:g} s.")
     if now_s - watch.heartbeat_s > HEARTBEATS_MISSED * limits.heartbeat_s:
         return Finding(failure=Failure.LINK, why="Three heartbeats were missed.")
     return None

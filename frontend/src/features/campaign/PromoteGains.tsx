@@ -23,7 +23,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
     const isDone = sameHeld(vehicle.safe_gains, campaign.winner.gains);
     return (
       <Note fz="body">
-        {why} {isDone && heldGainsNotice(vehicle)}
+        {why} {isDone && campaign.flying === null && heldGainsNotice(vehicle)}
       </Note>
     );
   }

@@ -19,7 +19,7 @@ import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
 import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
-import { type FlyStep, flyStateLabel, flyStep, hasLanded, isAbortStep, isAirborneStep } from "./flyScreen";
+import { type FlyStep, flyStateLabel, flyStep, gainsShown, hasLanded, isAbortStep, isAirborneStep } from "./flyScreen";
 import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
@@ -77,6 +77,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
     quarantined,
     readiness,
     hasFlown: wasAirborne || hasLanded(live?.phase ?? null),
+    isStopped: orders.said?.order === "motors off" && orders.said.accepted,
   });
   const isFlying = step === "flying";
   const isAborting = abortStage(trial.id, abort) === "accepted" || isAbortStep(status?.status.step);
@@ -138,10 +139,12 @@ function Screen({ campaign, trial, vehicle }: Props) {
         {!barred && (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}
         <HeldGains
           asked={trial.gains}
-          readBack={step === "staged" && !isHeld ? null : trial.read_back}
-          held={step === "over" || step === "judge" || !status?.isCurrent ? {} : status.status.held}
           titles={titles}
-          areSet={step !== "plan"}
+          {...gainsShown(step, {
+            isHeld,
+            readBack: trial.read_back,
+            reported: status?.isCurrent ? status.status.held : {},
+          })}
         />
       </section>
       {vehicle !== null && <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching !== null} />}

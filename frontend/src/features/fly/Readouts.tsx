@@ -9,7 +9,7 @@ import { gainText, NOTHING, withUnit } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
 import { percent } from "../../ui/uncertainty";
 import classes from "./Fly.module.css";
-import { type GainTick, gainTicks, secondsLeft } from "./flyScreen";
+import { type GainTick, gainTicks, isAirborneStep, secondsLeft } from "./flyScreen";
 
 interface Props {
   trial: Trial;
@@ -64,8 +64,10 @@ function useLastKnown(value: number | null | undefined): number | null | undefin
 /** Large readings: altitude and error, then the rest. Stale readings are grey. */
 export function Readouts({ trial, unit, live, status, hasLink, isFlying, isAborted, endS }: Props) {
   const reading = readingOf(live?.channel ?? "altitude_m");
-  const measured = isFlying ? live?.measured.at(-1) : undefined;
   const linked = status?.status;
+  // After its motors have stopped, the record's last altitude is not the vehicle's.
+  const isRecorded = isFlying && (!hasLink || isAirborneStep(linked?.step) || linked?.armed === true);
+  const measured = isRecorded ? live?.measured.at(-1) : undefined;
   const isCurrent = useIsCurrent(live);
   const stale = hasLink ? !(status?.isCurrent ?? false) : isFlying && !isCurrent;
   const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);

@@ -6,6 +6,7 @@ import {
   areReadBackSince,
   flyStateLabel,
   flyStep,
+  gainsShown,
   gainTicks,
   hasLanded,
   isAbortStep,
@@ -134,6 +135,16 @@ test("a gain is ticked only when the vehicle holds exactly what it was asked to"
   expect([kp?.confirmed, ki?.confirmed, kd?.confirmed]).toEqual([true, false, false]);
   expect([ki?.held, kd?.held]).toEqual([20, null]);
   expect(gainTicks({ kp: 283 }, { kp: 283 }, { kp: 1 })[0]?.confirmed).toBe(true);
+});
+
+test("gains read back for a flight are told of the vehicle only while it has them", () => {
+  const onVehicle = { isHeld: true, readBack: { kp: 283 }, reported: { kp: 300 } };
+  expect(gainsShown("plan", onVehicle)).toEqual({ readBack: null, held: { kp: 300 }, areSet: false });
+  expect(gainsShown("staged", onVehicle)).toEqual({ readBack: { kp: 283 }, held: { kp: 300 }, areSet: true });
+  expect(gainsShown("staged", { ...onVehicle, isHeld: false }).readBack).toBeNull();
+  expect(gainsShown("flying", onVehicle).readBack).toEqual({ kp: 283 });
+  expect(gainsShown("unstaging", onVehicle)).toEqual({ readBack: null, held: { kp: 300 }, areSet: false });
+  expect(gainsShown("judge", onVehicle)).toEqual({ readBack: null, held: {}, areSet: false });
 });
 
 test("safe gains count as read back only after the lift-off", () => {

@@ -77,6 +77,8 @@ interface Around {
   readiness: Readiness | null;
   /** Whether it has flown, for a vehicle that is on the ground now. */
   hasFlown?: boolean;
+  /** Whether this page has stopped its motors. */
+  isStopped?: boolean;
 }
 
 /** Whether the flight is over, by its phase from the event stream. */
@@ -89,7 +91,7 @@ export function flyStateLabel(
   trial: Standing,
   step: FlyStep,
   status: Aged | null,
-  { quarantined, readiness, hasFlown = false }: Around,
+  { quarantined, readiness, hasFlown = false, isStopped = false }: Around,
 ): StateLabel {
   if (step === "flying" && status !== null) {
     const away = readiness?.losses.map(({ kind }) => AWAY[kind]).find((word) => word !== undefined);
@@ -98,6 +100,7 @@ export function flyStateLabel(
     if (IN_FLIGHT.has(status.status.step)) {
       return { word: stepWord(status.status.step), tone: isAbortStep(status.status.step) ? "bad" : "busy" };
     }
+    if (isStopped) return { word: "Motors off", tone: "bad" };
     if (!quarantined) return { word: hasFlown ? "Landed, restoring safe gains" : "Starting", tone: "busy" };
   }
   if (quarantined) return { word: "Quarantined", tone: "bad" };
@@ -135,6 +138,26 @@ export function gainTicks(asked: Gains, readBack: Gains | null, held: Gains): Ga
     const onVehicle = readBack?.[name] ?? held[name] ?? null;
     return { name, asked: value, held: onVehicle, confirmed: onVehicle === value };
   });
+}
+
+interface OnVehicle {
+  /** Whether the staged gains are confirmed. */
+  isHeld: boolean;
+  readBack: Gains | null;
+  /** Gains that the vehicle reports now; empty if they are unknown. */
+  reported: Gains;
+}
+
+/** What the list of the flight's gains says of the vehicle: those read back for this flight count only while it has
+ * them, not before they are staged and not after the flight, which ends with the safe gains. */
+export function gainsShown(
+  step: FlyStep,
+  { isHeld, readBack, reported }: OnVehicle,
+): { readBack: Gains | null; held: Gains; areSet: boolean } {
+  const isOver = step === "judge" || step === "over";
+  const isOn = step === "flying" || (step === "staged" && isHeld);
+  const areSet = step === "staging" || step === "staged" || step === "flying";
+  return { readBack: isOn ? readBack : null, held: isOver ? {} : reported, areSet };
 }
 
 /** Whether the vehicle's safe gains have been read back after the lift-off of this flight, as at a reconnection. */
