@@ -1,6 +1,6 @@
 /** All queries. `live/staleQueries.ts` invalidates them by their keys. */
 
-import { keepPreviousData, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
+import { keepPreviousData, skipToken, useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
 import { answer } from "./client";
 import {
@@ -51,10 +51,10 @@ export function useCampaigns(filter: CampaignFilter) {
   });
 }
 
-export function useCampaign(campaignId: number) {
+export function useCampaign(campaignId: number | null) {
   return useQuery({
     queryKey: ["campaign", campaignId],
-    queryFn: () => answer(getCampaign({ path: { campaign_id: campaignId } })),
+    queryFn: campaignId === null ? skipToken : () => answer(getCampaign({ path: { campaign_id: campaignId } })),
   });
 }
 
@@ -99,8 +99,11 @@ export function useTrials(campaignId: number) {
   });
 }
 
-export function useTrial(trialId: number) {
-  return useQuery({ queryKey: ["trial", trialId], queryFn: () => answer(getTrial({ path: { trial_id: trialId } })) });
+export function useTrial(trialId: number | null) {
+  return useQuery({
+    queryKey: ["trial", trialId],
+    queryFn: trialId === null ? skipToken : () => answer(getTrial({ path: { trial_id: trialId } })),
+  });
 }
 
 /** Detail of a figure: a time window at full resolution, and one flight drawn individually. */

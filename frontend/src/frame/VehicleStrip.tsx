@@ -1,6 +1,7 @@
 import { IconAlertTriangle, IconAntennaBars5, IconAntennaBarsOff, IconBattery3, IconUser } from "@tabler/icons-react";
-import { Link } from "react-router";
+import { Link, useMatch } from "react-router";
 import { useOwnLease } from "../api/leases";
+import { useCampaign, useTrial } from "../api/queries";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { useVehicleStatus } from "../live/store";
@@ -10,12 +11,25 @@ import { withUnit } from "../ui/format";
 import { gainsInBrackets, inOrder, sameHeld } from "../ui/gains";
 import classes from "./VehicleStrip.module.css";
 
-/** On every page: each connected vehicle with its link, battery, gains and operator. */
+const ALWAYS_SHOWN: ReadonlySet<Vehicle["state"]> = new Set(["staged", "flying", "quarantined"]);
+
+/** On every page: each connected vehicle with its link, battery, gains and operator. A fly screen needs its height: it
+ * shows its own vehicle, and others only while something is up with them. */
 export function VehicleStrip() {
+  const own = useFlownVehicle();
   const connected = (useVehicles().data ?? []).filter(
     ({ registered, state }) => registered && state !== "disconnected",
   );
-  return connected.map((vehicle) => <VehicleLine key={vehicle.id} vehicle={vehicle} />);
+  return connected
+    .filter(({ id, state }) => own === null || id === own || ALWAYS_SHOWN.has(state))
+    .map((vehicle) => <VehicleLine key={vehicle.id} vehicle={vehicle} />);
+}
+
+/** The vehicle of the fly screen that is open; null on other pages, and until it is known. */
+function useFlownVehicle(): number | null {
+  const trialId = Number(useMatch("/fly/:trialId")?.params.trialId);
+  const trial = useTrial(Number.isInteger(trialId) ? trialId : null).data;
+  return useCampaign(trial?.campaign_id ?? null).data?.vehicle.id ?? null;
 }
 
 function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
