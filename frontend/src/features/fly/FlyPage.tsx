@@ -98,7 +98,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
         <Anchor component={Link} to={`/campaigns/${campaign.id}`} className={classes["back"]}>
           <IconChevronLeft size={20} aria-hidden />
           <span>
-            {campaign.name} · flight {trial.number}
+            Flight {trial.number} · {campaign.name}
           </span>
         </Anchor>
         <h1 className={classes["word"]} data-tone={tone}>

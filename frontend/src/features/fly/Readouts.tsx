@@ -47,6 +47,9 @@ function Reading({ title, value, topic, size = "usual", stale = false, bad = fal
 
 /** State of the link: its age, or why there is no data. */
 function LinkReading({ status }: { status: Aged | null }) {
+  if (status?.status.state === "gone" && status.linkAgeS !== null) {
+    return <Reading title="Link lost for" topic="linkAge" value={ageText(status.linkAgeS)} bad />;
+  }
   if (status === null || status.status.state !== "connected") {
     return <Reading title="Link" value={linkText(status)} bad />;
   }
@@ -106,7 +109,12 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, isAbort
         <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />
         {hasLink && <LinkReading status={status} />}
         {isScored && <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />}
-        {!isFlying && <Reading title="Record length" value={recordLength(trial, endS)} />}
+        {!isFlying && (
+          <Reading
+            title={trial.record === null ? "Scored window" : "Record length"}
+            value={recordLength(trial, endS)}
+          />
+        )}
       </dl>
     </div>
   );
