@@ -15,7 +15,7 @@ from app.campaigns.proposals import read_donor
 from app.campaigns.schemas import GainsPrediction, PredictedCurve
 from app.common.schemas import Interval
 from app.common.states import TrialState
-from app.core.definition import Definition
+from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
@@ -67,22 +67,13 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
     NotFoundError, and GainsError when they are not the campaign's gains or no controller can hold them.
     """
     with database.read() as session:
-        question = _question(session, repository.get_campaign(session, campaign_id), asked)
-        kept = cache.find(question.digest)
-        is_new = not question.flown and kept is None
-        recorded = question.flown | (
-            modelled_flights(question.definition, history.flown_gains(question.trials)) if is_new else set()
-        )
-        flights = history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else ()
-        donor = read_donor(session, question.definition) if is_new else None
-    predicted = predict_repeat(question.definition, flights, question.gains)
-    if predicted is None:
-        fitted = cache.get(
-            question.digest,
-            lambda: flight_predictor(question.definition, flights, donor) if kept is None else kept.predictor,
-        )
-        predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
-    return _view(question, predicted)
+        read = _read(session, cache, campaign_id, asked)
+    return _predict(cache, read)
+
+
+def fit_model(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> None:
+    """Fit and keep the model that `predict_planned` needs, while the session is open. Raises as `predict_gains`."""
+    _predict(cache, _read(session, cache, campaign_id, asked))
 
 
 def predict_planned(session: Session, cache: PredictorCache, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
@@ -113,6 +104,42 @@ def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Questio
     digest = history.history_digest(session, campaign, definition, trials)
     flown = {row.number for row in trials if row.state == TrialState.VALID and row.gains == gains}
     return _Question(definition, trials, gains, digest, flown)
+
+
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """All that a prediction needs of the database; `kept` is the model if it is fitted already."""
+
+    question: _Question
+    flights: Sequence[Flight]
+    donor: Flight | None
+    kept: FittedModel | None
+
+
+def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> _Read:
+    question = _question(session, repository.get_campaign(session, campaign_id), asked)
+    kept = cache.find(question.digest)
+    is_new = not question.flown and kept is None
+    modelled = modelled_flights(question.definition, history.flown_gains(question.trials)) if is_new else set()
+    recorded = question.flown | modelled
+    return _Read(
+        question,
+        flights=history.flights_of(session, campaign_id, recorded=recorded) if is_new or recorded else (),
+        donor=read_donor(session, question.definition) if is_new else None,
+        kept=kept,
+    )
+
+
+def _predict(cache: PredictorCache, read: _Read) -> GainsPrediction:
+    question, kept = read.question, read.kept
+    predicted = predict_repeat(question.definition, read.flights, question.gains)
+    if predicted is None:
+        fitted = cache.get(
+            question.digest,
+            lambda: flight_predictor(question.definition, read.flights, read.donor) if kept is None else kept.predictor,
+        )
+        predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
+    return _view(question, predicted)
 
 
 def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:

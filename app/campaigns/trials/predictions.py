@@ -5,21 +5,19 @@ from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
 
-from app.campaigns.flight_predictions import PredictorCache, predict_gains, predict_planned
+from app.campaigns.flight_predictions import PredictorCache, fit_model, predict_planned
 from app.campaigns.schemas import GainsPrediction
 from app.campaigns.trials.schemas import TrialPlan
 from app.campaigns.trials.service import find_gains
 from app.common.errors import GainlineError
 from app.core.policy import Gains
 from app.db.models import CampaignRow
-from app.db.session import Database
 
 
 @dataclass(frozen=True, slots=True)
 class TrialPredictor:
     """Predicts planned trials as the dashboard shows them."""
 
-    database: Database
     cache: PredictorCache
 
     def prepare(self, session: Session, campaign_id: int, new: TrialPlan) -> None:
@@ -28,7 +26,7 @@ class TrialPredictor:
         with suppress(GainlineError):
             gains = find_gains(session, campaign_id, new)
             if new.proposal_id is None:
-                predict_gains(self.database, self.cache, campaign_id, gains)
+                fit_model(session, self.cache, campaign_id, gains)
 
     def predict(self, session: Session, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
         """What is predicted for a trial with these gains."""

@@ -23,7 +23,6 @@ from app.web.dependencies import (
     FILE_BODY,
     PLANNED_RECORD_BODY,
     REQUEST_BODY,
-    CurrentDatabase,
     CurrentSettings,
     CursorText,
     Id,
@@ -37,8 +36,8 @@ from app.web.dependencies import (
 )
 
 
-async def _trial_predictor(request: Request, database: CurrentDatabase) -> TrialPredictor:
-    return TrialPredictor(database, request.app.state.predictors)
+async def _trial_predictor(request: Request) -> TrialPredictor:
+    return TrialPredictor(request.app.state.predictors)
 
 
 TrialPredictorDep = Annotated[TrialPredictor, Depends(_trial_predictor)]
