@@ -71,20 +71,30 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
     return _predict(cache, read)
 
 
-def fit_model(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> None:
-    """Fit and keep the model that `predict_planned` needs, while the session is open. Raises as `predict_gains`."""
-    _predict(cache, _read(session, cache, campaign_id, asked))
+@dataclass(frozen=True, slots=True)
+class DatedPrediction:
+    """A prediction, and the digest of the history that it is made of."""
+
+    digest: str
+    prediction: GainsPrediction
 
 
-def predict_planned(session: Session, cache: PredictorCache, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
-    """The same within a transaction, which fits no model: without one that is kept, only repeats are predicted."""
+def predict_ahead(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> DatedPrediction:
+    """The same before a transaction that plans a trial with these gains. Raises as `predict_gains` does."""
+    read = _read(session, cache, campaign_id, asked)
+    return DatedPrediction(read.question.digest, _predict(cache, read))
+
+
+def predict_planned(
+    session: Session, campaign: CampaignRow, gains: Gains, ahead: DatedPrediction | None
+) -> GainsPrediction:
+    """The prediction of a trial within the transaction that plans it, which is short: that made ahead if the history
+    is still the same, else that of a repeat, else none."""
     question = _question(session, campaign, gains)
+    if ahead is not None and (ahead.digest, ahead.prediction.gains) == (question.digest, question.gains):
+        return ahead.prediction
     flights = history.flights_of(session, campaign.id, recorded=question.flown) if question.flown else ()
-    predicted = predict_repeat(question.definition, flights, question.gains)
-    kept = cache.find(question.digest)
-    if predicted is None and kept is not None and kept.predictor is not None:
-        predicted = kept.predictor.predict(question.gains)
-    return _view(question, predicted)
+    return _view(question, predict_repeat(question.definition, flights, question.gains))
 
 
 @dataclass(frozen=True, slots=True)
