@@ -18,7 +18,6 @@ import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
-import classes from "./NextFlight.module.css";
 import { speedOf, watched } from "./nextStep";
 import { OverruleGate } from "./OverruleGate";
 import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
@@ -165,7 +164,6 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
     <Button
       fullWidth
       size="lg"
-      className={isMain ? (classes["main"] ?? "") : ""}
       variant={isMain && isAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
       loading={create.isPending}
