@@ -44,7 +44,7 @@ def register_by_hand(dashboard: Dashboard, name: str, drone: Drone) -> int:
     dashboard.button("Register vehicle").click()
     expect(address).to_have_attribute("aria-invalid", "true")
     expect(page.get_by_text(re.compile("^must be udp:HOST:PORT"))).to_be_visible()
-    expect(page.get_by_role("alert")).to_have_text("Correct the marked fields: Address.")
+    expect(page.get_by_role("alert")).to_have_text("Correct the marked field: Address.")
     address.fill("udp:192.168.1.5:4245@4244")
     dashboard.button("Register vehicle").click()
     expect(page.get_by_role("alert")).to_have_text("Correct the marked fields: Simulation on this computer.")
