@@ -5,7 +5,7 @@ import { useCampaign, useTrial } from "../api/queries";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { useVehicleStatus } from "../live/store";
-import { linkText } from "../live/vehicleStatus";
+import { heldGains, linkText } from "../live/vehicleStatus";
 import { VehicleBadge } from "../ui/Badges";
 import { withUnit } from "../ui/format";
 import { gainsInBrackets, inOrder, sameHeld } from "../ui/gains";
@@ -66,7 +66,7 @@ function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
         <span className="visually-hidden">Battery</span>
         {withUnit(aged?.status.batteryV, "V", 1)}
       </span>
-      <HeldGains vehicle={vehicle} held={aged?.status.held ?? vehicle.held ?? {}} stale={stale} />
+      <HeldGains vehicle={vehicle} held={heldGains(vehicle, aged)} stale={stale} />
       <InControl vehicle={vehicle} />
     </section>
   );

@@ -3,6 +3,7 @@ import {
   aged,
   ageText,
   before,
+  heldGains,
   type LastHeard,
   linkText,
   messageText,
@@ -97,4 +98,15 @@ test("what is not known stays unknown, and a line that is no status is left alon
   expect([status.altitudeM, status.armed, status.batteryV, status.held]).toEqual([null, null, null, {}]);
   expect(statusFrom('{"type":"vehicle","vehicle_id":3,"state":"asleep"}')).toBeNull();
   expect(statusFrom("null")).toBeNull();
+});
+
+test("gains that a connected vehicle has not reported since it restarted are not those read before", () => {
+  const now = { wallMs: 50_100, steadyMs: 1_100 };
+  const stored = { state: "ready", held: { kp: 1 } } as const;
+  expect(heldGains(stored, aged(heard(), now))).toEqual({ kp: 283, ki: 13, kd: 82 });
+  expect(heldGains(stored, aged(heard({ held: {} }), now))).toEqual({});
+  expect(heldGains(stored, null)).toEqual({ kp: 1 });
+  expect(heldGains({ ...stored, state: "disconnected" }, aged(heard({ held: {} }), now))).toEqual({ kp: 1 });
+  expect(heldGains({ ...stored, held: null }, null)).toEqual({});
+  expect(heldGains({ ...stored, held: null }, aged(heard({ state: "gone" }), now))).toEqual({});
 });

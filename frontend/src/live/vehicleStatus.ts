@@ -1,5 +1,7 @@
 /** Last received status of a connected vehicle, and its age. */
 
+import type { Vehicle } from "../api/types";
+
 type LinkState = "connecting" | "connected" | "gone" | "not answering";
 
 export interface VehicleStatus {
@@ -68,6 +70,18 @@ export function aged({ status, heardAt }: LastHeard, now: Moment): Aged {
   const linkAgeS = status.packetAgeS === null ? null : status.packetAgeS + statusAgeS;
   const isCurrent = status.state === "connected" && linkAgeS !== null && linkAgeS <= CURRENT_S;
   return { status, linkAgeS, statusAgeS, isCurrent };
+}
+
+/**
+ * The gains that a vehicle holds: as its link knows them, empty if it does not; without one as last read back, empty if
+ * what was read back is not known to hold any more.
+ */
+export function heldGains(
+  { state, held }: Pick<Vehicle, "state" | "held">,
+  known: Aged | null,
+): Readonly<Record<string, number>> {
+  if (state === "disconnected" || known === null || (held === null && !known.isCurrent)) return held ?? {};
+  return known.status.held;
 }
 
 /** `0.1 s` up to 10 s; then whole seconds and minutes. */

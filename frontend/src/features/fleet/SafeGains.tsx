@@ -5,6 +5,7 @@ import { useEditVehicle } from "../../api/fleet";
 import { problemOf, reasonsByField } from "../../api/problems";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
+import { heldGains } from "../../live/vehicleStatus";
 import { type NumberEntry, NumberField } from "../../ui/Fields";
 import { gainText, NOTHING } from "../../ui/format";
 import { inOrder, sameHeld } from "../../ui/gains";
@@ -27,8 +28,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   const [entered, setEntered] = useState<Record<string, number>>();
   const status = useVehicleStatus(vehicle.id);
   const { safe_gains: safe } = vehicle;
-  const live = status?.status.held ?? {};
-  const held = inOrder(Object.keys(live).length > 0 ? live : (vehicle.held ?? {}), Object.keys(safe));
+  const held = inOrder(heldGains(vehicle, status), Object.keys(safe));
   const isCurrent = status?.isCurrent ?? false;
   const isKnown = Object.keys(held).length > 0;
   if (entered) return <SafeGainsForm vehicle={vehicle} entered={entered} onDone={() => setEntered(undefined)} />;
@@ -76,8 +76,10 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
             <>
               Read back <Time at={vehicle.held_at} />.
             </>
+          ) : vehicle.held === null ? (
+            "Gains not read."
           ) : (
-            "Gains not read yet."
+            "Gains not read since the vehicle restarted."
           )}{" "}
           The safe gains are restored after every flight.
         </Note>

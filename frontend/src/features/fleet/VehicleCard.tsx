@@ -4,7 +4,7 @@ import { Link } from "react-router";
 import { useVehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
-import { linkText } from "../../live/vehicleStatus";
+import { heldGains, linkText } from "../../live/vehicleStatus";
 import { Aside } from "../../ui/Aside";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { withUnit } from "../../ui/format";
@@ -19,7 +19,8 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
   const status = useVehicleStatus(vehicle.registered ? vehicle.id : null);
   const ask = useVehicleRequest(vehicle.id);
   const names = Object.keys(vehicle.safe_gains);
-  const held = Object.keys(vehicle.held ?? {}).length > 0 ? gainsInBrackets(vehicle.held ?? {}, names) : "";
+  const held = heldGains(vehicle, status);
+  const isKnown = Object.keys(held).length > 0;
   const isLinked = vehicle.registered && vehicle.state !== "disconnected";
   return (
     <li className={`${row["card"]} ${classes["card"]}`} data-state={vehicle.state}>
@@ -34,7 +35,9 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
         <dl className={`${classes["facts"]} numbers`}>
           {isLinked && <Fact title="Link" value={linkText(status)} />}
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
-          {vehicle.registered && held !== "" && <Fact title="Current gains" value={held} />}
+          {vehicle.registered && (isKnown || isLinked) && (
+            <Fact title="Current gains" value={isKnown ? gainsInBrackets(held, names) : "not read"} />
+          )}
           <Fact title={`Safe ${names.join(", ")}`} value={gainsInBrackets(vehicle.safe_gains)} />
           {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "no operator"} />}
         </dl>
