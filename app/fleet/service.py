@@ -36,6 +36,7 @@ __all__ = [
     "campaign_vehicle",
     "can_fly",
     "chosen_vehicle",
+    "doubt_gains",
     "get_vehicle",
     "hold_gains",
     "is_classed_automatically",
@@ -49,6 +50,12 @@ __all__ = [
     "set_vehicle_state",
     "simulation_for",
 ]
+
+_GAINS_UNKNOWN: Final = "Its process ended before the safe gains were read back; the gains on the vehicle are unknown."
+_GAINS_WERE_UNKNOWN: Final = (
+    "Its process ended before the safe gains were read back; the gains on the vehicle were unknown until they were "
+    "read again."
+)
 
 
 def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Gains) -> VehicleRow:
@@ -189,6 +196,14 @@ def set_state_after_flight(row: VehicleRow, *, concern: str = "") -> None:
 def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
     """Record the gains that the vehicle reported."""
     row.held, row.held_at = dict(held), utc_now()
+    if row.concern == _GAINS_UNKNOWN:
+        row.concern = _GAINS_WERE_UNKNOWN
+
+
+def doubt_gains(row: VehicleRow) -> None:
+    """Quarantine a vehicle after a flight that ended without a report of its gains."""
+    row.held = row.held_at = None
+    set_state_after_flight(row, concern=_GAINS_UNKNOWN)
 
 
 def is_classed_automatically(row: VehicleRow) -> bool:

@@ -33,7 +33,6 @@ REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 
 _WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "the worker stopped before lift-off"}
-_NOT_VERIFIED: Final = "its process ended before the safe gains were read back; the gains on the vehicle are unknown"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -304,7 +303,7 @@ def _doubt_vehicle(flight: FlightRow) -> None:
     A simulated vehicle starts afresh with every flight.
     """
     if flight.vehicle.is_real:
-        fleet.set_state_after_flight(flight.vehicle, concern=_NOT_VERIFIED)
+        fleet.doubt_gains(flight.vehicle)
 
 
 def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:

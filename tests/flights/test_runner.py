@@ -13,8 +13,9 @@ from sqlalchemy.orm import Session
 
 from app.common.settings import Settings
 from app.common.states import FlightState, TrialState
-from app.db.models import FlightRow
+from app.db.models import FlightRow, VehicleRow
 from app.db.session import Database
+from app.fleet.service import hold_gains
 from app.flights.abort import AbortRegistry
 from app.flights.flight_rows import REQUEST_TIMEOUT
 from app.flights.process_messages import FlightFailure, FlightMessage, FlightRequest, GainsStaged, SafeGainsRestored
@@ -238,6 +239,21 @@ def test_a_process_that_dies_with_the_vehicle_leaves_a_real_one_in_quarantine(
     vehicle = get(client, "/api/vehicles/1")
     assert vehicle["state"] == then
     assert ("the gains on the vehicle are unknown" in vehicle["concern"]) == real
+
+
+def test_a_quarantine_over_unknown_gains_says_when_they_were_read_again(
+    client: TestClient, database: Database, field: RunnerFixture, trial_id: int
+) -> None:
+    make_vehicle_real(database)
+    with database.write() as session:
+        hold_gains(session.get_one(VehicleRow, 1), {"kp": 283.0})
+    field.kill_processes()
+    field.fly_next()
+    assert get(client, "/api/vehicles/1")["held"] is None
+    with database.write() as session:
+        hold_gains(session.get_one(VehicleRow, 1), {"kp": 283.0})
+    concern = get(client, "/api/vehicles/1")["concern"]
+    assert concern.endswith("the gains on the vehicle were unknown until they were read again.")
 
 
 @pytest.mark.parametrize(("real", "then"), [(True, "quarantined"), (False, "ready")])
