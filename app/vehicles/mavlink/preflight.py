@@ -4,7 +4,7 @@ Each check results in an item; the items shown to the operator are the ones that
 """
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
@@ -15,7 +15,7 @@ from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
 from app.vehicles.mavlink.events import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.parameters import read_parameter
-from app.vehicles.mavlink.profiles import base
+from app.vehicles.mavlink.profiles import PROFILES, base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
 from app.vehicles.mavlink.radio import AutopilotLink
 
@@ -86,13 +86,24 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
         heartbeat = radio.seen.heartbeat
         if heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot:
             return _set_target(radio, heartbeat, pinned)
-    makes = sorted(radio.link.other_makes)
-    others = f" Other autopilots were received, by MAV_AUTOPILOT: {makes}." if makes else ""
+    if makes := radio.link.other_makes:
+        raise VehicleError(
+            f"{_named(makes)} {'answers' if len(makes) == 1 else 'answer'} at {address}, not {radio.profile.title}; "
+            "nothing was sent.",
+            hint="Check that the right autopilot is selected, and that no other vehicle sends to this address.",
+        )
     raise VehicleError(
-        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title}.{others}",
+        f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title}.",
         hint="Check that the vehicle is on, that it sends to this computer's port, and that the right autopilot is "
         "selected.",
     )
+
+
+def _named(makes: Iterable[int]) -> str:
+    """The autopilots with these MAV_AUTOPILOT."""
+    titles = {profile.autopilot: profile.title for profile in PROFILES.values()}
+    names = " and ".join(titles.get(make, f"another autopilot ({make})") for make in sorted(makes))
+    return names[:1].upper() + names[1:]
 
 
 def _set_target(radio: AutopilotLink, heartbeat: Heartbeat, pinned: Identity | None) -> None:
