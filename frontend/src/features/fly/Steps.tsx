@@ -7,7 +7,7 @@ import { useTrials } from "../../api/queries";
 import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
 import { ABORT_LABELS, type AbortControl, type AbortStage, abortStage } from "../../live/flights";
-import { useConnection } from "../../live/store";
+import { useConnection, useVehicleStatus } from "../../live/store";
 import { StateBadge } from "../../ui/Badges";
 import { HoldButton } from "../../ui/HoldButton";
 import { ErrorNotice, FailureNotice } from "../../ui/Notices";
@@ -200,6 +200,7 @@ function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; 
   const isInControl = useIsInControl(vehicle);
   const isOthers = vehicle.control !== null && !isInControl;
   const may = isReady && trial.actions.includes("take-off");
+  const isCurrent = useVehicleStatus(vehicle.id)?.isCurrent === true;
   return (
     <Stack gap={12}>
       {(vehicle.is_real || isOthers) && !isInControl && <OperatorControl vehicle={vehicle} />}
@@ -222,12 +223,15 @@ function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; 
       )}
       <Button
         variant="default"
-        disabled={!trial.actions.includes("unstage")}
+        disabled={!trial.actions.includes("unstage") || !isCurrent}
         loading={unstage.isPending}
         onClick={() => unstage.mutate(trial)}
       >
         Unstage (restore safe gains)
       </Button>
+      {!isCurrent && (
+        <p className={classes["quiet"]}>The safe gains can be restored once data is received from the vehicle again.</p>
+      )}
       <ErrorNotice error={takeOff.error ?? unstage.error} />
     </Stack>
   );
