@@ -4,6 +4,7 @@ import {
   ageText,
   before,
   heldGains,
+  isDisarmed,
   type LastHeard,
   linkText,
   messageText,
@@ -109,4 +110,16 @@ test("gains that a connected vehicle has not reported since it restarted are not
   expect(heldGains({ ...stored, state: "disconnected" }, aged(heard({ held: {} }), now))).toEqual({ kp: 1 });
   expect(heldGains({ ...stored, held: null }, null)).toEqual({});
   expect(heldGains({ ...stored, held: null }, aged(heard({ state: "gone" }), now))).toEqual({});
+});
+
+test("a vehicle is disarmed only while it says so", () => {
+  const now = { wallMs: 50_100, steadyMs: 1_100 };
+  const later = { wallMs: 60_000, steadyMs: 11_000 };
+  expect([
+    isDisarmed(aged(heard({ armed: false }), now)),
+    isDisarmed(aged(heard({ armed: false }), later)),
+    isDisarmed(aged(heard(), now)),
+    isDisarmed(aged(heard({ armed: null }), now)),
+    isDisarmed(null),
+  ]).toEqual([true, false, false, false, false]);
 });

@@ -84,6 +84,11 @@ export function heldGains(
   return known.status.held;
 }
 
+/** Whether the vehicle reports now that its motors are off. */
+export function isDisarmed(known: Aged | null): boolean {
+  return known?.isCurrent === true && known.status.armed === false;
+}
+
 /** `0.1 s` up to 10 s; then whole seconds and minutes. */
 export function ageText(ageS: number | null): string {
   if (ageS === null) return "no data";

@@ -6,7 +6,7 @@ import { useRelease } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicleCommands, type VehicleCommand } from "../../api/vehicleCommands";
 import { useVehicleStatus } from "../../live/store";
-import type { Aged } from "../../live/vehicleStatus";
+import { type Aged, isDisarmed } from "../../live/vehicleStatus";
 import { ErrorNotice } from "../../ui/Notices";
 import { SlideToConfirm } from "../../ui/SlideToConfirm";
 import classes from "./Fleet.module.css";
@@ -18,6 +18,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
   const orders = useVehicleCommands(vehicle.id);
   const release = useRelease(vehicle.id);
   const watching = useReadOnlyReason(vehicle) !== null;
+  const isDown = isDisarmed(status);
   return (
     <section className={classes["quarantine"]}>
       <div role="alert">
@@ -28,17 +29,11 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         <p>{vehicle.concern}</p>
       </div>
       <p>
-        Gainline sends it no commands except Land and Motors off. Land it, stop its motors, inspect it, then release it.
+        It cannot be flown; Land, Motors off, Check now and Restore safe gains can still be sent.{" "}
+        {isDown ? "Inspect it, then release it." : "Land it, stop its motors, inspect it, then release it."}
       </p>
       <div className={classes["row"]}>
-        <Button
-          size="lg"
-          color="red"
-          leftSection={<IconArrowBarToDown size={22} aria-hidden />}
-          onClick={() => orders.press("land")}
-        >
-          Land now
-        </Button>
+        <LandNow isDown={isDown} orders={orders} />
         <MotorsOff vehicle={vehicle} status={status} orders={orders} watching={watching} />
       </div>
       <form
@@ -60,6 +55,25 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
       </form>
       <ErrorNotice error={release.error} />
     </section>
+  );
+}
+
+interface LandProps {
+  isDown: boolean;
+  orders: ReturnType<typeof useVehicleCommands>;
+}
+
+/** The Land command; not the main button for a vehicle that is down. */
+export function LandNow({ isDown, orders }: LandProps) {
+  return (
+    <Button
+      size="lg"
+      {...(isDown ? { variant: "default" } : { color: "red" })}
+      leftSection={<IconArrowBarToDown size={22} aria-hidden />}
+      onClick={() => orders.press("land")}
+    >
+      Land now
+    </Button>
   );
 }
 

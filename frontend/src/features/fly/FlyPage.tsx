@@ -1,5 +1,5 @@
-import { Anchor, Button, Skeleton, useComputedColorScheme } from "@mantine/core";
-import { IconAlertOctagonFilled, IconArrowBarToDown, IconChevronLeft } from "@tabler/icons-react";
+import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
+import { IconAlertOctagonFilled, IconChevronLeft } from "@tabler/icons-react";
 import { useCallback, useMemo, useRef } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
@@ -12,12 +12,13 @@ import { type PlotlyFigure, wholeFlight, withChosen, withLimit, withTimeRange } 
 import { type AbortControl, abortStage } from "../../live/flights";
 import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
+import { isDisarmed } from "../../live/vehicleStatus";
 import { VehicleBadge } from "../../ui/Badges";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ReadOnlyNotice } from "../../ui/Notices";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
-import { CommandResult, MotorsOff } from "../fleet/QuarantinePanel";
+import { CommandResult, LandNow, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
 import { type FlyStep, flyStateLabel, flyStep, gainsShown, hasLanded, isAbortStep, isAirborneStep } from "./flyScreen";
 import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
@@ -135,7 +136,9 @@ function Screen({ campaign, trial, vehicle }: Props) {
       <section className={classes["steps"]} aria-label="Next action">
         {readiness !== null && <ReadinessLosses losses={readiness.losses} />}
         <ReadOnlyNotice why={vehicle === null ? null : watching} />
-        {quarantined && vehicle !== null && <Quarantine vehicle={vehicle} concern={concern} orders={orders} />}
+        {quarantined && vehicle !== null && (
+          <Quarantine vehicle={vehicle} concern={concern} isDown={isDisarmed(status)} orders={orders} />
+        )}
         {!barred && (vehicle === null ? <PlainSteps {...steps} /> : <LinkedSteps {...steps} vehicle={vehicle} />)}
         <HeldGains
           asked={trial.gains}
@@ -177,11 +180,12 @@ function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure |
 interface QuarantineProps {
   vehicle: Vehicle;
   concern: string;
+  isDown: boolean;
   orders: ReturnType<typeof useVehicleCommands>;
 }
 
 /** Reason of the quarantine, the Land command, and a link to the release. */
-function Quarantine({ vehicle, concern, orders }: QuarantineProps) {
+function Quarantine({ vehicle, concern, isDown, orders }: QuarantineProps) {
   return (
     <section className={classes["quarantine"]}>
       <div role="alert">
@@ -191,14 +195,7 @@ function Quarantine({ vehicle, concern, orders }: QuarantineProps) {
         </h2>
         <p>{concern}</p>
       </div>
-      <Button
-        size="lg"
-        color="red"
-        leftSection={<IconArrowBarToDown size={22} aria-hidden />}
-        onClick={() => orders.press("land")}
-      >
-        Land now
-      </Button>
+      <LandNow isDown={isDown} orders={orders} />
       {orders.said?.order === "land" && <CommandResult orders={orders} />}
       <Anchor component={Link} to={`/vehicles/${vehicle.id}`} display="inline-block" py={12}>
         Inspect and release {vehicle.name}
