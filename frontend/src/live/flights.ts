@@ -113,3 +113,7 @@ export const ABORT_LABELS: Record<AbortStage, string> = {
   "not confirmed": "NOT CONFIRMED",
   accepted: "ABORTING",
 };
+
+/** What ABORT does while nothing is received from the vehicle. */
+export const ABORT_WITHOUT_LINK =
+  "The link is lost: an abort is sent again until the vehicle confirms it. Use the vehicle's own remote control.";

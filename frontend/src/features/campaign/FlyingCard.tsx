@@ -1,8 +1,8 @@
 import { Button, Stack } from "@mantine/core";
 import { Link, useOutletContext } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
-import { type AbortControl, abortStage } from "../../live/flights";
-import { useIsCurrent, useLiveFlight } from "../../live/store";
+import { ABORT_WITHOUT_LINK, type AbortControl, abortStage } from "../../live/flights";
+import { useIsCurrent, useLiveFlight, useVehicleStatus } from "../../live/store";
 import { isSaturated, readingOf } from "../../live/telemetry";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
@@ -28,6 +28,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const { registered } = campaign.vehicle;
+  const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
   const stage = flyingStage(trial, live);
   const isStale = !useIsCurrent(live) && live !== null && live.timeS.length > 0;
   return (
@@ -76,7 +77,9 @@ export function FlyingCard({ campaign, trial, step }: Props) {
         )}
         {stage !== STAGED && (
           <Note fz="body">
-            ABORT or Space ends the flight immediately: the safe gains are sent and the vehicle lands.
+            {status?.isCurrent === false
+              ? ABORT_WITHOUT_LINK
+              : "ABORT or Space ends the flight immediately: the safe gains are sent and the vehicle lands."}
           </Note>
         )}
       </Stack>

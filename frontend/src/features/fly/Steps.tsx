@@ -6,7 +6,7 @@ import { useFlyTrial } from "../../api/mutations";
 import { useTrials } from "../../api/queries";
 import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
-import { ABORT_LABELS, type AbortControl, type AbortStage, abortStage } from "../../live/flights";
+import { ABORT_LABELS, ABORT_WITHOUT_LINK, type AbortControl, type AbortStage, abortStage } from "../../live/flights";
 import { useConnection, useVehicleStatus } from "../../live/store";
 import { StateBadge } from "../../ui/Badges";
 import { HoldButton } from "../../ui/HoldButton";
@@ -58,7 +58,7 @@ export function LinkedSteps({
     case "unstaging":
       return <Waiting text="Writing the safe gains and reading them back. The flight is then planned again." />;
     case "flying":
-      return <Abort trial={trial} abort={abort} />;
+      return <Abort trial={trial} abort={abort} vehicle={vehicle} />;
     case "judge":
     case "over":
       return (
@@ -130,7 +130,7 @@ export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
     case "over":
       return <FlightReviewCard campaign={campaign} trial={trial} />;
     default:
-      return <Abort trial={trial} abort={abort} />;
+      return <Abort trial={trial} abort={abort} vehicle={null} />;
   }
 }
 
@@ -244,13 +244,22 @@ const ABORT_SAYS: Record<AbortStage, string> = {
   accepted: "Sending safe gains and Land until the vehicle confirms.",
 };
 
-function abortText(stage: AbortStage, isReached: boolean): string {
+function abortText(stage: AbortStage, isReached: boolean, isLinkLost: boolean): string {
+  if (isReached && isLinkLost && (stage === "none" || stage === "accepted")) return ABORT_WITHOUT_LINK;
   if (stage !== "accepted" || isReached) return ABORT_SAYS[stage];
   return "The worker has confirmed the abort, but is not reachable now.";
 }
 
+interface AbortProps {
+  trial: Trial;
+  abort: AbortControl;
+  /** null for a simulation without a link. */
+  vehicle: Vehicle | null;
+}
+
 /** Aborts without confirmation. */
-function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
+function Abort({ trial, abort, vehicle }: AbortProps) {
+  const status = useVehicleStatus(vehicle?.id ?? null);
   const stage = abortStage(trial.id, abort);
   const { state, worker } = useConnection();
   return (
@@ -260,7 +269,7 @@ function Abort({ trial, abort }: { trial: Trial; abort: AbortControl }) {
         {ABORT_LABELS[stage]}
         {stage === "none" && <kbd>Space</kbd>}
       </button>
-      <p className={classes["quiet"]}>{abortText(stage, state === "live" && worker)}</p>
+      <p className={classes["quiet"]}>{abortText(stage, state === "live" && worker, status?.isCurrent === false)}</p>
     </Stack>
   );
 }
