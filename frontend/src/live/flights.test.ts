@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { abortStage, stillUnderWay } from "./flights";
+import { abortReason, abortStage, stillUnderWay } from "./flights";
 
 test("an abort is under way only once the worker has accepted it", () => {
   const none = { asked: new Set<number>(), accepted: new Set<number>(), trouble: null };
@@ -14,4 +14,16 @@ test("an abort of an earlier attempt is forgotten, so that ABORT of the next one
   const asked = new Set([7, 8]);
   expect([...stillUnderWay(asked, new Set([8, 9]))]).toEqual([8]);
   expect(stillUnderWay(asked, new Set([7, 8, 9]))).toBe(asked);
+});
+
+test("an abort from a tab that is not the operator's says so", () => {
+  const control = { operator: "Ada", until: "2026-05-04T10:00:00Z" };
+  const real = { is_real: true, registered: true, control };
+  const elsewhere = { reason: "aborted from another browser" };
+  expect(abortReason(real, { operator: "Ada", token: "a" })).toEqual({});
+  expect(abortReason(real, { operator: "Ben", token: "b" })).toEqual(elsewhere);
+  expect(abortReason(real, undefined)).toEqual(elsewhere);
+  expect(abortReason({ ...real, control: null }, undefined)).toEqual(elsewhere);
+  expect(abortReason({ ...real, control: null, is_real: false }, undefined)).toEqual({});
+  expect(abortReason(undefined, undefined)).toEqual({});
 });

@@ -4,7 +4,10 @@ import { useQuery } from "@tanstack/react-query";
 import { useCallback, useEffect, useRef, useState } from "react";
 import { answer } from "../api/client";
 import { abortTrial, getCampaign, listCampaigns } from "../api/generated";
+import { leasesNow, type OwnLease } from "../api/leases";
 import { problemOf } from "../api/problems";
+import type { Vehicle } from "../api/types";
+import { useVehicles } from "../api/vehicles";
 import { liveFlightsNow } from "./store";
 
 export interface FlyingCampaign {
@@ -12,6 +15,7 @@ export interface FlyingCampaign {
   trialId: number;
   trialNumber: number;
   name: string;
+  vehicleId: number;
   isReal: boolean;
   /** Whether the vehicle is registered, with a process that keeps its link. */
   hasLink: boolean;
@@ -29,6 +33,7 @@ async function readFlying(): Promise<FlyingCampaign[]> {
             trialId: flying.trial_id,
             trialNumber: flying.trial_number,
             name,
+            vehicleId: vehicle.id,
             isReal: vehicle.is_real,
             hasLink: vehicle.registered,
           },
@@ -42,10 +47,21 @@ export function useFlying(): FlyingCampaign[] {
 
 const AGAIN_MS = 400;
 
+type Commanded = Pick<Vehicle, "is_real" | "registered" | "control">;
+
+/** The reason of an abort from this tab, for the server to use its own where the operator pressed it. */
+export function abortReason(vehicle: Commanded | undefined, own: OwnLease | undefined): { reason?: string } {
+  if (vehicle === undefined) return {};
+  const { control, is_real, registered } = vehicle;
+  const isOperators =
+    control === null ? own !== undefined || !(is_real && registered) : own?.operator === control.operator;
+  return isOperators ? {} : { reason: "aborted from another browser" };
+}
+
 /** Why the worker did not accept the abort; null if it did. Without the hint, because the page repeats it itself. */
-async function askToAbort(trialId: number): Promise<string | null> {
+async function askToAbort(trialId: number, body: { reason?: string }): Promise<string | null> {
   try {
-    const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body: {} }));
+    const { accepted, sentence } = await answer(abortTrial({ path: { trial_id: trialId }, body }));
     return accepted ? null : sentence;
   } catch (error) {
     return problemOf(error)?.detail ?? "";
@@ -67,11 +83,21 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
   const [asked, setAsked] = useState<ReadonlySet<number>>(new Set());
   const [accepted, setAccepted] = useState<ReadonlySet<number>>(new Set());
   const [trouble, setTrouble] = useState<string | null>(null);
+  const vehicles = useVehicles().data;
   const inTheAir = useRef<ReadonlySet<number>>(new Set());
+  const reasonOf = useRef<(trialId: number) => { reason?: string }>(() => ({}));
+  reasonOf.current = (trialId) => {
+    const vehicleId = flying.find((one) => one.trialId === trialId)?.vehicleId;
+    if (vehicleId === undefined) return {};
+    return abortReason(
+      vehicles?.find(({ id }) => id === vehicleId),
+      leasesNow().get(vehicleId),
+    );
+  };
   inTheAir.current = new Set(flying.map(({ trialId }) => trialId));
 
   const tell = useCallback(async (trialId: number): Promise<void> => {
-    const refusal = await askToAbort(trialId);
+    const refusal = await askToAbort(trialId, reasonOf.current(trialId));
     const over = !inTheAir.current.has(trialId) && !liveFlightsNow().some((flight) => flight.trialId === trialId);
     setTrouble(over ? null : refusal);
     if (refusal === null) setAccepted((before) => new Set([...before, trialId]));
