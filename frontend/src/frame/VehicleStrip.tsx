@@ -5,7 +5,7 @@ import { useCampaign, useTrial } from "../api/queries";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { useVehicleStatus } from "../live/store";
-import { heldGains, linkText } from "../live/vehicleStatus";
+import { heldGains, linkText, lowBattery } from "../live/vehicleStatus";
 import { VehicleBadge } from "../ui/Badges";
 import { withUnit } from "../ui/format";
 import { gainsInBrackets, inOrder, sameHeld } from "../ui/gains";
@@ -35,6 +35,7 @@ function useFlownVehicle(): number | null {
 function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
   const aged = useVehicleStatus(vehicle.id);
   const stale = aged === null || !aged.isCurrent;
+  const low = lowBattery(vehicle, aged?.status.batteryV);
   const LinkIcon = stale ? IconAntennaBarsOff : IconAntennaBars5;
   return (
     <section className={`${classes["line"]} numbers`} aria-label={`Vehicle ${vehicle.name}`}>
@@ -61,10 +62,16 @@ function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
         <span className="visually-hidden">Link</span>
         {linkText(aged)}
       </span>
-      <span className={classes["fact"]} data-stale={stale || undefined} title={`Battery ${vehicle.battery}`}>
+      <span
+        className={classes["fact"]}
+        data-stale={stale || undefined}
+        data-bad={(low !== "" && !stale) || undefined}
+        title={`Battery ${vehicle.battery}`}
+      >
         <IconBattery3 size={18} aria-hidden />
         <span className="visually-hidden">Battery</span>
         {withUnit(aged?.status.batteryV, "V", 1)}
+        {low !== "" && `, ${low}`}
       </span>
       <HeldGains vehicle={vehicle} held={heldGains(vehicle, aged)} stale={stale} />
       <InControl vehicle={vehicle} />

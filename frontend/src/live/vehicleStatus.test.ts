@@ -7,6 +7,7 @@ import {
   isDisarmed,
   type LastHeard,
   linkText,
+  lowBattery,
   messageText,
   secondsBetween,
   statusFrom,
@@ -122,4 +123,10 @@ test("a vehicle is disarmed only while it says so", () => {
     isDisarmed(aged(heard({ armed: null }), now)),
     isDisarmed(null),
   ]).toEqual([true, false, false, false, false]);
+});
+
+test("a battery below the vehicle's minimum is low", () => {
+  const vehicle = { options: { min_battery_v: 10.5 } };
+  expect(lowBattery(vehicle, 9)).toBe("below 10.5 V");
+  expect([lowBattery(vehicle, 10.5), lowBattery(vehicle, null), lowBattery({ options: {} }, 9)]).toEqual(["", "", ""]);
 });

@@ -1,6 +1,7 @@
 /** Last received status of a connected vehicle, and its age. */
 
 import type { Vehicle } from "../api/types";
+import { withUnit } from "../ui/format";
 
 type LinkState = "connecting" | "connected" | "gone" | "not answering";
 
@@ -87,6 +88,13 @@ export function heldGains(
 /** Whether the vehicle reports now that its motors are off. */
 export function isDisarmed(known: Aged | null): boolean {
   return known?.isCurrent === true && known.status.armed === false;
+}
+
+/** `below 10.5 V` for a battery below the vehicle's minimum; else empty. */
+export function lowBattery({ options }: Pick<Vehicle, "options">, batteryV: number | null | undefined): string {
+  const least = number(options["min_battery_v"]);
+  if (least === null || batteryV === null || batteryV === undefined || batteryV >= least) return "";
+  return `below ${withUnit(least, "V", 1)}`;
 }
 
 /** `0.1 s` up to 10 s; then whole seconds and minutes. */

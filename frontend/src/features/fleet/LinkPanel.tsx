@@ -5,7 +5,7 @@ import { useActs, useEditVehicle } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
 import { useVehicleStatus } from "../../live/store";
-import { linkText, messageText, stepWord } from "../../live/vehicleStatus";
+import { linkText, lowBattery, messageText, stepWord } from "../../live/vehicleStatus";
 import { NOTHING, withUnit } from "../../ui/format";
 import { LabelledValue } from "../../ui/LabelledValue";
 import { Note } from "../../ui/Note";
@@ -95,6 +95,7 @@ function NotConnected({ vehicle }: { vehicle: Vehicle }) {
 /** Label and voltage of the battery. Every flight stores the label. */
 export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
   const status = useVehicleStatus(vehicle.id);
+  const low = lowBattery(vehicle, status?.status.batteryV);
   const edit = useEditVehicle(vehicle.id);
   const [typed, setTyped] = useState<string | null>(null);
   const label = typed ?? vehicle.battery;
@@ -102,7 +103,12 @@ export function BatteryPanel({ vehicle }: { vehicle: Vehicle }) {
     <Panel title="Battery">
       <Stack gap={14}>
         <dl className={`${classes["facts"]} numbers`}>
-          <LabelledValue title="Voltage" value={withUnit(status?.status.batteryV, "V", 1)} stale={!status?.isCurrent} />
+          <LabelledValue
+            title={low === "" ? "Voltage" : `Voltage, ${low}`}
+            value={withUnit(status?.status.batteryV, "V", 1)}
+            stale={!status?.isCurrent}
+            bad={low !== "" && status?.isCurrent === true}
+          />
           <LabelledValue title="Minimum to fly" value={withUnit(Number(vehicle.options["min_battery_v"]), "V", 1)} />
         </dl>
         <form

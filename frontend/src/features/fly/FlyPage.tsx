@@ -117,7 +117,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           unit={unit}
           live={live}
           status={status}
-          hasLink={vehicle !== null}
+          vehicle={vehicle}
           isFlying={isFlying}
           isAborted={isAborted}
           endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}

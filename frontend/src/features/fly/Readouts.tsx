@@ -1,9 +1,9 @@
 import { IconCircleCheckFilled, IconCircleDashed } from "@tabler/icons-react";
 import { useRef } from "react";
-import type { Trial } from "../../api/types";
+import type { Trial, Vehicle } from "../../api/types";
 import { useIsCurrent } from "../../live/store";
 import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
-import { type Aged, ageText, linkText } from "../../live/vehicleStatus";
+import { type Aged, ageText, linkText, lowBattery } from "../../live/vehicleStatus";
 import type { Topic } from "../../ui/explanations";
 import { gainText, NOTHING, withUnit } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
@@ -17,7 +17,8 @@ interface Props {
   live: LiveFlight | null;
   /** null for a vehicle without a permanent link. */
   status: Aged | null;
-  hasLink: boolean;
+  /** null for a simulation without a link. */
+  vehicle: Vehicle | null;
   isFlying: boolean;
   /** Whether the flight was aborted: its error is not scored from then on, and its record has no known end. */
   isAborted: boolean;
@@ -65,12 +66,15 @@ function useLastKnown(value: number | null | undefined): number | null | undefin
 }
 
 /** Large readings: altitude and error, then the rest. Stale readings are grey. */
-export function Readouts({ trial, unit, live, status, hasLink, isFlying, isAborted, endS }: Props) {
+export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAborted, endS }: Props) {
+  const hasLink = vehicle !== null;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const linked = status?.status;
   // After its motors have stopped, the record's last altitude is not the vehicle's.
   const isRecorded = isFlying && (!hasLink || isAirborneStep(linked?.step) || linked?.armed === true);
   const measured = isRecorded ? live?.measured.at(-1) : undefined;
+  const batteryV = linked?.batteryV ?? live?.batteryV;
+  const low = vehicle === null ? "" : lowBattery(vehicle, batteryV);
   const isCurrent = useIsCurrent(live);
   const stale = hasLink ? !(status?.isCurrent ?? false) : isFlying && !isCurrent;
   const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
@@ -106,7 +110,12 @@ export function Readouts({ trial, unit, live, status, hasLink, isFlying, isAbort
             stale={stale}
           />
         )}
-        <Reading title="Battery" value={withUnit(linked?.batteryV ?? live?.batteryV, "V", 1)} stale={stale} />
+        <Reading
+          title={low === "" ? "Battery" : `Battery, ${low}`}
+          value={withUnit(batteryV, "V", 1)}
+          stale={stale}
+          bad={low !== "" && !stale}
+        />
         {hasLink && <LinkReading status={status} />}
         {isScored && <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />}
         {!isFlying && (
