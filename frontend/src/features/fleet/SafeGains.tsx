@@ -81,7 +81,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
           ) : (
             "Gains not read since the vehicle restarted."
           )}{" "}
-          The safe gains are restored after every flight.
+          {isKnown && !sameHeld(held, safe) ? safeGainsWritten(vehicle) : RESTORED}
         </Note>
         <Group gap={10}>
           <Button
@@ -104,6 +104,23 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
       </Stack>
     </Panel>
   );
+}
+
+const RESTORED = "The safe gains are restored after every flight.";
+
+/** When a vehicle that holds other gains is given its safe gains. */
+function safeGainsWritten({ state }: Vehicle): string {
+  switch (state) {
+    case "disconnected":
+      return "The safe gains are written at the next connection.";
+    case "ready":
+      return "The safe gains are written at the next check, restore or flight.";
+    case "quarantined":
+      return "The safe gains are written at the next check or restore.";
+    case "staged":
+    case "flying":
+      return RESTORED;
+  }
 }
 
 interface FormProps {
