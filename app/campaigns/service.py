@@ -36,7 +36,7 @@ from app.common.schemas import LONGEST_NAME, OptionValue, Page, decode_cursor, e
 from app.common.states import CAMPAIGN_ACTIONS, CampaignState, Outcome
 from app.core.definition import Definition as CoreDefinition
 from app.core.experiments import get_experiment
-from app.core.formatting import format_gains, named_flights, percent
+from app.core.formatting import confidence_text, format_gains, named_flights
 from app.core.tuning.confirmation import ComparisonState
 from app.db.models import CampaignRow, RehearsalRow, VehicleRow
 from app.fleet import service as fleet
@@ -325,7 +325,7 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
 def _because(row: CampaignRow, now: ComparisonState, asked: Promotion) -> str:
     assert now.comparison is not None
     assert now.comparison.confidence is not None
-    sure = percent(now.comparison.confidence)
+    sure = confidence_text(now.comparison.confidence)
     return f"{asked.statement} (campaign {row.id}, {named_flights(now.winner.numbers)}: better, {sure} confidence)"
 
 

@@ -41,7 +41,9 @@ def test_gains_that_flew_better_become_the_safe_ones_and_the_act_says_from_which
     assert (promoted["status"], promoted["safe_gains"], promoted["version"]) == (200, best["gains"], 2)
     act = get(client, f"/api/vehicles/{vehicle['id']}/acts")["items"][0]
     assert (act["kind"], act["asked"], act["by"]) == ("safe gains", best["gains"], "Ada")
-    assert act["reason"].startswith("Ada looked at the flights (campaign 1, flight 2: better, ")
+    assert act["reason"].startswith(
+        "Ada looked at the flights (campaign 1, flight 2: better, more than 99.9\u00a0% confidence"
+    )
     assert promote(client, campaign, header)["status"] == 409  # the vehicle's version is 2 now
 
 
