@@ -223,7 +223,7 @@ def find_altitude_behind(watch: TrialObservation) -> Finding | None:
 
 def find_battery(watch: TrialObservation, now_s: float) -> Finding | None:
     if watch.low_since_s is not None and now_s - watch.low_since_s > _LOW_BATTERY_S:
-        return Finding(failure=Failure.BATTERY, why=f"The battery was at {watch.battery_v:.1f} V.")
+        return Finding(failure=Failure.BATTERY, why=f"The battery voltage was low: {watch.battery_v:.1f} V.")
     if now_s - watch.battery_s > _NO_BATTERY_S:
         return Finding(failure=Failure.BATTERY, why=f"No battery voltage was received for {_NO_BATTERY_S:g} s.")
     return None

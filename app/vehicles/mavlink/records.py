@@ -165,7 +165,7 @@ def ending_of(trial: Trial) -> Ending:
 
 def reason_of(trial: Trial) -> str:
     """Return why the flight ended early or does not count, and remarks on its record."""
-    if trial.failure is None or trial.failure is Failure.OPERATOR:
+    if trial.failure in {None, Failure.OPERATOR, Failure.BATTERY}:
         reason = trial.why
     else:
         reason = f"{RESPONSES[trial.failure].text} {trial.why}"

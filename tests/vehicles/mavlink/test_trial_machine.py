@@ -610,7 +610,10 @@ def test_a_quarantine_also_lists_later_concerns() -> None:
     walk = aborting()
     reboot(walk)
     walk.touch_down()
-    assert (walk.state, walk.trial.why) == (State.QUARANTINE, "The battery was at 10.0 V. The vehicle rebooted.")
+    assert (walk.state, walk.trial.why) == (
+        State.QUARANTINE,
+        "The battery voltage was low: 10.0 V. The vehicle rebooted.",
+    )
     walk = recording()
     reboot(walk)
     walk.touch_down()

@@ -80,7 +80,7 @@ def test_a_window_that_the_flight_plan_would_cut_short_is_refused_on_the_ground(
 FAULTS = [
     ("link-lost:3@3", "invalid", "The link was lost in flight"),
     ("frozen-position:2@3", "invalid", "froze while packets still arrived"),
-    ("low-battery@3", "invalid", "The battery was at 9.0 V"),
+    ("low-battery@3", "invalid", "The battery voltage was low: 9.0 V."),
     ("no-lift-off@0", "aborted", "It was still on the ground 1.5 s after the command"),
     ("jumping-position:3@3", "invalid", "samples were dropped"),
     ("jumping-position:1.2@3", "completed", "samples jumped and were dropped."),
