@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Final, NoReturn
 
 from app.core.errors import InputError, Problem
+from app.core.formatting import format_gains
 from app.core.policy import Gains
 from app.vehicles.base import OptionValue, SafeGainsError, Vehicle, VehicleError, find_mismatch
 from app.vehicles.f16 import LTI
@@ -90,7 +91,9 @@ def restore_safe_gains(vehicle: Vehicle) -> dict[str, float]:
     try:
         held = vehicle.stage(wanted)
     except Exception as error:
-        raise SafeGainsError(f"The vehicle's safe gains {wanted} could not be set: {error}", hint=hint) from error
+        raise SafeGainsError(
+            f"The vehicle's safe gains ({format_gains(wanted)}) could not be set: {error}", hint=hint
+        ) from error
     if mismatch := find_mismatch(held, wanted):
         raise SafeGainsError(f"The vehicle does not hold its safe gains: {mismatch}.", hint=hint)
     return held
