@@ -38,13 +38,13 @@ from app.live.messages import FlightPhase, Phase, Telemetry
 from app.processes import ignore_stop_signals
 from app.processes.locks import LockedError, exclusive
 from app.vehicles.base import (
-    MOTORS_OFF_REQUESTED,
     FlightRecord,
     SafeGainsError,
     Sample,
     StopRequest,
     Vehicle,
     VehicleError,
+    motors_off_requested,
 )
 from app.vehicles.jsbsim import prepare
 from app.vehicles.registry import open_vehicle
@@ -240,8 +240,8 @@ def run_simulations(pipe: Connection, data_dir: Path, clock: Clock) -> None:
 def mark_if_requested(record: FlightRecord, reasons: Collection[str]) -> FlightRecord:
     """Return the record with `on_request` set: whether the flight was aborted for one of these reasons, which were sent
     by the worker, and not for a limit."""
-    stated = record.reason.removeprefix(MOTORS_OFF_REQUESTED)
-    asked = record.ending == "aborted" and any(stated.startswith(reason) for reason in reasons)
+    begins = tuple(text for reason in reasons for text in (reason, motors_off_requested(reason)))
+    asked = record.ending == "aborted" and record.reason.startswith(begins)
     return replace(record, on_request=asked)
 
 

@@ -85,7 +85,15 @@ class StopRequest:
 
 
 ShouldStop = Callable[[], StopRequest | None]
-MOTORS_OFF_REQUESTED: Final = "Motors off was requested: "
+
+
+def requested(command: str, reason: str) -> str:
+    """`Land was requested: too low.`; `Land was requested by the operator.` for a reason that begins so."""
+    return f"{command} was {reason}." if reason.startswith("requested ") else f"{command} was requested: {reason}."
+
+
+def motors_off_requested(reason: str) -> str:
+    return requested("Motors off", reason)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,8 +101,7 @@ class FlightRecord:
     """Result of a flight: its trajectory at full rate, how it ended, and the reason if it ended early.
 
     If `should_stop` ended the flight before any limit did, `reason` begins with the reason of the stop request, or with
-    `MOTORS_OFF_REQUESTED` followed by it. The caller that requested the stop then sets `on_request` of the aborted
-    flight.
+    `motors_off_requested` of it. The caller that requested the stop then sets `on_request` of the aborted flight.
     """
 
     trajectory: Trajectory

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Final
 
 from app.core.experiments.takeoff import WINDOW_S
-from app.vehicles.base import MOTORS_OFF_REQUESTED, RECORDED_BEYOND_S
+from app.vehicles.base import RECORDED_BEYOND_S, motors_off_requested
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     Action,
@@ -328,7 +328,7 @@ def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
     """Stop the motors at once, at any height; disarm repeats the command. A trial that has not failed is aborted."""
     if trial.stopped:
         return trial, ()
-    why, failure = joined(trial.why, f"{MOTORS_OFF_REQUESTED}{reason}."), trial.failure or Failure.OPERATOR
+    why, failure = joined(trial.why, motors_off_requested(reason)), trial.failure or Failure.OPERATOR
     trial = replace(trial, failure=failure, why=why, stopped=True, answered=False, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)

@@ -18,6 +18,8 @@ from app.vehicles.base import (
     Sample,
     ShouldStop,
     VehicleError,
+    motors_off_requested,
+    requested,
 )
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, limit_checks, parameters, preflight, records
@@ -292,12 +294,12 @@ class MavlinkVehicle:
 
     def land(self, reason: str) -> None:
         """Command the vehicle to land at once, in any state. Raises VehicleError if it cannot be commanded."""
-        self._requested = f"Land was requested: {reason}."
+        self._requested = requested("Land", reason)
         self._repeated = RepeatedCommand(self._radio, Action.LAND)
 
     def motors_off(self, reason: str) -> None:
         """Stop the motors at once, at any height."""
-        self._requested = f"Motors off was requested: {reason}."
+        self._requested = motors_off_requested(reason)
         self._repeated = RepeatedCommand(self._radio, Action.KILL)
 
     def log_to(self, path: Path | None) -> None:
@@ -352,7 +354,7 @@ class MavlinkVehicle:
         try:
             self._set_up()
         except VehicleError as error:
-            self._observe(str(error) if not self._decided else f"Its safe gains could not be verified: {error}")
+            self._observe(str(error) if not self._decided else f"Its safe gains could not be verified. {error}")
             return False
         if self._state in QUARANTINE_STATES and not was_observed:
             return False
@@ -558,7 +560,7 @@ class MavlinkVehicle:
             self._check_identity()
             if self._state not in QUARANTINE_STATES:
                 self._enter(State.QUARANTINE)
-                self._why = f"Its safe gains could not be verified: {error}"
+                self._why = f"Its safe gains could not be verified. {error}"
         finally:
             self._is_restoring = False
 

@@ -172,6 +172,7 @@ def test_the_report_says_which_aborts_count(client: TestClient, database: Databa
         ("aborted", "enough", {"enough"}, True),
         ("aborted", "enough 4 samples jumped and were dropped.", {"enough"}, True),
         ("aborted", "Motors off was requested: people below.", {"people below"}, True),
+        ("aborted", "Motors off was requested by the operator.", {"requested by the operator"}, True),
         ("aborted", "A safety limit was exceeded. It rose to 4.6 m.", {"enough"}, False),
         ("aborted", "A safety limit was exceeded. It rose to 4.6 m. Motors off was requested: hot.", {"hot"}, False),
         ("invalid", "enough", {"enough"}, False),
