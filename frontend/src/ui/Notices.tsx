@@ -1,6 +1,6 @@
 import { IconAlertTriangle, IconEye, IconLockOpen } from "@tabler/icons-react";
 import { formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
-import { stopped } from "./format";
+import { asSentence, stopped } from "./format";
 import classes from "./Notices.module.css";
 
 interface Props {
@@ -19,7 +19,9 @@ export function ErrorNotice({ error, shown = [] }: Props) {
 /** Why something failed earlier, as the server has stored it. Renders nothing without a reason. */
 export function FailureNotice({ reason }: { reason: string }) {
   if (reason === "") return null;
-  return <ProblemNotice problem={{ status: 0, title: reason, detail: "", hint: "", problems: [] }} shown={[]} />;
+  return (
+    <ProblemNotice problem={{ status: 0, title: asSentence(reason), detail: "", hint: "", problems: [] }} shown={[]} />
+  );
 }
 
 /** What the server's names stand for on a page. */

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import {
   against,
+  asSentence,
   bytesText,
   count,
   flightNumbers,
@@ -21,6 +22,8 @@ import {
 
 test("an error is printed to the millimetre, with its unit", () => {
   expect(withUnit(0.13189333802782058, "m")).toBe("0.132 m");
+  expect(withUnit(-0.001, "m", 2)).toBe("0.00 m");
+  expect(withUnit(-0.15, "m", 2)).toBe("−0.15 m");
   expect(withUnit(null, "m")).toBe(NOTHING);
   expect(withUnit(Number.NaN, "m")).toBe(NOTHING);
 });
@@ -154,4 +157,10 @@ test("an error of more than twice another is a multiple of it", () => {
 test("a reason ends with one full stop", () => {
   const reasons = ["is a log of another autopilot", "is too long.", "Which one?"];
   expect(reasons.map(stopped)).toEqual(["is a log of another autopilot.", "is too long.", "Which one?"]);
+});
+
+test("a fragment becomes a sentence", () => {
+  expect(asSentence("its process ended")).toBe("Its process ended.");
+  expect(asSentence("The vehicle rebooted.")).toBe("The vehicle rebooted.");
+  expect(asSentence("")).toBe("");
 });

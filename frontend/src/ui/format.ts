@@ -5,7 +5,12 @@ export const NOTHING = "–";
 /** Errors are known to about a millimetre: three digits after the point. */
 export function withUnit(value: number | null | undefined, unit: string, digits = 3): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
-  return `${value.toFixed(digits)}${unitAfter(unit)}`;
+  return `${trueMinus(value.toFixed(digits))}${unitAfter(unit)}`;
+}
+
+/** A number as text with a true minus, which a zero does not have. */
+function trueMinus(text: string): string {
+  return /^-0(\.0*)?$/.test(text) ? text.slice(1) : text.replace(/^-/, "−");
 }
 
 /** A unit as it follows a number; nothing for a number without one, which the catalogue calls 1. */
@@ -35,12 +40,17 @@ export function against(percent: number, base: string): string {
 /** A gain: whole numbers as they are, others in four digits, with a true minus. */
 export function gainText(value: number): string {
   const text = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(4)));
-  return text.replace(/^-/, "−");
+  return trueMinus(text);
 }
 
 /** A text as a sentence: with a full stop, unless it ends with a punctuation mark. */
 export function stopped(text: string): string {
   return /^$|[.!?…:]["”)]?$/.test(text) ? text : `${text}.`;
+}
+
+/** A text as a sentence of its own: with a capital letter and a full stop. */
+export function asSentence(text: string): string {
+  return stopped(text.charAt(0).toUpperCase() + text.slice(1));
 }
 
 /** Local date and time; with the year if it is not the current one. */

@@ -94,7 +94,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
     <>
       {suggestion !== null && (
         <Text w="100%" fz="body" lh={1.4}>
-          Suggested: <strong>{suggestion.outcome}</strong> ({suggestion.why}).
+          Suggested: <strong>{suggestion.outcome}</strong> ({suggestion.why.replace(/\.$/, "")}).
           {suggestion.outcome === "invalid" && ` ${consequenceOf(trial, trials, "invalid")}`}
         </Text>
       )}

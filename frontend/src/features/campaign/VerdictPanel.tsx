@@ -8,7 +8,7 @@ import type { Campaign, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import type { Topic } from "../../ui/explanations";
-import { flightsText, percentChange, percentText, withUnit } from "../../ui/format";
+import { asSentence, flightsText, percentChange, percentText, withUnit } from "../../ui/format";
 import { GainList } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
@@ -111,9 +111,9 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {asked}
         </Text>
       )}
-      {!isScored(trial) && <p className={classes["sentence"]}>{sentenceOf(trial)}</p>}
+      {!isScored(trial) && <p className={classes["sentence"]}>{asSentence(sentenceOf(trial))}</p>}
       {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
-        <p className={classes["reason"]}>{trial.reason}</p>
+        <p className={classes["reason"]}>{asSentence(trial.reason)}</p>
       )}
       <AbortCause trial={trial} />
       <TrialComparisons trial={trial} best={bestBeforeTitle(trial, trials).toLowerCase()} unit={unit} />

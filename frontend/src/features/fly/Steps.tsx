@@ -9,6 +9,7 @@ import { useFlyActions } from "../../api/vehicleCommands";
 import { ABORT_LABELS, ABORT_WITHOUT_LINK, type AbortControl, type AbortStage, abortStage } from "../../live/flights";
 import { useConnection, useVehicleStatus } from "../../live/store";
 import { StateBadge } from "../../ui/Badges";
+import { asSentence } from "../../ui/format";
 import { HoldButton } from "../../ui/HoldButton";
 import { ErrorNotice, FailureNotice } from "../../ui/Notices";
 import { trialStateLabel } from "../../ui/states";
@@ -320,7 +321,7 @@ function FlightReviewCard({ campaign, trial }: FlightReviewCardProps) {
         <PredictionResult trial={trial} />
         <FlightMarkers trial={trial} />
       </p>
-      {trial.state !== "captured" && <p className={classes["say"]}>{sentenceOf(trial)}</p>}
+      {trial.state !== "captured" && <p className={classes["say"]}>{asSentence(sentenceOf(trial))}</p>}
       <AbortCause trial={trial} />
       <Stack gap={8}>
         <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} campaign={campaign} />
