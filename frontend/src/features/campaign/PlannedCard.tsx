@@ -4,11 +4,12 @@ import { Link } from "react-router";
 import { type RecordUpload, useCancelTrial, useFlyTrial } from "../../api/mutations";
 import type { Campaign, Trial } from "../../api/types";
 import { gainText, withUnit } from "../../ui/format";
-import { ErrorNotice, FailureNotice } from "../../ui/Notices";
+import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { intervalText } from "../../ui/uncertainty";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
+import { FlightProblem } from "./FlightProblem";
 import { FlightWindow } from "./FlightWindow";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
@@ -53,7 +54,7 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
           )}
         </dl>
         <FlightWindow definition={campaign.definition} />
-        <FailureNotice reason={trial.flight?.problem ?? ""} />
+        <FlightProblem flight={trial.flight} />
         {can_fly ? (
           <>
             {!needs_staging && (

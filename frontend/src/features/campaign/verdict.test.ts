@@ -11,6 +11,7 @@ import {
   consequenceOf,
   endingOf,
   heldGainsNotice,
+  isWithdrawnByOperator,
   marksOf,
   otherClasses,
   predictionResult,
@@ -209,4 +210,12 @@ test("a scatter without a repeated gain set is named as the prior's", () => {
   const group = (...errors: number[]) => ({ errors }) as unknown as CampaignStatistics["groups"][number];
   expect(scatterMeaning({ sigma: 0.01, groups: [group(0.3), group(0.1)] })).toContain("prior");
   expect(scatterMeaning({ sigma: 0.01, groups: [group(0.3, 0.31), group(0.1)] })).not.toContain("prior");
+});
+
+test("a flight that the operator unstaged did not fail", () => {
+  const flight = (state: string, problem: string) => ({ flight: { id: 1, state, problem } }) as Trial;
+  expect(isWithdrawnByOperator(flight("cancelled", "unstaged by the operator"))).toBe(true);
+  expect(isWithdrawnByOperator(flight("cancelled", "it could not be started within 10 s"))).toBe(false);
+  expect(isWithdrawnByOperator(flight("failed", "The vehicle did not arm."))).toBe(false);
+  expect(isWithdrawnByOperator({ flight: null })).toBe(false);
 });

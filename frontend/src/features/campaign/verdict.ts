@@ -84,6 +84,11 @@ export function sentenceOf(trial: Trial): string {
   return trial.reason.charAt(0).toUpperCase() + trial.reason.slice(1);
 }
 
+/** Whether the operator withdrew the last flight before it took off, as by unstaging. */
+export function isWithdrawnByOperator({ flight }: Pick<Trial, "flight">): boolean {
+  return flight !== null && flight.state === "cancelled" && flight.problem.endsWith("by the operator");
+}
+
 type AbortWord = "behaved badly" | "something else";
 
 /** Whether an aborted flight counts against its gains; empty for other flights. */

@@ -11,10 +11,11 @@ import { useConnection, useVehicleStatus } from "../../live/store";
 import { StateBadge } from "../../ui/Badges";
 import { asSentence } from "../../ui/format";
 import { HoldButton } from "../../ui/HoldButton";
-import { ErrorNotice, FailureNotice } from "../../ui/Notices";
+import { ErrorNotice } from "../../ui/Notices";
 import { trialStateLabel } from "../../ui/states";
 import { FlightMarkers, PredictionResult } from "../campaign/FlightMarkers";
 import { FlightNotes } from "../campaign/FlightNotes";
+import { FlightProblem } from "../campaign/FlightProblem";
 import { AbortCause, FlightReview } from "../campaign/FlightReview";
 import { speedOf, wantsRehearsal } from "../campaign/nextStep";
 import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
@@ -123,7 +124,7 @@ export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
               </Anchor>
             </p>
           )}
-          <FailureNotice reason={trial.flight?.problem ?? ""} />
+          <FlightProblem flight={trial.flight} />
           <ErrorNotice error={fly.error} />
         </Stack>
       );
@@ -170,7 +171,7 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
           </Anchor>
         </p>
       )}
-      <FailureNotice reason={trial.flight?.problem ?? ""} />
+      <FlightProblem flight={trial.flight} />
       <PreflightChecks checks={vehicle.checks ?? []} />
       <Button
         size="xl"
