@@ -193,7 +193,7 @@ class GainStore:
         except VehicleError as error:
             return str(error)
         mismatch = find_mismatch(held, self.safe)
-        return mismatch and f"its safe gains are not set: {mismatch}."
+        return mismatch and f"Its safe gains are not set: {mismatch}."
 
     @property
     def wanted(self) -> Gains:

@@ -377,7 +377,7 @@ def _restoring(trial: Trial, event: Event) -> Step:
     if not isinstance(event, GainsRestored):
         return trial, ()
     if event.problem:
-        return quarantine(trial, f"Its safe gains could not be verified: {event.problem}", event.now_s)
+        return quarantine(trial, f"Its safe gains could not be verified. {event.problem}", event.now_s)
     if trial.doubt:
         return quarantine(trial, "", event.now_s)
     return enter(trial, State.IDLE, event.now_s), ()

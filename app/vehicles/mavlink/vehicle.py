@@ -272,7 +272,7 @@ class MavlinkVehicle:
             raise SafeGainsError(self.concern, hint=_ANOTHER)
         self._require_uid()
         if problem := self._restore_all():
-            raise SafeGainsError(f"The vehicle does not accept its earlier values: {problem}", hint=_SET_BY_HAND)
+            raise SafeGainsError(f"The vehicle does not accept its earlier values. {problem}", hint=_SET_BY_HAND)
         return dict(self._gains.held)
 
     def change_safe_gains(self, safe_gains: Gains) -> None:

@@ -601,9 +601,9 @@ def test_a_vehicle_that_stays_armed_is_disarmed_again_and_then_quarantined() -> 
 
 
 def test_safe_gains_that_cannot_be_verified_quarantine_the_vehicle() -> None:
-    walk = restoring().restore("it holds {'kp': 1600} instead of {'kp': 283}.")
+    walk = restoring().restore("Its safe gains are not set: kp is 1600 instead of 283.")
     assert walk.state is State.QUARANTINE
-    assert "Its safe gains could not be verified: it holds" in walk.trial.why
+    assert "Its safe gains could not be verified. Its safe gains are not set: kp" in walk.trial.why
 
 
 def test_a_quarantine_also_lists_later_concerns() -> None:
