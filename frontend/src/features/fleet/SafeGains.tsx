@@ -109,14 +109,14 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
 const RESTORED = "The safe gains are restored after every flight.";
 
 /** When a vehicle that holds other gains is given its safe gains. */
-function safeGainsWritten({ state }: Vehicle): string {
+function safeGainsWritten({ state, identity }: Vehicle): string {
   switch (state) {
     case "disconnected":
-      return "The safe gains are written at the next connection.";
+      return identity === null ? RESTORED : "The safe gains are written at the next connection.";
     case "ready":
       return "The safe gains are written at the next check, restore or flight.";
     case "quarantined":
-      return "The safe gains are written at the next check or restore.";
+      return "The safe gains are written when they are restored or the vehicle is released.";
     case "staged":
     case "flying":
       return RESTORED;
