@@ -1,7 +1,6 @@
 /** Last received status of a connected vehicle, and its age. */
 
 import type { Vehicle } from "../api/types";
-import { withUnit } from "../ui/format";
 
 type LinkState = "connecting" | "connected" | "gone" | "not answering";
 
@@ -94,7 +93,7 @@ export function isDisarmed(known: Aged | null): boolean {
 export function lowBattery({ options }: Pick<Vehicle, "options">, batteryV: number | null | undefined): string {
   const least = number(options["min_battery_v"]);
   if (least === null || batteryV === null || batteryV === undefined || batteryV >= least) return "";
-  return `below ${withUnit(least, "V", 1)}`;
+  return `below ${least.toFixed(1)} V`;
 }
 
 /** `0.1 s` up to 10 s; then whole seconds and minutes. */
