@@ -55,7 +55,10 @@ def rehearsal_result(trials: Sequence[RehearsalTrial], outcome: Outcome | None) 
 
 
 def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
-    """State of a campaign's latest rehearsal with exactly the same definition, safe gains included."""
+    """State of a campaign's latest rehearsal with exactly the same definition, safe gains included.
+
+    After the campaign's first flight both are frozen, so later safe gains of the vehicle need no other rehearsal.
+    """
     if not fleet.needs_staging(campaign.vehicle):
         return _NOT_NEEDED
     held = repository.rehearsals(session, campaign.id)

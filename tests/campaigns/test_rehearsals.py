@@ -4,6 +4,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.campaigns.definitions import definition_of
+from app.campaigns.proposals import start_flying
 from app.campaigns.rehearsals import RehearsalTrial, rehearsal_of, rehearsal_result
 from app.campaigns.service import get_row
 from app.common.states import Outcome, TrialState
@@ -141,6 +142,22 @@ def test_another_definition_and_other_safe_gains_want_another_one(
     [flown] = get(client, f"/api/campaigns/{rehearsal['id']}/trials")["items"]
     first = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]
     assert flown["gains"] == first["gains"]
+
+
+def test_safe_gains_set_after_the_first_flight_want_no_other_one(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    put_rehearsal(client, database, campaign)
+    with database.write() as session:
+        row = get_row(session, campaign["id"])
+        rehearsed = dict(row.vehicle.safe_gains)
+        start_flying(row)
+    softer = {"version": 1, "safe_gains": {"kp": 250, "ki": 13, "kd": 82}, "statement": "Ada: softer"}
+    assert client.patch(f"/api/vehicles/{campaign['vehicle']['id']}", json=softer).status_code == 200
+    assert again(client, campaign)["rehearsal"]["state"] == "passed"
+    with database.read() as session:
+        row = get_row(session, campaign["id"])
+        assert (row.safe_gains, row.vehicle.safe_gains) == (rehearsed, softer["safe_gains"])
 
 
 def test_where_no_simulation_flies_the_experiment_a_simulated_vehicle_is_asked_for(
