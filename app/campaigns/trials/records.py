@@ -163,8 +163,9 @@ def capture(
         score(experiment, repaired(experiment, recorded, glitches), accept_gaps=True).error if glitches else None
     )
     keep_response(row, judged.response)
-    if ending == "aborted":
+    if ending != "completed":  # the record may go on through the landing
         row.settling_time_s = row.steady_state_error_m = None
+        row.overshoot_m = row.overshoot_m or None
     row.curve = judged.curve
     row.landing_battery_v = landing_battery_v(recorded)
     row.ending = ending

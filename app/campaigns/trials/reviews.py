@@ -7,7 +7,7 @@ from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.history import set_trial_state
-from app.campaigns.trials.records import score
+from app.campaigns.trials.records import Score, keep_response, score
 from app.campaigns.trials.schemas import AbortJudgement, Classification, Trial
 from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action, check_transition, check_version
@@ -39,7 +39,11 @@ def classify_trial(
     check_action(TRIAL_ACTIONS, "classify", row.state, f"Flight {row.number}")
     check_transition(TRIAL_TRANSITIONS, row.state, outcome, f"Flight {row.number}")
     check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
-    row.error = _counted_error(session, campaign, row) if outcome == TrialState.VALID else None
+    row.error = None
+    if outcome == TrialState.VALID:
+        counted = _counted_score(session, campaign, row)
+        row.error = counted.error
+        keep_response(row, counted.response)
     set_trial_state(row, outcome, reason=classification.reason)
     row.version += 1
     proposals.history_changed(session, campaign)
@@ -73,8 +77,8 @@ def judge_abort(
     return trial_view(session, campaign, row)
 
 
-def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> float:
-    """Error of a flight that a person counts in spite of its gaps. Raises InputError for an aborted or unscorable
+def _counted_score(session: Session, campaign: CampaignRow, row: TrialRow) -> Score:
+    """Score of a flight that a person counts in spite of its gaps. Raises InputError for an aborted or unscorable
     flight."""
     if row.ending == "aborted":
         raise InputError(
@@ -94,4 +98,4 @@ def _counted_error(session: Session, campaign: CampaignRow, row: TrialRow) -> fl
             hint="Leave it invalid and fly the gains again.",
             problems=(Problem("outcome", reason),),
         )
-    return judged.error
+    return judged

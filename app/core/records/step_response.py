@@ -31,12 +31,13 @@ class StepResponse:
     above the set point.
 
     The rise time is None if 90 % was never reached. The settling time is None if the output was outside the band at the
-    end of the window; this and the steady-state error are None if the record ends before the window does.
+    end of the window. If the record ends before the window does, settling time and steady-state error are None, and so
+    is the overshoot unless the set point was reached.
     """
 
     rise_time_s: float | None
     settling_time_s: float | None
-    overshoot: float
+    overshoot: float | None
     steady_state_error: float | None
 
 
@@ -56,7 +57,7 @@ def step_response(time_s: Samples, values: Samples, set_point: SetPoint, stop_s:
     return StepResponse(
         rise_time_s=None if low is None or high is None else high - low,
         settling_time_s=_settled(at, output - target, SETTLING_BAND * target) if covered else None,
-        overshoot=excess,
+        overshoot=excess if covered or output.max() >= target else None,
         steady_state_error=_mean(at, output - target, stop_s - STEADY_S) if covered else None,
     )
 

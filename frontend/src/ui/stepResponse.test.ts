@@ -22,5 +22,6 @@ test("each measure prints with its unit, a signed one with its sign, and a missi
 
 test("a flight without a step of its set point has no response", () => {
   expect(hasStepResponse(flight)).toBe(true);
-  expect(hasStepResponse({ ...flight, overshoot_m: null })).toBe(false);
+  expect(hasStepResponse({ ...flight, overshoot_m: null })).toBe(true);
+  expect(hasStepResponse({ ...flight, overshoot_m: null, rise_time_s: null })).toBe(false);
 });

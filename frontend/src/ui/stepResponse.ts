@@ -25,9 +25,10 @@ export const MEASURES: readonly Measure[] = [
   { name: "steady_state_error_m", title: "Steady-state error", unit: "m", topic: "steadyStateError", digits: 3 },
 ];
 
-/** Whether the flight has a step response: not without a record, nor with a set point of zero. */
+/** Whether the flight has a step response: not without a record, nor with a set point of zero, nor if it ended during
+ * the climb. */
 export function hasStepResponse(flight: StepResponse): boolean {
-  return flight.overshoot_m !== null;
+  return flight.overshoot_m !== null || flight.rise_time_s !== null;
 }
 
 /** `+0.012 m` for a signed measure, `1.34 s` for others; a dash if there is none. A complete flight may not settle. */

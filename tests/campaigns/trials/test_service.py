@@ -35,6 +35,21 @@ def classify(client: TestClient, trial_id: int, outcome: str) -> int:
     return answer.status_code
 
 
+def test_only_a_completed_flight_has_a_steady_state_until_a_person_counts_it(
+    client: TestClient, database: Database
+) -> None:
+    """A record can go on through the landing of a flight that the program ended."""
+    campaign = create_ready_campaign(client, database, definition=PATIENT)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), create_record(ending="invalid", reason="The battery voltage is low."))
+    measured = ("settling_time_s", "overshoot_m", "steady_state_error_m")
+    ended = get(client, f"/api/trials/{trial['id']}")
+    assert [ended[name] for name in measured] == [None] * 3
+    assert classify(client, trial["id"], "valid") == 200
+    counted = get(client, f"/api/trials/{trial['id']}")
+    assert None not in [counted[name] for name in measured]
+
+
 def test_a_landing_outdates_what_was_planned_from_the_same_proposal(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     first, second = (create_trial(client, campaign["id"]) for _ in range(2))

@@ -77,6 +77,13 @@ def test_a_flight_broken_off_has_no_steady_state() -> None:
     found = respond(np.minimum(np.maximum(short, 0.0), 3.0), short)
     assert found.rise_time_s == pytest.approx(2.4, abs=2 * STEP_S)
     assert (found.settling_time_s, found.steady_state_error) == (None, None)
+    assert found.overshoot == 0.0
+
+
+def test_a_flight_broken_off_below_the_set_point_has_no_overshoot() -> None:
+    short = TIME_S[TIME_S < 6.0]
+    assert respond(np.full_like(short, 2.0), short).overshoot is None
+    assert respond(np.full_like(TIME_S, 2.0)).overshoot == 0.0
 
 
 def test_a_flight_that_never_reached_90_percent_has_no_rise_time() -> None:
