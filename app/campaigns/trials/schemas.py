@@ -214,6 +214,9 @@ class Trial(Schema):
         float | None, Field(description="error with the glitches replaced by straight lines; null without glitches")
     ]
     record: RecordBrief | None
+    may_be_valid: Annotated[
+        bool, Field(description="whether its record covers the scored window, so that it can be marked valid")
+    ]
     flight: FlightBrief | None
     seed: int
     speed: float | None

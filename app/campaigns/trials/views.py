@@ -22,6 +22,7 @@ from app.core.experiments import get_experiment
 from app.core.experiments.base import Scatter
 from app.core.formatting import named_flights, percent, without_word
 from app.core.policy import Gains
+from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
 from app.core.statistics.comparisons import Group, PooledScatter, compare, groups_of, pool_scatter
 from app.core.tuning.predictions import is_informative
@@ -173,6 +174,7 @@ def _view(
         glitches=[Glitch.model_validate(glitch) for glitch in row.glitches or ()],
         repaired_error=row.repaired_error,
         record=_record(row),
+        may_be_valid=_may_be_valid(campaign, row),
         flight=_flight(flight),
         seed=row.seed,
         speed=flight.speed if flight else None,
@@ -286,6 +288,13 @@ def _record(trial: TrialRow) -> RecordBrief | None:
         units=_units(row.columns[1:]),
         checksum=row.checksum,
     )
+
+
+def _may_be_valid(campaign: CampaignRow, row: TrialRow) -> bool:
+    """Whether a person may mark the flight valid. Without its record, which is large: its last time is in the curve."""
+    if row.state not in {TrialState.CAPTURED, TrialState.INVALID} or row.ending == "aborted" or not row.curve:
+        return row.state == TrialState.VALID
+    return row.curve[-1][0] >= float(experiment_of_campaign(campaign).grid_s[-1]) - MAX_GAP_S
 
 
 def _units(channels: Iterable[str]) -> dict[str, str]:

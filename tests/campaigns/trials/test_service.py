@@ -97,6 +97,18 @@ def test_a_lost_flight_outdates_nothing(client: TestClient, database: Database) 
     assert get(client, f"/api/trials/{waiting['id']}")["state"] == "planned"
 
 
+@pytest.mark.parametrize(("until_s", "may_be_valid"), [(20.0, False), (33.0, True)])
+def test_only_a_record_that_covers_the_window_may_be_marked_valid(
+    client: TestClient, database: Database, until_s: float, may_be_valid: bool
+) -> None:
+    campaign = create_ready_campaign(client, database, definition=PATIENT)
+    trial = create_trial(client, campaign["id"], fly={"speed": None})
+    land(database, lift_off(database), create_record(ending="invalid", reason="low battery", until_s=until_s))
+    ended = get(client, f"/api/trials/{trial['id']}")
+    assert (ended["state"], ended["may_be_valid"]) == ("invalid", may_be_valid)
+    assert classify(client, trial["id"], "valid") == (200 if may_be_valid else 422)
+
+
 def test_a_flight_that_was_broken_off_never_counts_as_complete(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
@@ -108,6 +120,7 @@ def test_a_flight_that_was_broken_off_never_counts_as_complete(client: TestClien
     )
     assert answer.status_code == 422
     assert problems_of(answer) == {"outcome": "cannot be valid: the flight was aborted"}
+    assert not get(client, f"/api/trials/{trial['id']}")["may_be_valid"]
     assert get(client, f"/api/trials/{trial['id']}")["record"]["ending"] == "aborted"
     assert classify(client, trial["id"], "aborted") == 200
 

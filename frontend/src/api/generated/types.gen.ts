@@ -3803,6 +3803,12 @@ export type Trial = {
      */
     repaired_error: number | null;
     record: RecordBrief | null;
+    /**
+     * May Be Valid
+     *
+     * whether its record covers the scored window, so that it can be marked valid
+     */
+    may_be_valid: boolean;
     flight: FlightBrief | null;
     /**
      * Seed

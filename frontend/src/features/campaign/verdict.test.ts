@@ -33,6 +33,7 @@ const trial = (number: number, state: Trial["state"], error: number | null, pred
     predicted_error,
     gains: { kp: number },
     actions: ["classify"],
+    may_be_valid: true,
   }) as unknown as Trial;
 
 const first = trial(1, "valid", 0.3267);
@@ -107,6 +108,8 @@ test("what a flight may be classed as follows from what it is", () => {
   expect(otherClasses(stopped)).toEqual(["aborted"]);
   expect(otherClasses(trial(6, "captured", 0.2))).toEqual(["valid", "aborted", "invalid"]);
   expect(otherClasses({ ...first, actions: [] })).toEqual([]);
+  expect(otherClasses({ ...glitch, may_be_valid: false })).toEqual([]);
+  expect(otherClasses({ ...trial(6, "captured", 0.2), may_be_valid: false })).toEqual(["aborted", "invalid"]);
 });
 
 test("an error lies inside of, above or below what was predicted", () => {
@@ -192,7 +195,8 @@ test("the operator may say what they have not said already, where the server let
 
 test("a class is suggested from how the record ended, with its reason", () => {
   const record = { ending: "completed" } as Trial["record"] & object;
-  const landed = { state: "captured", record, glitches: [], reason: "" } as const;
+  const landed = { state: "captured", record, may_be_valid: true, glitches: [], reason: "" } as const;
+  expect(suggestedClass({ ...landed, may_be_valid: false, glitches: [] })?.outcome).toBe("invalid");
   expect(suggestedClass({ ...landed, glitches: [] })?.outcome).toBe("valid");
   expect(suggestedClass({ ...landed, glitches: [{} as Trial["glitches"][number]] })?.why).toContain("1 glitch");
   const doubted = {

@@ -244,9 +244,10 @@ export function otherClasses(trial: Trial): ("valid" | "aborted" | "invalid")[] 
     case "aborted":
       return ["invalid"];
     case "invalid":
-      return [trial.flight?.state === "aborted" ? "aborted" : "valid"];
+      if (trial.flight?.state === "aborted") return ["aborted"];
+      return trial.may_be_valid ? ["valid"] : [];
     case "captured":
-      return ["valid", "aborted", "invalid"];
+      return trial.may_be_valid ? ["valid", "aborted", "invalid"] : ["aborted", "invalid"];
     case "lost":
       return ["invalid"];
     default:
@@ -260,7 +261,9 @@ export interface Suggestion {
 }
 
 /** Suggested class and its reason; the operator decides. */
-export function suggestedClass(trial: Pick<Trial, "state" | "record" | "glitches" | "reason">): Suggestion | null {
+export function suggestedClass(
+  trial: Pick<Trial, "state" | "record" | "may_be_valid" | "glitches" | "reason">,
+): Suggestion | null {
   if (trial.state === "lost") return { outcome: "invalid", why: trial.reason || "the end of the flight is unknown" };
   if (trial.state !== "captured" || trial.record === null) return null;
   switch (trial.record.ending) {
@@ -269,6 +272,7 @@ export function suggestedClass(trial: Pick<Trial, "state" | "record" | "glitches
     case "aborted":
       return { outcome: "aborted", why: trial.reason || "the flight was aborted" };
     case "completed": {
+      if (!trial.may_be_valid) return { outcome: "invalid", why: "the record ends before the scored window does" };
       const glitches = trial.glitches.length;
       if (glitches === 0) return { outcome: "valid", why: "the record is complete and without glitches" };
       return { outcome: "invalid", why: `the record has ${glitches} glitch${glitches === 1 ? "" : "es"}` };
