@@ -283,6 +283,7 @@ class FlightState(StrEnum):
 
 
 ACTIVE_FLIGHT_STATES: Final = frozenset({FlightState.REQUESTED, FlightState.RUNNING})
+FLOWN_FLIGHT_STATES: Final = frozenset({FlightState.LANDED, FlightState.ABORTED, FlightState.LOST})
 """A vehicle has at most one flight in these states."""
 
 FLIGHT_TRANSITIONS: Final[Mapping[FlightState, frozenset[FlightState]]] = {

@@ -8,7 +8,15 @@ from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
 from app.common.schemas import Position, instant
-from app.common.states import ACTIVE_ACT_STATES, ACTIVE_FLIGHT_STATES, GIVES_GAINS, ActKind, ActState, VehicleState
+from app.common.states import (
+    ACTIVE_ACT_STATES,
+    ACTIVE_FLIGHT_STATES,
+    FLOWN_FLIGHT_STATES,
+    GIVES_GAINS,
+    ActKind,
+    ActState,
+    VehicleState,
+)
 from app.db.models import FlightRow, VehicleActRow, VehicleRow
 from app.db.types import UtcDateTime
 
@@ -131,9 +139,9 @@ def acts_by_id(session: Session, ids: Sequence[int]) -> dict[int, VehicleActRow]
 
 
 def flights_of(session: Session, vehicle_id: int) -> Sequence[FlightRow]:
-    """Flights that a worker claimed and that are finished, oldest first."""
-    wanted = select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.finished_at.is_not(None))
-    return session.scalars(wanted.where(FlightRow.claimed_at.is_not(None)).order_by(FlightRow.id)).all()
+    """Flights that lifted off and have ended, oldest first."""
+    wanted = select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(FLOWN_FLIGHT_STATES))
+    return session.scalars(wanted.order_by(FlightRow.id)).all()
 
 
 def safe_gains_acts(session: Session, vehicle_id: int) -> Sequence[VehicleActRow]:

@@ -8,8 +8,11 @@ from typing import Any, Final
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from sqlalchemy import select
 
+from app.common.states import FlightState
 from app.core.records.trajectory import Trajectory
+from app.db.models import FlightRow
 from app.db.session import Database
 from app.vehicles.base import FlightRecord
 from tests.builders import create_ready_campaign, get, land, lift_off, run_jobs
@@ -131,6 +134,11 @@ def test_a_simulation_with_other_settings_is_another_vehicle(client: TestClient,
 
 def test_the_batteries_stand_as_the_flights_have_them(client: TestClient, database: Database) -> None:
     campaign = fly_campaign(client, database, sag_v=0.75)
+    with database.write() as session:
+        row = session.scalars(select(FlightRow)).first()
+        assert row is not None
+        columns = {one.key: getattr(row, one.key) for one in FlightRow.__table__.columns if one.key != "id"}
+        session.add(FlightRow(**columns | {"state": FlightState.CANCELLED}))
     trials = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
     flights = [get(client, f"/api/trials/{trial['id']}")["flight"] for trial in trials]
     card = about(client, campaign, "figures/batteries")
