@@ -296,6 +296,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         panels=() if record is None else tuple(_panels(record)),
         events=() if record is None or experiment.output != "altitude_m" else flight_events(record, glitches_s),
         notes=pinned_notes(row.note),
+        is_over=row.state in history.FLOWN,
     )
 
 

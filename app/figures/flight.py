@@ -48,7 +48,8 @@ class ChannelPanel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecordData:
-    """One recorded flight, with what else was recorded in `panels`, from top to bottom."""
+    """One recorded flight, with what else was recorded in `panels`, from top to bottom. `is_over`: it has flown, so a
+    record that is missing will not follow by itself."""
 
     number: int
     output_title: str
@@ -65,6 +66,7 @@ class FlightRecordData:
     panels: tuple[ChannelPanel, ...] = ()
     events: tuple[FlightEvent, ...] = ()
     notes: tuple[FlightEvent, ...] = ()
+    is_over: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,8 @@ class FlightFigure:
 
     def not_ready(self) -> str | None:
         if self.record.curve is None or len(self.record.curve.time_s) == 0:
+            if self.record.is_over:
+                return "No record of this flight was received."
             return "There is no record of this flight yet."
         return None
 

@@ -103,6 +103,8 @@ def test_throttle_is_marked_where_it_is_saturated_but_not_at_rest_before_it_star
 
 def test_a_flight_without_a_record_is_shown_as_such() -> None:
     assert FlightFigure(replace(RECORD, curve=None)).not_ready() == "There is no record of this flight yet."
+    lost = replace(RECORD, curve=None, is_over=True)
+    assert FlightFigure(lost).not_ready() == "No record of this flight was received."
 
 
 def test_the_table_reads_the_record_at_even_times() -> None:

@@ -24,9 +24,11 @@ export function FlightPage() {
 
 const ALTITUDE_PX = 330;
 const PANEL_PX = 125;
+const WITHOUT_RECORD_PX = 96;
 
-/** Room for the altitude and for each panel below it. */
+/** Room for the altitude and for each panel below it, or for the reason why there is no record. */
 function recordHeight(card: FigureCard | undefined): number {
+  if (card !== undefined && card.state !== "ready") return WITHOUT_RECORD_PX;
   const { meta } = (card?.figure?.["layout"] ?? {}) as { meta?: { panels?: number } };
   return ALTITUDE_PX + PANEL_PX * ((meta?.panels ?? 4) - 1);
 }
