@@ -57,6 +57,8 @@ _PANELS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
 """Panels below the scored output in a flight's figure, where they were recorded: the axis title, the unit, and the
 channels with their titles."""
 _CONFIDENCE: Final = 0.9
+_SPARSE_S: Final = 0.3
+"""Interval of reports from which on the record's first samples after the command say nothing about it."""
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
 
 
@@ -305,6 +307,16 @@ def _recorded_reference(record: Trajectory) -> Curve | None:
     return _curve(record, "reference_m") if "reference_m" in record.channels else None
 
 
+def _throttle(record: Trajectory) -> Curve:
+    """The throttle, without the samples after the command that hold a sparse report from before it."""
+    curve = _curve(record, "throttle")
+    reported_s = curve.time_s[1:][(np.diff(curve.values) != 0.0) & (curve.time_s[1:] > 0.0)]
+    if len(reported_s) < 2 or np.diff(reported_s).min() < _SPARSE_S:
+        return curve
+    received = (curve.time_s <= 0.0) | (curve.time_s >= reported_s[0])
+    return Curve(curve.time_s[received], curve.values[received])
+
+
 def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
     """The further channels; of a real flight also the interval between samples, which shows losses of the link."""
     for title, unit, channels in _PANELS:
@@ -313,7 +325,10 @@ def _panels(record: Trajectory) -> Iterator[ChannelPanel]:
             yield ChannelPanel(
                 title=title,
                 unit=unit,
-                curves={channels[name]: _curve(record, name) for name in recorded},
+                curves={
+                    channels[name]: _throttle(record) if name == "throttle" else _curve(record, name)
+                    for name in recorded
+                },
                 limits=_LIMITS.get(recorded[0]),
             )
     if record.clock != "simulation" and len(record.time_s) > 1:

@@ -97,6 +97,21 @@ def test_an_imported_flight_shows_its_own_reference_reported_throttle_and_glitch
     assert layout["annotations"][2]["x"] == pytest.approx(10.0, abs=0.05)
 
 
+def test_throttle_reported_once_a_second_is_not_drawn_as_zero_after_the_command(
+    client: TestClient, database: Database
+) -> None:
+    """Each report is held in the record until the next; the first one in flight came 1.3 s after the command."""
+    campaign = create_ready_campaign(client, database, vehicle="import")
+    climb = create_climb()
+    reports = np.floor(climb.time_s + 0.7)
+    throttle = np.where(climb.time_s < 1.3, 0.0, 0.6 + 0.01 * (reports % 2.0))
+    channels = {"altitude_m": climb["altitude_m"], "throttle": throttle}
+    trial = create_imported_trial(client, campaign["id"], csv_of({"time_s": climb.time_s, **channels}))
+    figure = traces(client, f"/api/trials/{trial['id']}/figure")
+    drawn = next(one for one in figure if one["name"] == "Reported throttle")
+    assert not [x for x in drawn["x"] if 0.0 < x < 1.28]
+
+
 def test_a_campaign_without_flights_shows_what_is_missing(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     card = get(client, f"/api/campaigns/{campaign['id']}/figures/errors")
