@@ -3,7 +3,7 @@ and photos, limited to a file size that can still be sent.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final, Protocol
 
@@ -134,7 +134,8 @@ def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Ident
         known = f"{identity.autopilot} {identity.version}".strip()
         hardware = f", hardware id {identity.uid}" if identity.uid else ""
         facts.append(Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}"))
-    facts += _options(vehicle.options, () if kind is None else kind.options)
+    titled = () if kind is None else [replace(each, title=each.label or each.title) for each in kind.options]
+    facts += _options(vehicle.options, titled)
     facts.append(Fact("Experiment", experiment.title))
     facts += _options(with_defaults(campaign.definition.experiment_options, experiment.options), experiment.options)
     facts += [

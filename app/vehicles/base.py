@@ -24,7 +24,8 @@ Ending = Literal["completed", "aborted", "invalid"]
 
 @dataclass(frozen=True, slots=True)
 class VehicleOption:
-    """One setting of a vehicle kind, with its unit, range or choices, and default."""
+    """One setting of a vehicle kind, with its unit, range or choices, and default. `label`: the title without the help
+    for entering a value, empty if it contains none."""
 
     name: str
     title: str
@@ -33,6 +34,7 @@ class VehicleOption:
     lower: float | None = None
     upper: float | None = None
     choices: tuple[OptionValue, ...] = ()
+    label: str = ""
 
 
 @dataclass(frozen=True, slots=True)

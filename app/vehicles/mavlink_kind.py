@@ -158,12 +158,15 @@ MAVLINK: Final = VehicleKind(
     can_fly=True,
     experiments=tuple(profile.experiment for profile in PROFILES.values()),
     options=(
-        VehicleOption("autopilot", "Autopilot: paparazzi, ardupilot or px4", "", "paparazzi"),
+        VehicleOption(
+            "autopilot", "Autopilot: paparazzi, ardupilot or px4", "", "paparazzi", label="Kind of autopilot"
+        ),
         VehicleOption(
             "address",
             "Address of the vehicle: udp:HOST:PORT@LOCALPORT, udpin:…, tcp:… or serial:DEVICE:BAUD",
             "",
             "udp:127.0.0.1:4245@4244",
+            label="Address",
         ),
         VehicleOption("simulated", "Simulated vehicle on this computer", "", False),
         VehicleOption("system_id", "MAVLink system id; 0: the first autopilot received", "", 0.0, 0.0, 255.0),
@@ -186,6 +189,7 @@ MAVLINK: Final = VehicleKind(
             "Second source of altitude: natnet:HOST?body=ID, odometry or mavlink:ADDRESS; empty: none",
             "",
             "",
+            label="Second source of altitude",
         ),
         VehicleOption("scored_source", "Scored source of altitude", "", "vehicle", choices=SCORED),
         VehicleOption(
@@ -193,8 +197,15 @@ MAVLINK: Final = VehicleKind(
             "ArduCopter, PX4: file with the 64 hexadecimal digits of the MAVLink 2 signing key; empty: unsigned",
             "",
             "",
+            label="Signing key file",
         ),
-        VehicleOption("log_folder", "Folder for the telemetry logs of all flights; empty: none", "", ""),
+        VehicleOption(
+            "log_folder",
+            "Folder for the telemetry logs of all flights; empty: none",
+            "",
+            "",
+            label="Telemetry log folder",
+        ),
     ),
     open=_open,
     connect=_connect,

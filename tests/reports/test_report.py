@@ -22,6 +22,7 @@ from app.reports import pdf, router, sections
 from tests.builders import Json, create_ready_campaign, create_record, create_trial, get, land, lift_off, run_jobs
 from tests.campaigns.test_landscapes import card_of, run_landscapes
 from tests.campaigns.trials.test_photos import JPEG, add, png
+from tests.fleet.vehicles import create_campaign_on, create_connected
 from tests.reports.conftest import NAME, REASON
 
 POLICY = "content-security-policy"
@@ -194,6 +195,12 @@ def test_a_campaign_that_has_not_flown_has_a_report_too(client: TestClient, data
     page = read(client, create_ready_campaign(client, database))
     assert "No valid flight yet" in page.said
     assert "No flights yet." in page.said
+
+
+def test_the_settings_of_a_vehicle_with_a_link_have_short_titles(client: TestClient, database: Database) -> None:
+    said = read(client, create_campaign_on(client, database, create_connected(client, database))).said
+    assert "Addressudp:127.0.0.1:4245@4244" in said
+    assert "HOST" not in said
 
 
 def test_the_report_of_no_campaign_is_not_found(client: TestClient) -> None:
