@@ -18,7 +18,7 @@ from app.core.definition import OptionValue, with_defaults
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
 from app.core.formatting import count, gain, gains, number, short_percent, without_word
-from app.core.policy import Gain
+from app.core.policy import Gain, Gains
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow, TrialRow
 from app.figures.base import Card
@@ -122,7 +122,9 @@ class _Described(Protocol):
     def unit(self) -> str: ...
 
 
-def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Identity | None) -> tuple[Fact, ...]:
+def describe_vehicle(
+    campaign: Campaign, experiment: Experiment, identity: Identity | None, safe_gains: str
+) -> tuple[Fact, ...]:
     """The vehicle, REAL or simulated, with its settings, and the experiment with its gains."""
     vehicle = campaign.vehicle
     kind = VEHICLE_KINDS.get(vehicle.kind)
@@ -136,6 +138,8 @@ def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Ident
         facts.append(Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}"))
     titled = () if kind is None else [replace(each, title=each.label or each.title) for each in kind.options]
     facts += _options(vehicle.options, titled)
+    if vehicle.can_fly:
+        facts.append(Fact("Safe gains", safe_gains))
     facts.append(Fact("Experiment", experiment.title))
     facts += _options(with_defaults(campaign.definition.experiment_options, experiment.options), experiment.options)
     facts += [
@@ -146,6 +150,11 @@ def describe_vehicle(campaign: Campaign, experiment: Experiment, identity: Ident
         for each in experiment.space.gains
     ]
     return tuple(facts)
+
+
+def describe_safe_gains(frozen: Gains | None, now: Gains) -> str:
+    """The vehicle's safe gains at the first flight, and those of now if they differ; only these before it."""
+    return gains(now) if frozen is None or frozen == now else f"{gains(frozen)} at the first flight, now {gains(now)}"
 
 
 def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, ...]:

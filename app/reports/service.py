@@ -21,7 +21,14 @@ from app.figures.base import card_of
 from app.fleet import service as fleet
 from app.fleet.views import acts_view, ledger_view
 from app.reports import sections
-from app.reports.sections import Anomaly, Report, describe_method, describe_vehicle, experiment_of
+from app.reports.sections import (
+    Anomaly,
+    Report,
+    describe_method,
+    describe_safe_gains,
+    describe_vehicle,
+    experiment_of,
+)
 
 _PAGE: Final = 200
 T = TypeVar("T")
@@ -42,7 +49,12 @@ def report_of(session: Session, campaign_id: int) -> Report:
         trials=trials,
         experiment=experiment.title,
         gains=experiment.space.gains,
-        what=describe_vehicle(campaign, experiment, vehicle.identity),
+        what=describe_vehicle(
+            campaign,
+            experiment,
+            vehicle.identity,
+            describe_safe_gains(campaigns.get_row(session, campaign_id).safe_gains, vehicle.safe_gains),
+        ),
         how=describe_method(campaign, experiment),
         cards=(
             *(card_of(figure(past, "light")) for figure in CAMPAIGN_FIGURES.values()),

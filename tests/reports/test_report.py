@@ -16,6 +16,8 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from app.campaigns.proposals import start_flying
+from app.campaigns.service import get_row
 from app.core.formatting import measured
 from app.db.session import Database
 from app.reports import pdf, router, sections
@@ -195,6 +197,19 @@ def test_a_campaign_that_has_not_flown_has_a_report_too(client: TestClient, data
     page = read(client, create_ready_campaign(client, database))
     assert "No valid flight yet" in page.said
     assert "No flights yet." in page.said
+
+
+def test_the_safe_gains_are_those_of_the_first_flight_and_later_ones_are_said(
+    client: TestClient, database: Database
+) -> None:
+    drone = create_connected(client, database)
+    campaign = create_campaign_on(client, database, drone)
+    assert "Safe gainskp 283, ki 13, kd 82Experiment" in read(client, campaign).said
+    with database.write() as session:
+        start_flying(get_row(session, campaign["id"]))
+    softer = {"version": 1, "safe_gains": {"kp": 250, "ki": 13, "kd": 82}, "statement": "Ada: softer"}
+    assert client.patch(f"/api/vehicles/{drone['id']}", json=softer).status_code == 200
+    assert "Safe gainskp 283, ki 13, kd 82 at the first flight, now kp 250, ki 13, kd 82" in read(client, campaign).said
 
 
 def test_the_settings_of_a_vehicle_with_a_link_have_short_titles(client: TestClient, database: Database) -> None:
