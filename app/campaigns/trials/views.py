@@ -208,18 +208,15 @@ def _group(row: TrialRow, field: ReferenceFlights) -> GroupBrief | None:
 
 
 def _flown_before(row: TrialRow, field: ReferenceFlights) -> list[int]:
-    """Numbers of the earlier flights of a trial that repeats their gains on purpose; empty for any other trial."""
+    """Numbers of the earlier flights with the gains of this trial."""
     same = field.group_with(row.gains)
-    if same is None or row.kind not in {"baseline", "repeat"}:
-        return []
-    return [number for number in same.numbers if number < row.number]
+    return [] if same is None else [number for number in same.numbers if number < row.number]
 
 
 def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[int] = ()) -> str:
     """Sentence that compares the flight with the best before it and with its prediction.
 
-    A trial that repeats the gains of the flights `again` was not meant to be better, so it is not compared with the
-    best.
+    A trial that repeats the gains of the flights `again` is not compared with the best.
     """
     match row.state:
         case TrialState.VALID if row.error is not None:

@@ -39,6 +39,17 @@ def test_gains_flown_again_on_purpose_are_not_held_against_the_best(client: Test
     assert second["predicted_error"] == pytest.approx(first["error"])
 
 
+def test_a_manual_strategy_that_proposes_flown_gains_repeats_them(client: TestClient, database: Database) -> None:
+    definition = {**PATIENT, "strategy": "manual"}
+    campaign = create_ready_campaign(client, database, vehicle="import", definition=definition)
+    for settling_s in (2.0, 2.1):
+        run_jobs(database)
+        create_imported_trial(client, campaign["id"], create_csv(settling_s))
+    second = get(client, "/api/trials/2")
+    assert second["kind"] == "manual"
+    assert f"{second['error']:.3f} m, repeating the gains of flight 1" in second["verdict"]
+
+
 def test_a_flight_is_compared_with_the_best_before_it_and_the_first_as_far_as_the_scatter_allows(
     client: TestClient, database: Database
 ) -> None:

@@ -137,7 +137,9 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         {bestBefore && (
           <Fact title={`${bestBeforeTitle(trial, trials)}, flight ${bestBefore.number}`}>
             {withUnit(bestBefore.error, unit)}{" "}
-            {!asked && !isCompared && <Change error={trial.error} other={bestBefore.error} unit={unit} />}
+            {!asked && !isCompared && !group?.trial_numbers.includes(bestBefore.number) && (
+              <Change error={trial.error} other={bestBefore.error} unit={unit} />
+            )}
           </Fact>
         )}
         {group !== undefined && group.errors.length > 1 && (
