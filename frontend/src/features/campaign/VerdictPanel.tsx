@@ -53,11 +53,11 @@ interface Props {
 function Change({ error, other, unit }: { error: number | null; other: number | null | undefined; unit: string }) {
   const percent = percentChange(error, other);
   if (percent === null) return null;
-  if (withUnit(error, unit) === withUnit(other, unit)) return <small>the same</small>;
+  if (withUnit(error, unit) === withUnit(other, unit)) return <small>this flight is the same</small>;
   const lower = percent < 0;
   return (
     <small data-better={lower || undefined}>
-      {percentText(Math.abs(percent))} {lower ? "lower" : "higher"}
+      this flight is {percentText(Math.abs(percent))} {lower ? "lower" : "higher"}
     </small>
   );
 }
