@@ -23,8 +23,8 @@ def propose(_definition: Definition, experiment: Experiment, space: PolicySpace,
     modelled = experiment.modelled
     trajectory, error = (None, None) if modelled is None else correct_by_bias(modelled, best).predict(gains)
     summary = (
-        f"You choose the next gains. The best so far are those of flight {best.number} ({format_gains(best.gains)}), "
-        f"error {short(best.error)} {experiment.error_unit}."
+        f"This strategy proposes no step. The best gains so far are those of flight {best.number} "
+        f"({format_gains(best.gains)}), error {short(best.error)} {experiment.error_unit}."
     )
     return Proposal(
         kind="manual",

@@ -8,7 +8,7 @@ import type { Campaign, Trial } from "../../api/types";
 import { Aside } from "../../ui/Aside";
 import { StateBadge } from "../../ui/Badges";
 import type { Topic } from "../../ui/explanations";
-import { asSentence, flightsText, percentChange, percentText, withUnit } from "../../ui/format";
+import { asSentence, flightsText, NOTHING, percentChange, percentText, withUnit } from "../../ui/format";
 import { GainList } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { ErrorNotice } from "../../ui/Notices";
@@ -62,8 +62,9 @@ function Change({ error, other, unit }: { error: number | null; other: number | 
   );
 }
 
-function unpredicted(hasModel: boolean): string {
-  return hasModel ? "None before the first valid flight" : "None: Gainline has no model of this controller";
+function unpredicted(hasModel: boolean, isFirst: boolean): string {
+  if (!hasModel) return "None: Gainline has no model of this controller";
+  return isFirst ? "None before the first valid flight" : NOTHING;
 }
 
 interface FactProps {
@@ -128,8 +129,8 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
           {statistics && scatter ? <small>({scatterMeaning(statistics)})</small> : null}
         </Fact>
         <Fact title="Predicted" topic="predicted">
-          {trial.predicted_error === null && bestBefore === null
-            ? unpredicted(hasModel)
+          {trial.predicted_error === null
+            ? unpredicted(hasModel, bestBefore === null)
             : withUnit(trial.predicted_error, unit)}{" "}
           {trial.predicted_interval && <small>{intervalText(trial.predicted_interval, unit)}</small>}{" "}
           <PredictionResult trial={trial} />

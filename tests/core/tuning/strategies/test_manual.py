@@ -19,7 +19,7 @@ def test_the_operator_starts_from_the_best_flown_gains() -> None:
     assert proposal.explanation.base_flight == 2
     assert proposal.predicted_error is not None
     assert abs(proposal.predicted_error - (1.0 + 1.0 + 1.0 + 0.25)) < 1e-6
-    assert "You choose" in proposal.explanation.summary
+    assert "proposes no step" in proposal.explanation.summary
 
 
 def test_the_landscape_that_is_shown_beside_them_is_the_models_corrected_by_the_best_flight() -> None:
