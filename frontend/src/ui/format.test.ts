@@ -144,6 +144,7 @@ test("what a field is filled with can be read again", () => {
 
 test("a number without a unit is printed alone", () => {
   expect([unitAfter("1"), unitAfter(""), unitAfter("m")]).toEqual(["", "", " m"]);
+  expect(`2${unitAfter("10 %·s²/m")}`).toBe("2 (10 %·s²/m)");
 });
 
 test("an error of more than twice another is a multiple of it", () => {

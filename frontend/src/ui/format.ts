@@ -13,9 +13,11 @@ function trueMinus(text: string): string {
   return /^-0(\.0*)?$/.test(text) ? text.slice(1) : text.replace(/^-/, "−");
 }
 
-/** A unit as it follows a number; nothing for a number without one, which the catalogue calls 1. */
+/** A unit as it follows a number; nothing for a number without one, which the catalogue calls 1. A unit that begins with
+ * a number is in brackets. */
 export function unitAfter(unit: string): string {
-  return unit === "" || unit === "1" ? "" : ` ${unit}`;
+  if (unit === "" || unit === "1") return "";
+  return /^\d/.test(unit) ? ` (${unit})` : ` ${unit}`;
 }
 
 /** Signed change of `value` against `base` in percent; null if one is missing or the base is 0. */
