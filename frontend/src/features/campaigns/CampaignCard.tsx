@@ -32,7 +32,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
       <Sparkline curves={spark} setPoint={units.setPoint} />
       <dl className={`${classes["figures"]} numbers`}>
         <div>
-          <dt>{best === null ? "Best error" : "Best error ± standard error"}</dt>
+          <dt>{(best?.standard_error ?? null) === null ? "Best error" : "Best error ± standard error"}</dt>
           <dd>{plusMinus(best?.mean, best?.standard_error, units.error)}</dd>
         </div>
         <div>
