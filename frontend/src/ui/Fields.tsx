@@ -66,8 +66,10 @@ function rangeOf({ lower = null, upper = null, unit = "" }: OptionInfo): string 
   return `${lower ?? "…"} … ${upper ?? ""}${after}`.trim();
 }
 
+const CHOICES: Readonly<Record<string, string>> = { mocap: "Motion capture" };
+
 function shown(choice: OptionValue): string {
-  return String(choice).replace(/^./, (letter) => letter.toUpperCase());
+  return CHOICES[String(choice)] ?? String(choice).replace(/^./, (letter) => letter.toUpperCase());
 }
 
 /** Input for an option, by its type: switch, select, text, or number with its range. */
