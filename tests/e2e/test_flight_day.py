@@ -299,7 +299,7 @@ def promote(dashboard: Dashboard, campaign_id: int, vehicle_id: int) -> None:
     campaign = dashboard.get(f"/campaigns/{campaign_id}")
     assert campaign["winner"]["verdict"] == "better"
     dashboard.button("Set best gains as safe gains").click()
-    dashboard.page.get_by_label("Decided by, and why").fill(DECIDED)
+    dashboard.page.get_by_label("Decided by, and based on which flights").fill(DECIDED)
     dashboard.button("Save safe gains").click()
     told = dashboard.page.get_by_text("The best gains are the safe gains of Number 1.")
     expect(told).to_contain_text("Number 1 still holds [283 13 82]")

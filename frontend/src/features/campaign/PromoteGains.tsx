@@ -55,7 +55,7 @@ export function PromoteGains({ campaign }: { campaign: Campaign }) {
         {gainsInBrackets(vehicle.safe_gains)}.
       </Note>
       <TextInput
-        label="Decided by, and why"
+        label="Decided by, and based on which flights"
         value={statement}
         maxLength={500}
         error={reasonsByField(problemOf(promote.error), ["statement"])["statement"]}
