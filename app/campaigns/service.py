@@ -364,8 +364,7 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
 def _simulation_of(session: Session, row: CampaignRow) -> VehicleChoice:
     if (found := fleet.simulation_for(session, row.experiment, row.vehicle.safe_gains)) is None:
         raise ConflictError(
-            f"No simulation supports the experiment {row.experiment} of campaign {row.id}.",
-            hint="Start `gainline sim-drone` with the same autopilot, register it as a simulated vehicle, "
-            "connect it, and start the rehearsal again.",
+            f"No registered simulated drone flies “{get_experiment(row.experiment).title}”.",
+            hint="Register a simulated drone of the same autopilot (`gainline sim-drone`), connect it, then rehearse.",
         )
     return found

@@ -6,12 +6,14 @@ import { Aside } from "../../ui/Aside";
 import { Note } from "../../ui/Note";
 import { ErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
+import { useHasModel } from "../../ui/units";
 import classes from "./NextFlight.module.css";
 
 /** Next action of a real vehicle's campaign that has not passed its rehearsal. */
 export function RehearsalCard({ campaign }: { campaign: Campaign }) {
   const navigate = useNavigate();
   const rehearse = useRehearse(campaign.id);
+  const hasModel = useHasModel(campaign.definition.experiment ?? "takeoff");
   const { state, campaign_id, reason } = campaign.rehearsal;
   return (
     <Panel title="Rehearse first">
@@ -20,6 +22,8 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
           {campaign.vehicle.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
           simulation with the same strategy, bounds, stop rule and gains: three valid flights (fewer if the stop rule
           ends it), none aborted or invalid.
+          {!hasModel &&
+            " It flies on a registered simulated drone with the same autopilot (gainline sim-drone): register and connect it first."}
         </Note>
         <p role="status">
           <strong>{STANDING[state]}</strong> {reason}.
