@@ -514,8 +514,8 @@ def _flight_plan(problem: str) -> CheckItem:
         name="flight_plan",
         title="Flight plan",
         passed=not problem,
-        found=problem or "has the blocks",
-        needed="the blocks for takeoff and landing",
+        found=problem or "blocks for takeoff and landing",
+        needed="blocks for takeoff and landing",
         hint="Load a flight plan with these blocks (docs/real-flight.md), then connect again." if problem else "",
     )
 

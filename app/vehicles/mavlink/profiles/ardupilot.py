@@ -74,19 +74,19 @@ class ArduPilot:
     )
     stop_settings: Final[tuple[str, ...]] = ()
     requirements: Final = (
-        Requirement("FS_GCS_ENABLE", "land when the ground station is lost (5)", frozenset({5.0})),
-        Requirement("FS_GCS_TIMEOUT", "land within 15 s of losing it", most=15.0),
+        Requirement("FS_GCS_ENABLE", "5 (land when the ground station is lost)", frozenset({5.0})),
+        Requirement("FS_GCS_TIMEOUT", "15 s or less (until it lands)", most=15.0),
         Requirement(
             "SYSID_MYGCS",
-            f"have Gainline as its ground station ({GROUND_STATION})",
+            f"{GROUND_STATION} (Gainline as its ground station)",
             frozenset({float(GROUND_STATION)}),
             newer_name="MAV_GCS_SYSID",
         ),
-        Requirement("FENCE_ENABLE", "keep inside its fence (1)"),
-        Requirement("FENCE_TYPE", "have a fence for altitude (bit 0)", bits=1),
-        Requirement("FENCE_ACTION", "land or brake at its fence (2 or 4)", frozenset({2.0, 4.0})),
-        Requirement("FENCE_ALT_MAX", "have its fence at 10 m or below", most=10.0),
-        Requirement("FS_EKF_ACTION", "land when its position is lost (1 or 3)", frozenset({1.0, 3.0})),
+        Requirement("FENCE_ENABLE", "1 (stay inside its fence)"),
+        Requirement("FENCE_TYPE", "bit 0 set (a fence for altitude)", bits=1),
+        Requirement("FENCE_ACTION", "2 or 4 (land or brake at its fence)", frozenset({2.0, 4.0})),
+        Requirement("FENCE_ALT_MAX", "10 m or less (altitude of its fence)", most=10.0),
+        Requirement("FS_EKF_ACTION", "1 or 3 (land when its position is lost)", frozenset({1.0, 3.0})),
     )
 
     def measure(self, message: Message) -> Measurement | None:

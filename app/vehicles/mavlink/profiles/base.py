@@ -117,7 +117,8 @@ def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
 @dataclass(frozen=True, slots=True)
 class Requirement:
     """Part of a failsafe that must be enabled before a flight: a parameter with one of these values, or else above
-    zero, at most `most`, and with all of these `bits`. `newer_name`: the parameter's name in newer releases."""
+    zero, at most `most`, and with all of these `bits`. `what`: these values, with their effect in brackets.
+    `newer_name`: the parameter's name in newer releases."""
 
     parameter: str
     what: str

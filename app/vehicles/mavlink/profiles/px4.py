@@ -66,10 +66,10 @@ class Px4:
     )
     stop_settings: Final[tuple[str, ...]] = ()
     requirements: Final = (
-        Requirement("NAV_DLL_ACT", "land when the ground station is lost (3)", frozenset({3.0})),
-        Requirement("COM_DL_LOSS_T", "land within 15 s of losing it", most=15.0),
-        Requirement("GF_ACTION", "hold or land when it leaves its fence (2 or 5)", frozenset({2.0, 5.0})),
-        Requirement("GF_MAX_VER_DIST", "have a fence at 10 m or less above home", most=10.0),
+        Requirement("NAV_DLL_ACT", "3 (land when the ground station is lost)", frozenset({3.0})),
+        Requirement("COM_DL_LOSS_T", "15 s or less (until it lands)", most=15.0),
+        Requirement("GF_ACTION", "2 or 5 (hold or land when it leaves its fence)", frozenset({2.0, 5.0})),
+        Requirement("GF_MAX_VER_DIST", "10 m or less (altitude of its fence above home)", most=10.0),
     )
 
     def measure(self, message: Message) -> Measurement | None:
