@@ -172,7 +172,8 @@ def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, .
     if experiment.output == "altitude_m":
         facts.append(Fact("Gate ceiling", f"{definition.ceiling_m:g} m"))
     facts.append(Fact("Stop rule", _stop(definition.stop)))
-    facts.append(Fact("Seed", str(definition.seed)))
+    if campaign.vehicle.can_fly and not campaign.vehicle.registered:
+        facts.append(Fact("Seed", str(definition.seed)))
     return tuple(facts)
 
 

@@ -42,6 +42,7 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
   const figure = useFlightFigure(trialId, theme);
   const experiment = campaign?.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
+  const hasSeed = campaign?.vehicle.can_fly && !campaign.vehicle.registered;
   const [pinning, setPinning] = useState(false);
   const [pin, setPin] = useState<NotePin | null>(null);
   const place = useCallback((timeS: number) => {
@@ -99,7 +100,8 @@ function FlightById({ campaignId, trialId }: { campaignId: number; trialId: numb
         {record !== null && (
           <p className="numbers">
             {grouped(record.samples)} samples over {record.duration_s.toFixed(1)} s, source {record.source}, clock{" "}
-            {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>, seed {trial.data.seed}.
+            {record.clock}. Checksum <code>{record.checksum.slice(0, 12)}</code>
+            {hasSeed && `, seed ${trial.data.seed}`}.
           </p>
         )}
         <GateChecks gate={gate} />

@@ -14,7 +14,13 @@ const campaign = {
     step_fraction: 1,
     seed: 3,
   },
-  vehicle: { kind: "jsbsim", title: "JSBSim", options: { mass_kg: 0.42, wind_from_deg: 90 } },
+  vehicle: {
+    kind: "jsbsim",
+    title: "JSBSim",
+    can_fly: true,
+    registered: false,
+    options: { mass_kg: 0.42, wind_from_deg: 90 },
+  },
   definition_digest: "0123456789abcdef",
 } as unknown as Campaign;
 
@@ -41,6 +47,8 @@ test("every setting that a proposal depends on is said in words", () => {
     Seed: "3",
     "Definition digest": "0123456789ab",
   });
+  const linked = { ...campaign, vehicle: { ...campaign.vehicle, registered: true } };
+  expect(settingsOf(linked, catalogue).map(([title]) => title)).not.toContain("Seed");
   expect(rows["Stop rule"]).toBe(
     "Two consecutive flights less than 5\u00a0% better than the best, or 7 flights, invalid ones not counted",
   );

@@ -114,7 +114,7 @@ export function settingsOf({ definition, vehicle, definition_digest }: Campaign,
     ...(definition.ceiling_m && experiment?.output_unit === "m"
       ? ([["Gate ceiling", `${definition.ceiling_m} m`]] as Row[])
       : []),
-    ["Seed", String(definition.seed)],
+    ...(vehicle.can_fly && !vehicle.registered ? ([["Seed", String(definition.seed)]] as Row[]) : []),
   ];
   if (definition_digest) rows.push(["Definition digest", definition_digest.slice(0, 12)]);
   return rows;

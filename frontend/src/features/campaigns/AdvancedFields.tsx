@@ -35,6 +35,9 @@ function Group({ title, children }: { title: string; children: ReactNode }) {
 export function AdvancedFields(props: Props) {
   const { form, catalogue, reasons, set } = props;
   const options = optionsOf(form, catalogue);
+  const isSimulated = catalogue.vehicle_kinds.some(
+    ({ name, can_fly, registered }) => name === form.vehicle && can_fly && !registered,
+  );
   const titled = (things: readonly { name: string; title: string }[], name: string): string =>
     things.find((thing) => thing.name === name)?.title ?? name;
   return (
@@ -65,16 +68,18 @@ export function AdvancedFields(props: Props) {
         prefix="vehicle.options"
         onChange={(vehicleOptions) => set({ vehicleOptions })}
       />
-      <Group title="Random seed">
-        <NumberField
-          label={ADVANCED_LABELS.seed}
-          whole
-          description="The same seed reproduces the same scatter"
-          value={form.seed}
-          error={reasons["seed"]}
-          onChange={(seed) => set({ seed })}
-        />
-      </Group>
+      {isSimulated && (
+        <Group title="Random seed">
+          <NumberField
+            label={ADVANCED_LABELS.seed}
+            whole
+            description="The same seed reproduces the same scatter"
+            value={form.seed}
+            error={reasons["seed"]}
+            onChange={(seed) => set({ seed })}
+          />
+        </Group>
+      )}
     </Stack>
   );
 }
