@@ -1,6 +1,6 @@
 """Rehearsals: whether a campaign on a real vehicle was first flown on a simulation with the same definition."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -76,6 +76,14 @@ def rehearsal_of(session: Session, campaign: CampaignRow) -> Rehearsal:
     return Rehearsal(
         state="missing", campaign_id=None, reason=changed if held else "it has not been flown on a simulation"
     )
+
+
+def passed_rehearsals(session: Session, campaign_ids: Collection[int]) -> set[int]:
+    """Ids of those campaigns that are the rehearsal of another one and let it fly."""
+    rehearsed = repository.rehearsed_ids(session, campaign_ids)
+    found = (rehearsal_of(session, repository.get_campaign(session, real_id)) for real_id in set(rehearsed.values()))
+    passed = {result.campaign_id for result in found if result.state == "passed"}
+    return {rehearsal_id for rehearsal_id in rehearsed if rehearsal_id in passed}
 
 
 def is_rehearsal_satisfied(rehearsal: Rehearsal) -> bool:

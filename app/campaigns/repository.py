@@ -253,6 +253,12 @@ def rehearsed_id(session: Session, rehearsal_id: int) -> int | None:
     return session.scalar(select(RehearsalRow.campaign_id).where(RehearsalRow.rehearsal_id == rehearsal_id))
 
 
+def rehearsed_ids(session: Session, campaign_ids: Collection[int]) -> Mapping[int, int]:
+    """The campaigns that these rehearse, by the id of the rehearsal."""
+    wanted = select(RehearsalRow).where(RehearsalRow.rehearsal_id.in_(campaign_ids))
+    return {row.rehearsal_id: row.campaign_id for row in session.scalars(wanted)}
+
+
 def get_proposal_or_none(session: Session, proposal_id: int) -> ProposalRow | None:
     return session.get(ProposalRow, proposal_id)
 

@@ -271,6 +271,7 @@ class CampaignSummary(Schema):
     first_error: float | None
     verdict: Annotated[Verdict | None, Field(description=VERDICT)]
     rehearsal: RehearsalState
+    has_passed_as_rehearsal: Annotated[bool, Field(description="whether it is a rehearsal that lets its campaign fly")]
     next_action: str
     spark: list[SparkCurve]
     updated_at: datetime

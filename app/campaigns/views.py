@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.campaigns import history, repository
 from app.campaigns.proposals import PROPOSAL_JOB, is_stale
-from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
+from app.campaigns.rehearsals import is_rehearsal_satisfied, passed_rehearsals, rehearsal_of
 from app.campaigns.schemas import (
     Advice,
     Campaign,
@@ -98,11 +98,15 @@ def summaries(session: Session, rows: Sequence[CampaignRow]) -> list[CampaignSum
     for trial in history.trials_of(session, *(row.id for row in rows)):
         by_campaign[trial.campaign_id].append(trial)
     sparks = _sparks(session, by_campaign)
-    return [_summary(row, by_campaign[row.id], rehearsal_of(session, row), sparks[row.id]) for row in rows]
+    passed = passed_rehearsals(session, [row.id for row in rows])
+    return [
+        _summary(row, by_campaign[row.id], rehearsal_of(session, row), sparks[row.id], has_passed=row.id in passed)
+        for row in rows
+    ]
 
 
 def _summary(
-    row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal, spark: list[SparkCurve]
+    row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal, spark: list[SparkCurve], *, has_passed: bool
 ) -> CampaignSummary:
     now = standing_of(row, trials)
     best = [] if now is None else [trial for trial in trials if trial.number in now.winner.numbers]
@@ -119,7 +123,8 @@ def _summary(
         first_error=None if now is None else now.baseline.mean,
         verdict=_verdict(now),
         rehearsal=rehearsal.state,
-        next_action=_next_action(row, trials, rehearsal),
+        has_passed_as_rehearsal=has_passed,
+        next_action=_next_action(row, trials, rehearsal, has_passed=has_passed),
         spark=spark,
         updated_at=row.updated_at,
     )
@@ -264,12 +269,16 @@ def _flying(flight: FlightRow | None, trials: Sequence[TrialRow]) -> FlyingTrial
     return FlyingTrial(trial_id=flight.trial_id, trial_number=number)
 
 
-def _next_action(row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal) -> str:
-    """One recommended action, in a few words."""
+def _next_action(
+    row: CampaignRow, trials: Sequence[TrialRow], rehearsal: Rehearsal, *, has_passed: bool = False
+) -> str:
+    """One recommended action, in a few words. `has_passed`: it is a rehearsal that lets its campaign fly."""
     if row.state in _NEXT_ACTIONS:
         return _NEXT_ACTIONS[row.state]
     if (waiting := history.find_unreviewed(trials)) is not None:
         return f"Review flight {waiting.number}"
+    if has_passed:
+        return "Fly the campaign on the real vehicle"
     if not is_rehearsal_satisfied(rehearsal):
         return "Continue the rehearsal" if rehearsal.state == "under way" else "Rehearse on a simulation"
     which = "first" if row.state == CampaignState.READY else "next"

@@ -108,6 +108,16 @@ def test_a_real_vehicle_is_staged_only_after_three_flights_on_its_simulation(
     assert client.post(f"/api/trials/{planned['id']}/stage").status_code == 202
 
 
+def test_the_card_of_one_that_has_passed_leads_to_the_real_vehicle(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    put_rehearsal(client, database, campaign)
+    cards = {one["rehearsal"]: one for one in get(client, "/api/campaigns")["items"]}
+    assert cards["not needed"]["has_passed_as_rehearsal"]
+    assert cards["not needed"]["next_action"] == "Fly the campaign on the real vehicle"
+    assert not cards["passed"]["has_passed_as_rehearsal"]
+
+
 def test_a_spoilt_one_is_flown_anew(client: TestClient, database: Database, campaign: Json) -> None:
     rehearsal = rehearse(client, campaign)
     run_jobs(database)

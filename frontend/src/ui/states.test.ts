@@ -8,6 +8,7 @@ test("a campaign on a real vehicle is headed by what comes next, not as ready to
   expect(campaignStateLabel("ready", null, "passed").word).toBe("Ready to fly");
   expect(campaignStateLabel("ready", null).word).toBe("Ready to fly");
   expect(campaignStateLabel("ready", null, "not needed", false).word).toBe("Ready");
+  expect(campaignStateLabel("deciding", null, "not needed", true, true).word).toBe("Rehearsal passed");
   expect(campaignStateLabel("draft", null, "missing").word).toBe("Preparing");
   expect(campaignStateLabel("finished", "converged", "missing").word).toBe("Converged");
 });

@@ -33,15 +33,18 @@ const REHEARSAL: Partial<Record<RehearsalState, StateLabel>> = {
   failed: { word: "Rehearsal failed", tone: "bad" },
 };
 
-/** `canFly`: whether Gainline can fly the vehicle, rather than import its records. */
+/** `canFly`: whether Gainline can fly the vehicle, rather than import its records; `hasPassed`: whether the campaign is a
+ * rehearsal that has passed. */
 export function campaignStateLabel(
   state: CampaignState,
   outcome: string | null,
   rehearsal: RehearsalState = "not needed",
   canFly = true,
+  hasPassed = false,
 ): StateLabel {
   if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
   const mayFly = state === "ready" || state === "deciding";
+  if (mayFly && hasPassed) return { word: "Rehearsal passed", tone: "good" };
   if (mayFly && REHEARSAL[rehearsal]) return REHEARSAL[rehearsal];
   return state === "ready" && !canFly ? { word: "Ready", tone: "quiet" } : CAMPAIGN[state];
 }

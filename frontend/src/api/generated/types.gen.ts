@@ -398,6 +398,12 @@ export type CampaignSummary = {
      */
     rehearsal: 'not needed' | 'missing' | 'under way' | 'passed' | 'failed';
     /**
+     * Has Passed As Rehearsal
+     *
+     * whether it is a rehearsal that lets its campaign fly
+     */
+    has_passed_as_rehearsal: boolean;
+    /**
      * Next Action
      */
     next_action: string;

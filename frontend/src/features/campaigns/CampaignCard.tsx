@@ -18,12 +18,13 @@ import { progress } from "./campaignList";
 /** A campaign in the list: result, curves, next action. */
 export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
   const { id, name, state, outcome, vehicle, best, flights, rehearsal, next_action, spark } = campaign;
+  const hasPassed = campaign.has_passed_as_rehearsal;
   const units = useUnits(campaign.experiment);
   return (
     <li className={classes["card"]}>
       <div className={classes["top"]}>
         <VehicleBadge isReal={vehicle.is_real} />
-        <StateBadge words={campaignStateLabel(state, outcome, rehearsal, vehicle.can_fly)} />
+        <StateBadge words={campaignStateLabel(state, outcome, rehearsal, vehicle.can_fly, hasPassed)} />
       </div>
       <h2 className={classes["name"]}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
