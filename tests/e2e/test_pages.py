@@ -219,6 +219,7 @@ def show(dashboard: Dashboard, size: str, theme: Theme) -> None:
 def violations(page: Page) -> list[str]:
     """What keeps somebody from reading it. Without the elements that pass, which take longer to list than to find."""
     page.evaluate("scrollTo(0, 0)")  # what has been scrolled under the header is covered on every page
+    page.mouse.move(0, 0)
     options = {"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]}
     found = Axe().run(page, options=options)
     return [found.generate_report()] if found.violations_count else []

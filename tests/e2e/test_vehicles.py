@@ -47,7 +47,7 @@ def register_by_hand(dashboard: Dashboard, name: str, drone: Drone) -> int:
     expect(page.get_by_role("alert")).to_have_text("Correct the marked field: Address.")
     address.fill("udp:192.168.1.5:4245@4244")
     dashboard.button("Register vehicle").click()
-    expect(page.get_by_role("alert")).to_have_text("Correct the marked fields: Simulation on this computer.")
+    expect(page.get_by_role("alert")).to_have_text("Correct the marked field: Simulation on this computer.")
     expect(page.get_by_text("must be off for udp:192.168.1.5:4245@4244: a simulation has the address")).to_be_visible()
     address.fill(drone.address)
     dashboard.button("Register vehicle").click()

@@ -32,7 +32,7 @@ export const EXPLANATIONS = explained({
   predicted: {
     question: "What is the predicted error?",
     answer: [
-      "The error that the model predicts for a flight with these gains, corrected by the flights so far. Before the first valid flight the model alone is often too uncertain; then no prediction is shown.",
+      "The error that the model predicts for a flight with these gains, corrected by the flights so far. Before the first valid flight it is often too uncertain to be shown.",
     ],
   },
   interval: {
@@ -70,8 +70,7 @@ export const EXPLANATIONS = explained({
   gate: {
     question: "What does the gate check?",
     answer: [
-      "Bounds and step size, always. For takeoffs with a model also integer overflow in the autopilot's 32-bit arithmetic, exactly, and altitude, divergence, oscillation and aborts in simulated flights that cover the uncertainty of the vehicle's parameters.",
-      "ArduCopter and PX4 have no model yet, so no simulation checks their gains.",
+      "Bounds and step size; with a model also integer overflow in the autopilot's 32-bit arithmetic, and altitude, divergence, oscillation and aborts in simulated flights that cover the uncertainty of the vehicle's parameters.",
     ],
   },
   glitch: {
@@ -90,7 +89,7 @@ export const EXPLANATIONS = explained({
   threshold: {
     question: "What does the next flight have to beat?",
     answer: [
-      "With the stop rule “No improvement”: the best error less the improvement threshold (Settings, Stop rule). Two consecutive flights above it, repeats not counted, end the campaign. Other stop rules have no such line.",
+      "The best error less the improvement threshold of the stop rule “No improvement”. Two consecutive flights above it, repeats not counted, end the campaign.",
       "The band shows how far the error of another flight with the best gains could vary by chance. A result inside it is not a resolvable change.",
     ],
   },
@@ -153,7 +152,7 @@ export const EXPLANATIONS = explained({
   safeGains: {
     question: "What are safe gains?",
     answer: [
-      "The gains written to the vehicle at every connection after the first, after every flight and on every abort, and then read back. The first connection only compares them. The operator is responsible for the safe gains of a real vehicle.",
+      "The gains written to the vehicle at every connection but the first, which only compares them, after every flight and on every abort, and then read back. The operator is responsible for those of a real vehicle.",
     ],
   },
   linkAge: {

@@ -124,7 +124,7 @@ def test_a_campaign_by_hand_proposes_the_start_and_then_the_best_flown_and_predi
     assert "there is no model of this vehicle's controller, so there is no prediction" in first.explanation.summary
     then = next_proposal(BY_HAND, FLOWN)
     assert said(then) == ("manual", FIRMER)
-    assert "The best so far are those of flight 2" in then.explanation.summary
+    assert "The best gains so far are those of flight 2" in then.explanation.summary
     assert advise(BY_HAND, PX4, FLOWN, then, evaluate_stop_rule(BY_HAND, FLOWN, then)).kind == "step"
 
 

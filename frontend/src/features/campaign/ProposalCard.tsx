@@ -57,7 +57,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
-      <Stack gap={12}>
+      <Stack gap={10}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
         <GainTable
@@ -180,7 +180,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
         <Button variant="default" loading={create.isPending} disabled={!isReady} onClick={() => create.mutate(trial)}>
           Plan flight {number}
         </Button>
-        <Note>Upload the record of a flight with these gains, or plan the flight now and upload its record later.</Note>
+        <Note>Plan the flight to upload its record later.</Note>
         <ErrorNotice error={create.error} />
       </>
     );

@@ -56,9 +56,9 @@ export function LogAnalysisPage() {
         className={over ? classes["over"] : ""}
       >
         <Text maw="90ch" lh={1.45} mb={10}>
-          Drop ArduCopter's .bin log here or choose it: in GUIDED, LOITER, ALT_HOLD or AUTO the vehicle should climb and
-          descend by about 2 m with a few seconds of hover between. Or Paparazzi's .data and .log files, or its .tlog,
-          of takeoffs to 3 m. The files are not stored.
+          Drop or choose ArduCopter's .bin log: in GUIDED, LOITER, ALT_HOLD or AUTO climb and descend by about 2 m with
+          a few seconds of hover between. Or Paparazzi's .data and .log, or .tlog, of takeoffs to 3 m. Nothing is
+          stored.
         </Text>
         <Group gap={10} mt={12} mb={10}>
           <FileButton multiple accept={ANALYSED_FILES} onChange={analyze} resetRef={resetFile}>
