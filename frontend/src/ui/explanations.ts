@@ -14,7 +14,7 @@ export const EXPLANATIONS = explained({
     question: "What is the error?",
     answer: [
       "How far the flight was from its set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. F-16: the integral of |reference − pitch|.",
-      "Lower is better. Zero is impossible because climbing takes time: under Paparazzi, over 32.6 s, the reference trajectory itself scores 0.091 m.",
+      "Lower is better. Zero is impossible because climbing takes time: the reference trajectory of Paparazzi scores 0.091 m over 32.6 s.",
     ],
   },
   altitude: {
@@ -52,7 +52,7 @@ export const EXPLANATIONS = explained({
   trustRegion: {
     question: "What is the trust region?",
     answer: [
-      "The largest step from the best gains flown. It grows when a prediction holds, and shrinks when the error is above its interval or a flight is aborted because of its gains.",
+      "The largest step from the best gains flown. It grows when a prediction holds, and shrinks when an error is above its interval or gains are the cause of an abort.",
     ],
   },
   fitted: {

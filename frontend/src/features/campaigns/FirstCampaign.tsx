@@ -15,7 +15,7 @@ const STEPS = [
     "The vehicle takes off with its default gains. The error is the mean distance from 3\u00a0m over 32.6\u00a0s.",
   ],
   ["Learn", "The flight is compared with a simple model, and the difference corrects the next prediction."],
-  ["Step", "Gainline evaluates many gain sets on the model and proposes the best. You see why, and decide."],
+  ["Step", "Gainline proposes the best of many gain sets on the model. You see why, and decide."],
 ] as const;
 
 /** Empty list: explains campaigns, and creates the first one with one click. */

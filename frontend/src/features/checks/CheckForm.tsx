@@ -30,9 +30,8 @@ export function CheckForm({ upload, onCheck, over, brief }: Props) {
     >
       {!brief && (
         <Text maw="90ch" lh={1.45} mb={10}>
-          The method requires an exact replica of the controller. Upload a recorded run of the autopilot's vertical
-          loop. It is replayed through Gainline’s replica of the controller and every signal is compared: bit for bit
-          for Paparazzi, within tolerances for the others.
+          Upload a recorded run of the autopilot's vertical loop. Every signal is compared with Gainline's replica of
+          the controller: bit for bit for Paparazzi, within tolerances for the others.
         </Text>
       )}
       <Text maw="90ch" lh={1.45} mb={10}>

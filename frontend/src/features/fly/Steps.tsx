@@ -185,7 +185,7 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
       <p className={classes["quiet"]}>
         {wantsControl
           ? "Take control first."
-          : "Writes these gains to the landed and disarmed vehicle and reads each one back. The vehicle does not move."}
+          : "Writes these gains to the landed, disarmed vehicle and reads each back. It does not move."}
       </p>
       <ErrorNotice error={stage.error} />
     </Stack>
