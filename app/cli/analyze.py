@@ -1,18 +1,15 @@
 """`gainline analyze`: from the log of a flight to gains, with what the model says of them."""
 
 from pathlib import Path
-from typing import Final
 
 from rich.console import Console
 from rich.markup import escape
 
 from app.cli.console import console, table, unwritable_error, write_json
-from app.cli.files import unreadable_error
+from app.cli.files import companion_of, unreadable_error
 from app.common.errors import InputError, Problem
 from app.log_analyses.schemas import LogAnswer
 from app.log_analyses.service import ANALYSED, analyze_content
-
-_COMPANION: Final = {".data": ".log"}
 
 
 def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -> None:
@@ -21,7 +18,8 @@ def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -
     Raises InputError for a log that cannot be analysed, and for a parameter file where nothing is proposed.
     """
     try:
-        content, companion = file.read_bytes(), _companion_of(file)
+        beside = companion_of(file)
+        content, companion = file.read_bytes(), None if beside is None else beside.read_bytes()
     except OSError as error:
         raise unreadable_error(file, error, ANALYSED) from error
     answer = analyze_content(content, companion, file.name).answer
@@ -29,13 +27,6 @@ def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -
     write_json(json_out, answer.model_dump(mode="json"))
     if params_out is not None:
         _write_parameters(params_out, answer)
-
-
-def _companion_of(file: Path) -> bytes | None:
-    """The file beside Paparazzi's .data file that has its messages and gains, if there is one."""
-    suffix = _COMPANION.get(file.suffix.lower())
-    beside = None if suffix is None else file.with_suffix(suffix)
-    return beside.read_bytes() if beside is not None and beside.is_file() else None
 
 
 def _print(out: Console, answer: LogAnswer) -> None:

@@ -76,14 +76,18 @@ def can_ask() -> bool:
     return sys.stdin.isatty()
 
 
+def companion_of(file: Path) -> Path | None:
+    """The .log file beside Paparazzi's .data file, which has its messages and gains; None if there is none."""
+    beside = file.with_suffix(".log")
+    return beside if file.suffix.lower() == ".data" and beside.is_file() else None
+
+
 def _read(file: Path, takeoff: int | None) -> Takeoff:
     try:
         with ExitStack() as files:
             stream = files.enter_context(file.open("rb"))
-            beside = file.with_suffix(".log")
-            companion = (
-                files.enter_context(beside.open("rb")) if file.suffix.lower() == ".data" and beside.is_file() else None
-            )
+            beside = companion_of(file)
+            companion = None if beside is None else files.enter_context(beside.open("rb"))
             return records.read_record(stream, name=file.name, takeoff=takeoff, companion=companion)
     except OSError as error:
         raise unreadable_error(file, error, "a log") from error

@@ -20,8 +20,8 @@ from app.core.records.step_response import StepResponse, step_response
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import calibrate
 from app.core.tuning.gate import check_policy
+from app.core.tuning.predictions import predict_flight
 from app.core.tuning.proposals import next_proposal
-from app.core.tuning.strategies.calibrated import flight_model
 from app.core.tuning.strategy import Interval
 
 SHORTEST_S: Final = 10.0
@@ -111,18 +111,17 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
     calibration = calibrate(experiment, flights)
     residual_m = float(np.sqrt(np.mean(calibration.residual**2)))
     _require_likeness(best, residual_m)
-    model, spread = flight_model(definition, experiment, flights), calibration.spread()
+    spread = calibration.spread()
 
     def assess(name: str, gains: Gains) -> AssessedGains:
-        _, error_m, interval = model(experiment.space.vector(gains))
-        assert interval is not None
+        predicted = predict_flight(calibration, best, experiment.space.vector(gains))
         gate = check_policy(definition, experiment, experiment.space, gains, flights, spread=spread)
         errors = [flight.error for flight in flights if flight.error is not None and flight.gains == gains]
         return AssessedGains(
             name=name,
             gains=gains,
-            predicted_error_m=error_m,
-            interval=interval,
+            predicted_error_m=predicted.error,
+            interval=predicted.interval,
             flown_error_m=sum(errors) / len(errors) if errors else None,
             refusal=" ".join(check.sentence for check in gate.refusals),
         )
@@ -148,7 +147,7 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
         assessments=(*flown, *stock),
         proposed=proposed if is_better else None,
         insufficient=None if is_better else _KEEP,
-        predicted=model(experiment.space.vector(shown.gains)).trajectory,
+        predicted=predict_flight(calibration, best, experiment.space.vector(shown.gains)).trajectory,
     )
 
 
