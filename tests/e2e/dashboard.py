@@ -71,8 +71,13 @@ _SETTLED: Final = """async ([ink, within]) => {
 """Until everything is fetched and drawn, in view or not, and nothing has moved for three frames."""
 
 
-def printed(value: float, uncertainty: float, unit: str = "m") -> str:
-    """`0.105 ± 0.012 m`: two digits of an uncertainty that begins with less than 3.55, else one."""
+def printed(value: float, uncertainty: float | None, unit: str = "m") -> str:
+    """`0.105 ± 0.012 m`: two digits of an uncertainty that begins with less than 3.55, else one.
+
+    `0.105 m` where the repeats were identical, as those of a drone without scatter are on a quiet machine.
+    """
+    if not uncertainty:
+        return f"{value:.3f} {unit}"
     power = int(np.floor(np.log10(uncertainty)))
     digits = max(0, 1 - power if uncertainty / 10.0**power < 3.55 else -power)
     return f"{value:.{digits}f} ± {uncertainty:.{digits}f} {unit}"

@@ -50,7 +50,7 @@ def assert_drawn_as_told(dashboard: Dashboard, check: Json) -> None:
 
 def test_one_click_shows_what_a_check_is(page_of_checks: Dashboard) -> None:
     dashboard, page = page_of_checks, page_of_checks.page
-    expect(page.get_by_text("The method requires an exact replica of the controller.")).to_be_visible()
+    expect(page.get_by_text("Every signal is compared with Gainline's replica of the controller")).to_be_visible()
     dashboard.button("Check example").click()
     expect(page.get_by_text("The replica agrees: all 8\N{NARROW NO-BREAK SPACE}192 steps are exact")).to_be_visible()
     check = newest(dashboard)
