@@ -20,7 +20,14 @@ ReadinessStep = Literal["control", "staged", "held", "in flight", "landed", "rev
 STEPS: Final[tuple[ReadinessStep, ...]] = ("control", "staged", "held", "in flight", "landed", "reviewed")
 
 LossKind = Literal[
-    "worker away", "not connected", "process silent", "link silent", "gains unknown", "quarantined", "control ended"
+    "worker away",
+    "not connected",
+    "process silent",
+    "link silent",
+    "gains unknown",
+    "battery low",
+    "quarantined",
+    "control ended",
 ]
 
 
@@ -69,6 +76,11 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
             way_on="Select Check now on its page, or stage the flight again.",
         ),
+        "battery low": LossText(
+            what="The battery voltage is below the vehicle's minimum.",
+            way_on="Insert a charged battery, then stage the flight again.",
+            keeps="staged",
+        ),
         "quarantined": LossText(
             what="The vehicle is quarantined.",
             way_on="Inspect it, then release it on its page.",
@@ -109,7 +121,7 @@ class Standing:
     """What readiness follows from: the stored state of a trial and its vehicle, and who asks.
 
     `has_link`: the vehicle is registered, with a process that keeps its link. `has_control`: the one who asks may
-    command it. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe gains are being
+    command it. `min_battery_v`: below it the vehicle does not take off. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe gains are being
     restored instead. `abort_cause_open`: nobody has stated yet why the flight was aborted.
     """
 
@@ -117,6 +129,7 @@ class Standing:
     vehicle: VehicleState
     has_link: bool
     has_control: bool
+    min_battery_v: float = 0.0
     take_off_requested: bool = False
     standing_down: bool = False
     abort_cause_open: bool = False
@@ -142,7 +155,7 @@ class Readiness:
     @property
     def is_ready(self) -> bool:
         """Whether the operator may start the takeoff."""
-        return self.steps[-1:] == ("staged",)
+        return self.steps[-1:] == ("staged",) and not self.losses
 
 
 def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
@@ -182,6 +195,8 @@ def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
     link = _link_loss(standing, report)
     if link is not None and not (is_quarantined and link == "not connected"):  # its release asks for the connection
         found.append(link)
+    elif link is None and _is_battery_low(standing, report):
+        found.append("battery low")
     if is_quarantined:
         found.append("quarantined")
     if not standing.has_control and standing.trial is not TrialState.PLANNED:
@@ -203,6 +218,11 @@ def _link_loss(standing: Standing, report: VehicleReport) -> LossKind | None:
     if status.state == "gone":
         return "link silent"
     return status.unready or None
+
+
+def _is_battery_low(standing: Standing, report: VehicleReport) -> bool:
+    battery_v = None if report.status is None else report.status.battery_v
+    return battery_v is not None and battery_v < standing.min_battery_v
 
 
 def _in_flight(kinds: list[LossKind], texts: Mapping[LossKind, LossText]) -> tuple[Loss, ...]:

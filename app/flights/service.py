@@ -145,6 +145,7 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         vehicle=vehicle.state,
         has_link=vehicle.registered,
         has_control=is_in_control(vehicle, context),
+        min_battery_v=float(vehicle.options.get("min_battery_v", 0.0)),
         take_off_requested=active is not None and active.take_off_at is not None,
         standing_down=active is not None and bool(active.stand_down),
         abort_cause_open=row.abort_cause == "operator",

@@ -160,6 +160,8 @@ def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: 
     take_control(dashboard)
     stage(dashboard, len(TRIED))
     hold(dashboard, HOLD_MS - 300)
+    told = dashboard.page.get_by_role("status").filter(has_text="Released early")
+    expect(told).to_have_text("Released early: nothing was sent. Hold again.")
     hold_button(dashboard.page).focus()
     for key in ("Enter", "Space"):
         dashboard.page.keyboard.down(key)

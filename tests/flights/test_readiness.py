@@ -11,9 +11,24 @@ from app.live.hub import VehicleReport
 from app.live.messages import UnreadyReason, VehicleLinkState, VehicleStatus
 
 
-def status(state: VehicleLinkState = "connected", unready: UnreadyReason = "", *, age_s: float = 0.1) -> VehicleStatus:
+MIN_BATTERY_V = 10.5
+
+
+def status(
+    state: VehicleLinkState = "connected",
+    unready: UnreadyReason = "",
+    *,
+    age_s: float = 0.1,
+    battery_v: float | None = 11.1,
+) -> VehicleStatus:
     return VehicleStatus(
-        vehicle_id=1, state=state, at="2026-11-24T12:00:00Z", step="idle", unready=unready, age_s=age_s
+        vehicle_id=1,
+        state=state,
+        at="2026-11-24T12:00:00Z",
+        step="idle",
+        unready=unready,
+        age_s=age_s,
+        battery_v=battery_v,
     )
 
 
@@ -52,6 +67,11 @@ REPORTS: dict[str, tuple[VehicleReport, VehicleState, LossKind]] = {
         VehicleState.READY,
         "gains unknown",
     ),
+    "low battery": (
+        VehicleReport(worker=True, status=status(battery_v=10.4)),
+        VehicleState.READY,
+        "battery low",
+    ),
     "quarantined": (GOOD, VehicleState.QUARANTINED, "quarantined"),
 }
 
@@ -59,7 +79,9 @@ REPORTS: dict[str, tuple[VehicleReport, VehicleState, LossKind]] = {
 def standing(
     state: TrialState, flags: dict[str, bool], vehicle: VehicleState = VehicleState.READY, *, has_control: bool = True
 ) -> Standing:
-    return Standing(trial=state, vehicle=vehicle, has_link=True, has_control=has_control, **flags)
+    return Standing(
+        trial=state, vehicle=vehicle, has_link=True, has_control=has_control, min_battery_v=MIN_BATTERY_V, **flags
+    )
 
 
 def up_to(step: ReadinessStep | None) -> tuple[ReadinessStep, ...]:
@@ -126,6 +148,12 @@ def test_control_that_ends_takes_everything_back(name: str) -> None:
 def test_a_quarantined_vehicle_without_a_connection_has_one_way_on() -> None:
     found = readiness_of(standing(TrialState.PLANNED, {}, VehicleState.QUARANTINED), REPORTS["connecting"][0])
     assert [each.kind for each in found.losses] == ["quarantined"]
+
+
+@pytest.mark.parametrize("battery_v", [MIN_BATTERY_V, None])
+def test_a_battery_at_its_minimum_or_not_reported_yet_takes_nothing_back(battery_v: float | None) -> None:
+    report = VehicleReport(worker=True, status=status(battery_v=battery_v))
+    assert readiness_of(standing(TrialState.STAGED, {}), report).is_ready
 
 
 def test_control_that_was_never_taken_is_no_loss() -> None:

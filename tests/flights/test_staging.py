@@ -58,13 +58,15 @@ def worker_link(settings: Settings) -> Iterator[LiveServer]:
         yield server
 
 
-def report(client: TestClient, planned: Json, unready: UnreadyReason = "") -> None:
+def report(client: TestClient, planned: Json, unready: UnreadyReason = "", *, battery_v: float = 11.8) -> None:
     """The vehicle's status arrives, as five times a second."""
     application: Any = client.app
     while not application.state.live.worker_running:
         get(client, "/api/health")
     vehicle_id = get(client, f"/api/campaigns/{planned['campaign_id']}")["vehicle"]["id"]
-    status = VehicleStatus(vehicle_id=vehicle_id, state="connected", at="", step="idle", unready=unready)
+    status = VehicleStatus(
+        vehicle_id=vehicle_id, state="connected", at="", step="idle", unready=unready, battery_v=battery_v
+    )
     application.state.live.hub.publish(status)
 
 
@@ -438,6 +440,25 @@ def test_a_staged_vehicle_that_is_no_longer_ready_does_not_take_off_until_it_is_
     assert (readiness["steps"], readiness["losses"], readiness["is_ready"]) == (["control", "staged"], [], True)
     assert client.post(f"{path}/take-off", headers=operator).status_code == 202
     assert client.get(f"{path}/readiness", headers=operator).json()["steps"] == ["control", "staged", "held"]
+
+
+def test_a_staged_vehicle_below_its_minimum_voltage_does_not_take_off_but_stays_staged(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    operator = control_header(client, real) | OUR_PAGE
+    path = f"/api/trials/{staged['id']}"
+    report(client, staged, battery_v=real["options"]["min_battery_v"] - 0.1)
+    refused = client.post(f"{path}/take-off", headers=operator)
+    assert (refused.status_code, refused.json()["detail"], refused.json()["hint"]) == (
+        409,
+        "The battery voltage is below the vehicle's minimum.",
+        "Insert a charged battery, then stage the flight again.",
+    )
+    readiness = client.get(f"{path}/readiness", headers=operator).json()
+    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (["control", "staged"], [], False)
+    assert is_wanted(database, staged) == (False, None)
+    report(client, staged, battery_v=real["options"]["min_battery_v"])
+    assert client.post(f"{path}/take-off", headers=operator).status_code == 202
 
 
 def test_who_is_not_in_control_sees_no_step_of_a_staged_flight_as_held(client: TestClient, staged: Json) -> None:

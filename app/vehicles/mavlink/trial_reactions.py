@@ -200,6 +200,11 @@ class Trial:
         known = RESPONSES[self.failure].outcome
         return "invalid" if known == "quarantine" else known
 
+    @property
+    def has_confirmed_stop(self) -> bool:
+        """Whether a vehicle whose motors a person has stopped reports it, in its newest heartbeat and by a reply."""
+        return self.stopped and self.answered and not self.watch.armed
+
 
 def measure_ground(trial: Trial, now_s: float) -> Trial:
     """Return the trial with the ground where the vehicle stands now, because its altitude shifts as its motors start,
@@ -325,14 +330,29 @@ def request_reply(trial: Trial, now_s: float) -> Step:
 
 
 def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
-    """Stop the motors at once, at any height; disarm repeats the command. A trial that has not failed is aborted."""
+    """Stop the motors at once, at any height; disarm repeats the command. A trial that has not failed is aborted, and a
+    vehicle that may have fallen is quarantined at its end."""
     if trial.stopped:
         return trial, ()
     why, failure = joined(trial.why, motors_off_requested(reason)), trial.failure or Failure.OPERATOR
-    trial = replace(trial, failure=failure, why=why, stopped=True, answered=False, awaited=None, unsent=())
+    doubt = trial.doubt or _find_drop(trial, now_s)
+    trial = replace(trial, failure=failure, why=why, doubt=doubt, stopped=True, answered=False, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)
     return replace(trial, repeated_s=now_s), (PerformAction(Action.KILL),)
+
+
+def _find_drop(trial: Trial, now_s: float) -> str:
+    """Return why a vehicle whose motors are stopped now may have fallen; empty if every source shows it on the ground,
+    or it has not been commanded to take off."""
+    watch, ground_m = trial.watch, trial.plan.ground_m
+    if trial.commanded_s is None:
+        return ""
+    if watch.last is not None and watching.is_airborne(watch, now_s, ground_m):
+        return f"It was {watch.last.altitude_m - ground_m:.1f} m above the ground: inspect it before it flies again."
+    if watching.is_grounded(watch, now_s, ground_m) and not watching.is_said_to_fly(watch, now_s, ground_m):
+        return ""
+    return "It was not known to be on the ground: inspect it before it flies again."
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:

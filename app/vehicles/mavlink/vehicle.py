@@ -530,7 +530,8 @@ class MavlinkVehicle:
         """Keep commanding Land to a vehicle that did not land within its trial, while it is armed and no pilot flies
         it."""
         by_hand = limit_checks.find_taken_over(trial.watch, trial.plan.limits) is not None
-        if not by_hand and not self._radio.is_disarmed and self._repeated is None:
+        is_disarmed = self._radio.is_disarmed or trial.has_confirmed_stop
+        if not by_hand and not is_disarmed and self._repeated is None:
             with suppress(LinkError):
                 self._repeated = RepeatedCommand(self._radio, Action.LAND, by_person=False)
                 self._requested = _LAND_REPEATED

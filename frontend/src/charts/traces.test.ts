@@ -37,7 +37,13 @@ test("the live deviation is what has been measured less the set point, from the 
     timeS: [-0.1, 0, 1, 3, 33],
     measured: [0, 0.1, 2.5, 4.5, 5.25],
   });
-  expect(drawn[1]).toMatchObject({ x: [0, 1, 3, 33], y: [-2.9, -0.5, 0.5, 0.25], showlegend: false });
+  const y = [-2.9, -0.5, Number.NaN, 0.5, Number.NaN, 0.25];
+  expect(drawn[1]).toMatchObject({ x: [0, 1, 1, 3, 3, 33], y, showlegend: false });
+});
+
+test("no line is drawn over an interval without samples, as while the server was restarted", () => {
+  const drawn = withLive(traces, { ...begun(1, 5), timeS: [0.5, 1.5, 4, 4.5], measured: [1, 2, 3, 3.1] });
+  expect(drawn[3]).toMatchObject({ x: [0.5, 1.5, 1.5, 4, 4.5], y: [1, 2, Number.NaN, 3, 3.1] });
 });
 
 test("the altitude limit is shown within the axis, and nothing changes without one", () => {

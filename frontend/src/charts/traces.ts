@@ -45,11 +45,23 @@ export function liveCurves(traces: readonly Trace[], { timeS, measured }: LiveFl
   const live = traceWithRole(traces, "live");
   const deviation = traceWithRole(traces, "live deviation");
   const setPoint = traces[traceWithRole(traces, "set point")];
-  if (live >= 0) curves.set(live, { x: timeS, y: measured, showlegend: true });
+  if (live >= 0) curves.set(live, { ...brokenAtGaps(timeS, measured), showlegend: true });
   if (deviation >= 0 && setPoint !== undefined) {
-    curves.set(deviation, { ...deviationFrom(setPoint, timeS, measured), showlegend: false });
+    const { x, y } = deviationFrom(setPoint, timeS, measured);
+    curves.set(deviation, { ...brokenAtGaps(x, y), showlegend: false });
   }
   return curves;
+}
+
+const GAP_S = 1;
+
+/** The curve with a missing value in each interval without samples: nothing is known there. */
+function brokenAtGaps(x: number[], y: number[]): { x: number[]; y: number[] } {
+  const starts = x.flatMap((time, place) => (time - (x[place - 1] ?? time) > GAP_S ? [place] : []));
+  if (starts.length === 0) return { x, y };
+  const within = (all: number[], value: (place: number) => number): number[] =>
+    all.flatMap((each, place) => (starts.includes(place) ? [value(place), each] : [each]));
+  return { x: within(x, (place) => x[place - 1] as number), y: within(y, () => Number.NaN) };
 }
 
 /** Output − set point, from the command on. */

@@ -11,12 +11,12 @@ interface Props {
 const AROUND = 2 * Math.PI * 20;
 
 /**
- * Calls `onHeld` after a press of two seconds; an earlier release cancels. Ignores the keyboard. A hold that something
- * else than the finger ends says so.
+ * Calls `onHeld` after a press of two seconds; an earlier release cancels. Ignores the keyboard. A hold that ends early
+ * says whether the finger or something else ended it.
  */
 export function HoldButton({ label, disabled = false, onHeld }: Props) {
   const [share, setShare] = useState<number | null>(null);
-  const [interrupted, setInterrupted] = useState(false);
+  const [cancelled, setCancelled] = useState<"" | "Hold interrupted" | "Released early">("");
   const pointer = useRef<number | null>(null);
   const frame = useRef(0);
   const note = useId();
@@ -30,7 +30,7 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
   }, []);
 
   const interrupt = useCallback((): void => {
-    if (pointer.current !== null) setInterrupted(true);
+    if (pointer.current !== null) setCancelled("Hold interrupted");
     letGo();
   }, [letGo]);
 
@@ -59,7 +59,7 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
     pointer.current = event.pointerId;
     const now = performance.now();
     setShare(0);
-    setInterrupted(false);
+    setCancelled("");
     watch({ sinceMs: now, seenMs: now });
   }
 
@@ -78,7 +78,9 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
   }, [disabled, interrupt]);
 
   const release = (event: PointerEvent<HTMLButtonElement>): void => {
-    if (event.pointerId === pointer.current) letGo();
+    if (event.pointerId !== pointer.current) return;
+    setCancelled("Released early");
+    letGo();
   };
   const cancel = (event: PointerEvent<HTMLButtonElement>): void => {
     if (event.pointerId === pointer.current) interrupt();
@@ -104,13 +106,13 @@ export function HoldButton({ label, disabled = false, onHeld }: Props) {
         </svg>
         <span>{share === null ? label : `Keep holding… ${(2 * (1 - share)).toFixed(1)} s`}</span>
       </button>
-      {interrupted && (
+      {cancelled && (
         <p role="status" className={classes["interrupted"]}>
-          Hold interrupted: nothing was sent.{!disabled && " Hold again."}
+          {cancelled}: nothing was sent.{!disabled && " Hold again."}
         </p>
       )}
       <p id={note} className={classes["note"]}>
-        Hold for 2 s with a finger or pointer. Release to cancel. The keyboard is ignored.
+        Hold for 2 s with a finger or pointer; release to cancel.
       </p>
     </div>
   );

@@ -1,6 +1,7 @@
 """A vehicle whose link stays open between flights, against the simulated drone."""
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -484,11 +485,16 @@ def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() ->
             vehicle.stage(OWN_SAFE["ardupilot"])
             record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
             assert record.ending == "aborted"
-            assert record.reason == "Motors off was requested: people below. It confirmed that its motors have stopped."
+            stopped = "Motors off was requested: people below. It confirmed that its motors have stopped."
+            assert re.fullmatch(
+                f"{stopped} It was 2.[0-9] m above the ground: inspect it before it flies again.", record.reason
+            )
             forced = [
                 at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
             ]
             assert forced[0] - told[0] < 0.3
+            assert vehicle.concern == record.reason
+            vehicle.release()
             assert (vehicle.concern, vehicle.read_gains()) == ("", OWN_SAFE["ardupilot"])
             assert "PSC_POSZ_P" in {text(message, "param_id") for message in rig.told("PARAM_SET")}
 
@@ -532,6 +538,8 @@ def test_motors_off_is_heard_also_after_the_program_failed_while_the_vehicle_lan
                 at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
             ]
             assert forced[0] - asked[0] < 0.3
+            assert vehicle.concern.endswith(" It was 3.2 m above the ground: inspect it before it flies again.")
+            vehicle.release()
             assert (vehicle.concern, vehicle.read_gains()) == ("", OWN_SAFE["ardupilot"])
 
 

@@ -13,6 +13,7 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
 )
 from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.records import ending_of
 from app.vehicles.mavlink.trial_reactions import State
 from tests.vehicles.mavlink.test_trial_machine import STAGES
 from tests.vehicles.mavlink.walking import GROUND_M, LIMITS, PLAN, SAFE_GAINS, STEP_S, TrialDriver
@@ -63,7 +64,26 @@ def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_say
     assert walk.altitude_m > 2.0
     assert len(walk.when(Action.KILL)) == 3
     walk.disarm().restore()
+    assert (walk.state, ending_of(walk.trial)) == (State.QUARANTINE, "aborted")
+
+
+def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_to_be_inspected() -> None:
+    """Seen: stopped at 3.2 m, its safe gains were restored in the debris, and it was ready for its next flight."""
+    walk = slide(STAGES[State.RECORD]()).disarm().restore()
+    assert (walk.state, ending_of(walk.trial)) == (State.QUARANTINE, "aborted")
+    assert walk.trial.why.endswith("It was 2.9 m above the ground: inspect it before it flies again.")
+
+
+def test_a_vehicle_whose_motors_were_stopped_on_the_ground_may_fly_again() -> None:
+    walk = slide(STAGES[State.LAND]().touch_down().pass_s(0.2)).disarm().restore()
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "aborted")
+    before_takeoff = slide(STAGES[State.ARM]()).disarm().restore()
+    assert (before_takeoff.state, before_takeoff.trial.outcome) == (State.IDLE, "aborted")
+
+
+def test_a_vehicle_whose_motors_were_stopped_while_it_was_not_heard_is_to_be_inspected() -> None:
+    walk = slide(STAGES[State.LINK_LOST]())
+    assert walk.trial.doubt == "It was not known to be on the ground: inspect it before it flies again."
 
 
 def test_motors_off_that_is_not_obeyed_quarantines_the_vehicle() -> None:

@@ -2914,7 +2914,7 @@ export type ReadinessLoss = {
     /**
      * Kind
      */
-    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'quarantined' | 'control ended';
+    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'quarantined' | 'control ended';
     /**
      * What
      */

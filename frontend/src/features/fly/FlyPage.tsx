@@ -134,7 +134,9 @@ function Screen({ campaign, trial, vehicle }: Props) {
         </div>
       </div>
       <section className={classes["steps"]} aria-label="Next action">
-        {readiness !== null && <ReadinessLosses losses={readiness.losses} />}
+        {readiness !== null && (
+          <ReadinessLosses losses={readiness.losses.filter(({ kind }) => !quarantined || kind !== "quarantined")} />
+        )}
         <ReadOnlyNotice why={vehicle === null ? null : watching} />
         {quarantined && vehicle !== null && (
           <Quarantine vehicle={vehicle} concern={concern} isDown={isDisarmed(status)} orders={orders} />
