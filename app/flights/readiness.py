@@ -121,8 +121,9 @@ class Standing:
     """What readiness follows from: the stored state of a trial and its vehicle, and who asks.
 
     `has_link`: the vehicle is registered, with a process that keeps its link. `has_control`: the one who asks may
-    command it. `min_battery_v`: below it the vehicle does not take off. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe gains are being
-    restored instead. `abort_cause_open`: nobody has stated yet why the flight was aborted.
+    command it. `min_battery_v`: below it the vehicle does not take off. `take_off_requested`: by the operator of a
+    staged flight. `standing_down`: its safe gains are being restored instead. `abort_cause_open`: nobody has stated
+    yet why the flight was aborted.
     """
 
     trial: TrialState

@@ -10,7 +10,6 @@ from app.flights.readiness import LOSSES, STEPS, LossKind, ReadinessStep, Standi
 from app.live.hub import VehicleReport
 from app.live.messages import UnreadyReason, VehicleLinkState, VehicleStatus
 
-
 MIN_BATTERY_V = 10.5
 
 
