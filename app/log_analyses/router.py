@@ -1,10 +1,11 @@
 """Log analyses over HTTP."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, status
 
-from app.log_analyses import service
+from app.campaigns.schemas import Campaign
+from app.log_analyses import campaigns, service
 from app.log_analyses.schemas import LogAnalysis
-from app.web.dependencies import REQUEST_BODY, Record
+from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
 
 router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 
@@ -17,3 +18,11 @@ def analyze_log(record: Record) -> LogAnalysis:
     `companion`) or .tlog of takeoffs to 3 m. Takes some seconds; nothing is stored.
     """
     return service.analyze_upload(record.content(), record.read_companion(), name=record.name)
+
+
+@router.post("/campaign", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
+def start_campaign(record: Record, asking: RequestContextDep) -> Campaign:
+    """Create a campaign of a vehicle that is flown elsewhere, with the takeoffs of a Paparazzi's log as its first
+    flights."""
+    found = service.read_upload(record.content(), record.read_companion(), name=record.name)
+    return record.once(Campaign, lambda session: campaigns.start_campaign(session, found, asking, name=record.name))

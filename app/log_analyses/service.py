@@ -1,4 +1,4 @@
-"""Operations on log analyses: analyse a log of any autopilot. Nothing is stored."""
+"""Operations on logs: analyse one of any autopilot, which stores nothing, and read the takeoffs of one."""
 
 import io
 from typing import Final, get_args
@@ -17,10 +17,12 @@ from app.logs.ardupilot_flight import read_ardupilot_flight
 from app.logs.dataflash import is_dataflash
 from app.logs.paparazzi import is_paparazzi
 from app.logs.readers import HEAD_BYTES, READERS, read_takeoffs
+from app.logs.takeoffs import Takeoff
 from app.logs.tlog import is_tlog
 from app.processes.sandbox import FILE, run_limited
 
-ANALYSED: Final = "ArduCopter's .bin log, or Paparazzi's .data or .tlog log of a takeoff"
+TAKEOFFS: Final = "Paparazzi's .data or .tlog log of a takeoff"
+ANALYSED: Final = f"ArduCopter's .bin log, or {TAKEOFFS}; logs of PX4 are not analysed yet"
 
 
 def analyze_upload(content: bytes, companion: bytes | None, *, name: str) -> LogAnalysis:
@@ -33,20 +35,27 @@ def analyze_upload(content: bytes, companion: bytes | None, *, name: str) -> Log
     return LogAnalysis(**dict(analysed.answer), figures=figures)
 
 
-def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
-    """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
-    head, stream = content[:HEAD_BYTES], io.BytesIO(content)
-    if is_dataflash(head):
-        flight = read_ardupilot_flight(stream, name=name)
-        return AnalysedManoeuvres(analyze(flight), name, flight.parameters.hover_throttle)
+def read_upload(content: bytes, companion: bytes | None, *, name: str) -> list[Takeoff]:
+    """Read every takeoff of an uploaded log of Paparazzi's, in a process with limits. Raises InputError that names what
+    is missing or wrong."""
+    return run_limited(FILE, read_content, content, companion, name, usable=TAKEOFFS)
+
+
+def read_content(content: bytes, companion: bytes | None, name: str, *, usable: str) -> list[Takeoff]:
+    """Read every takeoff of a Paparazzi's log in memory. Raises TrajectoryError, which asks for a `usable` log."""
+    head = content[:HEAD_BYTES]
     if is_tlog(head) or is_paparazzi(head):
         beside = None if companion is None else io.BytesIO(companion)
-        found = read_takeoffs(stream, name=name, companion=beside)
-        return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)
+        return list(read_takeoffs(io.BytesIO(content), name=name, companion=beside))
     kind = next((f" ({reader.title})" for reader in READERS if reader.recognises(head)), "")
     other = f"is another kind of log{kind}" if kind else "is not a log" if head else "is empty"
-    raise TrajectoryError(
-        f"{name} cannot be analysed.",
-        hint=f"Use {ANALYSED}. Logs of PX4 are not analysed yet.",
-        problems=(Problem("file", other),),
-    )
+    raise TrajectoryError(f"{name} cannot be used.", hint=f"Use {usable}.", problems=(Problem("file", other),))
+
+
+def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
+    """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
+    if is_dataflash(content[:HEAD_BYTES]):
+        flight = read_ardupilot_flight(io.BytesIO(content), name=name)
+        return AnalysedManoeuvres(analyze(flight), name, flight.parameters.hover_throttle)
+    found = read_content(content, companion, name, usable=ANALYSED)
+    return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)

@@ -120,11 +120,13 @@ class BodyLimitMiddleware:
         self._app = app
         record = "a flight record has at most 200 000 rows, so downsample or trim a longer one"
         of_flight = _Limit("file", upload_bytes, f"{record}. `gainline import` reads larger logs")
+        analysed = _Limit("file", upload_bytes, "`gainline analyze` reads larger logs")
         self._uploads = {
             "/trajectory": of_flight,
             "/records": of_flight,
             "/controller-checks": _Limit("file", upload_bytes, "`gainline controller check` reads larger logs"),
-            "/log-analyses": _Limit("file", upload_bytes, "`gainline analyze` reads larger logs"),
+            "/log-analyses": analysed,
+            "/log-analyses/campaign": analysed,
             "/photos": _Limit("file", PHOTO_BYTES, "a lower resolution in the camera's settings is enough"),
             "/api/bundles": _Limit("file", BUNDLE_BYTES, "`gainline unbundle` imports larger ones"),
         }

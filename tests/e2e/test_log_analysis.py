@@ -79,6 +79,22 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(page_o
     assert f'<define name="HOVER_KP" value="{kp}"/>' in content
 
 
+def test_a_campaign_starts_from_the_log_and_proposes_what_the_analysis_did(page_of_analysis: Dashboard) -> None:
+    dashboard, page = page_of_analysis, page_of_analysis.page
+    choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"))
+    rows = page.get_by_role("region", name="Gains compared").locator("tbody tr")
+    expect(rows).to_have_count(2, timeout=60_000)
+    proposed = rows.nth(1).locator("td").all_inner_texts()[1:4]
+    dashboard.button("Start campaign").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("takeoff")
+    campaign_id = int(page.url.rsplit("/", 1)[1])
+    assert [trial["gains"] for trial in dashboard.trials(campaign_id)] == [{"kp": 283, "ki": 13, "kd": 82}]
+    dashboard.until(lambda: dashboard.get(f"/campaigns/{campaign_id}/proposal")["state"] == "ready")
+    gains = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["gains"]
+    expect(page.get_by_role("heading", name="Next: flight 2")).to_be_visible()
+    assert [f"{gains[name]:g}" for name in ("kp", "ki", "kd")] == proposed
+
+
 def test_a_log_that_cannot_be_analysed_is_refused_and_the_next_one_is_not(page_of_analysis: Dashboard) -> None:
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.bin", recorded("px4_takeoff.ulg"))

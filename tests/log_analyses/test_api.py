@@ -8,7 +8,7 @@ from fastapi.testclient import TestClient
 from pymavlink.dialects.v20 import ardupilotmega
 
 from app.figures.theme import PALETTES
-from tests.builders import problems_of
+from tests.builders import Json, problems_of
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import Telemetry, recorded
 
@@ -74,7 +74,7 @@ def test_a_file_that_is_no_log_is_refused(client: TestClient) -> None:
     assert problems_of(answer) == {"file": "is not a log"}
     assert problems_of(send(client, "empty.bin", b"")) == {"file": "is empty"}
     assert answer.json()["hint"].startswith(
-        "Use ArduCopter's .bin log, or Paparazzi's .data or .tlog log of a takeoff."
+        "Use ArduCopter's .bin log, or Paparazzi's .data or .tlog log of a takeoff; logs of PX4 are not analysed yet."
     )
 
 
@@ -118,3 +118,61 @@ def test_a_telemetry_log_of_another_autopilot_is_refused(client: TestClient) -> 
     answer = send(client, "copter.tlog", log.content)
     assert answer.status_code == 422
     assert problems_of(answer)["file"].startswith("is a telemetry log of an autopilot with the gains PSC_")
+
+
+def start(client: TestClient, name: str, content: bytes) -> httpx2.Response:
+    return client.post(f"{PATH}/campaign", files={"file": (name, content)})
+
+
+def flights_of(client: TestClient, campaign: Json) -> list[Json]:
+    flights: list[Json] = client.get(f"/api/campaigns/{campaign['id']}/trials").json()["items"]
+    return flights
+
+
+def test_a_campaign_starts_with_the_takeoff_of_a_log(client: TestClient) -> None:
+    answer = start(client, "flight.tlog", recorded("paparazzi_283_13_82.tlog"))
+    assert answer.status_code == 201, answer.text
+    campaign = answer.json()
+    assert (campaign["name"], campaign["vehicle"]["title"]) == ("flight", "Flown elsewhere")
+    [flight] = flights_of(client, campaign)
+    assert (flight["state"], flight["gains"]) == ("valid", {"kp": 283, "ki": 13, "kd": 82})
+    analysed = send(client, "flight.tlog", recorded("paparazzi_283_13_82.tlog")).json()["numbers"]
+    assert flight["error"] == pytest.approx(analysed["error_m"], abs=1e-6)
+    assert campaign["definition"]["experiment_options"] == {"window_s": analysed["window_s"]}
+    assert client.get(f"/api/campaigns/{campaign['id']}/proposal").json()["state"] == "computing"
+
+
+def test_a_log_flown_with_gains_that_the_gate_refuses_starts_a_campaign_with_them_too(client: TestClient) -> None:
+    campaign = start(client, "flight.tlog", recorded("paparazzi_1624_1356_195.tlog")).json()
+    [flight] = flights_of(client, campaign)
+    assert (flight["state"], flight["gains"]) == ("valid", {"kp": 1624, "ki": 1356, "kd": 195})
+    assert not flight["gate"]["passed"]
+
+
+def test_every_takeoff_of_a_log_is_a_flight_of_its_campaign(client: TestClient) -> None:
+    flown = [{"kp": 283, "ki": 13, "kd": 82}, {"kp": 900, "ki": 40, "kd": 150}]
+    parts = [
+        data_of(Flight(gains=gains, setting=True), start_s=12.0 + 100.0 * place) for place, gains in enumerate(flown)
+    ]
+    files = {"file": ("day.data", "".join(parts).encode()), "companion": ("day.log", COMPANION.encode())}
+    answer = client.post(f"{PATH}/campaign", files=files)
+    assert answer.status_code == 201, answer.text
+    flights = flights_of(client, answer.json())
+    assert [(flight["state"], flight["gains"], flight["note"]) for flight in flights] == [
+        ("valid", gains, f"Takeoff {number} of day.data") for number, gains in enumerate(flown, start=1)
+    ]
+    assert flights[1]["error"] < flights[0]["error"]
+    assert answer.json()["best"]["trial_number"] == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("arducopter_steps.bin", "is another kind of log (ArduPilot's on-board log)"),
+        ("px4_takeoff.ulg", "is another kind of log (PX4's log)"),
+    ],
+)
+def test_no_campaign_starts_from_a_log_that_cannot_be_used(client: TestClient, name: str, reason: str) -> None:
+    answer = start(client, name, recorded(name))
+    assert (answer.status_code, problems_of(answer)) == (422, {"file": reason})
+    assert client.get("/api/campaigns").json()["items"] == []

@@ -93,15 +93,10 @@ class TakeoffAnalysis:
 def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
     """Analyse the takeoffs of one vehicle; deterministic, takes some seconds.
 
-    Takeoffs of less than 10 s are left out, and all but the last 8. The others are scored over the same window: that
-    of a campaign, or the shortest of them. Raises TrajectoryError if none is long enough or can be scored, and if the
-    best does not fly as the model does with its gains.
+    Raises TrajectoryError if none is long enough or can be scored, and if the best does not fly as the model does with
+    its gains.
     """
-    used = [each for each in takeoffs if each.trajectory.time_s[-1] >= SHORTEST_S][-MOST_TAKEOFFS:]
-    if not used:
-        longest_s = max((float(each.trajectory.time_s[-1]) for each in takeoffs), default=0.0)
-        raise _unanswered(f"has takeoffs of at most {longest_s:.1f} s; {SHORTEST_S:g} s are needed")
-    window_s = min(WINDOW_S, *(math.floor(10.0 * each.trajectory.time_s[-1]) / 10.0 for each in used))
+    used, window_s = comparable_takeoffs(takeoffs)
     definition = Definition(
         strategy="calibrated", experiment_options={"window_s": window_s}, stop=StopRule(kind="budget", max_flights=99)
     )
@@ -149,6 +144,16 @@ def analyze_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> TakeoffAnalysis:
         insufficient=None if is_better else _KEEP,
         predicted=predict_flight(calibration, best, experiment.space.vector(shown.gains)).trajectory,
     )
+
+
+def comparable_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> tuple[list[LoggedTakeoff], float]:
+    """The last 8 takeoffs of at least 10 s, and the window, s, over which all are scored: that of a campaign, or the
+    shortest of them. Raises TrajectoryError if none is long enough."""
+    used = [each for each in takeoffs if each.trajectory.time_s[-1] >= SHORTEST_S][-MOST_TAKEOFFS:]
+    if not used:
+        longest_s = max((float(each.trajectory.time_s[-1]) for each in takeoffs), default=0.0)
+        raise _unanswered(f"has takeoffs of at most {longest_s:.1f} s; {SHORTEST_S:g} s are needed")
+    return used, min(WINDOW_S, *(math.floor(10.0 * each.trajectory.time_s[-1]) / 10.0 for each in used))
 
 
 def _flight(experiment: Takeoff, takeoff: LoggedTakeoff) -> Flight:

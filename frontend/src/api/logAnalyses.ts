@@ -2,13 +2,18 @@
 
 import { useMutation } from "@tanstack/react-query";
 import { answer } from "./client";
-import { analyzeLog } from "./generated";
+import { analyzeLog, startCampaign } from "./generated";
 import type { RecordFiles } from "./records";
 
 export type { LogAnalysis } from "./generated";
 
 /** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
 export const ANALYSED_FILES = ".bin,.tlog,.data,.log";
+
+/** Create a campaign with the takeoffs of a Paparazzi's log. */
+export function useStartCampaign() {
+  return useMutation({ mutationFn: (files: RecordFiles) => answer(startCampaign({ body: { ...files } })) });
+}
 
 export function useAnalyzeLog() {
   return useMutation({ mutationFn: (files: RecordFiles) => answer(analyzeLog({ body: { ...files } })) });

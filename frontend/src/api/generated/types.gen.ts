@@ -7378,6 +7378,51 @@ export type AnalyzeLogResponses = {
 
 export type AnalyzeLogResponse = AnalyzeLogResponses[keyof AnalyzeLogResponses];
 
+export type StartCampaignData = {
+    body: {
+        file: Blob | File;
+        /**
+         * the .log file that Paparazzi writes next to a .data file
+         */
+        companion?: Blob | File;
+    };
+    headers?: {
+        /**
+         * Idempotency-Key
+         *
+         * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
+         */
+        'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path?: never;
+    query?: never;
+    url: '/api/log-analyses/campaign';
+};
+
+export type StartCampaignErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type StartCampaignError = StartCampaignErrors[keyof StartCampaignErrors];
+
+export type StartCampaignResponses = {
+    /**
+     * Successful Response
+     */
+    201: Campaign;
+};
+
+export type StartCampaignResponse = StartCampaignResponses[keyof StartCampaignResponses];
+
 export type CompareFlightsData = {
     body?: never;
     path?: never;

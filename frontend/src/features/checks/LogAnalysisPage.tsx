@@ -1,9 +1,9 @@
 import { Anchor, Button, FileButton, Group, Skeleton, Text, Title, useComputedColorScheme } from "@mantine/core";
 import { IconDownload, IconFileUpload } from "@tabler/icons-react";
 import { useRef, useState } from "react";
-import { Link } from "react-router";
-import { ANALYSED_FILES, type LogAnalysis, useAnalyzeLog } from "../../api/logAnalyses";
-import { recordOf } from "../../api/records";
+import { Link, useNavigate } from "react-router";
+import { ANALYSED_FILES, type LogAnalysis, useAnalyzeLog, useStartCampaign } from "../../api/logAnalyses";
+import { type RecordFiles, recordOf } from "../../api/records";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { DataTable } from "../../ui/DataTable";
 import { ErrorNotice } from "../../ui/Notices";
@@ -21,11 +21,11 @@ export function LogAnalysisPage() {
   useTitle("Log analysis");
   const [over, setOver] = useState(false);
   const resetFile = useRef<() => void>(null);
-  const [shown, setShown] = useState<LogAnalysis | null>(null);
+  const [shown, setShown] = useState<ResultProps | null>(null);
   const { mutate, error, variables, isPending } = useAnalyzeLog();
   const analyze = (files: readonly File[]) => {
     const chosen = recordOf(files);
-    if (chosen && !isPending) mutate(chosen, { onSuccess: setShown });
+    if (chosen && !isPending) mutate(chosen, { onSuccess: (analysis) => setShown({ analysis, files: chosen }) });
     resetFile.current?.();
   };
   return (
@@ -50,7 +50,7 @@ export function LogAnalysisPage() {
           <Skeleton height={280} mt={12} radius="md" aria-hidden />
         </Panel>
       )}
-      {shown && <Result analysis={shown} />}
+      {shown && <Result {...shown} />}
       <Panel
         title={shown ? "Analyse another log" : "Better altitude gains from one log"}
         className={over ? classes["over"] : ""}
@@ -82,8 +82,13 @@ export function LogAnalysisPage() {
   );
 }
 
-function Result({ analysis }: { analysis: LogAnalysis }) {
-  const { file_name, answer, proposes, flight, vehicle, gains, notes, parameter_file, figures } = analysis;
+interface ResultProps {
+  analysis: LogAnalysis;
+  files: RecordFiles;
+}
+
+function Result({ analysis, files }: ResultProps) {
+  const { file_name, autopilot, answer, proposes, flight, vehicle, gains, notes, parameter_file, figures } = analysis;
   const figure = figures[useComputedColorScheme("light")];
   const columns = gains.columns.map((title) => ({ name: title, title, unit: "", digits: null }));
   return (
@@ -104,21 +109,40 @@ function Result({ analysis }: { analysis: LogAnalysis }) {
             <li key={note}>{note}</li>
           ))}
         </ul>
-        {parameter_file !== null && (
-          <Button
-            component="a"
-            mt="sm"
-            variant="default"
-            href={`data:text/plain;charset=utf-8,${encodeURIComponent(parameter_file.content)}`}
-            download={parameter_file.name}
-            leftSection={<IconDownload size={18} aria-hidden />}
-          >
-            Download parameter file
-          </Button>
-        )}
+        <Group gap={10} mt="sm">
+          {autopilot === "Paparazzi" && <StartCampaign key={file_name} files={files} />}
+          {parameter_file !== null && (
+            <Button
+              component="a"
+              variant="default"
+              href={`data:text/plain;charset=utf-8,${encodeURIComponent(parameter_file.content)}`}
+              download={parameter_file.name}
+              leftSection={<IconDownload size={18} aria-hidden />}
+            >
+              Download parameter file
+            </Button>
+          )}
+        </Group>
       </Panel>
       {figure && <FigurePanel title={figure.title} card={figure} error={null} height={FIGURE_HEIGHT_PX} />}
     </article>
+  );
+}
+
+/** Starts a campaign with the takeoffs of the log as its first flights. */
+function StartCampaign({ files }: { files: RecordFiles }) {
+  const { mutate, error, isPending } = useStartCampaign();
+  const navigate = useNavigate();
+  return (
+    <>
+      <Button
+        loading={isPending}
+        onClick={() => mutate(files, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) })}
+      >
+        Start campaign
+      </Button>
+      <ErrorNotice error={error} />
+    </>
   );
 }
 
