@@ -160,7 +160,7 @@ def test_screen_readers_always_get_announcements_and_speech_only_when_switched_o
     assert said(dashboard) == []
 
     dashboard.open("/settings")
-    dashboard.page.get_by_role("switch", name="Spoken announcements").click()
+    dashboard.page.get_by_role("checkbox", name="Spoken announcements").click()
     dashboard.until(lambda: said(dashboard) == ["Announcements are on."])
     dashboard.open(f"/campaigns/{campaign_id}")
     dashboard.fly_headless_body(campaign_id, {"variant": "repeat"})

@@ -39,7 +39,7 @@ def register_by_hand(dashboard: Dashboard, name: str, drone: Drone) -> int:
     page.get_by_role("link", name="Register a vehicle").click()
     address = page.get_by_role("textbox", name="Address")
     page.get_by_label("Name").fill(name)
-    page.get_by_role("switch", name="Simulation on this computer").check()
+    page.get_by_role("checkbox", name="Simulation on this computer").check()
     address.fill("udp:nowhere")
     dashboard.button("Register vehicle").click()
     expect(address).to_have_attribute("aria-invalid", "true")

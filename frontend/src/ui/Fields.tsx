@@ -1,4 +1,4 @@
-import { InputBase, type InputBaseProps, Switch, TextInput, type TextInputProps } from "@mantine/core";
+import { Checkbox, InputBase, type InputBaseProps, TextInput, type TextInputProps } from "@mantine/core";
 import { IconChevronDown } from "@tabler/icons-react";
 import { useState } from "react";
 import type { OptionInfo } from "../api/types";
@@ -72,13 +72,13 @@ function shown(choice: OptionValue): string {
   return CHOICES[String(choice)] ?? String(choice).replace(/^./, (letter) => letter.toUpperCase());
 }
 
-/** Input for an option, by its type: switch, select, text, or number with its range. */
+/** Input for an option, by its type: checkbox, select, text, or number with its range. */
 export function OptionField({ option, value, error, onChange }: OptionFieldProps) {
   const { title, default: standard, choices = [] } = option;
   const now = value ?? standard;
   if (typeof standard === "boolean") {
     return (
-      <Switch
+      <Checkbox
         size="md"
         label={title}
         checked={now === true}

@@ -1,4 +1,4 @@
-import { Button, Checkbox, Stack, Switch, TextInput } from "@mantine/core";
+import { Button, Checkbox, Stack, TextInput } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useState } from "react";
 import { useNavigate } from "react-router";
@@ -112,7 +112,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
             ? "A simulation on this computer: one click starts a flight, and its result is classified automatically."
             : "A real vehicle: the operator in control holds a button to take off, and reviews every flight."}
         </p>
-        <Switch
+        <Checkbox
           size="md"
           label={LABELS["options.simulated"]}
           checked={simulated}

@@ -1,12 +1,12 @@
 import {
   Anchor,
   Button,
+  Checkbox,
   Group,
   SegmentedControl,
   SimpleGrid,
   Skeleton,
   Stack,
-  Switch,
   Text,
   TextInput,
   Title,
@@ -86,7 +86,7 @@ function ThisBrowser() {
           onChange={(value) => setColorScheme(value as typeof colorScheme)}
         />
       </div>
-      <Switch
+      <Checkbox
         label="Spoken announcements"
         description={
           canSpeak
