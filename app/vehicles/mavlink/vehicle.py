@@ -25,6 +25,7 @@ from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, limit_checks, parameters, preflight, records
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
+from app.vehicles.mavlink.boot_clock import RESTARTED_S
 from app.vehicles.mavlink.events import Action, PacketReceived, RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.opening import limits_of, open_radio
@@ -42,6 +43,7 @@ STANDSTILL_S: Final = 1.0
 """Observation before arming, because a long time may have passed since the gains were staged."""
 
 _LISTEN_S: Final = 0.1
+_POSITIONS_CEASED_S: Final = 2.0
 _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
 _ANOTHER: Final = "Check which vehicle it is, then try again."
@@ -105,6 +107,7 @@ class MavlinkVehicle:
             options, clock, on_message=on_message, on_wait=self._while_waiting, transport=transport
         )
         self._status_reader = StatusReader(self._radio)
+        self._telemetry_requested_s = self._radio.clock.now_s()
         try:
             self._gains = GainStore(self._radio, safe_gains)
             self._decided = decided
@@ -128,6 +131,7 @@ class MavlinkVehicle:
         not be written; VehicleError if the vehicle does not confirm them; SafeGainsError in quarantine."""
         self._require_not_quarantined()
         self._identify()
+        self._renew_telemetry()
         self._require_not_quarantined()
         self._require_uid()
         preflight.require_disarmed(self._radio)
@@ -226,12 +230,14 @@ class MavlinkVehicle:
 
     def attend(self, timeout_s: float) -> None:
         """Receive for `timeout_s` while sending the ground station's heartbeats. A command of `land` or `motors_off` is
-        repeated every second until telemetry confirms it. Raises LinkError if the link is closed."""
+        repeated every second until telemetry confirms it. If only heartbeats arrive, telemetry is requested again,
+        which takes longer. Raises LinkError if the link is closed."""
         until_s = self._radio.clock.now_s() + timeout_s
         while (left_s := until_s - self._radio.clock.now_s()) > 0.0:
             packets = self._radio.receive(min(left_s, _LISTEN_S))
             self._check_identity()
             self._repeat_command(packets)
+        self._renew_telemetry()
 
     def confirm_staged(self) -> None:
         """Read the staged gains again after a silence. Raises VehicleError if it restarted meanwhile, does not send its
@@ -415,6 +421,29 @@ class MavlinkVehicle:
         self._listen(0.0)
         if self._pinned is not None and self._state not in QUARANTINE_STATES:
             self._pinned = self._pinned.completed_by(self.identity)
+
+    def _renew_telemetry(self) -> None:
+        """Request telemetry again from a vehicle on the ground of which only heartbeats have arrived for 2 s, and
+        receive long enough to notice a restart: a restarted ArduPilot sends nothing else, and only the time of its
+        positions shows the restart."""
+        seen = self._radio.seen
+        position_s = seen.positions[-1][0] if seen.positions else float("-inf")
+        without_s = seen.heartbeat_s - max(position_s, self._telemetry_requested_s)
+        if without_s <= _POSITIONS_CEASED_S * self._radio.timeout_factor or not self._is_at_rest:
+            return
+        self._telemetry_requested_s = self._radio.clock.now_s()
+        with suppress(VehicleError):  # a closed link fails again in the next operation
+            self._identify()
+            if self._is_at_rest:
+                preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
+                until_s = self._radio.clock.now_s() + 2.0 * RESTARTED_S
+                while self._radio.clock.now_s() < until_s:
+                    self._listen(_LISTEN_S)
+
+    @property
+    def _is_at_rest(self) -> bool:
+        """Whether it is disarmed, may be commanded, and is not being landed or stopped."""
+        return self._state not in QUARANTINE_STATES and self._radio.is_disarmed and self._repeated is None
 
     def _require_uid(self) -> None:
         """Raise VehicleError if the pinned hardware id is known, and this vehicle has not reported its own."""

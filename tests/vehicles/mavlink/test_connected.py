@@ -384,6 +384,32 @@ def test_gains_that_were_staged_before_a_restart_are_not_flown() -> None:
         assert vehicle.restore() == SAFE
 
 
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4", "paparazzi"])
+def test_a_restart_between_flights_is_noticed_before_the_next_which_then_flies(autopilot: str) -> None:
+    """Observed defect: a restarted ArduCopter sends heartbeats only. Its restart was noticed as it was about to take
+    off, which failed."""
+    with LockstepRig(autopilot) as rig, connected(rig) as vehicle:
+        if autopilot != "paparazzi":
+            rig.switch_on_failsafes()
+        vehicle.attend(40.0)
+        rig.drone.reboot()
+        attend_until(vehicle, lambda: vehicle.condition().held == {}, within_s=8.0)
+        assert "It restarted" in vehicle.condition().trouble
+        vehicle.stage(OWN_SAFE[autopilot])
+        assert vehicle.condition().trouble == ""
+        assert vehicle.fly(ORDER, on_sample=unwatched, should_stop=never).ending == "completed"
+
+
+def test_a_restart_is_noticed_by_staging_itself() -> None:
+    with LockstepRig("ardupilot") as rig, connected(rig) as vehicle:
+        rig.switch_on_failsafes()
+        vehicle.attend(40.0)
+        rig.drone.reboot()
+        rig.wait_s(6.0)
+        vehicle.stage(OWN_SAFE["ardupilot"])
+        assert vehicle.fly(ORDER, on_sample=unwatched, should_stop=never).ending == "completed"
+
+
 @pytest.mark.parametrize("lost_s", [0.0, 1.0])
 def test_every_parameter_can_be_read_also_where_some_are_lost(lost_s: float) -> None:
     """Lost for so long, in which the drone sends about five of them."""
