@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from sqlalchemy import String, func, literal, null, select, tuple_, union_all
+from sqlalchemy import ColumnElement, String, and_, func, literal, null, or_, select, tuple_, union_all
 from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
@@ -104,16 +104,19 @@ def ledger(
 ) -> tuple[list[tuple[Line, Position]], int]:
     """The newest `limit` + 1 lines before that position, each with its own position; and the total count.
 
-    A flight is a line from its request on, and another one once the safe gains are restored after it.
+    A flight is a line from its request on, and another one once the safe gains were restored after it, or it ended
+    without that although its gains were on the vehicle.
     """
     flight = FlightRow.vehicle_id == vehicle_id
     lines = union_all(
         select(
             FlightRow.requested_at.label("at"), (2 * FlightRow.id).label("rank"), literal("flight", String).label("why")
         ).where(flight),
-        select(FlightRow.restored_at, 2 * FlightRow.id + 1, literal(RESTORE_AFTER_FLIGHT, String)).where(
-            flight, FlightRow.restored_at.is_not(null())
-        ),
+        select(
+            func.coalesce(FlightRow.restored_at, FlightRow.finished_at),
+            2 * FlightRow.id + 1,
+            literal(RESTORE_AFTER_FLIGHT, String),
+        ).where(flight, or_(FlightRow.restored_at.is_not(null()), _is_left_with_its_gains())),
         select(VehicleActRow.requested_at, 2 * VehicleActRow.id, VehicleActRow.kind.cast(String)).where(
             VehicleActRow.vehicle_id == vehicle_id,
             VehicleActRow.kind.in_(GIVES_GAINS),
@@ -128,6 +131,16 @@ def ledger(
         wanted = wanted.where(tuple_(lines.c.at, lines.c.rank) < tuple_(at, literal(before[1])))
     found = session.execute(wanted.limit(limit + 1)).all()
     return [((row.why, row.rank // 2), (row.at.isoformat(), row.rank)) for row in found], total
+
+
+def _is_left_with_its_gains() -> ColumnElement[bool]:
+    """Whether a flight of a registered vehicle ended with its gains written and no safe gains read back since."""
+    return and_(
+        FlightRow.finished_at.is_not(null()),
+        FlightRow.read_back.is_not(null()),
+        FlightRow.safe_gains.is_not(null()),
+        FlightRow.vehicle.has(VehicleRow.registered),
+    )
 
 
 def flights_by_id(session: Session, ids: Sequence[int]) -> dict[int, FlightRow]:

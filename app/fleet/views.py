@@ -174,8 +174,8 @@ def _of_restoring(vehicle: VehicleRow, row: FlightRow) -> GivenGains:
         act_id=None,
         asked=asked,
         read_back=row.restored,
-        outcome="done" if row.restored == asked else "failed",
-        asked_at=row.restored_at,
+        outcome="not confirmed" if row.restored is None else "done" if row.restored == asked else "failed",
+        asked_at=row.restored_at or row.finished_at,
     )
 
 

@@ -365,6 +365,19 @@ def test_the_ledger_lists_every_gain_set_that_was_given(
     assert seen(client, real)["held"] == better
 
 
+def test_safe_gains_that_were_not_read_back_after_a_flight_stand_in_the_ledger(
+    client: TestClient, database: Database, real: Json, staged: Json
+) -> None:
+    """Observed defect: the ledger ended with the gains of the flight, and nothing said that the safe ones failed."""
+    with database.write() as session:
+        outcome = FlightOutcome(problem="refused", concern="Its safe gains could not be verified.")
+        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
+    line = get(client, f"/api/vehicles/{real['id']}/ledger")["items"][0]
+    assert (line["purpose"], line["asked"]) == ("restore after flight", DEFAULT_GAINS)
+    assert (line["read_back"], line["outcome"]) == (None, "not confirmed")
+    assert line["asked_at"] is not None
+
+
 def test_safe_gains_that_did_not_come_back_stand_in_the_ledger_as_they_were_read(
     client: TestClient, database: Database, real: Json, staged: Json
 ) -> None:
