@@ -46,9 +46,9 @@ def stage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) ->
 
 
 @router.post("/trials/{trial_id}/unstage", status_code=status.HTTP_202_ACCEPTED)
-def unstage_trial(act: IdempotentPost, trial_id: Id) -> Trial:
+def unstage_trial(act: IdempotentPost, asking: RequestContextDep, trial_id: Id) -> Trial:
     """Restore the safe gains of a staged vehicle instead of flying; the trial is then planned again."""
-    return act(Trial, lambda session: service.unstage_trial(session, trial_id))
+    return act(Trial, lambda session: service.unstage_trial(session, trial_id, asking))
 
 
 @router.post("/trials/{trial_id}/take-off", status_code=status.HTTP_202_ACCEPTED)

@@ -5,7 +5,7 @@ from contextlib import suppress
 
 from sqlalchemy.orm import Session
 
-from app.accounts.permissions import LOCAL_CLI, RequestContext
+from app.accounts.permissions import LOCAL_CLI, RequestContext, RequestOrigin
 from app.campaigns import history, rehearsals
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import experiment_of_campaign
@@ -18,7 +18,7 @@ from app.common.conflict_checks import check_action
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.states import ACTIVE_FLIGHT_STATES, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
 from app.core.errors import GainlineError
-from app.db.models import CampaignRow, FlightRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import is_in_control, require_control, require_may_command, require_not_controlled_by_other
@@ -178,15 +178,26 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
     return trial_view(session, campaign, row)
 
 
-def unstage_trial(session: Session, trial_id: int) -> Trial:
-    """Request that a staged vehicle's safe gains are restored; its trial is then planned again.
+def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOCAL_CLI) -> Trial:
+    """Request that a staged vehicle's safe gains are restored; its trial is then planned again, with the origin of the
+    request as the reason.
 
     Raises ConflictError when nothing is staged.
     """
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "unstage", row.state, f"Flight {row.number}")
-    _staged(session, row).stand_down = "unstaged by the operator"
-    return trial_view(session, campaigns.get_row(session, row.campaign_id), row)
+    campaign = campaigns.get_row(session, row.campaign_id)
+    _staged(session, row).stand_down = f"unstaged {_origin(campaign.vehicle, context)}"
+    return trial_view(session, campaign, row)
+
+
+def _origin(vehicle: VehicleRow, context: RequestContext) -> str:
+    """Where a request comes from that is open to everyone: `by the operator`, `from another browser`, …"""
+    if is_in_control(vehicle, context):
+        return "by the operator"
+    if context.caller.place is RequestOrigin.ELSEWHERE:
+        return "from another device"
+    return "from another browser" if context.from_our_page else "by a script"
 
 
 def _staged(session: Session, row: TrialRow) -> FlightRow:
