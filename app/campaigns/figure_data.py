@@ -244,7 +244,7 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
 
 def _next(flight: NextFlight, rows: Sequence[TrialRow]) -> NextFlight:
     """The flight without an error, interval and band that say nothing; the model's curve stays."""
-    if is_informative(None if flight.interval is None else flight.interval.low, corrected=history.is_corrected(rows)):
+    if history.is_prediction_informative(None if flight.interval is None else flight.interval.low, rows):
         return flight
     return replace(flight, predicted_error=None, interval=None, band=None)
 

@@ -21,7 +21,6 @@ from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.gate import space_of
-from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import Proposal, band_channels
 from app.db.models import CampaignRow, TrialRow
 from app.db.session import Database
@@ -160,9 +159,7 @@ def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
             gains=dict(gains), predicted_error=None, interval=None, curve=None, lower=None, upper=None
         )
     interval = predicted.interval
-    predicts = is_informative(
-        None if interval is None else interval.lower, corrected=history.is_corrected(question.trials)
-    )
+    predicts = history.is_prediction_informative(None if interval is None else interval.lower, question.trials)
     lower, upper = (_edge(predicted.predicted, channel) for channel in band_channels(output))
     return GainsPrediction(
         gains=dict(gains),

@@ -29,6 +29,7 @@ from app.common.states import (
 from app.core.definition import Definition, Donor, Flight, Prediction
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory
+from app.core.tuning.predictions import is_informative
 from app.db import trajectories
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
@@ -158,6 +159,12 @@ def best_of(trials: Sequence[TrialRow]) -> TrialRow | None:
 def is_corrected(trials: Sequence[TrialRow], number: float = math.inf) -> bool:
     """Whether a flight had corrected the model before this flight; by default, before the next one."""
     return any(row.state == TrialState.VALID and row.number < number for row in trials)
+
+
+def is_prediction_informative(lower: float | None, trials: Sequence[TrialRow], number: float = math.inf) -> bool:
+    """Whether a prediction with an interval from `lower` on said anything before this flight; by default, before the
+    next one."""
+    return is_informative(lower, corrected=is_corrected(trials, number))
 
 
 def find_unreviewed(trials: Sequence[TrialRow]) -> TrialRow | None:

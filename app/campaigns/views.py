@@ -35,7 +35,6 @@ from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialSt
 from app.core.definition import aborted_by_gains
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
-from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import Explanation
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrialRow
 from app.fleet import service as fleet
@@ -174,7 +173,7 @@ def proposal_view(session: Session, campaign: CampaignRow, row: ProposalRow, tri
     advice = _advice(row, verdict)
     interval = None if row.interval is None else Interval.model_validate(row.interval)
     lower = None if interval is None else interval.lower
-    predicts = is_informative(lower, corrected=history.is_corrected(trials))
+    predicts = history.is_prediction_informative(lower, trials)
     return Proposal(
         id=row.id,
         campaign_id=row.campaign_id,

@@ -35,7 +35,6 @@ from app.core.experiments.base import Experiment
 from app.core.formatting import format_gains, named_flights, number
 from app.core.policy import Gains
 from app.core.records.trajectory import CHANNEL_UNITS
-from app.core.tuning.predictions import is_informative
 from app.db.migrate import migrate
 from app.db.models import ProposalRow, TrialRow
 from app.db.session import Database
@@ -379,7 +378,7 @@ def _document(
 def _predicts(trial: TrialRow, trials: Sequence[TrialRow]) -> bool:
     """Whether the trial's prediction says anything, as in the API."""
     lower = None if trial.predicted_interval is None else trial.predicted_interval["lower"]
-    return is_informative(lower, corrected=history.is_corrected(trials, trial.number))
+    return history.is_prediction_informative(lower, trials, trial.number)
 
 
 def _describe_outcome(trial: TrialRow) -> str:
