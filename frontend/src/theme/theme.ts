@@ -72,7 +72,5 @@ export const theme = createTheme({
     Title: { styles: { root: { letterSpacing: "-0.015em" } } },
     Textarea: { defaultProps: { size: "md" } },
     FileInput: tall,
-    // Text is unreadable while it unfolds.
-    Accordion: { defaultProps: { transitionDuration: 0 } },
   },
 });

@@ -1,4 +1,5 @@
-import { Accordion, Box, Skeleton, Title } from "@mantine/core";
+import { Box, Skeleton, Title, UnstyledButton } from "@mantine/core";
+import { IconChevronDown } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
 import type { GainInfo } from "../api/types";
 import { type NumberEntry, NumberField } from "./Fields";
@@ -37,9 +38,6 @@ export function MissingEntries({ numbers, texts = [] }: { numbers: readonly stri
   );
 }
 
-/** The library makes ids of it, so it must be one word. */
-const SECTION = "section";
-
 interface FoldedSectionProps {
   title: string;
   /** Whether it must be open, because it contains a refused field. */
@@ -49,14 +47,16 @@ interface FoldedSectionProps {
 
 /** The part of a form that has defaults, collapsed at first. */
 export function FoldedSection({ title, forcedOpen, children }: FoldedSectionProps) {
-  const [opened, setOpened] = useState<string | null>(null);
+  const [isOpened, setOpened] = useState(false);
+  const isOpen = forcedOpen || isOpened;
   return (
-    <Accordion variant="contained" chevronPosition="left" value={forcedOpen ? SECTION : opened} onChange={setOpened}>
-      <Accordion.Item value={SECTION}>
-        <Accordion.Control mih={56}>{title}</Accordion.Control>
-        <Accordion.Panel>{children}</Accordion.Panel>
-      </Accordion.Item>
-    </Accordion>
+    <div className={classes["folded"]}>
+      <UnstyledButton aria-expanded={isOpen} onClick={() => setOpened(!isOpen)}>
+        <IconChevronDown size={18} aria-hidden />
+        {title}
+      </UnstyledButton>
+      <div hidden={!isOpen}>{children}</div>
+    </div>
   );
 }
 

@@ -1,4 +1,5 @@
-import { Anchor, Button, Radio } from "@mantine/core";
+import { Anchor, Button, Input } from "@mantine/core";
+import type { ReactNode } from "react";
 import { Link } from "react-router";
 import type { Vehicle, VehicleKindInfo } from "../../api/types";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";
@@ -17,42 +18,36 @@ interface Props {
   onVehicle: (vehicle: Vehicle) => void;
 }
 
-const keyOf = (vehicleId: number): string => `vehicle ${vehicleId}`;
-
 /** Selection of a registered vehicle or a shared simulation. */
 export function VehiclePicker({ kinds, registered, others, kind, vehicleId, error, onKind, onVehicle }: Props) {
-  const choose = (key: string): void => {
-    const chosen = registered.find(({ id }) => keyOf(id) === key);
-    if (chosen === undefined) onKind(key);
-    else onVehicle(chosen);
-  };
   return (
     <div>
-      <Radio.Group
-        size="md"
-        label="Vehicle"
-        value={vehicleId === null ? kind : keyOf(vehicleId)}
-        onChange={choose}
-        error={error}
-      >
-        <div className={classes["cards"]}>
+      <Input.Wrapper size="md" label="Vehicle" labelElement="div" error={error}>
+        <div role="radiogroup" aria-label="Vehicle" className={classes["cards"]}>
           {registered.map((vehicle) => (
-            <Radio.Card key={vehicle.id} value={keyOf(vehicle.id)} className={classes["card"]}>
-              <Top isReal={vehicle.is_real} />
-              <strong>{vehicle.name}</strong>
-              <span className={classes["line"]}>{autopilotTitle(vehicle)}</span>
+            <VehicleOption
+              key={vehicle.id}
+              isReal={vehicle.is_real}
+              checked={vehicle.id === vehicleId}
+              name={vehicle.name}
+              line={autopilotTitle(vehicle)}
+              onChoose={() => onVehicle(vehicle)}
+            >
               <StateBadge words={vehicleStateLabel(vehicle)} />
-            </Radio.Card>
+            </VehicleOption>
           ))}
           {kinds.map(({ name, title, line, is_real }) => (
-            <Radio.Card key={name} value={name} className={classes["card"]}>
-              <Top isReal={is_real} />
-              <strong>{title}</strong>
-              <span className={classes["line"]}>{line}</span>
-            </Radio.Card>
+            <VehicleOption
+              key={name}
+              isReal={is_real}
+              checked={vehicleId === null && name === kind}
+              name={title}
+              line={line}
+              onChoose={() => onKind(name)}
+            />
           ))}
         </div>
-      </Radio.Group>
+      </Input.Wrapper>
       <div className={classes["more"]}>
         {others.length > 0 && <span>Vehicles that fly another experiment (choosing one changes it):</span>}
         {others.map((vehicle) => (
@@ -68,11 +63,25 @@ export function VehiclePicker({ kinds, registered, others, kind, vehicleId, erro
   );
 }
 
-function Top({ isReal }: { isReal: boolean }) {
+interface OptionProps {
+  isReal: boolean;
+  checked: boolean;
+  name: string;
+  line: string;
+  onChoose: () => void;
+  children?: ReactNode;
+}
+
+function VehicleOption({ isReal, checked, name, line, onChoose, children }: OptionProps) {
   return (
-    <span className={classes["top"]}>
-      <VehicleBadge isReal={isReal} />
-      <Radio.Indicator size="md" />
-    </span>
+    <label className={classes["card"]}>
+      <span className={classes["top"]}>
+        <VehicleBadge isReal={isReal} />
+        <input type="radio" name="vehicle" checked={checked} onChange={onChoose} />
+      </span>
+      <strong>{name}</strong>
+      <span className={classes["line"]}>{line}</span>
+      {children}
+    </label>
   );
 }
