@@ -39,7 +39,7 @@ export function ConnectionNotice({ flying }: { flying: readonly FlyingCampaign[]
     return (
       <p className={classes["notice"]} role="status">
         <strong>The server is not responding.</strong>{" "}
-        {heardAt === null ? "The data is out of date. " : ["Data as of ", <Time key="at" at={heardAt} />, ". "]}
+        {heardAt === null ? "The data is out of date. " : ["Data as of ", <Time key="at" at={heardAt} seconds />, ". "]}
         The page updates automatically when the server is back.
       </p>
     );

@@ -51,9 +51,10 @@ test("a time can be read in UTC", () => {
 
 test("a local time names the year only when it is another one", () => {
   const at = "2026-07-02T12:00:00Z";
-  expect(localTime(at, new Date("2026-12-01T00:00:00Z"))).not.toContain("2026");
-  expect(localTime(at, new Date("2027-12-01T00:00:00Z"))).toContain("2026");
+  expect(localTime(at, { now: new Date("2026-12-01T00:00:00Z") })).not.toContain("2026");
+  expect(localTime(at, { now: new Date("2027-12-01T00:00:00Z") })).toContain("2026");
   expect(localTime(null)).toBe(NOTHING);
+  expect(localTime("2026-11-23T09:05:07Z", { seconds: true })).toMatch(/:05:07/);
 });
 
 test("one flight is singular", () => {

@@ -56,11 +56,16 @@ export function asSentence(text: string): string {
 }
 
 /** Local date and time; with the year if it is not the current one. */
-export function localTime(iso: string | null | undefined, now: Date = new Date()): string {
+export function localTime(
+  iso: string | null | undefined,
+  { now = new Date(), seconds = false }: { now?: Date; seconds?: boolean } = {},
+): string {
   if (!iso) return NOTHING;
   const at = new Date(iso);
   const year = at.getFullYear() === now.getFullYear() ? {} : ({ year: "numeric" } as const);
-  return at.toLocaleString(undefined, { ...year, month: "short", day: "numeric", hour: "numeric", minute: "2-digit" });
+  const second = seconds ? ({ second: "2-digit" } as const) : {};
+  const parts = { month: "short", day: "numeric", hour: "numeric", minute: "2-digit" } as const;
+  return at.toLocaleString(undefined, { ...year, ...parts, ...second });
 }
 
 export function utcTime(iso: string): string {
