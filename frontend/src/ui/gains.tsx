@@ -1,4 +1,5 @@
 import { Fragment } from "react";
+import type { Vehicle } from "../api/types";
 import { gainText, NOTHING } from "./format";
 import { useGainTitles } from "./units";
 
@@ -40,4 +41,21 @@ export function inOrder(gains: Gains, names: readonly string[]): Gains {
 export function sameHeld(held: Gains, safe: Gains): boolean {
   const names = Object.keys(safe);
   return names.length > 0 && names.every((name) => held[name] === safe[name]);
+}
+
+export const RESTORED = "The safe gains are restored after every flight.";
+
+/** When a vehicle that holds other gains is given its safe gains. */
+export function safeGainsWritten({ state, identity }: Pick<Vehicle, "state" | "identity">): string {
+  switch (state) {
+    case "disconnected":
+      return identity === null ? RESTORED : "The safe gains are written at the next connection.";
+    case "ready":
+      return "The safe gains are written at the next check, restore or flight.";
+    case "quarantined":
+      return "The safe gains are written when they are restored or the vehicle is released.";
+    case "staged":
+    case "flying":
+      return RESTORED;
+  }
 }

@@ -169,11 +169,14 @@ test("the best gains become the safe ones only once flights have shown that they
 });
 
 test("after a change of the safe gains it is told what the vehicle holds until they are written to it", () => {
-  const vehicle = { name: "Bee", state: "ready", held: { kd: 82, kp: 283 }, safe_gains: { kp: 400, kd: 100 } } as const;
+  const identity = { system_id: 31, autopilot: "paparazzi", version: "", uid: "" };
+  const gains = { held: { kd: 82, kp: 283 }, safe_gains: { kp: 400, kd: 100 } };
+  const vehicle = { name: "Bee", state: "ready", identity, ...gains } as const;
   expect(heldGainsNotice(vehicle)).toBe(
     "Bee still holds [283 82]. The safe gains are written at the next check, restore or flight.",
   );
   expect(heldGainsNotice({ ...vehicle, state: "disconnected" })).toContain("at the next connection");
+  expect(heldGainsNotice({ ...vehicle, state: "quarantined" })).toContain("or the vehicle is released");
   expect(heldGainsNotice({ ...vehicle, held: vehicle.safe_gains })).toBe("");
   expect(heldGainsNotice({ ...vehicle, held: null })).toBe("");
 });

@@ -2,7 +2,7 @@
 
 import type { Campaign, CampaignStatistics, RepeatGroup, Trial, Vehicle } from "../../api/types";
 import { count, flightsText } from "../../ui/format";
-import { gainsInBrackets, inOrder, sameHeld } from "../../ui/gains";
+import { gainsInBrackets, inOrder, safeGainsWritten, sameHeld } from "../../ui/gains";
 import { wasFlown } from "../../ui/states";
 
 export const VERDICTS = {
@@ -224,14 +224,14 @@ export function promotable(
 export function heldGainsNotice({
   name,
   state,
+  identity,
   held,
   safe_gains: safe,
-}: Pick<Vehicle, "name" | "state" | "held" | "safe_gains">): string {
+}: Pick<Vehicle, "name" | "state" | "identity" | "held" | "safe_gains">): string {
   if (held === null || Object.keys(held).length === 0 || sameHeld(held, safe)) return "";
   const gains = gainsInBrackets(inOrder(held, Object.keys(safe)));
-  return state === "disconnected"
-    ? `${name} held ${gains} when last read. The safe gains are written at the next connection.`
-    : `${name} still holds ${gains}. The safe gains are written at the next check, restore or flight.`;
+  const reading = state === "disconnected" ? `held ${gains} when last read` : `still holds ${gains}`;
+  return `${name} ${reading}. ${safeGainsWritten({ state, identity })}`;
 }
 
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "Low battery", "Collision"];

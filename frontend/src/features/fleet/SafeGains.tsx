@@ -8,7 +8,7 @@ import { useVehicleStatus } from "../../live/store";
 import { heldGains } from "../../live/vehicleStatus";
 import { type NumberEntry, NumberField } from "../../ui/Fields";
 import { gainText, NOTHING } from "../../ui/format";
-import { inOrder, sameHeld } from "../../ui/gains";
+import { inOrder, RESTORED, safeGainsWritten, sameHeld } from "../../ui/gains";
 import { HelpTip } from "../../ui/HelpTip";
 import { Note } from "../../ui/Note";
 import { FormErrorNotice } from "../../ui/Notices";
@@ -104,23 +104,6 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
       </Stack>
     </Panel>
   );
-}
-
-const RESTORED = "The safe gains are restored after every flight.";
-
-/** When a vehicle that holds other gains is given its safe gains. */
-function safeGainsWritten({ state, identity }: Vehicle): string {
-  switch (state) {
-    case "disconnected":
-      return identity === null ? RESTORED : "The safe gains are written at the next connection.";
-    case "ready":
-      return "The safe gains are written at the next check, restore or flight.";
-    case "quarantined":
-      return "The safe gains are written when they are restored or the vehicle is released.";
-    case "staged":
-    case "flying":
-      return RESTORED;
-  }
 }
 
 interface FormProps {
