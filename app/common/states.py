@@ -100,12 +100,15 @@ VEHICLE_ACTIONS: Final[Mapping[str, frozenset[VehicleState]]] = {
     "restore": _DOWN,
     "parameters": frozenset({VehicleState.READY}),
     "edit": _DOWN | {VehicleState.DISCONNECTED},
+    "configure": frozenset({VehicleState.DISCONNECTED}),
+    "delete": frozenset({VehicleState.DISCONNECTED}),
     "land": _MAYBE_UP,
     "motors off": _MAYBE_UP,
     "release": frozenset({VehicleState.QUARANTINED}),
 }
 """Actions that a person may take on a vehicle, and in which states. A vehicle that is not registered takes only `fly`
-and `release`. Disconnecting a vehicle that is not connected stops reconnecting it."""
+and `release`. `configure` changes its options, `edit` everything else. Disconnecting a vehicle that is not connected
+stops reconnecting it."""
 
 
 class ActKind(StrEnum):

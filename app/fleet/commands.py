@@ -211,10 +211,10 @@ def record_reconnected(
 ) -> bool:
     """Record that a vehicle was reconnected without a request.
 
-    Returns False, and leaves the vehicle disconnected, if it is no longer wanted connected.
+    Returns False, and leaves the vehicle disconnected, if it is no longer wanted connected or was deleted.
     """
-    row = repository.get_one(session, vehicle_id)
-    if not row.wanted_connected:
+    row = repository.one_or_none(session, vehicle_id)
+    if row is None or not row.wanted_connected:
         return False
     read_back = dict(held) or None
     record_connected(session, vehicle_id, identity, concern=concern, held=read_back)

@@ -1,8 +1,8 @@
-"""Registration of vehicles, and changes of their settings; placeholders for vehicles of other installations, which
-never fly from here.
+"""Registration of vehicles, changes of their settings, and their deletion; placeholders for vehicles of other
+installations, which never fly from here.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import count
 from typing import Final
 
@@ -21,9 +21,12 @@ from app.fleet import repository
 from app.fleet.control import record_act, require_may_command, require_not_controlled_by_other
 from app.fleet.schemas import NewVehicle, Vehicle, VehicleEdit
 from app.fleet.service import require_idle
-from app.fleet.views import is_registered_one_by_one, settings_of, vehicle_view
+from app.fleet.views import is_linked_or_wanted, is_registered_one_by_one, settings_of, vehicle_view
 from app.vehicles.kinds import VehicleKind
 from app.vehicles.registry import IMPORT, VEHICLE_KINDS, get_kind
+
+_NAMED: Final = 3
+"""Campaigns named in one sentence."""
 
 
 def register_vehicle(session: Session, new: NewVehicle, context: RequestContext) -> Vehicle:
@@ -93,6 +96,29 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
     return vehicle_view(row)
 
 
+def delete_vehicle(session: Session, vehicle_id: int, version: int, context: RequestContext) -> None:
+    """Delete a registered vehicle together with its acts.
+
+    Raises ConflictError while campaigns use it, it is connected or being connected, or it has a concern, and as
+    `edit_vehicle` does.
+    """
+    row = repository.get_one(session, vehicle_id)
+    check_version(version, row.version, row.name, {})
+    _require_own(row)
+    require_may_command(row, context)
+    _require_unlinked(row, "it cannot be deleted")
+    require_idle(session, row)
+    require_not_controlled_by_other(row, context)
+    if campaigns := repository.campaign_names(session, row.id):
+        raise ConflictError(
+            f"{row.name} cannot be deleted: {_listed(campaigns)}.",
+            hint="Delete the campaigns that have not flown, or choose another vehicle for them. A vehicle that has "
+            "flown a campaign stays registered, because its flights refer to it.",
+        )
+    repository.delete_acts(session, row.id)
+    session.delete(row)
+
+
 def promote_gains(
     session: Session, row: VehicleRow, gains: Mapping[str, float], *, version: int, reason: str, context: RequestContext
 ) -> None:
@@ -118,16 +144,32 @@ def _differences(row: VehicleRow, edit: VehicleEdit) -> dict[str, tuple[object, 
     return {field: (getattr(row, field), value) for field, value in sent.items()}
 
 
+def _require_unlinked(row: VehicleRow, so: str) -> None:
+    """Raise ConflictError unless the vehicle is disconnected for good and free of any concern."""
+    if row.concern:
+        raise ConflictError(
+            f"{row.name} is quarantined: {row.concern} Until it is released, {so}.",
+            hint="Connect it, inspect it, then release it.",
+        )
+    if is_linked_or_wanted(row):
+        link = "being connected" if row.state == VehicleState.DISCONNECTED else "connected"
+        raise ConflictError(f"{row.name} is {link}; {so}.", hint="Disconnect it first.")
+
+
+def _listed(campaigns: Sequence[str]) -> str:
+    """`the campaign Ladder uses it`, with at most three names."""
+    if len(campaigns) == 1:
+        return f"the campaign {campaigns[0]} uses it"
+    named = ", ".join(campaigns[:_NAMED])
+    return f"{len(campaigns)} campaigns use it: {named}{', …' if len(campaigns) > _NAMED else ''}"
+
+
 def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], context: RequestContext) -> None:
     kind = VEHICLE_KINDS[row.kind]
     options = kind.check({**settings_of(row), **asked}, field="options", simulation_hosts=context.simulation_hosts)
     if options == settings_of(row):
         return
-    if row.state != VehicleState.DISCONNECTED:
-        raise ConflictError(
-            f"{row.name} is connected; its link settings cannot be changed.",
-            hint="Disconnect it, change them, and connect it again.",
-        )
+    _require_unlinked(row, "its settings cannot be changed")
     if kind.is_real_with(options, context.simulation_hosts) != row.is_real:
         raise InputError(
             f"{row.name} is {'REAL' if row.is_real else 'simulated'}. This cannot be changed, because its flights "

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from sqlalchemy import ColumnElement, String, and_, func, literal, null, or_, select, tuple_, union_all
+from sqlalchemy import ColumnElement, String, and_, delete, func, literal, null, or_, select, tuple_, union_all
 from sqlalchemy.orm import Session
 
 from app.common.errors import NotFoundError
@@ -17,7 +17,7 @@ from app.common.states import (
     ActState,
     VehicleState,
 )
-from app.db.models import FlightRow, VehicleActRow, VehicleRow
+from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.db.types import UtcDateTime
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
@@ -149,6 +149,16 @@ def flights_by_id(session: Session, ids: Sequence[int]) -> dict[int, FlightRow]:
 
 def acts_by_id(session: Session, ids: Sequence[int]) -> dict[int, VehicleActRow]:
     return {row.id: row for row in session.scalars(select(VehicleActRow).where(VehicleActRow.id.in_(ids)))}
+
+
+def campaign_names(session: Session, vehicle_id: int) -> Sequence[str]:
+    """Names of the campaigns that use the vehicle, oldest first."""
+    wanted = select(CampaignRow.name).where(CampaignRow.vehicle_id == vehicle_id)
+    return session.scalars(wanted.order_by(CampaignRow.id)).all()
+
+
+def delete_acts(session: Session, vehicle_id: int) -> None:
+    session.execute(delete(VehicleActRow).where(VehicleActRow.vehicle_id == vehicle_id))
 
 
 def flights_of(session: Session, vehicle_id: int) -> Sequence[FlightRow]:

@@ -1,8 +1,8 @@
 """Vehicles over HTTP."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, status
+from fastapi import APIRouter, Depends, Query, status
 from starlette.concurrency import run_in_threadpool
 
 from app.accounts import permissions
@@ -53,6 +53,17 @@ def register_vehicle(act: IdempotentPost, asking: RequestContextDep, body: NewVe
 @router.get("/{vehicle_id}")
 def get_vehicle(session: Reader, vehicle_id: Id) -> Vehicle:
     return service.get_vehicle(session, vehicle_id)
+
+
+@router.delete("/{vehicle_id}", status_code=status.HTTP_204_NO_CONTENT)
+def delete_vehicle(
+    session: Writer,
+    asking: RequestContextDep,
+    vehicle_id: Id,
+    version: Annotated[int, Query(ge=1, description="version as last read")],
+) -> None:
+    """Delete a registered vehicle that no campaign uses, with its acts, while it is disconnected."""
+    registration.delete_vehicle(session, vehicle_id, version, asking)
 
 
 @router.post("/{vehicle_id}/connect", status_code=status.HTTP_202_ACCEPTED)

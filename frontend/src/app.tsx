@@ -11,6 +11,7 @@ import { NotFoundPage } from "./ui/NotFound";
 const ComparePage = lazyPage("ComparePage");
 const ControllerPage = lazyPage("ControllerPage");
 const LogAnalysisPage = lazyPage("LogAnalysisPage");
+const EditVehiclePage = lazyPage("EditVehiclePage");
 const FlightPage = lazyPage("FlightPage");
 const FlyPage = lazyPage("FlyPage");
 const JobsPage = lazyPage("JobsPage");
@@ -35,6 +36,7 @@ export function App() {
         <Route path="vehicles" element={<VehiclesPage />} />
         <Route path="vehicles/new" element={<NewVehiclePage />} />
         <Route path="vehicles/:vehicleId" element={<VehiclePage />} />
+        <Route path="vehicles/:vehicleId/edit" element={<EditVehiclePage />} />
         <Route path="reproductions" element={<ReproductionsPage />} />
         <Route path="controller/:checkId?" element={<ControllerPage />} />
         <Route path="log-analysis" element={<LogAnalysisPage />} />

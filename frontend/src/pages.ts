@@ -5,6 +5,7 @@ export { NewCampaignPage } from "./features/campaigns/NewCampaignPage";
 export { ControllerPage } from "./features/checks/ControllerPage";
 export { LogAnalysisPage } from "./features/checks/LogAnalysisPage";
 export { ComparePage } from "./features/compare/ComparePage";
+export { EditVehiclePage } from "./features/fleet/EditVehiclePage";
 export { NewVehiclePage } from "./features/fleet/NewVehiclePage";
 export { VehiclePage } from "./features/fleet/VehiclePage";
 export { VehiclesPage } from "./features/fleet/VehiclesPage";

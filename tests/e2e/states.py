@@ -89,6 +89,15 @@ class States:
         self.fly(campaign_id, flights)
         return campaign_id
 
+    def delete_campaign(self, campaign_id: int) -> None:
+        """Delete a campaign without flights."""
+
+        def delete_it(session: Session) -> None:
+            version = campaigns.get_campaign(session, campaign_id).version
+            campaigns.delete_campaign(session, campaign_id, version, LOCAL_CLI)
+
+        self._write(delete_it)
+
     def fly(self, campaign_id: int, flights: int = 1) -> list[int]:
         """Fly the next proposals; the trials' ids."""
         return [self._fly(campaign_id, None) for _ in range(flights)]

@@ -121,6 +121,10 @@ class Pages:
         return f"/vehicles/{self.vehicle_id}"
 
     @cached_property
+    def edit_vehicle(self) -> str:
+        return f"/vehicles/{self.vehicle_id}/edit"
+
+    @cached_property
     def shared_vehicle(self) -> str:
         return f"/vehicles/{self._states.vehicle_of(self.flights_under_way[0])}"
 
@@ -166,8 +170,8 @@ FIXED = {
 }
 NAMES = (
     "list", "new", "ready", "under-way", "finished", "elsewhere", "overruled", "pitch", "flight", "vehicles",
-    "new-vehicle", "vehicle", "shared-vehicle", "fly", "controller", "controller-check", "log-analysis",
-    "reproductions", "compare", "jobs", "settings", "missing",
+    "new-vehicle", "vehicle", "edit-vehicle", "shared-vehicle", "fly", "controller", "controller-check",
+    "log-analysis", "reproductions", "compare", "jobs", "settings", "missing",
 )  # fmt: skip
 WITH_TABS = ("ready", "under-way", "finished", "elsewhere", "overruled", "pitch")
 

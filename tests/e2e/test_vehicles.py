@@ -159,3 +159,34 @@ def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
         expect(dashboard.panel("Gain history")).to_contain_text("Safe gains at release")
         dashboard.post(f"/vehicles/{vehicle_id}/disconnect")
         until_in_state(dashboard, vehicle_id, "disconnected")
+
+
+def test_a_disconnected_vehicle_is_edited_and_deleted_once_no_campaign_uses_it(
+    dashboard: Dashboard, states: States
+) -> None:
+    page = dashboard.page
+    vehicle_id = states.vehicle("Gnat", options={"address": "udp:127.0.0.1:14995@14994", "simulated": True})
+    campaign_id = states.campaign("mavlink", vehicle_id=vehicle_id, name="Ladder")
+    dashboard.open(f"/vehicles/{vehicle_id}")
+    page.get_by_role("link", name="Edit").click()
+    page.get_by_label("Name").fill("Hornet")
+    page.get_by_role("textbox", name="Address", exact=True).fill("udp:nowhere")
+    page.get_by_role("button", name=re.compile("^Advanced")).click()
+    page.get_by_label("Lowest battery voltage to fly with").fill("11")
+    dashboard.button("Save").click()
+    expect(page.get_by_role("alert")).to_have_text("Correct the marked field: Address.")
+    page.get_by_role("textbox", name="Address", exact=True).fill("udp:127.0.0.1:14993@14992")
+    dashboard.button("Save").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Hornet")
+    expect(dashboard.panel("Connection")).to_contain_text("udp:127.0.0.1:14993@14992")
+    expect(fact(dashboard, "Battery", "Minimum to fly")).to_have_text("11.0 V")
+
+    page.get_by_role("link", name="Edit").click()
+    dashboard.button("Delete vehicle").click()
+    dashboard.button("Delete with its gain history").click()
+    expect(page.get_by_role("alert")).to_contain_text("Hornet cannot be deleted: the campaign Ladder uses it.")
+    states.delete_campaign(campaign_id)
+    dashboard.button("Delete with its gain history").click()
+    page.wait_for_url(re.compile("/vehicles$"))
+    expect(page.get_by_role("link", name="Register a vehicle")).to_be_visible()
+    expect(page.get_by_role("link", name="Hornet")).to_have_count(0)

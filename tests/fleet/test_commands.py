@@ -45,6 +45,8 @@ POSSIBLE = {
     "stage": {"ready"},
     "fly": {"ready"},
     "edit": {"disconnected", "ready", "quarantined"},
+    "configure": {"disconnected"},
+    "delete": {"disconnected"},
     "land": {"staged", "flying", "quarantined"},
     "motors off": {"staged", "flying", "quarantined"},
 }
@@ -62,7 +64,7 @@ def newest(client: TestClient, vehicle: Json) -> Json:
 
 @pytest.mark.parametrize("state", VehicleState)
 @pytest.mark.parametrize(
-    "act", ["connect", "disconnect", "check", "restore", "parameters", "release", "stage", "fly", "edit"]
+    "act", ["connect", "disconnect", "check", "restore", "parameters", "release", "stage", "fly", "edit", "configure"]
 )
 def test_a_vehicle_is_asked_what_its_state_allows_and_nothing_else(
     client: TestClient, database: Database, act: str, state: VehicleState
@@ -76,6 +78,9 @@ def test_a_vehicle_is_asked_what_its_state_allows_and_nothing_else(
             status = client.post(f"/api/trials/{trial['id']}/{act}").status_code
         case "edit":
             status = client.patch(f"/api/vehicles/{vehicle['id']}", json={"version": 1, "battery": "4"}).status_code
+        case "configure":
+            asked = {"version": 1, "options": {"system_id": 5}}
+            status = client.patch(f"/api/vehicles/{vehicle['id']}", json=asked).status_code
         case _:
             status = ask(client, vehicle, act)
     assert (status < 300) == (state in POSSIBLE[act])

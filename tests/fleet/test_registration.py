@@ -15,6 +15,7 @@ from tests.fleet.vehicles import (
     SEEN,
     create_campaign_on,
     create_connected,
+    finish_act,
     put_into,
     register,
     seen,
@@ -29,7 +30,7 @@ def test_a_registered_vehicle_has_settings_of_its_own_and_is_not_connected(clien
     assert vehicle["options"]["system_id"] == 7
     assert vehicle["options"]["telemetry_hz"] == 50
     assert (vehicle["safe_gains"], vehicle["held"], vehicle["identity"]) == (DEFAULT_GAINS, None, None)
-    assert vehicle["actions"] == ["connect", "edit"]
+    assert vehicle["actions"] == ["connect", "edit", "configure", "delete"]
     assert seen(client, vehicle) == vehicle
 
 
@@ -167,6 +168,8 @@ def test_the_link_changes_only_while_it_is_closed_and_pins_the_identity_anew(
     assert "connected" in client.patch(path, json=change).json()["detail"]
     same = client.patch(path, json={"version": 1, "options": vehicle["options"]})
     assert (same.status_code, same.json()["identity"]["system_id"]) == (200, 1)
+    assert client.post(f"{path}/disconnect").status_code == 202
+    finish_act(database)
     put_into(VehicleState.DISCONNECTED, database, vehicle)
     edited = client.patch(path, json={**change, "version": 2}).json()
     assert (edited["options"]["system_id"], edited["identity"], edited["version"]) == (5, None, 3)
@@ -224,3 +227,78 @@ def test_new_safe_gains_have_the_first_proposal_of_what_has_not_flown_computed_a
     asked = {"version": 1, "safe_gains": {"kp": 250, "ki": 10, "kd": 100}, "statement": "Ada"}
     assert client.patch(f"/api/vehicles/{vehicle['id']}", json=asked).status_code == 200
     assert get(client, path)["state"] == "computing"
+
+
+def test_a_vehicle_that_no_campaign_uses_is_deleted_with_its_acts(client: TestClient, database: Database) -> None:
+    vehicle = register(client)
+    path = f"/api/vehicles/{vehicle['id']}"
+    assert client.delete(path).status_code == 422
+    assert client.delete(path, params={"version": 2}).status_code == 409
+    assert client.delete(path, params={"version": 1}).status_code == 204
+    assert client.get(path).status_code == 404
+    assert client.get(f"{path}/acts").status_code == 404
+    assert register(client)["id"] > vehicle["id"]
+
+
+def test_a_vehicle_that_campaigns_use_is_kept_and_they_are_named(client: TestClient, database: Database) -> None:
+    vehicle = register(client)
+    path = f"/api/vehicles/{vehicle['id']}"
+    campaigns = [create_campaign_on(client, database, vehicle)]
+    one = client.delete(path, params={"version": 1})
+    assert (one.status_code, one.json()["detail"]) == (409, "Drone cannot be deleted: the campaign Real uses it.")
+    assert "choose another vehicle" in one.json()["hint"]
+    campaigns += [create_campaign_on(client, database, vehicle, name=name) for name in ("B", "C", "D")]
+    four = client.delete(path, params={"version": 1})
+    assert four.json()["detail"] == "Drone cannot be deleted: 4 campaigns use it: Real, B, C, …."
+    for campaign in campaigns:
+        gone = client.delete(f"/api/campaigns/{campaign['id']}", params={"version": campaign["version"]})
+        assert gone.status_code == 204
+    assert client.delete(path, params={"version": 1}).status_code == 204
+
+
+def test_a_vehicle_in_quarantine_is_neither_deleted_nor_given_other_settings(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = register(client)
+    path = f"/api/vehicles/{vehicle['id']}"
+    with database.write() as session:
+        commands.record_connected(session, vehicle["id"], IDENTITY, concern="Its gains are unknown.")
+        commands.record_disconnected(session, vehicle["id"])
+    assert seen(client, vehicle)["actions"] == ["connect", "edit"]
+    for refused in (
+        client.delete(path, params={"version": 1}),
+        client.patch(path, json={"version": 1, "options": {"system_id": 5}}),
+    ):
+        assert refused.status_code == 409
+        assert refused.json()["detail"].startswith("Drone is quarantined: Its gains are unknown.")
+    assert client.patch(path, json={"version": 1, "name": "Bee"}).status_code == 200
+    assert seen(client, vehicle)["concern"] == "Its gains are unknown."
+
+
+def test_a_vehicle_that_is_being_connected_is_neither_deleted_nor_given_other_settings(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    path = f"/api/vehicles/{vehicle['id']}"
+    for state, word in ((VehicleState.READY, "connected"), (VehicleState.DISCONNECTED, "being connected")):
+        put_into(state, database, vehicle)
+        for refused in (
+            client.delete(path, params={"version": 1}),
+            client.patch(path, json={"version": 1, "options": {"system_id": 5}}),
+        ):
+            assert (refused.status_code, f"Drone is {word};" in refused.json()["detail"]) == (409, True)
+
+
+def test_only_who_may_command_a_real_vehicle_deletes_it(settings: Settings, client: TestClient) -> None:
+    vehicle = register(client, real=True)
+    with TestClient(create_app(settings), base_url="http://127.0.0.1:8000", client=HERE) as locked:
+        refused = locked.delete(f"/api/vehicles/{vehicle['id']}", params={"version": 1})
+    assert refused.status_code == 403
+    assert client.delete(f"/api/vehicles/{vehicle['id']}", params={"version": 1}).status_code == 204
+
+
+def test_a_vehicle_that_was_deleted_meanwhile_is_not_reconnected(client: TestClient, database: Database) -> None:
+    vehicle = register(client)
+    assert client.delete(f"/api/vehicles/{vehicle['id']}", params={"version": 1}).status_code == 204
+    with database.write() as session:
+        assert not commands.record_reconnected(session, vehicle["id"], IDENTITY, concern="", held={})

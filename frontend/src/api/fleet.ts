@@ -5,6 +5,7 @@ import { answer } from "./client";
 import {
   checkVehicle,
   connectVehicle,
+  deleteVehicle,
   disconnectVehicle,
   editVehicle,
   listActs,
@@ -14,6 +15,7 @@ import {
   registerVehicle,
   releaseVehicle,
   restoreSafeGains,
+  type Vehicle,
   type VehicleEdit,
 } from "./generated";
 import { controlHeader } from "./leases";
@@ -46,6 +48,17 @@ export function useEditVehicle(vehicleId: number) {
     mutationFn: (body: VehicleEdit) =>
       answer(editVehicle({ path: { vehicle_id: vehicleId }, body, headers: controlHeader(vehicleId) })),
     onSettled: () => changed(vehicleId),
+  });
+}
+
+/** Delete the vehicle as it was read; `onDeleted` is called even if its page is gone by then. */
+export function useDeleteVehicle({ id, version }: Vehicle, onDeleted: () => void) {
+  const changed = useVehicleChanged();
+  return useMutation({
+    mutationFn: () =>
+      answer(deleteVehicle({ path: { vehicle_id: id }, query: { version }, headers: controlHeader(id) })),
+    onSuccess: onDeleted,
+    onSettled: () => void changed(id),
   });
 }
 

@@ -5933,6 +5933,12 @@ export type UnstageTrialData = {
          * a text chosen by the client, new for each operation: repeating a request with the same key has no further effect
          */
         'Idempotency-Key'?: string | null;
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
     };
     path: {
         /**
@@ -6226,6 +6232,51 @@ export type RegisterVehicleResponses = {
 };
 
 export type RegisterVehicleResponse = RegisterVehicleResponses[keyof RegisterVehicleResponses];
+
+export type DeleteVehicleData = {
+    body?: never;
+    headers?: {
+        /**
+         * X-Gainline-Control
+         *
+         * token of the lease that gives control of the vehicle
+         */
+        'X-Gainline-Control'?: string | null;
+    };
+    path: {
+        /**
+         * Vehicle Id
+         */
+        vehicle_id: number;
+    };
+    query: {
+        /**
+         * Version
+         *
+         * version as last read
+         */
+        version: number;
+    };
+    url: '/api/vehicles/{vehicle_id}';
+};
+
+export type DeleteVehicleErrors = {
+    /**
+     * An error: what happened, what to do about it, and the invalid fields.
+     */
+    default: Problem;
+};
+
+export type DeleteVehicleError = DeleteVehicleErrors[keyof DeleteVehicleErrors];
+
+export type DeleteVehicleResponses = {
+    /**
+     * Successful Response
+     */
+    204: void;
+};
+
+export type DeleteVehicleResponse = DeleteVehicleResponses[keyof DeleteVehicleResponses];
 
 export type GetVehicleData = {
     body?: never;

@@ -21,7 +21,7 @@ function armedText(armed: boolean | null | undefined): string {
 }
 
 /** Current state of the link and the vehicle's telemetry. */
-export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
+export function LinkPanel({ vehicle, mayEdit }: { vehicle: Vehicle; mayEdit: boolean }) {
   const aged = useVehicleStatus(vehicle.id);
   const isLinked = vehicle.state !== "disconnected";
   const stale = !(aged?.isCurrent ?? false);
@@ -29,7 +29,16 @@ export function LinkPanel({ vehicle }: { vehicle: Vehicle }) {
   const message = aged === null ? null : messageText(aged);
   const { identity } = vehicle;
   return (
-    <Panel title="Connection">
+    <Panel
+      title="Connection"
+      tools={
+        mayEdit && (
+          <Button component={Link} to={`/vehicles/${vehicle.id}/edit`} variant="default">
+            Edit
+          </Button>
+        )
+      }
+    >
       <Stack gap={14}>
         {isLinked ? (
           <dl className={`${classes["facts"]} numbers`}>

@@ -8,15 +8,14 @@ import { reasonsByField, standingProblem } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Catalogue } from "../../api/types";
 import { VehicleBadge } from "../../ui/Badges";
-import { OptionField, SelectField } from "../../ui/Fields";
+import { SelectField } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
-import { FoldedSection, FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
+import { FormPage, GainFields, MissingEntries } from "../../ui/FormPage";
 import { FormErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { useTitle } from "../../ui/useTitle";
 import {
   AUTOPILOTS,
   autopilotOf,
-  furtherOptions,
   gainsFor,
   isSimulated,
   startingVehicle,
@@ -25,6 +24,7 @@ import {
   vehicleRequest,
   withAutopilot,
 } from "./fleet";
+import { AddressField, FurtherFields, furtherLabels, NameField, PLAIN_LABELS } from "./VehicleFields";
 
 export function NewVehiclePage() {
   useTitle("Register a vehicle");
@@ -37,9 +37,8 @@ export function NewVehiclePage() {
 }
 
 const LABELS = {
-  name: "Name",
+  ...PLAIN_LABELS,
   "options.autopilot": "Autopilot",
-  "options.address": "Address",
   "options.simulated": "Simulation on this computer",
   safe_gains_confirmed: "Verified safe on this vehicle",
   statement: "Verified by, and how",
@@ -52,19 +51,15 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
   const set = (change: Partial<VehicleForm>): void => setForm({ ...form, ...change });
   const setOption = (name: string, value: boolean | number | string): void =>
     set({ options: { ...form.options, [name]: value } });
-  const further = furtherOptions(catalogue);
   const gains = gainsFor(catalogue, autopilotOf(form));
-  const folded = Object.fromEntries(further.map(({ name, title }) => [`options.${name}`, title]));
   const labels = {
     ...LABELS,
     ...Object.fromEntries(gains.map(({ name }) => [`safe_gains.${name}`, name])),
-    ...folded,
+    ...furtherLabels(catalogue),
   };
   const request = vehicleRequest(form);
   const problem = standingProblem(register.error, register.variables, request);
   const reasons = reasonsByField(problem, Object.keys(labels));
-  const refusedBelow = Object.keys(folded).some((field) => reasons[field] !== undefined);
-
   const unread = unreadGains(form);
   const simulated = isSimulated(form);
   const refusal = useRegistrationRefusal(!simulated);
@@ -78,14 +73,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
       }}
     >
       <ReadOnlyNotice why={refusal} />
-      <TextInput
-        label={LABELS.name}
-        description="Shown on every page, for example the number on the airframe"
-        value={form.name}
-        maxLength={120}
-        error={reasons["name"]}
-        onChange={(event) => set({ name: event.currentTarget.value })}
-      />
+      <NameField value={form.name} error={reasons["name"]} onChange={(name) => set({ name })} />
       <div className={classes["pair"]}>
         <SelectField
           label={LABELS["options.autopilot"]}
@@ -94,15 +82,10 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           error={reasons["options.autopilot"]}
           onChange={(value) => setForm(withAutopilot(form, catalogue, value))}
         />
-        <TextInput
-          label={LABELS["options.address"]}
-          description="udp:HOST:PORT@LOCALPORT, udpin:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD"
-          inputWrapperOrder={["label", "input", "description", "error"]}
-          value={String(form.options["address"] ?? "")}
+        <AddressField
+          value={form.options["address"]}
           error={reasons["options.address"]}
-          autoCapitalize="off"
-          spellCheck={false}
-          onChange={(event) => setOption("address", event.currentTarget.value)}
+          onChange={(address) => setOption("address", address)}
         />
       </div>
       <div className={classes["kind"]} data-real={!simulated || undefined}>
@@ -148,19 +131,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           />
         </Stack>
       )}
-      <FoldedSection title="Advanced: identity, limits, motion capture, signing" forcedOpen={refusedBelow}>
-        <div className={classes["pair"]}>
-          {further.map((option) => (
-            <OptionField
-              key={option.name}
-              option={option}
-              value={form.options[option.name]}
-              error={reasons[`options.${option.name}`]}
-              onChange={(value) => setOption(option.name, value)}
-            />
-          ))}
-        </div>
-      </FoldedSection>
+      <FurtherFields catalogue={catalogue} options={form.options} reasons={reasons} onChange={setOption} />
       <FormErrorNotice error={problem} labels={labels} />
       <MissingEntries numbers={unread} />
       <Button

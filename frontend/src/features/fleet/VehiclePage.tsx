@@ -106,7 +106,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
       <ErrorNotice error={ask.error} />
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
-        <LinkPanel vehicle={vehicle} />
+        <LinkPanel vehicle={vehicle} mayEdit={watching === null && vehicle.actions.includes("configure")} />
         <SafeGains vehicle={vehicle} restoring={asking === "restore"} onRestore={() => ask.mutate("restore")} />
         <Panel title="Operator">
           {watching === null ? (
