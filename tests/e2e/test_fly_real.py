@@ -193,7 +193,7 @@ def test_one_operator_is_in_control_and_a_take_over_is_seen(
     in_state(dashboard, vehicle_id, "ready")
 
 
-def test_the_motors_stop_when_the_knob_is_slid_to_its_end_and_not_before(
+def test_the_motors_stop_when_the_knob_is_slid_to_its_end_and_the_vehicle_is_to_be_inspected(
     dashboard: Dashboard, vehicle_id: int, trial_id: int
 ) -> None:
     page = dashboard.page
@@ -203,12 +203,20 @@ def test_the_motors_stop_when_the_knob_is_slid_to_its_end_and_not_before(
     stage(dashboard, len(TRIED))
     hold_until_it_flies(dashboard, trial_id)
     expect(word(dashboard)).to_have_text("In flight")
+    see_it_fly(dashboard, 40)
     knob.click()
     slide(page, knob, 150)
     assert orders(dashboard, vehicle_id) == []
     slide(page, knob, 400)
     dashboard.until(lambda: orders(dashboard, vehicle_id) == ["motors off"])
     dashboard.until(lambda: state_of(dashboard, trial_id) not in {"staged", "flying"})
+    in_state(dashboard, vehicle_id, "quarantined")
+    expect(page.get_by_role("heading", name="Do not fly")).to_be_visible()
+    expect(page.get_by_label("Next action")).to_contain_text("above the ground: inspect it before it flies again.")
+    page.get_by_role("link", name="Inspect and release").click()
+    page.get_by_label("Inspected by, and findings").fill("Ada: nothing is broken")
+    dashboard.button("Release vehicle").click()
+    in_state(dashboard, vehicle_id, "ready")
 
 
 def orders(dashboard: Dashboard, vehicle_id: int) -> list[str]:
