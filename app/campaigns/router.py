@@ -35,6 +35,7 @@ from app.web.dependencies import (
     IdempotentPost,
     Limit,
     Reader,
+    ReadVersion,
     RequestContextDep,
     Theme,
     Writer,
@@ -90,7 +91,7 @@ def delete_campaign(
     session: Writer,
     asking: RequestContextDep,
     campaign_id: Id,
-    version: Annotated[int, Query(ge=1, description="version as last read")],
+    version: ReadVersion,
 ) -> None:
     """Delete a campaign in which no flight was started."""
     service.delete_campaign(session, campaign_id, version, asking)

@@ -109,12 +109,12 @@ def create_campaign(session: Session, new: NewCampaign) -> Campaign:
     return campaign_view(session, row)
 
 
-def create_ready_campaign(session: Session, new: NewCampaign) -> Campaign:
-    """Create a campaign whose first flights have been flown already: it takes them without a proposal. Raises
-    InputError that names every invalid field."""
+def create_ready_campaign(session: Session, new: NewCampaign) -> int:
+    """Create a campaign whose first flights have been flown already: it takes them without a proposal. Returns its id.
+    Raises InputError that names every invalid field."""
     row = add_campaign(session, new.name, new.definition, new.vehicle, parent_id=None)
     set_campaign_state(row, CampaignState.READY)
-    return campaign_view(session, row)
+    return row.id
 
 
 def add_campaign(

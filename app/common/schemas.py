@@ -10,6 +10,7 @@ import binascii
 import json
 import unicodedata
 from datetime import datetime
+from pathlib import PurePath
 from typing import Annotated, Final, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
@@ -35,6 +36,11 @@ def find_control_characters(text: str) -> tuple[str, ...]:
 
 def without_control_characters(text: str) -> str:
     return "".join(each for each in text if not is_control(each))
+
+
+def uploaded_name(name: str, *, unnamed: str) -> str:
+    """Name of an uploaded file: shortened, without folders and control characters; `unnamed` if nothing is left."""
+    return without_control_characters(PurePath(name.replace("\\", "/")).name).strip()[:LONGEST_NAME] or unnamed
 
 
 T = TypeVar("T")

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from pathlib import PurePath
 from typing import Annotated, Final, Literal
 
 from pydantic import Field, TypeAdapter
@@ -10,7 +9,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session, undefer
 
 from app.common.errors import NotFoundError, StorageError
-from app.common.schemas import Gains, Page, Schema, decode_cursor, encode_cursor, without_control_characters
+from app.common.schemas import Gains, Page, Schema, decode_cursor, encode_cursor, uploaded_name
 from app.controller_checks.autopilot import Autopilot
 from app.controller_checks.check import AUTOPILOTS, examine_content, examine_file
 from app.controller_checks.paparazzi import parse_gains
@@ -86,7 +85,6 @@ class ControllerCheck(ControllerCheckSummary):
     figures: list[CheckFigure]
 
 
-_NAME_LENGTH: Final = 120
 _UNNAMED: Final = "recording"
 _RESULT: Final = TypeAdapter(Result)
 
@@ -97,7 +95,9 @@ def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: s
     Raises InputError that names what is wrong with it.
     """
     given = None if gains is None else parse_gains(gains)
-    return run_limited(FILE, examine_content, content, name=named(name), companion=companion, given=given)
+    return run_limited(
+        FILE, examine_content, content, name=uploaded_name(name, unnamed=_UNNAMED), companion=companion, given=given
+    )
 
 
 def examine_example() -> Result:
@@ -111,7 +111,12 @@ def store_example(session: Session, result: Result) -> ControllerCheck:
 
 def store_check(session: Session, name: str, result: Result) -> ControllerCheck:
     """Store the result of a check; the recording itself is not kept."""
-    row = ControllerCheckRow(file_name=named(name), kind=result.kind, passed=result.passed, result=result.as_json())
+    row = ControllerCheckRow(
+        file_name=uploaded_name(name, unnamed=_UNNAMED),
+        kind=result.kind,
+        passed=result.passed,
+        result=result.as_json(),
+    )
     session.add(row)
     session.flush()
     return _view(row, result)
@@ -152,11 +157,6 @@ def figure(session: Session, check_id: int, name: FigureName, theme: ThemeName) 
 def delete_check(session: Session, check_id: int) -> None:
     """Delete a check. Raises NotFoundError."""
     session.delete(get_one(session, check_id))
-
-
-def named(name: str) -> str:
-    """Name of an uploaded file: shortened, without folders and control characters."""
-    return without_control_characters(PurePath(name.replace("\\", "/")).name).strip()[:_NAME_LENGTH] or _UNNAMED
 
 
 def _result(row: ControllerCheckRow) -> Result:

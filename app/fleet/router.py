@@ -1,8 +1,8 @@
 """Vehicles over HTTP."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Depends, Query, status
+from fastapi import APIRouter, Depends, status
 from starlette.concurrency import run_in_threadpool
 
 from app.accounts import permissions
@@ -30,6 +30,7 @@ from app.web.dependencies import (
     Limit,
     Live,
     Reader,
+    ReadVersion,
     RequestContextDep,
     Writer,
     json_only,
@@ -60,7 +61,7 @@ def delete_vehicle(
     session: Writer,
     asking: RequestContextDep,
     vehicle_id: Id,
-    version: Annotated[int, Query(ge=1, description="version as last read")],
+    version: ReadVersion,
 ) -> None:
     """Delete a registered vehicle that no campaign uses, with its acts, while it is disconnected."""
     registration.delete_vehicle(session, vehicle_id, version, asking)

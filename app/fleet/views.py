@@ -147,7 +147,7 @@ def _actions(row: VehicleRow) -> list[str]:
         impossible.add("fly")
     if not is_linked_or_wanted(row):
         impossible.add("disconnect")
-    if row.wanted_connected or row.concern:
+    if is_linked_or_wanted(row) or row.concern:
         impossible |= {"configure", "delete"}
     return [action for action in possible if action not in impossible]
 

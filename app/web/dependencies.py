@@ -30,6 +30,7 @@ from app.web.origin import caller_of
 M = TypeVar("M", bound=BaseModel)
 
 Id = Annotated[int, Path(ge=1, le=2**63 - 1)]
+ReadVersion = Annotated[int, Query(ge=1, description="version as last read")]
 Limit = Annotated[int, Query(ge=1, le=200, description="maximum number of items on the page")]
 CursorText = Annotated[str | None, Query(max_length=500, description="`next_cursor` of the previous page")]
 IdempotencyKey = Annotated[

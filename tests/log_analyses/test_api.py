@@ -142,6 +142,21 @@ def test_a_campaign_starts_with_the_takeoff_of_a_log(client: TestClient) -> None
     assert client.get(f"/api/campaigns/{campaign['id']}/proposal").json()["state"] == "computing"
 
 
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("   .tlog", ".tlog"),
+        ("reversed\u202e.tlog", "reversed"),
+        ("C:\\logs\\day.tlog", "day"),
+        ("x" * 3000 + ".tlog", "x" * 120),
+    ],
+)
+def test_a_campaign_takes_what_can_be_shown_of_the_files_name(client: TestClient, file: str, name: str) -> None:
+    """Seen: a name that no campaign may have was an internal error."""
+    answer = start(client, file, recorded("paparazzi_283_13_82.tlog"))
+    assert (answer.status_code, answer.json()["name"]) == (201, name)
+
+
 def test_a_log_flown_with_gains_that_the_gate_refuses_starts_a_campaign_with_them_too(client: TestClient) -> None:
     campaign = start(client, "flight.tlog", recorded("paparazzi_1624_1356_195.tlog")).json()
     [flight] = flights_of(client, campaign)

@@ -3,8 +3,7 @@
 import pytest
 from fastapi.testclient import TestClient
 
-from app.common.schemas import find_control_characters
-from app.controller_checks.service import named
+from app.common.schemas import find_control_characters, uploaded_name
 from tests.builders import create_campaign, problems_of
 from tests.fleet.vehicles import register
 
@@ -41,4 +40,4 @@ def test_each_control_character_is_reported_once() -> None:
 
 
 def test_the_name_of_a_file_loses_them() -> None:
-    assert named("folder/\x1b[2Jflight\u202e.data") == "[2Jflight.data"
+    assert uploaded_name("folder/\x1b[2Jflight\u202e.data", unnamed="recording") == "[2Jflight.data"
