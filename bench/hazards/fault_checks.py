@@ -14,11 +14,13 @@ from bench.hazards.cases import ABORT, MOCAP, MOTORS_OFF, OTHER_LANDING, OTHER_M
 from bench.hazards.fault_trial import TrialResult
 from bench.hazards.intervals import Span, covers, longest, overlap, total
 from bench.hazards.rig import InjectedFault
-from bench.hazards.trial_states import AIR, DESCENT, LIFTED_M, State
+from bench.hazards.trial_states import AIR, DESCENT, LIFTED_M, RESTING_M, State
 from bench.hazards.wire import Command
 
 GROUND: Final = (State.PREFLIGHT, State.SET_GAINS)
 SILENT: Final = ("link-lost", "wrong-system", "reboot")
+UNSEEN: Final = ("frozen-position", "jumping-position", *MOCAP)
+"""Faults in which the position of the vehicle is not known."""
 DEAF: Final = ("link-lost", "reboot")
 """Faults in which the vehicle receives nothing either."""
 GAIN_FAILURES: Final = (ABORT, WILD_GAINS, "no-lift-off")
@@ -31,6 +33,10 @@ IMPACT_M_S: Final = 1.9
 LAND_AGAIN_S: Final[Mapping[str, float]] = {"paparazzi": 6.0, "ardupilot": 1.0, "px4": 1.0}
 """Interval of Land after five seconds: under Paparazzi each Land restarts the landing."""
 DRIFT_M_S: Final = 0.1
+LANDED_S: Final = 2.0
+"""Time within which the autopilot itself reports that it has landed."""
+DROP_M: Final = 0.5
+"""Height from which the telemetry shows a vehicle in the air, whatever its noise and delay."""
 SLACK_S: Final = 0.35
 """Tolerance for the rig's clock and for a packet in transit."""
 STANDSTILL_S: Final = 1.05
@@ -209,17 +215,23 @@ class _Checker:
             case "safe":
                 if not self.result.holds_safe:
                     yield f"reported as holding its safe gains, but holds {dict(self.result.held)}"
-                falls = bool(self.of(MOTORS_OFF))
-                if self.result.armed or (abs(self.result.height_m) > LIFTED_M and not falls):
+                if self.result.armed or abs(self.result.height_m) > LIFTED_M:
                     yield f"reported as safe, but is {'armed' if self.result.armed else 'off the ground'}"
                 if any(self.began_in(kind, *AIR) for kind in ("reboot",)):
                     yield "the autopilot restarted in the air, but the vehicle was not quarantined"
+                if self._dropped_m() > DROP_M:
+                    yield f"its motors were stopped at {self._dropped_m():.2f} m, but the vehicle was not quarantined"
             case "quarantined":
                 if not any(self._reasons_for_quarantine()):
                     yield f"unnecessary quarantine ({self.result.reason})"
             case "unopened":
                 if self.result.armed or not self._holds_no_trial():
                     yield f"never connected, but holds {dict(self.result.held)}"
+
+    def _dropped_m(self) -> float:
+        """Return the height at which the operator's first motors off reached the vehicle; 0 if none did."""
+        asked_s = min((begun_s for begun_s, _ in self.of(MOTORS_OFF)), default=float("inf"))
+        return next((stop.height_m for stop in self.result.stops if stop.at_s >= asked_s), 0.0)
 
     def _holds_no_trial(self) -> bool:
         """Whether no gain is the trial's, unless it equals the safe one."""
@@ -234,6 +246,10 @@ class _Checker:
         yield any(each.kind == OTHER_MODE for each in self.result.injected)
         yield self.result.impact_m_s > IMPACT_M_S
         yield bool(self.of("mocap-drift"))  # motion capture still shows it in the air
+        yield self._dropped_m() > RESTING_M
+        for begun_s, _ in self.of(MOTORS_OFF):  # it was not seen on the ground when they were stopped
+            yield any(covers(self.of(kind), (begun_s, begun_s)) for kind in (*SILENT, *UNSEEN))
+            yield 0.0 <= begun_s - self.result.touched_down_s < LANDED_S
         for lost_s, _ in self.states.spans(State.LINK_LOST):
             yield any(end_s > lost_s + 60.0 - SLACK_S for _, end_s in self.beatless)
         for begun_s, _ in self.states.spans(State.LAND, State.ABORT_LAND):
@@ -247,7 +263,8 @@ class _Checker:
             yield any(overlap(span, (begun_s, ended_s + SLACK_S)) > 1.8 for span in [*self.silent, *mute])
         if self.result.outcome == "refused":
             spans = [*self.silent, *mute]
-            yield any(overlap(span, (ended_s - SLACK_S, ended_s + 15.0)) > 0.0 for span in spans)
+            heard_s = ended_s - self.heartbeat_s - SLACK_S
+            yield any(overlap(span, (heard_s, ended_s + 15.0)) > 0.0 for span in spans)
 
     def _kinds(self, *kinds: str) -> list[InjectedFault]:
         return [each for each in self.result.injected if each.kind in kinds]

@@ -18,7 +18,7 @@ class TrialResult:
     `outcome` is completed, aborted, invalid (these three with a record) or refused (without a flight). `vehicle` is
     what the program reports afterwards: safe, quarantined, or unopened (never connected). The rest is the drone's true
     state: `flew_on` are the gains that it held at lift-off, `impact_m_s` its fastest descent within half a metre of the
-    ground.
+    ground, `touched_down_s` when it was last off the ground.
     """
 
     outcome: str
@@ -30,6 +30,7 @@ class TrialResult:
     armed: bool
     height_m: float
     impact_m_s: float
+    touched_down_s: float
     packets: int
     stops: tuple[MotorStop, ...]
     injected: tuple[InjectedFault, ...]
@@ -83,6 +84,7 @@ def _end(rig: Rig, outcome: str, vehicle: str, reason: str) -> TrialResult:
         armed=drone.autopilot.armed,
         height_m=drone.body.altitude_m,
         impact_m_s=rig.impact_m_s,
+        touched_down_s=rig.touched_down_s,
         packets=rig.packets,
         stops=tuple(rig.stops),
         injected=tuple(rig.injected),

@@ -13,7 +13,7 @@ from app.vehicles.base import OptionValue, StopRequest
 from app.vehicles.mavlink.dialects import FieldValue
 from app.vehicles.mavlink_kind import MAVLINK
 from bench.hazards.cases import ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case, PlannedFault
-from bench.hazards.trial_states import State, TrialStates
+from bench.hazards.trial_states import RESTING_M, State, TrialStates
 from bench.hazards.wire import DIALECTS, GAINS, Command, read_command, stops_motors
 
 SILENCING: Final = frozenset({"link-lost", "wrong-system", "no-heartbeat", "reboot"})
@@ -66,6 +66,7 @@ class Rig(Lockstep):
         self.packets: int = 0
         self.flew_on: Mapping[str, float] | None = None
         self.impact_m_s = 0.0
+        self.touched_down_s = 0.0
         self.stop_request: StopRequest | None = None
         self._waiting = list(case.faults)
         self._kind = get_autopilot(case.autopilot)
@@ -78,6 +79,8 @@ class Rig(Lockstep):
     def tick(self) -> None:
         """Advance by one tick. Raises TimeoutError if the trial takes too long."""
         super().tick()
+        if self.drone.body.altitude_m > RESTING_M:
+            self.touched_down_s = self.drone.time_s
         if 0.0 < self.drone.body.altitude_m < _NEAR_GROUND_M:
             self.impact_m_s = max(self.impact_m_s, -self.drone.body.climb_rate_m_s)
         self._update()

@@ -115,6 +115,7 @@ def flown(*injected: InjectedFault, **changes: object) -> TrialResult:
         armed=False,
         height_m=0.0,
         impact_m_s=0.8,
+        touched_down_s=47.0,
         packets=100,
         stops=(MotorStop(51.0, 0.0),),
         injected=injected,
@@ -141,12 +142,23 @@ def test_the_commands_determine_the_states_of_a_trial() -> None:
 LINK_LOST: Final = InjectedFault("link-lost", State.RECORD, 20.0, 23.0)
 ABORT: Final = InjectedFault("abort", State.RECORD, 20.0, float("inf"))
 
+
+def stop_requested(at_s: float) -> InjectedFault:
+    """Return the operator's motors off at that time."""
+    return InjectedFault("motors-off", State.RECORD, at_s, float("inf"))
+
+
 WRONG: Final[list[tuple[TrialResult, str]]] = [
     (flown(stops=(MotorStop(20.0, 0.2),)), "motors off was sent at 0.20 m"),
     (flown(holds_safe=False), "reported as holding its safe gains, but"),
     (flown(armed=True), "is armed"),
     (flown(height_m=1.0), "off the ground"),
     (flown(vehicle="quarantined"), "unnecessary quarantine"),
+    (flown(stop_requested(20.0), stops=(MotorStop(20.1, 3.0),), outcome="aborted"), "stopped at 3.00 m, but the vehicle"),
+    (
+        flown(stop_requested(50.9), stops=(MotorStop(51.0, 0.0),), outcome="aborted", vehicle="quarantined"),
+        "unnecessary quarantine",
+    ),
     (flown(outcome="invalid"), "the trial is invalid, but nothing was expected"),
     (flown(LINK_LOST), "the trial is completed, but F5 invalid"),
     (flown(ABORT), "but F8 aborted was expected"),
@@ -189,6 +201,8 @@ FOUND: Final = [
     (case(PlannedFault("no-lift-off", State.SET_GAINS, 0.1), autopilot="px4"), "aborted", "safe"),
     # seed 20261320: switched back to its previous mode before a heartbeat could tell, it did not lift off
     (case(PlannedFault("other-mode", State.TAKEOFF, 0.27), autopilot="px4"), "aborted", "safe"),
+    # a vehicle whose motors were stopped at 3 m passed for safe
+    (case(PlannedFault("motors-off", State.RECORD, 5.0), autopilot="ardupilot"), "aborted", "quarantined"),
 ]
 
 
