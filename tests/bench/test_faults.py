@@ -154,7 +154,10 @@ WRONG: Final[list[tuple[TrialResult, str]]] = [
     (flown(armed=True), "is armed"),
     (flown(height_m=1.0), "off the ground"),
     (flown(vehicle="quarantined"), "unnecessary quarantine"),
-    (flown(stop_requested(20.0), stops=(MotorStop(20.1, 3.0),), outcome="aborted"), "stopped at 3.00 m, but the vehicle"),
+    (
+        flown(stop_requested(20.0), stops=(MotorStop(20.1, 3.0),), outcome="aborted"),
+        "stopped at 3.00 m, but the vehicle",
+    ),
     (
         flown(stop_requested(50.9), stops=(MotorStop(51.0, 0.0),), outcome="aborted", vehicle="quarantined"),
         "unnecessary quarantine",
