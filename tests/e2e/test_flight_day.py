@@ -28,6 +28,8 @@ from tests.e2e.states import States
 from tests.e2e.test_pages import ROOT, SCREENSHOTS
 from tests.runtime.drones import SAFE, Drone
 
+pytestmark = pytest.mark.real_time
+
 PICTURES: Final = ROOT / "docs" / "images" / "day" if os.environ.get("GAINLINE_README_IMAGE") else SCREENSHOTS / "day"
 """Of the guide with GAINLINE_README_IMAGE=1, else to look at."""
 NAME: Final = "Takeoff to 3 m, Number 1"

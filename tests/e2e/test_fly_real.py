@@ -32,6 +32,8 @@ from tests.e2e.flying_by_hand import (
 from tests.e2e.states import States
 from tests.runtime.drones import SAFE, TRIED, Drone
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture(scope="module")
 def vehicle_id(shared_server: Server, states: States, browser: Browser) -> Iterator[int]:

@@ -7,12 +7,15 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import pytest
 from playwright.sync_api import Locator, Request, Route, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
 from tests.e2e.wifi import InterruptibleProxy
+
+pytestmark = pytest.mark.real_time
 
 CHARTS_FETCHED = "performance.getEntriesByType('resource').some(one => one.name.includes('plotly'))"
 

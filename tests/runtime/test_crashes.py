@@ -11,6 +11,8 @@ import pytest
 
 from tests.runtime.processes import Serving, is_alive, stream, wait_for
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture
 def serving(tmp_path: Path) -> Iterator[Serving]:

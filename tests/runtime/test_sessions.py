@@ -10,6 +10,8 @@ from tests.runtime.drones import OUR_PAGE, SAFE, SPEED, TRIED, connected
 from tests.runtime.processes import Serving, stream, wait_for
 from tests.runtime.test_storage import locked
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture(scope="module")
 def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:

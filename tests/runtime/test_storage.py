@@ -12,6 +12,8 @@ import pytest
 
 from tests.runtime.processes import Serving, stream, wait_for
 
+pytestmark = pytest.mark.real_time
+
 SIZE_MB = 32
 LESS_THAN_A_RECORD_MB = 3
 

@@ -16,6 +16,8 @@ from tests.vehicles.flying import SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig
 from tests.vehicles.mavlink.test_vehicle import fly
 
+pytestmark = pytest.mark.real_time
+
 
 def natnet(port: int) -> str:
     return f"natnet:127.0.0.1?body=4&multicast=no&command_port={port}"

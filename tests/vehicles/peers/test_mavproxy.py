@@ -13,6 +13,8 @@ from tests.simdrone.ground import eventually, served
 from tests.simdrone.paparazzi import CLIMB, HOLDING_POINT, LAND_HERE, START_ENGINE, SYSTEM, TAKEOFF
 from tests.vehicles.peers.mavproxy import MavProxy
 
+pytestmark = pytest.mark.real_time
+
 SPEED = 5.0
 PATIENCE_S = 60.0
 
