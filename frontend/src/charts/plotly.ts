@@ -185,25 +185,31 @@ export async function drawPrediction(
   else await plotly.update(chart, { x: curves.map(({ x }) => x), y: curves.map(({ y }) => y) }, {}, places);
 }
 
-/** Extend the live traces with the telemetry of a trial; returns the unsubscribe function. */
+/**
+ * Extend the live traces with the telemetry of a trial; returns the unsubscribe function. While they only grow, nothing
+ * else is drawn again.
+ */
 export function drawLive(plotly: Plotly, chart: HTMLElement, traces: readonly Trace[], trialId: number): () => void {
   let latest: LiveFlight | null = null;
+  let isBegun = false;
   const drawing = throttled(async () => {
     if (latest === null || latest.timeS.length === 0) return;
-    const curves = [...liveCurves(traces, latest)];
-    const shown = curves.map(([, curve]) => curve);
-    const change = {
-      x: shown.map(({ x }) => x),
-      y: shown.map(({ y }) => y),
-      showlegend: shown.map(({ showlegend }) => showlegend),
-    };
-    const room = roomFor((chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity], latest.measured);
-    await plotly.update(
-      chart,
-      change,
-      Number.isFinite(room[1]) ? { "yaxis.range": room } : {},
-      curves.map(([place]) => place),
-    );
+    const drawn = liveCurves(traces, latest);
+    const [places, curves] = [[...drawn.keys()], [...drawn.values()]];
+    const [x, y] = [curves.map((curve) => curve.x), curves.map((curve) => curve.y)];
+    const range = (chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity];
+    const room = roomFor(range, latest.measured);
+    if (isBegun && room[0] === range[0] && room[1] === range[1]) {
+      await plotly.animate(
+        chart,
+        { data: curves.map((_, index) => ({ x: x[index], y: y[index] })), traces: places },
+        AT_ONCE,
+      );
+      return;
+    }
+    const showlegend = curves.map((curve) => curve.showlegend);
+    await plotly.update(chart, { x, y, showlegend }, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, places);
+    isBegun = curves.every((curve) => curve.x.length > 0);
   }, SHORTEST_REDRAW_MS);
   const unfollow = onLive(trialId, (flight) => {
     latest = flight;
