@@ -48,6 +48,7 @@ def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_pa
     assert {line.split(",")[0]: float(line.split(",")[1]) for line in lines} == pytest.approx(gains)
 
 
+@pytest.mark.complete
 def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path) -> None:
     older, newer = tmp_path / "older.bin", tmp_path / "newer.bin"
     flight = simulated_flight(QUIET)
@@ -69,6 +70,7 @@ def test_the_document_alone_can_be_printed(steps: Path) -> None:
     assert json.loads(result.stdout)["file_name"] == "steps.bin"
 
 
+@pytest.mark.complete
 def test_gains_may_replace_gains_but_nothing_else(steps: Path, tmp_path: Path) -> None:
     earlier = tmp_path / "gains.param"
     earlier.write_text("PSC_POSZ_P,1\n")
@@ -83,6 +85,7 @@ def test_gains_may_replace_gains_but_nothing_else(steps: Path, tmp_path: Path) -
     assert steps.read_bytes() == before
 
 
+@pytest.mark.complete
 def test_a_wrong_hover_throttle_is_told(tmp_path: Path) -> None:
     """The vehicle hovers at 0.40 of its throttle, and was told 0.30."""
     path = tmp_path / "hover.bin"
@@ -93,6 +96,7 @@ def test_a_wrong_hover_throttle_is_told(tmp_path: Path) -> None:
     assert "hover throttle 0.400, but MOT_THST_HOVER was 0.300" in " ".join(result.output.split())
 
 
+@pytest.mark.complete
 def test_a_flight_with_the_throttle_at_its_limit_for_a_moment_says_so(tmp_path: Path) -> None:
     flight = simulated_flight(QUIET)
     flight.segments[0].throttle[60:63] = 1.0

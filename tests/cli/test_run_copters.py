@@ -199,6 +199,7 @@ def test_gains_that_a_vehicle_is_never_given_are_refused_whoever_overrules(monke
     assert len(rig.writes) == written
 
 
+@pytest.mark.complete
 def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> None:
     with drone("px4", "--no-failsafes") as address:
         named = ("--vehicle", f"mavlink:{address}")

@@ -289,7 +289,7 @@ def filled_of(height: float, words: str) -> float:
 
 
 @PRINTS
-@pytest.mark.parametrize("paper", ["A4", "Letter"])
+@pytest.mark.parametrize("paper", ["A4", pytest.param("Letter", marks=pytest.mark.complete)])
 def test_the_first_page_is_full_with_result_curves_and_gains(
     client: TestClient, campaign: Json, tmp_path: Path, paper: str
 ) -> None:
@@ -310,6 +310,7 @@ def test_the_first_page_is_full_with_result_curves_and_gains(
     assert second.lines[0] == "Flights"
 
 
+@pytest.mark.complete
 @PRINTS
 def test_photos_are_printed_on_the_page_of_their_note_and_no_heading_ends_a_page(
     client: TestClient, campaign: Json, tmp_path: Path
@@ -362,6 +363,7 @@ def test_a_failing_browser_is_reported_in_words(
     assert "without a PDF" in answer.json()["detail"]
 
 
+@pytest.mark.complete
 def test_a_browser_that_takes_too_long_is_ended_with_its_children(
     client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

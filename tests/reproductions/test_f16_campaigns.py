@@ -10,6 +10,7 @@ from tests.core.tuning.flying import compiled_only
 pytestmark = compiled_only
 
 
+@pytest.mark.complete
 def test_results_do_not_depend_on_how_many_processes_compute_them() -> None:
     heard: list[tuple[int, int]] = []
     alone = study(0.45, (10, 11), ("identified",), lambda done, total: heard.append((done, total)), processes=1)

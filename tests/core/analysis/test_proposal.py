@@ -18,7 +18,14 @@ DEFAULTS = {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I
 STIFF = {"PSC_POSZ_P": 3.0, "PSC_VELZ_P": 8.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I": 3.0}
 
 
-@pytest.mark.parametrize("copter", [GUSTY, replace(GUSTY, motor_lag_s=0.12), replace(GUSTY, hover_throttle=0.17)])
+@pytest.mark.parametrize(
+    "copter",
+    [
+        GUSTY,
+        pytest.param(replace(GUSTY, motor_lag_s=0.12), marks=pytest.mark.complete),
+        pytest.param(replace(GUSTY, hover_throttle=0.17), marks=pytest.mark.complete),
+    ],
+)
 def test_a_proposal_is_allowed_and_better_than_what_it_began_with(copter: SimulatedCopter) -> None:
     flight = simulated_flight(copter)
     estimate = fit_copter(flight)

@@ -275,6 +275,7 @@ def test_what_a_refused_run_had_set_is_put_back_too() -> None:
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
 
 
+@pytest.mark.complete
 def test_a_px4_that_was_told_to_land_after_it_had_disarmed_is_brought_back_and_flies() -> None:
     with ready("px4") as rig, connected(rig) as vehicle:
         autopilot = rig.drone.autopilot
