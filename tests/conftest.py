@@ -1,6 +1,7 @@
 """Fixtures of the storage and REST tests: a real database, migrated once and copied, and the real application on it."""
 
 import shutil
+import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -49,7 +50,14 @@ def migrated_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shared_application(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
     """One for all tests of a process: its routes and its statements are compiled once."""
     folder = tmp_path_factory.mktemp("shared")
-    return create_app(Settings(data_dir=folder / "data", ui_dir=folder / "ui", port=0))
+    application = create_app(Settings(data_dir=folder / "data", ui_dir=folder / "ui", port=0))
+    event.listen(application.state.database.engine, "connect", _do_not_wait_for_the_disk)
+    return application
+
+
+def _do_not_wait_for_the_disk(connection: sqlite3.Connection, _entry: object) -> None:
+    """No database of these tests has to outlive its process: those that kill one have servers of their own."""
+    connection.execute("PRAGMA synchronous = OFF")
 
 
 @pytest.fixture
