@@ -2,6 +2,7 @@
 
 import sqlite3
 import threading
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,8 @@ THREADS = 8
 WRITES = 25
 
 
-def test_the_file_is_in_wal_mode_with_foreign_keys_and_a_commit_outlives_a_power_cut(database: Database) -> None:
-    with database.read() as session:
+def test_the_file_is_in_wal_mode_with_foreign_keys_and_a_commit_outlives_a_power_cut(tmp_path: Path) -> None:
+    with closing(Database(tmp_path / "gainline.sqlite3")) as database, database.read() as session:
         found = [
             session.execute(text(f"PRAGMA {name}")).scalar()
             for name in ("journal_mode", "foreign_keys", "busy_timeout", "synchronous")

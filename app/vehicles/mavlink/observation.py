@@ -6,7 +6,7 @@ one, by itself or by its clock, is doubted until more of the same kind have arri
 """
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from app.vehicles.mavlink.boot_clock import AHEAD_S, BACK_S, RESTARTED_S, OtherClock
 from app.vehicles.mavlink.events import (
@@ -20,6 +20,11 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
 )
 from app.vehicles.mavlink.failures import GROUND_M, Limits
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Record = TypeVar("Record", bound="DataclassInstance")
 
 RESTING_M_S: Final = 0.1
 FRESH_S: Final = 0.5
@@ -186,10 +191,21 @@ def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObser
     if watch.doubted is not None and is_fresh(watch, now_s):
         return watch
     airborne = is_airborne(watch, now_s, ground_m)
-    watch = replace(watch, lifted=watch.lifted or airborne, unseen=watch.unseen and not airborne)
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
     grounded = is_grounded(watch, now_s, ground_m) and not is_said_to_fly(watch, now_s, ground_m)
-    return replace(watch, grounded_since_s=since_s if grounded else None)
+    return with_changes(
+        watch,
+        lifted=watch.lifted or airborne,
+        unseen=watch.unseen and not airborne,
+        grounded_since_s=since_s if grounded else None,
+    )
+
+
+def with_changes(record: Record, **changes: object) -> Record:
+    """Return the record with other values; itself if it has them, as after most of the events of a trial."""
+    if all(getattr(record, name) == value for name, value in changes.items()):
+        return record
+    return replace(record, **changes)
 
 
 # ---- conclusions

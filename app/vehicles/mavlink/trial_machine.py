@@ -87,7 +87,8 @@ def advance(trial: Trial, event: Event) -> Step:
         trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
     elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=replace(trial.watch, duplicate_reason=event.why))
-    trial = replace(trial, watch=watching.settle(trial.watch, event.now_s, trial.plan.ground_m))
+    settled = watching.settle(trial.watch, event.now_s, trial.plan.ground_m)
+    trial = trial if settled is trial.watch else replace(trial, watch=settled)
     trial, requests = _confirm_take_off(trial, event)
     trial, commands = _react(_with_jump(_with_fall(trial)), event)
     return trial, (*kept, *requests, *commands)
@@ -297,7 +298,7 @@ def _resting(trial: Trial, now_s: float) -> Trial:
     else:
         rests = watching.is_still(trial.watch, now_s, trial.plan.ground_m)
     since_s = trial.resting_since_s if trial.resting_since_s is not None else now_s
-    return replace(trial, resting_since_s=since_s if rests else None)
+    return watching.with_changes(trial, resting_since_s=since_s if rests else None)
 
 
 def _has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
@@ -427,7 +428,7 @@ def _taken_over(trial: Trial) -> Finding | None:
 
 def _changed(trial: Trial) -> Finding | None:
     """Return an unexpected change of state during a landing, in which disarming is expected."""
-    watch = replace(trial.watch, armed=True)
+    watch = watching.with_changes(trial.watch, armed=True)
     return limit_checks.find_duplicate(watch) or limit_checks.find_unexpected(
         watch, trial.plan.limits, _modes(trial), _blocks(trial)
     )
