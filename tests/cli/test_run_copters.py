@@ -160,9 +160,8 @@ def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(
     assert (held["MIS_TAKEOFF_ALT"], list(folder.iterdir())) == (2.5, [])
 
 
-@pytest.mark.parametrize(
-    "autopilot", ["ardupilot-4.7", *(pytest.param(one, marks=pytest.mark.complete) for one in ("ardupilot", "px4"))]
-)
+@pytest.mark.complete
+@pytest.mark.parametrize("autopilot", ["ardupilot-4.7", "ardupilot", "px4"])
 def test_three_sets_are_flown_by_hand_and_the_safe_gains_are_back(
     tmp_path: Path, autopilot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -44,6 +44,7 @@ VIOLATIONS = {
 }
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(("file", "violation", "contract"), VIOLATIONS.values(), ids=VIOLATIONS.keys())
 def test_a_forbidden_import_breaks_a_contract(file: str, violation: str, contract: str, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "app", tmp_path / "app", ignore=shutil.ignore_patterns("__pycache__", "ui"))

@@ -165,6 +165,7 @@ def test_the_answer_tells_what_was_measured_and_what_is_predicted() -> None:
     assert lines[-4:] == [f"{name},{value:g}" for name, value in found.proposed.gains.items()]
 
 
+@pytest.mark.complete
 def test_among_gains_that_deviate_alike_those_with_more_margin_are_proposed() -> None:
     """On the binary's vehicle 3, 8, 0.85, 3 has the least deviation, at a margin of 2.0; 3, 8, 0.5, 3 deviates 0.1 mm
     more."""
