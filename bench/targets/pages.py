@@ -45,6 +45,8 @@ that is possible on the vehicle.
 - A method that ends early, or has fewer flights than the number in the column, is counted with its last
   recommendation.
 - Shares have Wilson 95 % intervals.
+- All of this is about takeoffs under Paparazzi. Steps under ArduCopter, with the rules of its documentation and
+  searches for comparison, are in [benchmarks.md](benchmarks.md#from-a-log-to-gains).
 
 ![Share of vehicles within 5 % against flights]({figure})
 

@@ -17,6 +17,7 @@ import httpx2
 
 T = TypeVar("T")
 PATIENCE_S = 40.0
+ENDED = {"valid", "aborted", "invalid", "cancelled"}
 
 
 def environment(**more: str) -> dict[str, str]:
@@ -131,11 +132,14 @@ class Serving:
         return identity
 
     def trial(self, trial_id: int, *states: str) -> Any:
-        """The trial, once it is in one of the states."""
+        """The trial, once it is in one of the states; one that has ended otherwise fails with its reason."""
 
         def there() -> Any:
             found = self.get(f"/trials/{trial_id}")
-            return found if found["state"] in states else None
+            if found["state"] in states:
+                return found
+            assert found["state"] not in ENDED, f"trial {trial_id} is {found['state']}: {found['reason']}"
+            return None
 
         return wait_for(f"trial {trial_id} to be {' or '.join(states)}", there)
 

@@ -34,9 +34,9 @@ def test_a_registered_vehicle_flies_and_holds_its_safe_gains_afterwards(serving:
                 heard.append(name if name != "vehicle" else data["step"])
                 if name == "phase" and data["phase"] == "landed":
                     break
+        flown = serving.trial(trial_id, "valid")
         assert {"arm", "record", "land"} <= set(heard), "the vehicle's own steps are shown while it flies"
         assert heard.count("telemetry") > 33.0 / SPEED * 20.0
-        flown = serving.trial(trial_id, "valid")
         assert flown["read_back"] == TRIED
         assert flown["record"]["duration_s"] > 32.0
         assert vehicle.in_state("ready")["held"] == SAFE

@@ -1,4 +1,4 @@
-"""Events on the time line of a recorded takeoff: command, lift-off, glitch, abort, landing, and pinned notes."""
+"""Events on the time line of a recorded takeoff: command, lift-off, glitch, gap, abort, landing, and pinned notes."""
 
 import re
 from collections.abc import Sequence
@@ -7,11 +7,15 @@ from typing import Final
 
 import numpy as np
 
-from app.core.records.trajectory import Trajectory
+from app.core.records.trajectory import Samples, Trajectory
 
 AIRBORNE_M: Final = 0.1
 """Height above which the vehicle has left the ground."""
-_NAMED_GLITCHES: Final = 3
+GAP_S: Final = 1.0
+"""Time without samples from which the link counts as lost."""
+_GAP_INTERVALS: Final = 5.0
+"""A gap is that many times longer than the usual interval, because some logs have less than a sample a second."""
+_NAMED: Final = 3
 _PINNED: Final = re.compile(r"\s*(-?\d{1,4}(?:\.\d{1,6})?)\s?s\s?[:–-]\s?(\S.*)")
 
 
@@ -27,11 +31,14 @@ def flight_events(trajectory: Trajectory, glitches_s: Sequence[float] = ()) -> t
     """The events that the record shows, in order, with its glitches, which begin at `glitches_s`.
 
     Lift-off: the first sample more than 0.1 m above the last one before the command. Landing: the first sample at most
-    that high after the last one higher. Abort: the set point, where it was recorded, returns to the ground. Only the
-    command and the glitches, if there is no altitude. More than three glitches are one event, at the first.
+    that high after the last one higher. Abort: the set point, where it was recorded, returns to the ground. No data: no
+    samples for longer than a second, which is no glitch as well. Only the command, the glitches and the times without
+    data, if there is no altitude. More than three of a kind are one event, at the first.
     """
     time_s, channels = trajectory.time_s, trajectory.channels
-    found = [FlightEvent(0.0, "Command"), *_glitches(glitches_s)]
+    gaps = _gaps(time_s)
+    others_s = [begin_s for begin_s in glitches_s if not any(begin_s == first_s for first_s, _ in gaps)]
+    found = [FlightEvent(0.0, "Command"), *_glitches(others_s), *_named_gaps(gaps)]
     if "altitude_m" not in channels or not len(time_s):
         return tuple(sorted(found, key=_time))
     is_commanded = time_s >= 0.0
@@ -57,9 +64,24 @@ def _time(event: FlightEvent) -> float:
 
 
 def _glitches(begin_s: Sequence[float]) -> list[FlightEvent]:
-    if len(begin_s) > _NAMED_GLITCHES:
+    if len(begin_s) > _NAMED:
         return [FlightEvent(min(begin_s), f"{len(begin_s)} glitches")]
     return [FlightEvent(time_s, "Glitch") for time_s in begin_s]
+
+
+def _gaps(time_s: Samples) -> list[tuple[float, float]]:
+    """Beginning and length of each gap, s."""
+    intervals_s = np.diff(time_s)
+    if not intervals_s.size:
+        return []
+    places = np.flatnonzero(intervals_s > max(GAP_S, _GAP_INTERVALS * float(np.median(intervals_s))))
+    return [(float(time_s[place]), float(intervals_s[place])) for place in places]
+
+
+def _named_gaps(gaps: Sequence[tuple[float, float]]) -> list[FlightEvent]:
+    if len(gaps) > _NAMED:
+        return [FlightEvent(gaps[0][0], f"No data, {len(gaps)} times")]
+    return [FlightEvent(begin_s, f"No data for {lasts_s:.1f} s") for begin_s, lasts_s in gaps]
 
 
 def _abort(trajectory: Trajectory) -> int | None:

@@ -62,6 +62,28 @@ def test_the_lines_of_a_note_that_begin_with_a_time_are_pinned_to_it() -> None:
     ]
 
 
+def test_a_lost_link_is_an_event_with_its_length_and_a_slow_log_has_none() -> None:
+    def named(*removed: tuple[float, float], interval_s: float = 0.1) -> list[tuple[float, str]]:
+        time_s = np.arange(-1.0, 20.0, interval_s)
+        for begin_s, end_s in removed:
+            time_s = time_s[(time_s <= begin_s + 1e-6) | (time_s >= end_s - 1e-6)]
+        record = Trajectory(time_s, {"altitude_m": np.zeros_like(time_s)}, "mavlink", "vehicle")
+        return [(round(event.time_s, 2), event.name) for event in flight_events(record)]
+
+    command = (0.0, "Command")
+    assert named((2.0, 2.9)) == [command]
+    assert named((2.0, 4.3), (9.0, 10.5)) == [command, (2.0, "No data for 2.3 s"), (9.0, "No data for 1.5 s")]
+    assert named((2.0, 4.0), (6.0, 8.0), (9.0, 11.0), (13.0, 15.0)) == [command, (2.0, "No data, 4 times")]
+    assert named(interval_s=1.5) == [command]
+
+
+def test_a_gap_is_not_a_glitch_as_well() -> None:
+    time_s = np.array([-1.0, 0.0, 0.5, 1.0, 4.0, 4.5, 5.0])
+    record = Trajectory(time_s, {"altitude_m": np.zeros_like(time_s)}, "mavlink", "vehicle")
+    found = [(event.time_s, event.name) for event in flight_events(record, [1.0, 4.0])]
+    assert found == [(0.0, "Command"), (1.0, "No data for 3.0 s"), (4.0, "Glitch")]
+
+
 def test_glitches_are_events_and_many_of_them_are_one() -> None:
     def named(*begin_s: float) -> list[tuple[float, str]]:
         record = Trajectory(TIME_S, {"altitude_m": np.zeros_like(TIME_S)}, "mavlink", "vehicle")
