@@ -1,7 +1,7 @@
 """The gains of each flight, one small panel per gain, with the next ones as open diamonds."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 from app.core import formatting
 from app.core.policy import Gain
@@ -13,6 +13,8 @@ from app.figures.theme import PALETTES, Palette, ThemeName
 
 GAP = 0.09
 """Height between two panels as a share of the whole: room for the title of the lower one."""
+_LETTERS: Final = 48
+"""Of a name, on the narrowest screen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,15 +115,18 @@ class GainsFigure:
         }
 
     def _names(self, palette: Palette) -> list[dict[str, object]]:
-        """Name and unit of each gain, above its panel."""
-        count = len(self.history.gains)
+        """Name, title and unit of each gain, above its panel; where one would not fit, the titles show under the
+        pointer."""
+        gains = self.history.gains
+        fit = all(len(_said(gain.name, gain.title, gain)) <= _LETTERS for gain in gains)
         return [
             theme.note(
                 palette,
-                f"<b>{gain.name}</b> {gain.title}" + (f" ({gain.unit})" if gain.unit else ""),
-                y=theme.stacked(index, count, GAP)[1],
+                _said(f"<b>{gain.name}</b>", gain.title if fit else "", gain),
+                y=theme.stacked(index, len(gains), GAP)[1],
+                hovertext=gain.title,
             )
-            for index, gain in enumerate(self.history.gains, start=1)
+            for index, gain in enumerate(gains, start=1)
         ]
 
     def _summary(self) -> str:
@@ -146,6 +151,10 @@ class GainsFigure:
             *(Column(gain.name, gain.title, gain.unit, 0 if gain.integer else None) for gain in self.history.gains),
         )
         return Table(columns, tuple(rows))
+
+
+def _said(name: str, title: str, gain: Gain) -> str:
+    return " ".join(filter(None, (name, title, f"({gain.unit})" if gain.unit else "")))
 
 
 def padded(low: float, high: float, gain: Gain) -> list[float]:

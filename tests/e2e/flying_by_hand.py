@@ -82,8 +82,8 @@ def hold_button(page: Page) -> Locator:
     return page.get_by_role("button", name=re.compile("^(Hold to fly|Keep holding)"))
 
 
-def press(dashboard: Dashboard) -> None:
-    """Put the finger on the button while the page's clock stands still, on an answer about readiness asked since.
+def stop_the_clock(dashboard: Dashboard) -> None:
+    """Let the page's clock stand still on an answer about readiness asked since, whatever else the machine does.
 
     An answer holds for 4 s of that clock, which outruns the server: the jump leaves none from before, and of the two
     that follow, the first may have been asked earlier. The page asks anew once it has read an answer, so its clock
@@ -104,6 +104,12 @@ def press(dashboard: Dashboard) -> None:
     page.on("response", hear)
     dashboard.until(is_answered)
     page.remove_listener("response", hear)
+
+
+def press(dashboard: Dashboard) -> None:
+    """Put the finger on the button while the page's clock stands still."""
+    page = dashboard.page
+    stop_the_clock(dashboard)
     middle_of(page, hold_button(page))
     page.mouse.down()
     expect(hold_button(page)).to_contain_text("Keep holding")

@@ -183,10 +183,10 @@ def test_a_disconnected_vehicle_is_edited_and_deleted_once_no_campaign_uses_it(
 
     page.get_by_role("link", name="Edit").click()
     dashboard.button("Delete vehicle").click()
-    dashboard.button("Delete with its gain history").click()
+    dashboard.button("Delete with its gain history and commands").click()
     expect(page.get_by_role("alert")).to_contain_text("Hornet cannot be deleted: the campaign Ladder uses it.")
     states.delete_campaign(campaign_id)
-    dashboard.button("Delete with its gain history").click()
+    dashboard.button("Delete with its gain history and commands").click()
     page.wait_for_url(re.compile("/vehicles$"))
     expect(page.get_by_role("link", name="Register a vehicle")).to_be_visible()
     expect(page.get_by_role("link", name="Hornet")).to_have_count(0)

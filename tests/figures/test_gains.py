@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from app.figures.gains import GainsFigure, padded
@@ -17,6 +19,21 @@ def test_every_panel_says_above_it_what_its_gain_is() -> None:
     assert [one["text"].split(" ")[0] for one in named] == ["<b>kp</b>", "<b>ki</b>", "<b>kd</b>"]
     assert all(gain.title in one["text"] and gain.unit in one["text"] for gain, one in zip(GAINS, named, strict=True))
     assert named[0]["y"] > named[1]["y"] > named[2]["y"]
+
+
+def test_titles_that_do_not_fit_on_a_phone_show_under_the_pointer() -> None:
+    long = tuple(replace(gain, name=f"PSC_{gain.name}", title=f"{gain.title} of the climb rate loop") for gain in GAINS)
+    flown = replace(history(flight(1, 0.3)), gains=long)
+    flown = replace(
+        flown, flights=tuple(replace(one, gains={gain.name: 1.0 for gain in long}) for one in flown.flights)
+    )
+    named = layout(GainsFigure(flown).compute())["annotations"]
+    assert [one["text"] for one in named] == [
+        "<b>PSC_kp</b> (counts)",
+        "<b>PSC_ki</b> (counts)",
+        "<b>PSC_kd</b> (counts)",
+    ]
+    assert [one["hovertext"] for one in named] == [gain.title for gain in long]
 
 
 def test_the_proposed_gains_are_open_diamonds_at_the_next_flight() -> None:

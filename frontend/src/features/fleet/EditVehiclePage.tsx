@@ -86,7 +86,7 @@ function DeleteVehicle({ vehicle }: { vehicle: Vehicle }) {
     <>
       {isAsked ? (
         <Button color="red" loading={remove.isPending} onClick={() => remove.mutate()}>
-          Delete with its gain history
+          Delete with its gain history and commands
         </Button>
       ) : (
         <Button variant="default" onClick={() => setAsked(true)}>
