@@ -77,6 +77,11 @@ def test_a_lost_link_is_an_event_with_its_length_and_a_slow_log_has_none() -> No
     assert named(interval_s=1.5) == [command]
 
 
+def test_a_record_of_a_single_sample_has_no_gap() -> None:
+    record = Trajectory(np.zeros(1), {"altitude_m": np.zeros(1)}, "mavlink", "vehicle")
+    assert [event.name for event in flight_events(record)] == ["Command"]
+
+
 def test_a_gap_is_not_a_glitch_as_well() -> None:
     time_s = np.array([-1.0, 0.0, 0.5, 1.0, 4.0, 4.5, 5.0])
     record = Trajectory(time_s, {"altitude_m": np.zeros_like(time_s)}, "mavlink", "vehicle")
