@@ -118,11 +118,11 @@ class GainsFigure:
         """Name, title and unit of each gain, above its panel; where one would not fit, the titles show under the
         pointer."""
         gains = self.history.gains
-        fit = all(len(_said(gain.name, gain.title, gain)) <= _LETTERS for gain in gains)
+        fit = all(len(_label(gain.name, gain.title, gain)) <= _LETTERS for gain in gains)
         return [
             theme.note(
                 palette,
-                _said(f"<b>{gain.name}</b>", gain.title if fit else "", gain),
+                _label(f"<b>{gain.name}</b>", gain.title if fit else "", gain),
                 y=theme.stacked(index, len(gains), GAP)[1],
                 hovertext=gain.title,
             )
@@ -153,7 +153,7 @@ class GainsFigure:
         return Table(columns, tuple(rows))
 
 
-def _said(name: str, title: str, gain: Gain) -> str:
+def _label(name: str, title: str, gain: Gain) -> str:
     return " ".join(filter(None, (name, title, f"({gain.unit})" if gain.unit else "")))
 
 

@@ -38,6 +38,7 @@ def errors(campaign: dict[str, Any]) -> list[float]:
     return [trial["error"] for trial in campaign["trials"]]
 
 
+@pytest.mark.complete
 def test_the_gradient_tunes_the_jsbsim_drone_by_the_fourth_flight(tmp_path: Path) -> None:
     campaign = flown(tmp_path, "run", "ardrone-takeoff", "--vehicle", "jsbsim", "--strategy", "gradient", *PAPER)
     assert campaign["trials"][0]["gains"] == {"kp": 283, "ki": 13, "kd": 82}
@@ -69,6 +70,7 @@ def test_a_hover_throttle_the_model_gets_wrong_is_overcome_on_the_twin(
     assert min(errors(campaign)[:7]) <= limit
 
 
+@pytest.mark.complete
 def test_the_same_seed_gives_the_same_campaign_and_another_seed_another(tmp_path: Path) -> None:
     noisy = ("run", "ardrone-takeoff", "--vehicle", "twin", "--max-flights", "3")
     first, again, other = (flown(tmp_path, *noisy, "--seed", seed) for seed in ("4", "4", "5"))

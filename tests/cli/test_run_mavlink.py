@@ -25,6 +25,7 @@ def gainline(*arguments: str) -> Result:
     return CliRunner().invoke(app, list(arguments))
 
 
+@pytest.mark.complete
 def test_a_whole_campaign_is_flown_over_the_link(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out, logs = tmp_path / "campaign.json", tmp_path / "logs"
     logs.mkdir()

@@ -165,6 +165,7 @@ def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_e
     assert "2 photos of this flight omitted" in page.said
 
 
+@pytest.mark.complete
 def test_the_landscape_is_in_the_report_once_it_is_computed(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

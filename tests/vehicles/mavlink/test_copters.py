@@ -105,7 +105,7 @@ class AltitudeAnew(Fault):
         return replace(letter, fields={**letter.fields, "z": z - 0.5})
 
 
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+@pytest.mark.parametrize("autopilot", ["ardupilot", pytest.param("px4", marks=pytest.mark.complete)])
 def test_heights_count_from_the_ground_though_the_altitude_begins_anew_at_arming(
     autopilot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
