@@ -65,6 +65,7 @@ class _Checker:
         self.beatless = self.of(*SILENT, "no-heartbeat")
         self.armed_s = self.states.first_s(State.ARM)
         self.took_off_s = self.states.first_s(State.TAKEOFF)
+        self.stop_asked_s = min((begun_s for begun_s, _ in self.of(MOTORS_OFF)), default=float("inf"))
 
     def of(self, *kinds: str) -> list[Span]:
         return [(each.begun_s, each.ended_s) for each in self.result.injected if each.kind in kinds]
@@ -230,8 +231,7 @@ class _Checker:
 
     def _dropped_m(self) -> float:
         """Return the height at which the operator's first motors off reached the vehicle; 0 if none did."""
-        asked_s = min((begun_s for begun_s, _ in self.of(MOTORS_OFF)), default=float("inf"))
-        return next((stop.height_m for stop in self.result.stops if stop.at_s >= asked_s), 0.0)
+        return next((stop.height_m for stop in self.result.stops if stop.at_s >= self.stop_asked_s), 0.0)
 
     def _holds_no_trial(self) -> bool:
         """Whether no gain is the trial's, unless it equals the safe one."""
@@ -272,9 +272,8 @@ class _Checker:
     # ---- the packets that were sent
 
     def _wire(self) -> Iterator[str]:
-        asked_s = min((each.begun_s for each in self._kinds(MOTORS_OFF)), default=float("inf"))
         for stop in self.result.stops:
-            if stop.height_m > LIFTED_M and stop.at_s < asked_s:
+            if stop.height_m > LIFTED_M and stop.at_s < self.stop_asked_s:
                 yield f"motors off was sent at {stop.height_m:.2f} m"
         if self.states.now is State.CONNECT and self.result.packets:
             yield f"{self.result.packets} packets were sent before a heartbeat was heard"
@@ -287,7 +286,7 @@ class _Checker:
             ]
             if gaps:
                 yield f"Land was not repeated for {max(gaps):.1f} s while the link was lost"
-            if any(lost_s <= at_s < min(end_s, asked_s) for at_s in self.states.times_of(Command.MOTORS_OFF)):
+            if any(lost_s <= at_s < min(end_s, self.stop_asked_s) for at_s in self.states.times_of(Command.MOTORS_OFF)):
                 yield "motors off was sent while the link was lost"
         yield from self._first_command_out_of_the_air()
 

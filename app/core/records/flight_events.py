@@ -11,7 +11,7 @@ from app.core.records.trajectory import Samples, Trajectory
 
 AIRBORNE_M: Final = 0.1
 """Height above which the vehicle has left the ground."""
-GAP_S: Final = 1.0
+_GAP_S: Final = 1.0
 """Time without samples from which the link counts as lost."""
 _GAP_INTERVALS: Final = 5.0
 """A gap is that many times longer than the usual interval, because some logs have less than a sample a second."""
@@ -37,7 +37,7 @@ def flight_events(trajectory: Trajectory, glitches_s: Sequence[float] = ()) -> t
     """
     time_s, channels = trajectory.time_s, trajectory.channels
     gaps = _gaps(time_s)
-    others_s = [begin_s for begin_s in glitches_s if not any(begin_s == first_s for first_s, _ in gaps)]
+    others_s = [begin_s for begin_s in glitches_s if begin_s not in dict(gaps)]
     found = [FlightEvent(0.0, "Command"), *_glitches(others_s), *_named_gaps(gaps)]
     if "altitude_m" not in channels or not len(time_s):
         return tuple(sorted(found, key=_time))
@@ -74,7 +74,7 @@ def _gaps(time_s: Samples) -> list[tuple[float, float]]:
     intervals_s = np.diff(time_s)
     if not intervals_s.size:
         return []
-    places = np.flatnonzero(intervals_s > max(GAP_S, _GAP_INTERVALS * float(np.median(intervals_s))))
+    places = np.flatnonzero(intervals_s > max(_GAP_S, _GAP_INTERVALS * float(np.median(intervals_s))))
     return [(float(time_s[place]), float(intervals_s[place])) for place in places]
 
 

@@ -196,19 +196,18 @@ export function drawLive(plotly: Plotly, chart: HTMLElement, traces: readonly Tr
     if (latest === null || latest.timeS.length === 0) return;
     const drawn = liveCurves(traces, latest);
     const [places, curves] = [[...drawn.keys()], [...drawn.values()]];
-    const [x, y] = [curves.map((curve) => curve.x), curves.map((curve) => curve.y)];
     const range = (chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity];
     const room = roomFor(range, latest.measured);
     if (isBegun && room[0] === range[0] && room[1] === range[1]) {
-      await plotly.animate(
-        chart,
-        { data: curves.map((_, index) => ({ x: x[index], y: y[index] })), traces: places },
-        AT_ONCE,
-      );
+      await plotly.animate(chart, { data: curves.map(({ x, y }) => ({ x, y })), traces: places }, AT_ONCE);
       return;
     }
-    const showlegend = curves.map((curve) => curve.showlegend);
-    await plotly.update(chart, { x, y, showlegend }, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, places);
+    const change = {
+      x: curves.map(({ x }) => x),
+      y: curves.map(({ y }) => y),
+      showlegend: curves.map(({ showlegend }) => showlegend),
+    };
+    await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, places);
     isBegun = curves.every((curve) => curve.x.length > 0);
   }, SHORTEST_REDRAW_MS);
   const unfollow = onLive(trialId, (flight) => {
