@@ -112,7 +112,8 @@ stops reconnecting it."""
 
 
 class ActKind(StrEnum):
-    """Kinds of acts: requests to a registered vehicle and decisions about it, outside its flights."""
+    """Kinds of acts: what a person asked of a registered vehicle, or decided about it. The last four belong to flights,
+    which carry them out; the others are carried out between flights."""
 
     CONNECT = "connect"
     DISCONNECT = "disconnect"
@@ -124,6 +125,10 @@ class ActKind(StrEnum):
     MOTORS_OFF = "motors off"
     SAFE_GAINS = "safe gains"
     CONTROL = "control"
+    STAGE = "stage"
+    TAKE_OFF = "take-off"
+    UNSTAGE = "unstage"
+    ABORT = "abort"
 
 
 GIVES_GAINS: Final = frozenset({ActKind.CONNECT, ActKind.RESTORE, ActKind.RELEASE})

@@ -24,6 +24,7 @@ from app.fleet import commands
 from app.fleet.commands import ActTask, LinkedVehicle
 from app.flights.abort import AbortRegistry
 from app.flights.connection_process import run_connection_process
+from app.flights.flight_commands import record_abort
 from app.flights.process_messages import CommandForwarded, ConnectionOpened, ConnectionRequest, Publish, VehicleResponse
 from app.flights.vehicle_connection import RECONNECT_INTERVAL_S, VehicleConnection, status_time
 from app.live.messages import NO_LINK, VehicleCommandKind, VehicleLinkState, VehicleStatus
@@ -119,6 +120,13 @@ class VehicleConnectionManager:
         if (trial_id := session.trial_id) is not None:
             self._abort_registry.abort(trial_id, reason)
         return answer
+
+    def abort(self, trial_id: int, reason: str) -> bool:
+        """Abort the trial's flight, then record that. Returns whether that trial is being flown here."""
+        accepted = self._abort_registry.abort(trial_id, reason)
+        if accepted:
+            self._record_in_background(lambda t: record_abort(t, trial_id, reason))
+        return accepted
 
     def session(self, vehicle_id: int) -> VehicleConnection:
         """The vehicle's connection, for a flight. Raises VehicleError when there is none."""

@@ -16,12 +16,26 @@ from app.campaigns.trials.service import check_own_gains
 from app.campaigns.trials.views import trial_view
 from app.common.conflict_checks import check_action
 from app.common.errors import ConflictError, NotAllowedError
-from app.common.states import ACTIVE_FLIGHT_STATES, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, FlightMode, FlightState
+from app.common.states import (
+    ACTIVE_FLIGHT_STATES,
+    HISTORY_TRIAL_STATES,
+    TRIAL_ACTIONS,
+    ActKind,
+    FlightMode,
+    FlightState,
+)
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
-from app.fleet.control import is_in_control, require_control, require_may_command, require_not_controlled_by_other
+from app.fleet.control import (
+    control_of,
+    is_in_control,
+    require_control,
+    require_may_command,
+    require_not_controlled_by_other,
+)
+from app.flights.flight_commands import record_abort, record_flight_command
 from app.flights.readiness import Readiness, Standing, readiness_of, require_ready
 from app.flights.schemas import TrialReadiness
 from app.live.hub import VehicleReport
@@ -110,7 +124,7 @@ def request_flight(
     rehearsals.require_rehearsed(session, campaign)
     fleet.require_window_fits(vehicle, experiment_of_campaign(campaign).window_s)
     fleet.require_ready(session, vehicle, mode)
-    require_not_controlled_by_other(vehicle, context)
+    by = require_not_controlled_by_other(vehicle, context)
     now = utc_now()
     session.add(
         FlightRow(
@@ -127,6 +141,7 @@ def request_flight(
         )
     )
     session.flush()
+    record_flight_command(session, row.id, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
@@ -168,13 +183,14 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
         raise ConflictError(f"The takeoff of trial {row.number} has already been requested.", hint="Watch the flight.")
     vehicle = campaign.vehicle
     if fleet.needs_staging(vehicle):
-        require_control(vehicle, context)
+        by = require_control(vehicle, context)
         rehearsals.require_rehearsed(session, campaign)  # again: a flight of it may be reclassified while staged
     else:
         require_may_command(vehicle, context)
-        require_not_controlled_by_other(vehicle, context)
+        by = require_not_controlled_by_other(vehicle, context)
     require_ready(_readiness(session, row, context, report_of))
     flight.take_off_at = utc_now()
+    record_flight_command(session, row.id, ActKind.TAKE_OFF, by=by)
     return trial_view(session, campaign, row)
 
 
@@ -187,7 +203,11 @@ def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOC
     row = history.trial_row(session, trial_id)
     check_action(TRIAL_ACTIONS, "unstage", row.state, f"Flight {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
-    _staged(session, row).stand_down = f"unstaged {_origin(campaign.vehicle, context)}"
+    reason = f"unstaged {_origin(campaign.vehicle, context)}"
+    _staged(session, row).stand_down = reason
+    operator = control_of(campaign.vehicle) if is_in_control(campaign.vehicle, context) else None
+    by = "" if operator is None else operator.operator
+    record_flight_command(session, row.id, ActKind.UNSTAGE, by=by, reason="" if by else reason)
     return trial_view(session, campaign, row)
 
 
@@ -220,6 +240,7 @@ def withdraw_flight(session: Session, trial_id: int, reason: str) -> AbortAnswer
     flight = history.latest_flights(session, [trial_id]).get(trial_id)
     if flight is not None and flight.state == FlightState.REQUESTED:
         set_flight_state(flight, FlightState.CANCELLED, problem=reason)
+        record_abort(session, trial_id, reason)
         return AbortAnswer(trial_id=trial_id, accepted=True, sentence="The flight had not started; it was withdrawn.")
     if flight is not None and flight.state == FlightState.RUNNING:
         raise ConflictError(

@@ -196,9 +196,7 @@ class Worker:
             links=is_loopback(self._settings.host),
             clock=self._clock,
         )
-        live = LiveServer(
-            live_address(data_dir), abort=self._abort_registry.abort, order=sessions.order, hello=self._hello
-        )
+        live = LiveServer(live_address(data_dir), abort=sessions.abort, order=sessions.order, hello=self._hello)
         flight_runner = FlightRunner(
             database,
             data_dir,

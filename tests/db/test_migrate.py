@@ -91,6 +91,29 @@ def test_a_filled_first_database_is_brought_up_to_date_and_its_proposals_compute
         assert connection.execute("SELECT count(*) FROM campaign").fetchone() == (2,)
 
 
+def test_what_was_asked_of_a_vehicle_survives_new_kinds_of_commands(migrated_file: Path, tmp_path: Path) -> None:
+    file = tmp_path / "gainline.sqlite3"
+    file.write_bytes(migrated_file.read_bytes())
+    add = (
+        "INSERT INTO vehicle_act (id, vehicle_id, kind, state, by, reason, problem, requested_at)"
+        " VALUES (?, 1, ?, 'done', 'Ada', '', '', '2026-11-20 10:00:00')"
+    )
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parents[2] / "migrations"))
+    with open_engine(file, foreign_keys=False).connect() as connection:
+        config.attributes["connection"] = connection
+        connection.exec_driver_sql(add, (1, "land"))
+        connection.exec_driver_sql(add, (2, "abort"))
+        command.downgrade(config, "0007")
+        kept = connection.exec_driver_sql("SELECT id, kind, by FROM vehicle_act").fetchall()
+        command.upgrade(config, "0008")
+        connection.exec_driver_sql(add, (3, "take-off"))
+        after = connection.exec_driver_sql("SELECT id, kind FROM vehicle_act").fetchall()
+        connection.commit()
+    assert kept == [(1, "land", "Ada")]
+    assert after == [(1, "land"), (3, "take-off")]
+
+
 def test_a_database_of_a_newer_program_is_refused_and_left_alone(settings: Settings) -> None:
     set_revision(settings.database_file, "9999")
     for check in (require_current, migrate):

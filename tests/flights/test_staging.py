@@ -101,6 +101,13 @@ def take_off(client: TestClient, staged: Json, headers: dict[str, str]) -> tuple
     return answer.status_code, answer.json().get("detail", "")
 
 
+def unstage_claimed(database: Database, staged: Json) -> None:
+    """Its worker restores the safe gains instead of taking off."""
+    outcome = FlightOutcome(withdrawn=True, problem="unstaged by the operator", restored=DEFAULT_GAINS)
+    with database.write() as session:
+        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
+
+
 def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
     """Whether its worker may take off, and why it is to stand down."""
     with database.read() as session:
@@ -214,9 +221,7 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
         409,
         f"Flight {staged['number']} is being unstaged: unstaged by the operator.",
     )
-    with database.write() as session:
-        outcome = FlightOutcome(withdrawn=True, problem="unstaged by the operator", restored=DEFAULT_GAINS)
-        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
+    unstage_claimed(database, staged)
     after = trial(client, staged)
     assert (after["state"], after["flight"]["state"], after["actions"][0]) == ("planned", "cancelled", "stage")
     assert seen(client, real)["state"] == "ready"
@@ -439,6 +444,34 @@ def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json
     answer = client.post(f"/api/trials/{planned['id']}/abort")
     assert (answer.status_code, answer.json()["accepted"]) == (202, True)
     assert trial(client, planned)["flight"]["state"] == "cancelled"
+
+
+def test_the_command_log_says_who_asked_what_of_a_flight(
+    client: TestClient, database: Database, real: Json, planned: Json
+) -> None:
+    """Observed gap: staging, takeoff and abort of a flight left no trace among the vehicle's commands."""
+    operator = {**OUR_PAGE, **control_header(client, real)}
+    client.post(f"/api/trials/{planned['id']}/stage", headers=operator)
+    stage_claimed(database)
+    client.post(f"/api/trials/{planned['id']}/unstage")
+    unstage_claimed(database, trial(client, planned))
+    client.post(f"/api/trials/{planned['id']}/stage", headers=operator)
+    stage_claimed(database)
+    assert take_off(client, planned, operator)[0] == 202
+    unstage_claimed(database, trial(client, planned))
+    client.post(f"/api/trials/{planned['id']}/stage", headers=operator)
+    client.post(f"/api/trials/{planned['id']}/abort", json={"reason": "too close"})
+    log = get(client, f"/api/vehicles/{real['id']}/acts")["items"]
+    campaign = get(client, f"/api/campaigns/{planned['campaign_id']}")
+    flight = f"flight {planned['number']} of {campaign['name']}"
+    assert [(act["kind"], act["by"], act["reason"]) for act in log[:6]] == [
+        ("abort", "", f"{flight}: too close"),
+        ("stage", "Ada", flight),
+        ("take-off", "Ada", flight),
+        ("stage", "Ada", flight),
+        ("unstage", "", f"{flight}: unstaged by a script"),
+        ("stage", "Ada", flight),
+    ]
 
 
 LOST = {

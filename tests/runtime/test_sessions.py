@@ -92,6 +92,8 @@ def test_an_abort_reaches_a_vehicle_in_the_air_while_the_database_is_locked(serv
         assert ended["reason"] == "enough"
         assert ended["abort_cause"] == "operator"
         assert vehicle.in_state("ready")["held"] == SAFE
+        (logged,) = [act for act in vehicle.acts() if act["kind"] == "abort"]
+        assert logged["reason"].endswith(": enough")
 
 
 @pytest.mark.complete

@@ -88,9 +88,10 @@ export type Access = {
 /**
  * ActKind
  *
- * Kinds of acts: requests to a registered vehicle and decisions about it, outside its flights.
+ * Kinds of acts: what a person asked of a registered vehicle, or decided about it. The last four belong to flights,
+ * which carry them out; the others are carried out between flights.
  */
-export type ActKind = 'connect' | 'disconnect' | 'check' | 'restore' | 'parameters' | 'release' | 'land' | 'motors off' | 'safe gains' | 'control';
+export type ActKind = 'connect' | 'disconnect' | 'check' | 'restore' | 'parameters' | 'release' | 'land' | 'motors off' | 'safe gains' | 'control' | 'stage' | 'take-off' | 'unstage' | 'abort';
 
 /**
  * ActState

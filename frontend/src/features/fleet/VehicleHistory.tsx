@@ -78,7 +78,7 @@ function Line({ line }: { line: GivenGains }) {
   );
 }
 
-/** Requests to the vehicle besides its flights: who, when, outcome. */
+/** What people asked of the vehicle: who, when, outcome. */
 export function RequestList({ vehicleId }: { vehicleId: number }) {
   const acts = useActs(vehicleId);
   const items = acts.data?.pages.flatMap((page) => page.items) ?? [];

@@ -37,6 +37,10 @@ export const ACTS: Record<ActKind, string> = {
   "motors off": "Motors off",
   "safe gains": "Set safe gains",
   control: "Take over control",
+  stage: "Stage",
+  "take-off": "Take off",
+  unstage: "Unstage",
+  abort: "Abort",
 };
 
 export const PURPOSES: Record<GivenGains["purpose"], string> = {

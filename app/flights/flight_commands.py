@@ -1,0 +1,23 @@
+"""Entries in a registered vehicle's log of commands for what was asked of its flights."""
+
+from sqlalchemy.orm import Session
+
+from app.campaigns import history
+from app.campaigns import service as campaigns
+from app.common.states import ActKind
+from app.fleet.control import record_act
+
+
+def record_flight_command(session: Session, trial_id: int, kind: ActKind, *, by: str, reason: str = "") -> None:
+    """Record a command to the vehicle of a trial; `by` is the operator, empty when the request was nobody's in
+    control. Shared simulations have no log. Raises NotFoundError."""
+    trial = history.trial_row(session, trial_id)
+    campaign = campaigns.get_row(session, trial.campaign_id)
+    if campaign.vehicle.registered:
+        flight = f"flight {trial.number} of {campaign.name}"
+        record_act(session, campaign.vehicle, kind, by=by, reason=f"{flight}: {reason}" if reason else flight)
+
+
+def record_abort(session: Session, trial_id: int, reason: str) -> None:
+    """Record an abort, which everyone may request; `reason` says who did. Raises NotFoundError."""
+    record_flight_command(session, trial_id, ActKind.ABORT, by="", reason=reason)
