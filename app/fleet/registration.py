@@ -2,7 +2,8 @@
 installations, which never fly from here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import count
 from typing import Final
 
@@ -13,6 +14,7 @@ from app.common.conflict_checks import check_action, check_version
 from app.common.errors import ConflictError, InputError, Problem, UnconfirmedError
 from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
+from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
 from app.core.formatting import format_gains
 from app.core.policy import PolicySpace
@@ -32,8 +34,9 @@ _NAMED: Final = 3
 def register_vehicle(session: Session, new: NewVehicle, context: RequestContext) -> Vehicle:
     """Register a vehicle; it is not connected yet.
 
-    Raises InputError that names what cannot be used, ConflictError when the name is taken, UnconfirmedError when no
-    person has confirmed a real vehicle's safe gains, NotAllowedError when the client may not command it.
+    Raises InputError that names everything that cannot be used, ConflictError when only the name is taken,
+    UnconfirmedError when only a person's confirmation of a real vehicle's safe gains is missing, NotAllowedError when
+    the client may not command it.
     """
     kind = get_kind(new.kind, field="kind")
     if not is_registered_one_by_one(kind):
@@ -43,14 +46,18 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
             problems=(Problem("kind", "cannot be registered"),),
         )
     require(Permission.LINK, context.caller, new.name)
-    options = kind.check(new.options, field="options", simulation_hosts=context.simulation_hosts)
+    refused: list[GainlineError] = []
+    options = _accepted_options(kind, new.options, context, refused)
+    gains = _accepted_gains(kind, options, new.safe_gains, refused)
+    with _noting(refused):
+        _require_free(session, new.name)
     is_real = kind.is_real_with(options, context.simulation_hosts)
-    space = _space(kind, options, new.safe_gains)
-    gains = space.check(new.safe_gains, field="safe_gains") if new.safe_gains else space.mapping(space.default)
-    _require_free(session, new.name)
     if is_real:
-        require(Permission.REAL, context.caller, new.name)
-        _require_confirmed(new, gains)
+        if not refused:
+            require(Permission.REAL, context.caller, new.name)
+        with _noting(refused):
+            _require_confirmed(new, gains)
+    _raise_all(refused)
     row = VehicleRow(
         kind=kind.name,
         name=new.name,
@@ -65,6 +72,55 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
     session.flush()
     record_act(session, row, ActKind.SAFE_GAINS, by="", reason=new.statement or "registered", asked=gains)
     return vehicle_view(row)
+
+
+@contextmanager
+def _noting(refused: list[GainlineError]) -> Iterator[None]:
+    """Add a refusal to those before it, so that a client hears of all of them at once."""
+    try:
+        yield
+    except GainlineError as error:
+        refused.append(error)
+
+
+def _raise_all(refused: list[GainlineError]) -> None:
+    """Raise the one error, or one InputError with the problems of all."""
+    if len(refused) == 1:
+        raise refused[0]
+    if refused:
+        raise InputError(
+            "The vehicle cannot be registered like this.",
+            problems=tuple(problem for error in refused for problem in error.problems),
+            hint="Correct the fields listed.",
+        )
+
+
+def _accepted_options(
+    kind: VehicleKind, asked: Mapping[str, OptionValue], context: RequestContext, refused: list[GainlineError]
+) -> dict[str, OptionValue]:
+    """The options; after a refusal those that are valid, completed with the defaults."""
+    try:
+        return kind.check(asked, field="options", simulation_hosts=context.simulation_hosts)
+    except InputError as error:
+        refused.append(error)
+        wrong = {problem.field for problem in error.problems}
+        return kind.completed({name: value for name, value in asked.items() if f"options.{name}" not in wrong})
+
+
+def _accepted_gains(
+    kind: VehicleKind,
+    options: Mapping[str, OptionValue],
+    asked: Mapping[str, float] | None,
+    refused: list[GainlineError],
+) -> dict[str, float]:
+    """The safe gains, or the default ones. With refused options the autopilot may be the wrong one: gains that are not
+    its are then not judged."""
+    space = _space(kind, options, asked)
+    gains = space.mapping(space.default)
+    if asked and (not refused or set(asked) == set(space.names)):
+        with _noting(refused):
+            gains = space.check(asked, field="safe_gains")
+    return gains
 
 
 def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: RequestContext) -> Vehicle:

@@ -51,11 +51,7 @@ __all__ = [
     "simulation_for",
 ]
 
-_GAINS_UNKNOWN: Final = "Its process ended before the safe gains were read back; the gains on the vehicle are unknown."
-_GAINS_WERE_UNKNOWN: Final = (
-    "Its process ended before the safe gains were read back; the gains on the vehicle were unknown until they were "
-    "read again."
-)
+_GAINS_NOT_READ_BACK: Final = "Its process ended before the safe gains were read back after the flight."
 
 
 def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Gains) -> VehicleRow:
@@ -196,14 +192,12 @@ def set_state_after_flight(row: VehicleRow, *, concern: str = "") -> None:
 def hold_gains(row: VehicleRow, held: Mapping[str, float]) -> None:
     """Record the gains that the vehicle reported."""
     row.held, row.held_at = dict(held), utc_now()
-    if row.concern == _GAINS_UNKNOWN:
-        row.concern = _GAINS_WERE_UNKNOWN
 
 
 def doubt_gains(row: VehicleRow) -> None:
     """Quarantine a vehicle after a flight that ended without a report of its gains."""
     row.held = row.held_at = None
-    set_state_after_flight(row, concern=_GAINS_UNKNOWN)
+    set_state_after_flight(row, concern=_GAINS_NOT_READ_BACK)
 
 
 def is_classed_automatically(row: VehicleRow) -> bool:

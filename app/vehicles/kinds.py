@@ -49,7 +49,8 @@ class VehicleKind:
     nothing is written to it.
     In the folder `trial_parameters` both keep the parameters that a trial changes in addition to the gains, so that
     they are restored even if this process dies.
-    `find_conflicts(options, hosts)` names options that are valid one by one but not together;
+    `find_conflicts(options, hosts)` names options whose text cannot be used, or that are valid one by one but not
+    together; where an option is refused for its type or range, it receives the default;
     `is_simulation(options, hosts)` returns whether a vehicle of a real kind is a simulation.
     `check_gains(options, gains)` raises GainsError for gains that are never written to such a vehicle, even if a person
     overrules the gate. `longest_window_s(options)` is the longest window, s, that such a vehicle can fly.
@@ -101,10 +102,9 @@ class VehicleKind:
             complete[name] = value
             if reason:
                 problems.append(Problem(f"{field}.{name}", reason))
-        if not problems:
-            problems = [
-                Problem(f"{field}.{p.field}", p.reason) for p in self.find_conflicts(complete, simulation_hosts)
-            ]
+        refused = {problem.field for problem in problems}
+        conflicts = [Problem(f"{field}.{p.field}", p.reason) for p in self.find_conflicts(complete, simulation_hosts)]
+        problems += [problem for problem in conflicts if problem.field not in refused]
         if problems:
             raise InputError(
                 f"These options do not suit the vehicle {self.name}.",

@@ -114,11 +114,11 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
         problems.append(Problem("autopilot", f"must be {', '.join(PROFILES)}, got {options['autopilot']}"))
     try:
         address = addresses.parse(str(options["address"]))
+        if options["simulated"] and not _may_simulate(address, simulation_hosts):
+            here = " or ".join(("127.0.0.1", *sorted(simulation_hosts)))
+            problems.append(Problem("simulated", f"must be off for {address}: a simulation has the address {here}"))
     except InputError as error:
-        return (*problems, *error.problems)
-    if options["simulated"] and not _may_simulate(address, simulation_hosts):
-        here = " or ".join(("127.0.0.1", *sorted(simulation_hosts)))
-        problems.append(Problem("simulated", f"must be off for {address}: a simulation has the address {here}"))
+        problems += error.problems
     problems += _second_source_problems(str(options["second_source"]), str(options["scored_source"]))
     if options["signing_key_file"] and options["autopilot"] == "paparazzi":
         problems.append(

@@ -106,9 +106,50 @@ def test_unusable_fields_are_named(client: TestClient) -> None:
 
     assert refusal(kind="balloon") == {"kind"}
     assert refusal(kind="twin") == {"kind"}
-    assert refusal(options={"system_id": 999, "wings": 2}) == {"options.system_id", "options.wings"}
+    assert refusal(options={"simulated": True, "system_id": 999, "wings": 2}) == {"options.system_id", "options.wings"}
     assert refusal(safe_gains={"kp": 283, "ki": 13}) == {"safe_gains.kd"}
     assert refusal(safe_gains={"kp": 1e9, "ki": 13, "kd": 82}) == {"safe_gains.kp"}
+
+
+def test_everything_that_is_wrong_with_a_registration_is_named_at_once(client: TestClient) -> None:
+    """Observed defect: options, gains, name and confirmation were refused one after another."""
+    unlock(client)
+    register(client, "Drone")
+    asked = {
+        "name": "Drone",
+        "kind": "mavlink",
+        "options": {"address": "somewhere", "radius_m": 1e6, "system_id": 3},
+        "safe_gains": {"kp": -1, "kd": 100, "ki": 50},
+    }
+    answer = client.post("/api/vehicles", json=asked)
+    assert answer.status_code == 422
+    assert [problem["field"] for problem in answer.json()["problems"]] == [
+        "options.radius_m",
+        "options.address",
+        "safe_gains.kp",
+        "name",
+        "safe_gains_confirmed",
+        "statement",
+    ]
+    asked["options"] = {"autopilot": "px5"}
+    fields = [problem["field"] for problem in client.post("/api/vehicles", json=asked).json()["problems"]]
+    assert fields[0] == "options.autopilot"
+
+
+def test_gains_of_another_autopilot_than_the_default_are_judged_once_the_autopilot_is_known(
+    client: TestClient,
+) -> None:
+    unlock(client)
+    asked = {
+        "name": "Copter",
+        "kind": "mavlink",
+        "options": {"autopilot": "arducopter"},
+        "safe_gains": {"PSC_POSZ_P": 1.0},
+        "safe_gains_confirmed": True,
+        "statement": "Ada",
+    }
+    answer = client.post("/api/vehicles", json=asked)
+    assert [problem["field"] for problem in answer.json()["problems"]] == ["options.autopilot"]
 
 
 def test_a_name_belongs_to_one_vehicle(client: TestClient) -> None:

@@ -238,10 +238,10 @@ def test_a_process_that_dies_with_the_vehicle_leaves_a_real_one_in_quarantine(
     assert "exit code -9" in after["flight"]["problem"]
     vehicle = get(client, "/api/vehicles/1")
     assert vehicle["state"] == then
-    assert ("the gains on the vehicle are unknown" in vehicle["concern"]) == real
+    assert ("before the safe gains were read back" in vehicle["concern"]) == real
 
 
-def test_a_quarantine_over_unknown_gains_says_when_they_were_read_again(
+def test_a_quarantine_over_gains_that_were_not_read_back_stays_true_when_they_are_read_again(
     client: TestClient, database: Database, field: RunnerFixture, trial_id: int
 ) -> None:
     make_vehicle_real(database)
@@ -252,8 +252,9 @@ def test_a_quarantine_over_unknown_gains_says_when_they_were_read_again(
     assert get(client, "/api/vehicles/1")["held"] is None
     with database.write() as session:
         hold_gains(session.get_one(VehicleRow, 1), {"kp": 283.0})
-    concern = get(client, "/api/vehicles/1")["concern"]
-    assert concern.endswith("the gains on the vehicle were unknown until they were read again.")
+    vehicle = get(client, "/api/vehicles/1")
+    assert vehicle["held"] == {"kp": 283.0}
+    assert vehicle["concern"] == "Its process ended before the safe gains were read back after the flight."
 
 
 @pytest.mark.parametrize(("real", "then"), [(True, "quarantined"), (False, "ready")])
