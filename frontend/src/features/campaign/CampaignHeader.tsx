@@ -33,9 +33,7 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
             </ActionIcon>
           </Group>
         )}
-        <Anchor component={Link} to="/" py={4} fz="small" ms="auto">
-          All campaigns
-        </Anchor>
+        <Exports campaign={campaign} />
       </Group>
       <div className={classes["facts"]}>
         <StateBadge
@@ -58,7 +56,9 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
             ))}
           </dl>
         </details>
-        <Exports campaign={campaign} />
+        <Anchor component={Link} to="/" py={4} fz="small" ms="auto">
+          All campaigns
+        </Anchor>
       </div>
     </header>
   );

@@ -54,7 +54,7 @@ export function GainTable({ rows, from, unit, titles, entry }: Props) {
           </tr>
           <tr>
             <td colSpan={4}>
-              <Bounds row={row} entry={entry} />
+              <Bounds row={row} title={titles[row.name] ?? ""} entry={entry} />
               {entry?.reasons[row.name] && (
                 <small className={classes["reason"]} role="alert">
                   {entry.reasons[row.name]}
@@ -83,12 +83,15 @@ function NextInput({ name, texts, reasons, refused, onText }: GainEntry & { name
 }
 
 /** The old and the new gain on a scale of the bounds; a slider where the gain may be changed. */
-function Bounds({ row, entry }: { row: GainRow; entry: GainEntry | undefined }) {
+function Bounds({ row, title, entry }: { row: GainRow; title: string; entry: GainEntry | undefined }) {
   const { name, now, next, bounds } = row;
   if (bounds === null) return null;
   const [from, to] = [placeIn(bounds, now), placeIn(bounds, next ?? now)];
   return (
-    <div className={classes["bounds"]}>
+    <div className={classes["bounds"]} data-entry={entry !== undefined || undefined}>
+      <small className={classes["compactTitle"]} aria-hidden>
+        {title}
+      </small>
       <small>{gainText(bounds[0])}</small>
       <div className={classes["scale"]}>
         <span

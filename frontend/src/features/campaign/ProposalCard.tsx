@@ -1,4 +1,5 @@
 import { Button, Stack } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
 import { IconPlaneDeparture } from "@tabler/icons-react";
 import { useReadOnlyReason } from "../../api/access";
 import { type RecordUpload, useCreateTrial } from "../../api/mutations";
@@ -18,6 +19,7 @@ import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal } from "./GateChecks";
 import { ImportRecord } from "./ImportRecord";
+import classes from "./NextFlight.module.css";
 import { speedOf, watched } from "./nextStep";
 import { OverruleGate } from "./OverruleGate";
 import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
@@ -25,6 +27,9 @@ import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { StopCampaign } from "./StopCampaign";
 import { type ChosenFlight, type ShowPreview, useNextFlight } from "./useNextFlight";
 import { isPriorScatter } from "./verdict";
+
+/** A tablet on its side: the button is to be seen without scrolling. */
+const LOW_AND_NARROW = "(max-width: 1200px) and (max-height: 860px)";
 
 interface Props {
   campaign: Campaign;
@@ -54,12 +59,15 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isBestAgain = isRepeat(chosen.name) && group !== undefined && group === reference;
   const outside = groups.find(({ is_best }) => is_best);
   const isBestOutside = outside !== undefined && reference !== undefined && outside !== reference;
+  const isCompact = useMediaQuery(LOW_AND_NARROW, undefined, { getInitialValueInEffect: false }) ?? false;
+  const isReasonLater = isCompact && proposal.recommended !== "stop" && !isDoubtful(proposal);
+  const reason = <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />;
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
-      <Stack gap={10}>
+      <Stack gap={10} mod={{ compact: isCompact }} className={classes["proposal"] ?? ""}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
-        <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />
+        {!isReasonLater && reason}
         <GainTable
           rows={chosen.rows}
           from={campaign.best === null ? "Safe gains" : isBestOutside ? "Best in bounds" : "Best gains"}
@@ -86,7 +94,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         {chosen.predicted?.interval && isEvaluated && isRepeat(chosen.name) && groups.length > 0 && (
           <PriorScatter campaignId={campaign.id} />
         )}
-        <FlightWindow definition={campaign.definition} />
+        {!isCompact && <FlightWindow definition={campaign.definition} />}
         <FormErrorNotice
           error={chosen.error}
           labels={chosen.entry ? Object.fromEntries(chosen.rows.map(({ name }) => [name, name])) : {}}
@@ -102,6 +110,8 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           upload={upload}
           isSecondary={isSecondary}
         />
+        {isReasonLater && reason}
+        {isCompact && <FlightWindow definition={campaign.definition} />}
         <div>
           {chosen.choice?.proposed && (
             <ProposalExplanation
