@@ -175,7 +175,7 @@ class VehicleProcess(FlightLoop):
             cleared = super()._await_takeoff_clearance()
             is_in_time = cleared is not None and time.monotonic() <= cleared.by_s
             if is_in_time and (problem := _NOT_READY.get(self._staging)):
-                raise _not_flown(f"It was not flown: {problem}.", "Stage it again.")
+                raise _not_flown(f"The flight was not started: {problem}.", "Stage it again.")
         finally:
             self._staging = "none"
         return cleared
@@ -345,7 +345,7 @@ class VehicleProcess(FlightLoop):
         self._take_off_by_s = now_s + TAKE_OFF_TIMEOUT_S if now_s <= by_s else None
         if now_s > by_s:
             raise _not_flown(
-                "It was not flown: the takeoff was too late, because the vehicle's process had stalled.",
+                "The flight was not started: the takeoff was too late, because the vehicle's process had stalled.",
                 "Check that this computer is not overloaded, then request the flight again.",
             )
 

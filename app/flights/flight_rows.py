@@ -72,7 +72,9 @@ def _read(session: Session, flight_id: int) -> tuple[FlightRow, CampaignRow]:
 def _read_running(session: Session, flight_id: int) -> tuple[FlightRow, CampaignRow]:
     flight, campaign = _read(session, flight_id)
     if flight.state != FlightState.RUNNING:
-        raise ConflictError(f"Flight {flight_id} is {flight.state}, not running.", hint="It must not continue.")
+        raise ConflictError(
+            f"Flight {flight_id} is {flight.state}, not running.", hint="It cannot continue. Reload the trial."
+        )
     return flight, campaign
 
 
@@ -107,7 +109,9 @@ def withdraw_requested_flights(session: Session, reason: str) -> list[int]:
 
 def _withdraw(flight: FlightRow, reason: str) -> None:
     set_flight_state(
-        flight, FlightState.CANCELLED, problem=f"It was not flown: {reason}. Request it again if it is still needed."
+        flight,
+        FlightState.CANCELLED,
+        problem=f"The flight was not started: {reason}. Request it again if it is still needed.",
     )
 
 
@@ -188,10 +192,12 @@ def record_lift_off(session: Session, flight_id: int) -> None:
     may_take_off, reason = _clearance(flight)
     if not may_take_off:
         why = reason or "its takeoff has not been requested"
-        raise ConflictError(f"Flight {trial.number} must not fly: {why}.", hint="Stage it again if it is still needed.")
+        raise ConflictError(
+            f"Flight {trial.number} cannot be flown: {why}.", hint="Stage it again if it is still needed."
+        )
     if mismatch := find_mismatch(trial.read_back or {}, trial.gains):
         raise ConflictError(
-            f"Flight {trial.number} must not fly: the vehicle does not hold its gains: {mismatch}.",
+            f"Flight {trial.number} cannot be flown: the vehicle does not hold its gains: {mismatch}.",
             hint="Stage it again. If this happens again, check the vehicle's link.",
         )
     set_trial_state(trial, TrialState.FLYING, reason="")

@@ -47,12 +47,12 @@ _BY_HAND: Final = "If it does not descend, use its own remote control."
 LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
     {
         "worker away": LossText(
-            what="The worker is not responding. Nothing can be commanded.",
-            way_on="Gainline restarts its own worker within seconds; a separate one is started with `gainline worker`. "
-            "Then stage the flight again.",
+            what="The worker is not responding. No commands can be sent.",
+            way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again "
+            "with `gainline worker`. Then stage the flight again.",
             what_in_flight="The worker is not responding.",
-            way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to it is "
-            "lost, the flight continues. If in doubt, use the vehicle's own remote control.",
+            way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to the "
+            "worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.",
         ),
         "not connected": LossText(
             what="The vehicle is not connected.",
@@ -61,9 +61,9 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "process silent": LossText(
-            what="Gainline's connection to the vehicle is not responding: commands do not reach it.",
+            what="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
             way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
-            what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach it.",
+            what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "link silent": LossText(
@@ -110,7 +110,8 @@ _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
 _IN_FLIGHT: Final = STEPS.index("in flight")
 _WITHOUT_LINK: Final = LossText(
     what="The worker is not responding. Nothing can be flown.",
-    way_on="Gainline restarts its own worker within seconds; a separate one is started with `gainline worker`.",
+    way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again with "
+    "`gainline worker`.",
     what_in_flight="The worker is not responding.",
     way_on_in_flight="If the worker has stopped, the simulated flight is lost.",
 )

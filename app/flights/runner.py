@@ -130,7 +130,7 @@ class FlightRunner:
             telemetry_log(self._data_dir, request.flight_id).parent.mkdir(exist_ok=True)
             backend = self._acquire_backend(request)
         except (GainlineError, OSError) as error:
-            return FlightOutcome(problem=f"It was not started: {error}")
+            return FlightOutcome(problem=f"The flight was not started: {error}")
         try:
             return self._fly_on_backend(backend, request, flag)
         finally:
@@ -187,7 +187,9 @@ class FlightRunner:
             else:
                 self._store(lambda session: flight_rows.record_lift_off(session, request.flight_id))
         except GainlineError as error:
-            ended = FlightOutcome(problem=f"It was not flown, because its start could not be recorded: {error}")
+            ended = FlightOutcome(
+                problem=f"The flight was not started, because its start could not be recorded: {error}"
+            )
         if ended.lifted_off:
             backend.take_off()
         else:

@@ -40,8 +40,8 @@ _ENDED: Final = (
     "own remote control now."
 )
 NOT_ANSWERING: Final = (
-    "Gainline's connection to it is not responding: commands do not reach the vehicle. If it flies, use its own "
-    "remote control now."
+    "Gainline's connection to the vehicle is not responding: commands do not reach the vehicle. If it is flying, use "
+    "its own remote control now."
 )
 MAX_UNANSWERED_ORDERS: Final = 50
 """Far fewer than fill the pipe of a process that does not read, so that sending a command never blocks."""

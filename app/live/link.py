@@ -186,8 +186,8 @@ def _deadline_s() -> float:
 def _link_down(why: str) -> LinkDownError:
     return LinkDownError(
         f"The worker could not be reached: {why}.",
-        hint="If a vehicle is in the air, use its own remote control now. A supervised worker restarts within "
-        "seconds; start a separate one with `gainline worker`.",
+        hint="If a vehicle is in the air, use its own remote control now. The server restarts its own worker "
+        "within seconds. If the worker runs separately, start it again with `gainline worker`.",
     )
 
 

@@ -96,7 +96,7 @@ def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, databa
     task = claim(database)
     with database.write() as session:
         flight_rows.record_staged(session, task.flight_id, {"kp": 282, "ki": 13, "kd": 82})
-    with pytest.raises(ConflictError, match="must not fly"), database.write() as session:
+    with pytest.raises(ConflictError, match="cannot be flown"), database.write() as session:
         flight_rows.record_lift_off(session, task.flight_id)
     with database.write() as session:
         flight_rows.record_outcome(session, task.flight_id, FlightOutcome(problem="the vehicle did not take the gains"))

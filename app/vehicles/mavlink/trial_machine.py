@@ -336,7 +336,7 @@ def _disarming(trial: Trial, event: Event) -> Step:
         return enter(replace(trial, why=trial.why + confirmed), State.RESTORE, now_s), (RestoreGains(),)
     airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     if airborne and not trial.stopped:
-        why = "It was in the air when its motors should be stopped."
+        why = "It was in the air when its motors were to be stopped."
         return abort(replace(trial, doubt=trial.doubt or why), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
         return quarantine(trial, _why_not_stopped(trial, now_s), now_s)

@@ -640,7 +640,7 @@ class MavlinkVehicle:
         if self._state is State.QUARANTINE:
             raise SafeGainsError(
                 f"The vehicle is quarantined: {self._why}",
-                hint="Land it if it flies, check that its motors have stopped, verify its gains, then release it.",
+                hint="Land it if it is flying, check that its motors have stopped, verify its gains, then release it.",
             )
         if self._state is State.OBSERVE:
             raise SafeGainsError(

@@ -68,7 +68,7 @@ export function readOnlyReason(access: Access, vehicle: WatchedVehicle | null): 
 /** How such a vehicle can be commanded; null if this browser may. */
 function wayToCommand(access: Access, isReal: boolean): string | null {
   if (isReal ? access.may_command : access.may_link) return null;
-  if (access.elsewhere) return "Operate it on the computer that runs Gainline.";
+  if (access.elsewhere) return "Operate it from the computer that runs Gainline.";
   return access.may_link
     ? access.hint
     : "Other devices can reach this server. To fly this vehicle, restart Gainline with --host 127.0.0.1.";

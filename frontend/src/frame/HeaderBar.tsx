@@ -48,7 +48,7 @@ export function ConnectionNotice({ flying }: { flying: readonly FlyingCampaign[]
     return (
       <p className={classes["notice"]} role="status">
         <strong>The worker is not responding.</strong> {withoutWorker(flying)} The server restarts its own worker within
-        seconds; a separate one is started with <code>gainline worker</code>.
+        seconds. If the worker runs separately, start it again with <code>gainline worker</code>.
       </p>
     );
   }
@@ -62,7 +62,7 @@ const ON_GROUND: ReadonlySet<string> = new Set(["staging", "staged"]);
 function withoutWorker(flying: readonly FlyingCampaign[]): string {
   const inTheAir = flying.filter(({ trialId }) => !ON_GROUND.has(liveNow(trialId)?.phase ?? ""));
   if (inTheAir.some(({ hasLink }) => hasLink)) {
-    return "If the worker has stopped, the vehicle is landing now; if only the connection to it is lost, the flight continues. If in doubt, use the vehicle's own remote control.";
+    return "If the worker has stopped, the vehicle is landing now; if only the connection to the worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.";
   }
   if (inTheAir.length > 0) return "If the worker has stopped, the simulated flight is lost.";
   return "Nothing can be flown or computed until it is back.";

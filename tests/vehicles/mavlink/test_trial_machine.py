@@ -858,7 +858,7 @@ def test_a_vehicle_that_is_in_the_air_again_after_its_record_is_landed_and_looke
     walk.altitude_m -= 0.2
     walk.pass_s(4.0).disarm().restore()
     assert (walk.state, walk.trial.failure) == (State.QUARANTINE, None)
-    assert walk.trial.why == "It was in the air when its motors should be stopped."
+    assert walk.trial.why == "It was in the air when its motors were to be stopped."
 
 
 def test_glitches_do_not_end_a_flight_but_too_many_void_it() -> None:

@@ -118,7 +118,7 @@ export function PlainSteps({ campaign, trial, step, abort, isBlocked }: Props) {
             </>
           ) : (
             <p className={classes["say"]}>
-              This vehicle is not flown by Gainline.{" "}
+              Gainline does not fly this vehicle.{" "}
               <Anchor component={Link} to={`/campaigns/${campaign.id}`}>
                 Upload the flight record
               </Anchor>
@@ -249,7 +249,7 @@ const ABORT_SAYS: Record<AbortStage, string> = {
 function abortText(stage: AbortStage, isReached: boolean, isLinkLost: boolean): string {
   if (isReached && isLinkLost && (stage === "none" || stage === "accepted")) return ABORT_WITHOUT_LINK;
   if (stage !== "accepted" || isReached) return ABORT_SAYS[stage];
-  return "The worker has confirmed the abort, but is not reachable now.";
+  return "The worker has confirmed the abort, but cannot be reached now.";
 }
 
 interface AbortProps {
