@@ -140,7 +140,7 @@ def _flight(row: TrialRow, *, corrected: bool) -> FlightData:
     return FlightData(
         number=row.number,
         gains=row.gains,
-        outcome="not yet judged" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
+        outcome="not yet reviewed" if row.state == TrialState.CAPTURED else cast("Outcome", row.state.value),
         curve=None,
         error=row.error,
         predicted_error=row.predicted_error if predicts else None,

@@ -9,7 +9,7 @@ import numpy as np
 from app.core.policy import Gain, Gains
 from app.core.records.trajectory import Samples
 
-Outcome = Literal["not yet judged", "valid", "aborted", "invalid", "lost"]
+Outcome = Literal["not yet reviewed", "valid", "aborted", "invalid", "lost"]
 """Label of a flight's outcome in figures."""
 
 

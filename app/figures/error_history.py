@@ -24,8 +24,8 @@ class ErrorsFigure:
     `predicted_error`, `predicted_low`, `predicted_high`, `best_so_far`; the proposal is the last row.
 
     Every trace carries `meta.role`: noise (around the best), best so far, threshold, interval, predicted, repeats,
-    measured, not counted, not yet judged, off scale. In `interval` and `predicted` the next flight is the last one, and
-    `meta.next` is its number: a page puts other gains in its place. Both are hidden while they are empty. Flights
+    measured, not counted, not yet reviewed, off scale. In `interval` and `predicted` the next flight is the last one,
+    and `meta.next` is its number: a page puts other gains in its place. Both are hidden while they are empty. Flights
     without an error are marked in a strip below the axis of errors.
     """
 
@@ -216,7 +216,7 @@ class ErrorsFigure:
                 text=text,
                 line=theme.line(theme.with_opacity(palette.prediction, 0.4), 8),
                 connectgaps=False,
-                hovertemplate=f"<b>Flight %{{x}}</b><br>expected %{{text}} {self.history.error_unit}<extra></extra>",
+                hovertemplate=f"<b>Flight %{{x}}</b><br>predicted %{{text}} {self.history.error_unit}<extra></extra>",
             )
         ]
 
@@ -253,11 +253,11 @@ class ErrorsFigure:
     def _not_valid(self, palette: Palette) -> list[Trace]:
         """Marks for flights that do not count and those without a review: at their error, or in the strip."""
         flights = self.history.flights
-        uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet judged"}]
-        unjudged = [flight for flight in flights if flight.outcome == "not yet judged"]
+        uncounted = [flight for flight in flights if flight.outcome not in {"valid", "not yet reviewed"}]
+        unjudged = [flight for flight in flights if flight.outcome == "not yet reviewed"]
         marked = (
             ("not counted", uncounted, "x-thin", palette.bad),
-            ("not yet judged", unjudged, "circle-open", palette.dim),
+            ("not yet reviewed", unjudged, "circle-open", palette.dim),
         )
         return [
             trace

@@ -204,7 +204,7 @@ class TrajectoriesFigure:
         return robust_span(curves, low=low, high=high)
 
     def _standing(self, flight: FlightData) -> str:
-        if flight.outcome == "not yet judged":
+        if flight.outcome == "not yet reviewed":
             return "unjudged"
         if flight.outcome != "valid":
             return "invalid"

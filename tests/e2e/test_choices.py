@@ -22,7 +22,7 @@ _DEVIATION_LINE = """chart => {
 
 def gains_shown(dashboard: Dashboard) -> dict[str, float]:
     """The next gains in the card's table, by name, as a person reads them."""
-    rows = dashboard.page.get_by_role("table", name=re.compile("^(Best|Safe) gains and next$")).get_by_role("row")
+    rows = dashboard.page.get_by_role("table", name=re.compile("^(Best|Safe) gains and next gains$")).get_by_role("row")
     found = {}
     for row in rows.filter(has=dashboard.page.get_by_role("rowheader")).all():
         cell = row.get_by_role("cell").nth(1)

@@ -66,31 +66,31 @@ def test_an_invalid_flight_is_a_cross_and_never_the_best() -> None:
 
 def test_a_flight_without_an_error_stands_in_a_strip_below_the_axis_of_errors() -> None:
     """Seen: an aborted flight looked like one with an error of 0.015 m, the best of all."""
-    flights = (flight(1, 0.3), flight(2, None, outcome="aborted"), flight(3, None, outcome="not yet judged"))
+    flights = (flight(1, 0.3), flight(2, None, outcome="aborted"), flight(3, None, outcome="not yet reviewed"))
     card = ErrorsFigure(history(*flights)).compute()
     errors, strip = layout(card)["yaxis"], layout(card)["yaxis2"]
     assert strip["domain"][1] < errors["domain"][0]
     assert (strip["tickvals"], strip["ticktext"], strip["range"]) == ([0], ["no error"], [-1, 1])
     assert layout(card)["xaxis"]["anchor"] == "y2"
-    for role, number in (("not counted", 2), ("not yet judged", 3)):
+    for role, number in (("not counted", 2), ("not yet reviewed", 3)):
         drawn = trace(card, role)
         assert (drawn["x"], drawn["y"], drawn["yaxis"]) == ([number], [0], "y2")
         assert "no error" in drawn["hovertemplate"]
 
 
 def test_an_unreviewed_flight_with_an_error_stands_at_it_and_needs_no_strip() -> None:
-    card = ErrorsFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet judged"))).compute()
-    drawn = trace(card, "not yet judged")
+    card = ErrorsFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet reviewed"))).compute()
+    drawn = trace(card, "not yet reviewed")
     assert (drawn["x"], drawn["y"], drawn["yaxis"], drawn["showlegend"]) == ([2], [0.2], "y", True)
     assert "yaxis2" not in layout(card)
     assert layout(card)["yaxis"]["domain"] == [0.0, 1.0]
 
 
 def test_an_unreviewed_flight_is_not_an_excluded_one() -> None:
-    flights = (flight(1, 0.3), flight(2, None, outcome="lost"), flight(3, None, outcome="not yet judged"))
+    flights = (flight(1, 0.3), flight(2, None, outcome="lost"), flight(3, None, outcome="not yet reviewed"))
     card = ErrorsFigure(history(*flights)).compute()
-    assert (trace(card, "not counted")["x"], trace(card, "not yet judged")["x"]) == ([2], [3])
-    assert trace(card, "not yet judged")["name"] == "Not yet judged"
+    assert (trace(card, "not counted")["x"], trace(card, "not yet reviewed")["x"]) == ([2], [3])
+    assert trace(card, "not yet reviewed")["name"] == "Not yet reviewed"
 
 
 def test_a_flight_with_a_huge_error_is_marked_at_the_edge_with_its_value() -> None:

@@ -70,12 +70,12 @@ def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
 
 
 def test_an_unreviewed_flight_is_not_drawn_like_an_excluded_one() -> None:
-    card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet judged"))).compute()
+    card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 0.2, outcome="not yet reviewed"))).compute()
     drawn = trace(card, "flight", trial=2)
     assert (drawn["name"], drawn["meta"]["standing"], drawn["line"]["dash"]) == (
-        "Flight 2 · not yet judged", "unjudged", "longdash")  # fmt: skip
+        "Flight 2 · not yet reviewed", "unjudged", "longdash")  # fmt: skip
     assert [one["name"] for one in traces(card) if one.get("showlegend", True)] == [
-        "Set point", "Reference", "Flight 2 · not yet judged", "Flight 1 · best"]  # fmt: skip
+        "Set point", "Reference", "Flight 2 · not yet reviewed", "Flight 1 · best"]  # fmt: skip
 
 
 def test_the_prediction_is_dashed_and_named_after_the_next_flight() -> None:

@@ -160,7 +160,7 @@ export function withChosen(traces: readonly Trace[], trial: number | null): Trac
 }
 
 /** Roles of markers whose x value is the flight number. */
-const FLOWN = new Set(["measured", "not counted", "not yet judged", "flown"]);
+const FLOWN = new Set(["measured", "not counted", "not yet reviewed", "flown"]);
 const NUMBERED = new Set([...FLOWN, "off scale", "off scale deviation", "best", "predicted"]);
 
 /** The flight of a chart point, from Plotly's event; null for others. */

@@ -39,7 +39,7 @@ export const EXPLANATIONS = explained({
     question: "What is the interval?",
     answer: [
       "Nine out of ten flights should fall inside it. It covers the flight-to-flight scatter and the uncertainty of the model.",
-      "A flight outside it means that the model is off, or that the vehicle or the conditions have changed.",
+      "A flight outside it can mean that the model is inaccurate, or that the vehicle or the conditions have changed.",
     ],
   },
   bias: {
@@ -52,7 +52,7 @@ export const EXPLANATIONS = explained({
   trustRegion: {
     question: "What is the trust region?",
     answer: [
-      "The largest step from the best gains flown. It grows when a prediction holds, and shrinks when an error is above its interval or gains are the cause of an abort.",
+      "The largest step from the best gains flown. It grows when a prediction holds, and shrinks when an error is above its interval or the gains have caused an abort.",
     ],
   },
   fitted: {
@@ -120,7 +120,7 @@ export const EXPLANATIONS = explained({
   drift: {
     question: "What is drift?",
     answer: [
-      "A change of the error with the same gains over time, for example from battery, wind or wear. It is a straight line through all flights of gains that were flown at least twice, from the first such flight to the last.",
+      "A change of the error with the same gains over time, for example from battery, wind or wear. It is fitted as a straight line through all flights of gains that were flown at least twice, from the first such flight to the last.",
     ],
   },
   overshoot: {
@@ -152,7 +152,7 @@ export const EXPLANATIONS = explained({
   safeGains: {
     question: "What are safe gains?",
     answer: [
-      "The gains written to the vehicle at every connection but the first, which only compares them, after every flight and on every abort, and then read back. The operator is responsible for those of a real vehicle.",
+      "The gains that are written to the vehicle and read back after every flight, on every abort, and at every connection except the first, which only compares them. The operator is responsible for those of a real vehicle.",
     ],
   },
   linkAge: {

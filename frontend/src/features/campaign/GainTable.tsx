@@ -25,7 +25,7 @@ interface Props {
 export function GainTable({ rows, from, unit, titles, entry }: Props) {
   return (
     <table className={classes["gains"]}>
-      <caption className="visually-hidden">{from} and next</caption>
+      <caption className="visually-hidden">{from} and next gains</caption>
       <thead>
         <tr>
           <th scope="col">Gain{unit && ` (${unit})`}</th>

@@ -87,7 +87,7 @@ export function AdvancedFields(props: Props) {
 const STOPS: Record<StopKind, { label: string; line: string }> = {
   noise: {
     label: "No resolvable improvement",
-    line: "Ends when no further step promises a resolvable improvement, and the best and first gains have been flown again.",
+    line: "Ends when no further step is predicted to give a resolvable improvement, and the best and first gains have been flown again.",
   },
   paper: {
     label: "No improvement",

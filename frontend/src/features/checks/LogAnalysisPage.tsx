@@ -56,9 +56,9 @@ export function LogAnalysisPage() {
         className={over ? classes["over"] : ""}
       >
         <Text maw="90ch" lh={1.45} mb={10}>
-          Drop or choose ArduCopter's .bin log: in GUIDED, LOITER, ALT_HOLD or AUTO climb and descend by about 2 m with
-          a few seconds of hover between. Or Paparazzi's .data and .log, or .tlog, of takeoffs to 3 m. Nothing is
-          stored.
+          Drop or choose a log. ArduCopter: the .bin log of a flight in GUIDED, LOITER, ALT_HOLD or AUTO that climbs and
+          descends by about 2 m, with a few seconds of hover in between. Paparazzi: the .data and .log files, or the
+          .tlog, of takeoffs to 3 m. Nothing is stored.
         </Text>
         <Group gap={10} mt={12} mb={10}>
           <FileButton multiple accept={ANALYSED_FILES} onChange={analyze} resetRef={resetFile}>

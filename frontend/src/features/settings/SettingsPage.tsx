@@ -167,8 +167,8 @@ function Backup({ system }: { system: System }) {
           <ol>
             <li>Stop Gainline.</li>
             <li>
-              In {system.data_dir}, delete gainline.sqlite3-wal and gainline.sqlite3-shm, and move gainline.sqlite3
-              away.
+              In {system.data_dir}, delete gainline.sqlite3-wal and gainline.sqlite3-shm, and move gainline.sqlite3 to
+              another folder.
             </li>
             <li>Copy the backup there as gainline.sqlite3.</li>
             <li>Start Gainline. A backup of an earlier version is migrated.</li>
