@@ -198,7 +198,7 @@ class Rehearsal(Schema):
 
 class Winner(Schema):
     """The gains with the lowest mean error plus its standard error, which are repeated, confirmed and promoted. After
-    repeats these may be others than those of the flight with the lowest error."""
+    repeats these may differ from those of the flight with the lowest error."""
 
     gains: Gains
     trial_numbers: list[int]

@@ -209,8 +209,8 @@ def delete_campaign(session: Session, campaign_id: int, version: int, context: R
     _require_no_flight(session, row)
     if repository.has_claimed_flight(session, row.id):
         raise ConflictError(
-            f"Campaign {row.id} is in the ledger of {row.vehicle.title}, because one of its flights was started.",
-            hint="It cannot be deleted: the ledger keeps every gain set that was written to a vehicle.",
+            f"Campaign {row.id} is in the gain history of {row.vehicle.title}, because one of its flights was started.",
+            hint="It cannot be deleted: the gain history keeps every gain set that was written to a vehicle.",
         )
     repository.delete_unclaimed_flights(session, row.id)
     predicted = [proposal.predicted for proposal in repository.proposals(session, row.id) if proposal.predicted]
@@ -236,7 +236,7 @@ def reopen_campaign(session: Session, campaign_id: int, flights: int, context: R
     check_action(CAMPAIGN_ACTIONS, "reopen", row.state, f"Campaign {row.id}")
     if (rehearsed := repository.rehearsed_id(session, row.id)) is not None:
         raise ConflictError(
-            f"Campaign {row.id} is the rehearsal of campaign {rehearsed}, whose clearance to fly rests on its result.",
+            f"Campaign {row.id} is the rehearsal of campaign {rehearsed}, which depends on its result.",
             hint="Clone it to fly more.",
         )
     reopen(row)
@@ -349,10 +349,8 @@ def rehearse(session: Session, campaign_id: int) -> Campaign:
     row = repository.get_campaign(session, campaign_id)
     existing = rehearsal_of(session, row)
     if existing.state == "not needed":
-        why = (
-            f": {existing.reason}" if existing.reason else f", {row.vehicle.name} is not a real vehicle flown from here"
-        )
-        raise ConflictError(f"Campaign {row.id} needs no rehearsal{why}.", hint="Fly it.")
+        why = existing.reason or f"{row.vehicle.name} is not a real vehicle flown from here"
+        raise ConflictError(f"Campaign {row.id} needs no rehearsal: {why}.", hint="Fly it.")
     if existing.campaign_id is not None and existing.state != "failed":
         return campaign_view(session, repository.get_campaign(session, existing.campaign_id))
     made = add_campaign(

@@ -38,8 +38,8 @@ _REFUSALS: Final[Mapping[str, str]] = MappingProxyType(
         "land": "cannot be commanded to land",
         "motors off": "cannot be commanded to stop its motors",
         "parameters": "cannot be asked for its parameters",
-        "plan": "takes no further flight",
-        "propose": "gets no proposal",
+        "plan": "cannot have another flight planned",
+        "propose": "cannot get a proposal",
         "release": "cannot be released",
         "reopen": "cannot be reopened",
         "restore": "cannot be sent its safe gains",
@@ -47,7 +47,7 @@ _REFUSALS: Final[Mapping[str, str]] = MappingProxyType(
         "stage": "cannot be staged",
         "take-off": "cannot take off",
         "unstage": "cannot be unstaged",
-        "upload": "takes no record",
+        "upload": "cannot accept a record",
     }
 )
 

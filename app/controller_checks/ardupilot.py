@@ -53,7 +53,7 @@ def _examine(recording: Recording) -> Result:
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
     followed = int(trace.followed.sum())
-    limited = f"{grouped(followed)} rows at a throttle limit are computed each from the recorded row before it."
+    limited = f"{grouped(followed)} rows at a throttle limit are each computed from the recorded row before."
     return TraceReplay(
         time_s=trace.time_s,
         recorded=dict(zip(OUTPUTS, trace.outputs.T, strict=True)),
@@ -81,7 +81,7 @@ def _notes(comparison: LogComparison) -> Iterable[str]:
     if rows["z_d_m"]:
         yield f"The desired motion was shaped again from the row before, in {grouped(rows['z_d_m'])} rows."
     else:
-        yield "The desired motion was not shaped again: the log has no position targets (GUIP), or also other targets."
+        yield "The desired motion was not shaped again: the log has no position targets (GUIP), or not only those."
     if not rows["throttle"]:
         yield "The demanded throttle was not computed: the log has no PIDA and CTUN beside PSCD."
 

@@ -277,7 +277,7 @@ def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
         problems.append(Problem("statement", "must name the reviewer"))
     if problems:
         raise UnconfirmedError(
-            f"{new.name} is a real vehicle, and every flight of it ends with {format_gains(gains)}. A person must "
+            f"{new.name} is a real vehicle, and each of its flights ends with {format_gains(gains)}. A person must "
             "review these gains first.",
             hint="Compare them with gains that fly well on this vehicle, then confirm them and give your name.",
             problems=tuple(problems),

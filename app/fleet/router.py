@@ -120,7 +120,7 @@ async def stop_motors(
     live: Live, database: CurrentDatabase, asking: RequestContextDep, vehicle_id: Id, body: VehicleOrder | None = None
 ) -> OrderAnswer:
     """Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
-    Only for a client that may not command real vehicles is the database read first, to see whether this is one."""
+    The database is read first only for a client that may not command real vehicles, to see whether this is one."""
     if not is_allowed(permissions.Permission.STOP, asking.caller):
         await run_in_threadpool(_require_simulated, database, vehicle_id, asking)
     return await _order(live, vehicle_id, "motors off", body, "The command to stop the motors has been sent.")

@@ -145,8 +145,8 @@ def require_window_fits(row: VehicleRow, window_s: float) -> None:
         raise ConflictError(
             f"{row.name} can fly a scored window of at most {longest_s:g} s; the campaign's is {window_s:g} s. Its "
             "flight plan would land it before the end.",
-            hint="Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then its setting "
-            "“Paparazzi: time limit of the flight plan's takeoff”.",
+            hint="Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
+            "setting “Paparazzi: time limit of the flight plan's takeoff”.",
         )
 
 

@@ -60,8 +60,8 @@ def take_off_trial(act: IdempotentPost, asking: RequestContextDep, live: Live, t
 
 @router.get("/trials/{trial_id}/readiness")
 def get_readiness(session: Reader, asking: RequestContextDep, live: Live, trial_id: Id) -> TrialReadiness:
-    """How far a flight has come, and what takes it back at this moment. It changes without an event: read it again
-    every second before a takeoff."""
+    """How far a flight has come, and which steps are lost at this moment, and why. It changes without an event: read it
+    again every second before a takeoff."""
     return service.trial_readiness(session, trial_id, asking, live.report)
 
 

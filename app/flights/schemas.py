@@ -9,7 +9,7 @@ from app.flights.readiness import LossKind, ReadinessStep
 
 
 class ReadinessLoss(Schema):
-    """Something that takes readiness back: what it means now, and what to do."""
+    """A reason why readiness is lost: what it means now, and what to do."""
 
     kind: LossKind
     what: str

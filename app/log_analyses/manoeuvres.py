@@ -155,7 +155,7 @@ def _notes(analysis: Analysis) -> list[str]:
         f"Throttle activity is relative to the gains flown; a proposal has at most {LARGEST_ACTIVITY:g}.",
         _MARGIN,
         *(
-            [f"At the limit of the search range, the documented one: {', '.join(analysis.at_limit)}."]
+            [f"At the limit of the search range, which is the documented range: {', '.join(analysis.at_limit)}."]
             if analysis.at_limit
             else []
         ),

@@ -22,7 +22,7 @@ def analyze_log(record: Record) -> LogAnalysis:
 
 @router.post("/campaign", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
 def start_campaign(record: Record, asking: RequestContextDep) -> Campaign:
-    """Create a campaign of a vehicle that is flown elsewhere, with the takeoffs of a Paparazzi's log as its first
+    """Create a campaign of a vehicle that is flown elsewhere, with the takeoffs of a Paparazzi log as its first
     flights."""
     found = service.read_upload(record.content(), record.read_companion(), name=record.name)
     return record.once(Campaign, lambda session: campaigns.start_campaign(session, found, asking, name=record.name))

@@ -120,7 +120,7 @@ class ParameterFile(Schema):
 
 
 class LogAnswer(Schema):
-    """The answer of a log without its figure."""
+    """The result of a log analysis without its figure."""
 
     file_name: str
     autopilot: Literal["ArduCopter", "Paparazzi"]
@@ -129,12 +129,12 @@ class LogAnswer(Schema):
     flight: Annotated[Sequence[str], Field(description="how the altitude was controlled")]
     vehicle: Annotated[Sequence[str], Field(description="the fitted vehicle")]
     gains: GainsTable
-    notes: Annotated[Sequence[str], Field(description="how to read the table, and what to heed")]
+    notes: Annotated[Sequence[str], Field(description="how to read the table, and precautions")]
     parameter_file: ParameterFile | None
     numbers: ManoeuvreNumbers | TakeoffNumbers
 
 
 class LogAnalysis(LogAnswer):
-    """The answer of a log."""
+    """The result of a log analysis."""
 
     figures: Annotated[dict[ThemeName, FigureCard], Field(description="by theme")]

@@ -42,7 +42,7 @@ def read_upload(content: bytes, companion: bytes | None, *, name: str) -> list[T
 
 
 def read_content(content: bytes, companion: bytes | None, name: str, *, usable: str) -> list[Takeoff]:
-    """Read every takeoff of a Paparazzi's log in memory. Raises TrajectoryError, which asks for a `usable` log."""
+    """Read every takeoff of a Paparazzi log in memory. Raises TrajectoryError, which asks for a `usable` log."""
     head = content[:HEAD_BYTES]
     if is_tlog(head) or is_paparazzi(head):
         beside = None if companion is None else io.BytesIO(companion)

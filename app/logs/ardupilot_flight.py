@@ -171,12 +171,14 @@ def _thinned(time_s: Samples, part: Part) -> NDArray[np.int64]:
 def _logged(tables: Mapping[str, Table], name: str) -> _Logged:
     loop, tuning = tables.get("PSCD", {}), tables.get("CTUN", {})
     if "TimeUS" not in loop:
-        older = "; the log has PSCZ of an older release, which is not read" if tables.get("PSCZ") else ""
+        older = "; the log has PSCZ of an older release, which is not supported" if tables.get("PSCZ") else ""
         raise _refused(name, "PSCD", f"is missing: add NTUN to LOG_BITMASK, and fly again{older}")
     reference = next((each for each in _REFERENCES if each in loop), None)
     absent = [each for each in _LOOP if each not in loop]
     if reference is None or absent:
-        raise _refused(name, f"PSCD.{absent[0] if absent else _REFERENCES[0]}", "is missing: this release is not read")
+        raise _refused(
+            name, f"PSCD.{absent[0] if absent else _REFERENCES[0]}", "is missing: this release is not supported"
+        )
     if not {"TimeUS", *_TUNING} <= tuning.keys():
         raise _refused(name, "CTUN", "is missing: add CTUN to LOG_BITMASK, and fly again")
     at_s = numbers(loop["TimeUS"]) / 1e6

@@ -174,5 +174,5 @@ def _missing(topics: Mapping[str, Table]) -> Iterator[str]:
     elif not has_status:
         yield (
             f"no {_STATUS} in the log, so the takeoff is found from the land detector alone: check that it is "
-            "the flight"
+            "the right flight"
         )

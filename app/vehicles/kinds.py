@@ -107,7 +107,7 @@ class VehicleKind:
         problems += [problem for problem in conflicts if problem.field not in refused]
         if problems:
             raise InputError(
-                f"These options do not suit the vehicle {self.name}.",
+                f"These options cannot be used with the vehicle {self.name}.",
                 problems=tuple(problems),
                 hint="Correct the options listed.",
                 script_hint="Correct the options listed, or omit them to use their defaults.",

@@ -33,7 +33,7 @@ main {{ max-width: 34rem; margin: 15vh auto; padding: 0 1.5rem }}
 <h1>This link has been used or has expired</h1>
 <p>A link unlocks one browser, within {LINK_VALID_S // 60} minutes. Run <code>gainline unlock</code> on the computer
 that runs Gainline, and open the link that it prints.</p>
-<p><a href="/">To the dashboard</a>, which cannot command real vehicles in this browser.</p>
+<p><a href="/">Open the dashboard</a>; it cannot command real vehicles from this browser.</p>
 </main>
 </html>
 """

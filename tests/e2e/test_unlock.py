@@ -76,5 +76,5 @@ def test_a_used_link_shows_how_to_get_another(open_dashboard: Opener, shared_ser
     expect(dashboard.page.get_by_role("heading", name="This link has been used or has expired")).to_be_visible()
     expect(dashboard.page.get_by_text("gainline unlock")).to_be_visible()
     picture(dashboard.page, "spent")
-    dashboard.page.get_by_role("link", name="To the dashboard").click()
+    dashboard.page.get_by_role("link", name="Open the dashboard").click()
     expect(dashboard.page.get_by_role("navigation").first).to_be_visible()

@@ -150,7 +150,7 @@ def test_an_older_release_without_the_shaped_altitude_is_read_by_its_target() ->
 def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_named() -> None:
     log = ardupilot_log(FLIGHT)
     assert "PSCZ of an older release" in refusal(log.replace(b"PSCD", b"PSCZ"))[1]
-    assert refusal(log.replace(b",TVD", b",XVD")) == ("PSCD.TVD", "is missing: this release is not read")
+    assert refusal(log.replace(b",TVD", b",XVD")) == ("PSCD.TVD", "is missing: this release is not supported")
     assert refusal(log.replace(b",DPD,TPD", b",XPD,YPD"))[0] == "PSCD.DPD"
 
 

@@ -64,8 +64,8 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
         raise InputError(
             "The log does not say with which gains it was flown.",
             hint="Choose a log with the vehicle's parameters: for Paparazzi's .data file add the .log file of the same "
-            "name; start a telemetry log before the ground station connects. Or upload the record as a CSV file, which "
-            "takes the planned gains as flown.",
+            "name; start a telemetry log before the ground station connects. Or upload the record as a CSV file; it "
+            "is then taken as flown with the planned gains.",
             problems=(Problem("file", f"does not contain values of {', '.join(row.gains)}"),),
         )
     if _same(row.gains, flown.gains):
@@ -258,7 +258,7 @@ def import_record(
         return trial_view(session, campaign, row)
     if fleet.can_fly(campaign.vehicle):
         raise ConflictError(
-            f"This campaign is flown from here, by {campaign.vehicle.title}; it takes no records of other flights.",
+            f"This campaign is flown from here, by {campaign.vehicle.title}; it accepts no records of other flights.",
             hint="Fly it, or choose a campaign whose vehicle is “Flown elsewhere”.",
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)

@@ -255,7 +255,7 @@ def _require_own_controller(flight: LoggedFlight) -> None:
         rows += len(targets)
     if differing > _OTHER_CONTROLLER_SHARE * rows:
         raise _unanswered(
-            f"has another climb rate target than its own parameters give, in {differing} of {rows} rows: terrain "
+            f"has a climb rate target other than its own parameters give, in {differing} of {rows} rows: terrain "
             "following, or a release with another position controller"
         )
 

@@ -175,7 +175,7 @@ def _require_likeness(best: Flight, residual_m: float) -> None:
     if residual_m > min(most, max(least, _RESIDUAL_SHARE * (best.error or 0.0))):
         raise _unanswered(
             f"has a takeoff that differs by {residual_m:.2f} m rms from every vehicle of the model with its gains: it "
-            "climbed to another height than 3 m, flew with other gains than the log says, or in strong gusts"
+            "climbed to a height other than 3 m, flew with gains other than the log says, or flew in strong gusts"
         )
 
 

@@ -341,8 +341,8 @@ def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
         needed=f"{plan_time_s:g} s or less: after it the flight plan lands it",
         hint=""
         if passed
-        else "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then its setting "
-        "“Paparazzi: time limit of the flight plan's takeoff”.",
+        else "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
+        "setting “Paparazzi: time limit of the flight plan's takeoff”.",
     )
 
 

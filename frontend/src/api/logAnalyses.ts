@@ -10,7 +10,7 @@ export type { LogAnalysis } from "./generated";
 /** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
 export const ANALYSED_FILES = ".bin,.tlog,.data,.log";
 
-/** Create a campaign with the takeoffs of a Paparazzi's log. */
+/** Create a campaign with the takeoffs of a Paparazzi log. */
 export function useStartCampaign() {
   return useMutation({ mutationFn: (files: RecordFiles) => answer(startCampaign({ body: { ...files } })) });
 }

@@ -424,8 +424,8 @@ export const takeOffTrial = <ThrowOnError extends boolean = false>(options: Opti
 /**
  * Get Readiness
  *
- * How far a flight has come, and what takes it back at this moment. It changes without an event: read it again
- * every second before a takeoff.
+ * How far a flight has come, and which steps are lost at this moment, and why. It changes without an event: read it
+ * again every second before a takeoff.
  */
 export const getReadiness = <ThrowOnError extends boolean = false>(options: Options<GetReadinessData, ThrowOnError>): RequestResult<GetReadinessResponses, GetReadinessErrors, ThrowOnError> => (options.client ?? client).get<GetReadinessResponses, GetReadinessErrors, ThrowOnError>({ url: '/api/trials/{trial_id}/readiness', ...options });
 
@@ -573,7 +573,7 @@ export const landVehicle = <ThrowOnError extends boolean = false>(options: Optio
  * Stop Motors
  *
  * Stop the vehicle's motors now, at any height: it falls. Goes straight to the worker without waiting for storage.
- * Only for a client that may not command real vehicles is the database read first, to see whether this is one.
+ * The database is read first only for a client that may not command real vehicles, to see whether this is one.
  */
 export const stopMotors = <ThrowOnError extends boolean = false>(options: Options<StopMotorsData, ThrowOnError>): RequestResult<StopMotorsResponses, StopMotorsErrors, ThrowOnError> => (options.client ?? client).post<StopMotorsResponses, StopMotorsErrors, ThrowOnError>({
     url: '/api/vehicles/{vehicle_id}/motors-off',
@@ -760,7 +760,7 @@ export const analyzeLog = <ThrowOnError extends boolean = false>(options: Option
 /**
  * Start Campaign
  *
- * Create a campaign of a vehicle that is flown elsewhere, with the takeoffs of a Paparazzi's log as its first
+ * Create a campaign of a vehicle that is flown elsewhere, with the takeoffs of a Paparazzi log as its first
  * flights.
  */
 export const startCampaign = <ThrowOnError extends boolean = false>(options: Options<StartCampaignData, ThrowOnError>): RequestResult<StartCampaignResponses, StartCampaignErrors, ThrowOnError> => (options.client ?? client).post<StartCampaignResponses, StartCampaignErrors, ThrowOnError>({

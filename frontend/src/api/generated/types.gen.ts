@@ -2341,7 +2341,7 @@ export type LeaseRequest = {
 /**
  * LogAnalysis
  *
- * The answer of a log.
+ * The result of a log analysis.
  */
 export type LogAnalysis = {
     /**
@@ -2378,7 +2378,7 @@ export type LogAnalysis = {
     /**
      * Notes
      *
-     * how to read the table, and what to heed
+     * how to read the table, and precautions
      */
     notes: Array<string>;
     parameter_file: ParameterFile | null;
@@ -2909,7 +2909,7 @@ export type Proposal = {
 /**
  * ReadinessLoss
  *
- * Something that takes readiness back: what it means now, and what to do.
+ * A reason why readiness is lost: what it means now, and what to do.
  */
 export type ReadinessLoss = {
     /**
@@ -4399,7 +4399,7 @@ export type VehicleTrouble = {
  * Winner
  *
  * The gains with the lowest mean error plus its standard error, which are repeated, confirmed and promoted. After
- * repeats these may be others than those of the flight with the lowest error.
+ * repeats these may differ from those of the flight with the lowest error.
  */
 export type Winner = {
     /**
