@@ -134,7 +134,7 @@ def serve(
         typer.Option(
             help="Address to listen on. 0.0.0.0 admits other devices, such as a tablet: anyone who can reach "
             "this computer over the network can then view every campaign, and browsers unlocked with "
-            "`gainline unlock` can change campaigns and fly simulations; vehicles with a link do not fly.  "
+            "`gainline unlock` can change campaigns and fly simulations; vehicles with a link cannot be flown.  "
             "[default: GAINLINE_HOST, else 127.0.0.1]"
         ),
     ] = None,

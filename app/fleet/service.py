@@ -64,7 +64,7 @@ def chosen_vehicle(session: Session, choice: VehicleChoice, *, default_gains: Ga
         return _registered(session, choice, choice.id, default_gains)
     described = get_kind(choice.kind)
     if is_registered_one_by_one(described):
-        raise _no_choice("id", "is missing: each vehicle of this kind is registered")
+        raise _no_choice("id", "is missing: a vehicle of this kind must be registered first")
     if (known := repository.shared_of_kind_or_none(session, choice.kind)) is not None:
         return known
     row = VehicleRow(

@@ -158,7 +158,7 @@ def _starts(on_progress: Progress) -> Iterator[Row]:
             done += 1
             on_progress(_FROM_SHOWCASE + share * done, f"models' optima at ±{short_percent(perturbation)}, seed {seed}")
         yield Row(
-            group=f"The model's optimum flown on the truth, median of {SEEDS} models",
+            group=f"The model's optimum flown on the true model, median of {SEEDS} models",
             label=f"error over the optimum's at ±{short_percent(perturbation)}",
             unit="×",
             measured=float(np.median(errors)) / BEST_ERROR,

@@ -165,7 +165,7 @@ def test_a_name_belongs_to_one_vehicle(client: TestClient) -> None:
 def test_a_campaign_names_the_registered_vehicle_that_flies_it(client: TestClient, database: Database) -> None:
     missing = client.post("/api/campaigns", json={"name": "A", "vehicle": {"kind": "mavlink"}})
     assert missing.status_code == 422
-    assert "each vehicle of this kind is registered" in problems_of(missing)["vehicle.id"]
+    assert "a vehicle of this kind must be registered first" in problems_of(missing)["vehicle.id"]
     assert "POST /api/vehicles" in missing.json()["script_hint"]
     one, two = register(client, "One"), register(client, "Two", real=True)
     campaign = create_campaign_on(client, database, two)
