@@ -28,6 +28,7 @@ LossKind = Literal[
     "battery low",
     "quarantined",
     "control ended",
+    "controlled by other",
 ]
 
 
@@ -91,6 +92,11 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on="Take control.",
             keeps=None,
         ),
+        "controlled by other": LossText(
+            what="Another operator is in control of the vehicle.",
+            way_on="Only that operator can start the takeoff. To start it yourself, take over.",
+            keeps="held",
+        ),
     }
 )
 
@@ -122,15 +128,16 @@ class Standing:
     """What readiness follows from: the stored state of a trial and its vehicle, and who asks.
 
     `has_link`: the vehicle is registered, with a process that keeps its link. `has_control`: the one who asks may
-    command it. `min_battery_v`: below it the vehicle does not take off. `take_off_requested`: by the operator of a
-    staged flight. `standing_down`: its safe gains are being restored instead. `abort_cause_open`: nobody has stated
-    yet why the flight was aborted.
+    command it; `is_controlled_by_other`: may not, because another operator is in control. `min_battery_v`: below it
+    the vehicle does not take off. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe
+    gains are being restored instead. `abort_cause_open`: nobody has stated yet why the flight was aborted.
     """
 
     trial: TrialState
     vehicle: VehicleState
     has_link: bool
     has_control: bool
+    is_controlled_by_other: bool = False
     min_battery_v: float = 0.0
     take_off_requested: bool = False
     standing_down: bool = False
@@ -202,7 +209,7 @@ def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
     if is_quarantined:
         found.append("quarantined")
     if not standing.has_control and standing.trial is not TrialState.PLANNED:
-        found.append("control ended")
+        found.append("controlled by other" if standing.is_controlled_by_other else "control ended")
     return found
 
 

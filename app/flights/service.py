@@ -155,11 +155,13 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
     vehicle = campaigns.get_row(session, row.campaign_id).vehicle
     flight = history.latest_flights(session, [row.id]).get(row.id)
     active = flight if flight is not None and flight.state in ACTIVE_FLIGHT_STATES else None
+    has_control = is_in_control(vehicle, context)
     standing = Standing(
         trial=row.state,
         vehicle=vehicle.state,
         has_link=vehicle.registered,
-        has_control=is_in_control(vehicle, context),
+        has_control=has_control,
+        is_controlled_by_other=not has_control and control_of(vehicle) is not None,
         min_battery_v=float(vehicle.options.get("min_battery_v", 0.0)),
         take_off_requested=active is not None and active.take_off_at is not None,
         standing_down=active is not None and bool(active.stand_down),

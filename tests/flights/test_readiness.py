@@ -144,6 +144,20 @@ def test_control_that_ends_takes_everything_back(name: str) -> None:
     assert [each.kind for each in found.losses] == ["control ended"]
 
 
+@pytest.mark.parametrize("name", ["staged", "held"])
+def test_who_watches_another_operators_flight_sees_what_it_has_reached_and_cannot_fly_it(name: str) -> None:
+    """Observed defect: a second tab said “Control: lost” although the operator in the first one had it."""
+    state, flags, reached = REACHED[name]
+    watched = replace(standing(state, flags, has_control=False), is_controlled_by_other=True)
+    found = readiness_of(watched, GOOD)
+    assert (found.steps, found.lost, found.is_ready) == (up_to(reached), (), False)
+    assert [each.kind for each in found.losses] == ["controlled by other"]
+    assert [each.kind for each in readiness_of(watched, VehicleReport(worker=False)).losses] == [
+        "worker away",
+        "controlled by other",
+    ]
+
+
 def test_a_quarantined_vehicle_without_a_connection_has_one_way_on() -> None:
     found = readiness_of(standing(TrialState.PLANNED, {}, VehicleState.QUARANTINED), REPORTS["connecting"][0])
     assert [each.kind for each in found.losses] == ["quarantined"]

@@ -526,6 +526,16 @@ def test_who_is_not_in_control_sees_no_step_of_a_staged_flight_as_held(client: T
     assert [loss["kind"] for loss in readiness["losses"]] == ["control ended"]
 
 
+def test_who_watches_while_another_operator_is_in_control_sees_the_flight_as_staged(
+    client: TestClient, real: Json, staged: Json
+) -> None:
+    report(client, staged)
+    take_control(client, real, "Ada")
+    readiness = get(client, f"/api/trials/{staged['id']}/readiness")
+    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (["control", "staged"], [], False)
+    assert [loss["kind"] for loss in readiness["losses"]] == ["controlled by other"]
+
+
 def test_a_vehicle_of_which_no_status_has_come_does_not_take_off(client: TestClient, real: Json, staged: Json) -> None:
     operator = control_header(client, real) | OUR_PAGE
     answer = client.post(f"/api/trials/{staged['id']}/take-off", headers=operator)

@@ -2915,7 +2915,7 @@ export type ReadinessLoss = {
     /**
      * Kind
      */
-    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'quarantined' | 'control ended';
+    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'quarantined' | 'control ended' | 'controlled by other';
     /**
      * What
      */

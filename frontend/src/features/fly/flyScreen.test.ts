@@ -121,9 +121,10 @@ test("a staged vehicle is ready only while its readiness holds", () => {
     const readiness = { steps: [], lost: [], losses, is_ready: kinds.length === 0 };
     return flyStateLabel(staged, "staged", null, { quarantined: false, readiness }).word;
   };
-  expect([label(), label("link silent"), label("control ended")]).toEqual([
+  expect([label(), label("link silent"), label("control ended"), label("controlled by other")]).toEqual([
     "Staged, ready to fly",
     "Not ready to fly",
+    "Staged",
     "Staged",
   ]);
   const unknown = flyStateLabel(staged, "staged", null, { quarantined: false, readiness: null });

@@ -68,7 +68,9 @@ const AWAY: Readonly<Partial<Record<Loss["kind"], string>>> = {
 function stagedLabel(readiness: Readiness | null): StateLabel {
   if (readiness === null) return { word: "Checking readiness", tone: "busy" };
   if (readiness.is_ready) return WORDS.staged;
-  const isOnlyControl = readiness.losses.every(({ kind }) => kind === "control ended");
+  const isOnlyControl = readiness.losses.every(
+    ({ kind }) => kind === "control ended" || kind === "controlled by other",
+  );
   return isOnlyControl ? { word: "Staged", tone: "quiet" } : { word: "Not ready to fly", tone: "bad" };
 }
 
