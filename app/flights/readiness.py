@@ -57,7 +57,7 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
         ),
         "not connected": LossText(
             what="The vehicle is not connected.",
-            way_on="Connect it on its page, then stage the flight again.",
+            way_on="Connect it on its page, then stage the flight.",
             what_in_flight="Gainline's connection to the vehicle has ended.",
             way_on_in_flight="Use the vehicle's own remote control.",
         ),

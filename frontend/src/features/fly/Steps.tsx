@@ -164,12 +164,9 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
     <Stack gap={12}>
       {(vehicle.is_real || isOthers || isInControl) && <OperatorControl vehicle={vehicle} />}
       {vehicle.state === "disconnected" && (
-        <p className={classes["say"]}>
-          {vehicle.name} is not connected.{" "}
-          <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
-            Connect
-          </Anchor>
-        </p>
+        <Anchor component={Link} to={`/vehicles/${vehicle.id}`} py={12}>
+          Connect {vehicle.name}
+        </Anchor>
       )}
       <FlightProblem flight={trial.flight} />
       <PreflightChecks checks={vehicle.checks ?? []} />
