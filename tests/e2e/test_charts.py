@@ -122,8 +122,15 @@ def test_a_row_points_at_its_own_curves_after_flights_were_flown_on_the_open_pag
     dashboard.settled()
     dashboard.open_tab("Flights")
     for flight in (1, 2, 3):
-        row(dashboard, flight).hover()
-        dashboard.until(partial(points_at, dashboard, flight))
+        dashboard.until(partial(is_pointed_at_by_its_row, dashboard, flight))
+
+
+def is_pointed_at_by_its_row(dashboard: Dashboard, flight: int) -> bool:
+    """Whether its curves stand out, with the mouse moved onto its row anew: a row may move away from under it."""
+    dashboard.page.mouse.move(5, 5)
+    row(dashboard, flight).hover()
+    dashboard.page.wait_for_timeout(100)
+    return points_at(dashboard, flight)
 
 
 def place_of(chart: Locator, flight: int) -> tuple[float, float]:
@@ -148,12 +155,13 @@ def brush(dashboard: Dashboard, first: tuple[float, float], last: tuple[float, f
     mouse.up()
 
 
-def point_at(dashboard: Dashboard, place: tuple[float, float], flight: int) -> None:
+def point_at(dashboard: Dashboard, chart: Locator, flight: int) -> None:
     """Move the mouse to and fro until the flight is pointed at: Plotly ignores a hover while it draws."""
 
     def is_pointed_at() -> bool:
-        dashboard.page.mouse.move(place[0] - 3, place[1])
-        dashboard.page.mouse.move(*place)
+        x, y = place_of(chart, flight)
+        dashboard.page.mouse.move(x - 3, y)
+        dashboard.page.mouse.move(x, y)
         return curve(dashboard, flight).get_attribute("data-pointed") == ""
 
     dashboard.until(is_pointed_at)
@@ -167,14 +175,13 @@ def test_a_mark_points_at_its_curve_and_its_gains_and_chooses_its_flight(page_of
     x, y = place_of(chart, number)
     brush(page_of_many, (x - 15, y - 60), (x + 15, y - 60))  # else a pixel holds three flights
     page_of_many.settled()
-    place = place_of(chart, number)
-    point_at(page_of_many, place, number)
+    point_at(page_of_many, chart, number)
     label = page_of_many.plot("gains").locator(".hoverlayer .hovertext")
     expect(label.first).to_contain_text(f"Flight {number}")
     page_of_many.page.mouse.move(5, 5)
     expect(curve(page_of_many, number)).not_to_have_attribute("data-pointed", "")
-    point_at(page_of_many, place, number)
-    page_of_many.page.mouse.click(*place)
+    point_at(page_of_many, chart, number)
+    page_of_many.page.mouse.click(*place_of(chart, number))
     expect(page_of_many.panel(f"Flight {number}")).to_be_visible()
 
 
