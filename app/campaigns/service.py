@@ -314,7 +314,9 @@ def promote_best(session: Session, campaign_id: int, asked: Promotion, context: 
     now = standing_within_bounds_of(row, history.trials_of(session, campaign_id))
     if now is None or now.comparison is None:
         raise ConflictError(
-            "The best gains so far are the first flight's, so there is nothing to set.", hint="Fly other gains first."
+            "The best gains so far are the first flight's. Only gains that are shown to be better than these can "
+            "become the safe gains.",
+            hint="Fly other gains first.",
         )
     compared = now.comparison
     if compared.verdict != "better":

@@ -239,7 +239,12 @@ def reproduce(
 @app.command("sim-drone")
 @report_errors
 def sim_drone(
-    autopilot: Annotated[str, typer.Option(help="Autopilot to simulate: paparazzi, ardupilot or px4.")] = "paparazzi",
+    autopilot: Annotated[
+        str,
+        typer.Option(
+            help="Autopilot to simulate: paparazzi, paparazzi-bare, paparazzi-5.10, ardupilot, ardupilot-4.7 or px4."
+        ),
+    ] = "paparazzi",
     link: Annotated[
         str | None,
         typer.Option(

@@ -113,7 +113,7 @@ stops reconnecting it."""
 
 class ActKind(StrEnum):
     """Kinds of acts: what a person asked of a registered vehicle, or decided about it. The last four belong to flights,
-    which carry them out; the others are carried out between flights."""
+    which carry them out; the others to the time between flights."""
 
     CONNECT = "connect"
     DISCONNECT = "disconnect"
@@ -125,6 +125,7 @@ class ActKind(StrEnum):
     MOTORS_OFF = "motors off"
     SAFE_GAINS = "safe gains"
     CONTROL = "control"
+    SETTINGS = "settings"
     STAGE = "stage"
     TAKE_OFF = "take-off"
     UNSTAGE = "unstage"

@@ -34,9 +34,7 @@ def examine(
         return autopilot.examine(
             Recording(stream=stream, beginning=beginning, name=name, companion=companion, given=given)
         )
-    reason = (
-        "is empty" if not beginning.raw else "is neither a log nor a trace of a loop that Gainline has a replica of"
-    )
+    reason = "is empty" if not beginning.raw else "contains no signals of a control loop that Gainline has a replica of"
     raise InputError(
         f"{name} is not a recording of the vertical loop.",
         hint=f"Use {'; '.join(each.recordings for each in AUTOPILOTS.values())}.",

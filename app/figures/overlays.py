@@ -109,7 +109,7 @@ def _alone(palette: Palette, flight: FlightData, top: float, unit: str, *, in_pr
         textposition="bottom center",
         showlegend=False,
         marker={"symbol": "triangle-up", "size": 12, "color": palette.bad},
-        textfont={"color": palette.bad},
+        textfont=_readable(palette.bad),
         cliponaxis=False,
         hovertemplate=f"{text}<extra></extra>",
     )
@@ -183,12 +183,17 @@ def off_scale(
         text=["" if side is None else f"{label} {'↑' if up else '↓'} {_signed(values[peak], digits)}\u00a0{unit}"],
         textposition=f"{'bottom' if up else 'top'} {side or 'center'}",
         marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
-        textfont={"color": colour},
+        textfont=_readable(colour),
         showlegend=False,
         cliponaxis=False,
         hovertemplate=f"{name}<extra></extra>",
         **more,
     )
+
+
+def _readable(colour: str) -> dict[str, str]:
+    """The font of a label that curves may cross: with an outline in the opposite tone."""
+    return {"color": colour, "shadow": "auto"}
 
 
 MAX_INDIVIDUAL_FLIGHTS: Final = 30

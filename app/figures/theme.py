@@ -104,6 +104,7 @@ def layout(palette: Palette, **more: object) -> dict[str, object]:
             "font": {"size": 12, "color": palette.ink},
             "bgcolor": "rgba(0,0,0,0)",
             "tracegroupgap": 0,
+            "itemwidth": 40,  # two dashes of the longest style
             "itemclick": "toggleothers",
             "itemdoubleclick": "toggle",
         },

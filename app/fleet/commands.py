@@ -270,6 +270,7 @@ def record_released(session: Session, vehicle_id: int, *, identity: Identity | N
     """End the quarantine. `identity`: the identity that answers now, which the person has accepted."""
     row = repository.get_one(session, vehicle_id)
     row.concern = ""
+    row.checks = row.checked_at = None
     if identity is not None:
         row.identity = asdict(identity)
     _move_to(row, VehicleState.READY)

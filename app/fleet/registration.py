@@ -48,11 +48,12 @@ def register_vehicle(session: Session, new: NewVehicle, context: RequestContext)
     require(Permission.LINK, context.caller, new.name)
     refused: list[GainlineError] = []
     options = _accepted_options(kind, new.options, context, refused)
+    has_refused_options = bool(refused)
     gains = _accepted_gains(kind, options, new.safe_gains, refused)
     with _noting(refused):
         _require_free(session, new.name)
     is_real = kind.is_real_with(options, context.simulation_hosts)
-    if is_real:
+    if is_real and not has_refused_options:  # with other options it may be a simulation
         if not refused:
             require(Permission.REAL, context.caller, new.name)
         with _noting(refused):
@@ -138,7 +139,7 @@ def edit_vehicle(session: Session, vehicle_id: int, edit: VehicleEdit, context: 
     require_idle(session, row)
     by = require_not_controlled_by_other(row, context)
     if edit.options is not None:
-        _set_options(row, edit.options, context)
+        _set_options(session, row, edit.options, context, by=by)
     if edit.safe_gains is not None:
         _set_safe_gains(session, row, edit.safe_gains, statement=edit.statement, by=by)
     if edit.name is not None and edit.name != row.name:
@@ -220,7 +221,9 @@ def _listed(campaigns: Sequence[str]) -> str:
     return f"{len(campaigns)} campaigns use it: {named}{', …' if len(campaigns) > _NAMED else ''}"
 
 
-def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], context: RequestContext) -> None:
+def _set_options(
+    session: Session, row: VehicleRow, asked: Mapping[str, OptionValue], context: RequestContext, *, by: str
+) -> None:
     kind = VEHICLE_KINDS[row.kind]
     options = kind.check({**settings_of(row), **asked}, field="options", simulation_hosts=context.simulation_hosts)
     if options == settings_of(row):
@@ -234,7 +237,9 @@ def _set_options(row: VehicleRow, asked: Mapping[str, OptionValue], context: Req
             problems=(Problem("options", "would change whether the vehicle is real"),),
         )
     _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has other gains
+    changed = ", ".join(f"{name} {value}" for name, value in options.items() if value != settings_of(row)[name])
     row.options, row.identity, row.checks, row.checked_at = options, None, None, None
+    record_act(session, row, ActKind.SETTINGS, by=by, reason=changed)
 
 
 def _set_safe_gains(
@@ -272,9 +277,9 @@ def _require_free(session: Session, name: str, *, unless: int | None = None) -> 
 def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
     problems = []
     if not new.safe_gains_confirmed:
-        problems.append(Problem("safe_gains_confirmed", "must be confirmed by the person who reviewed the safe gains"))
+        problems.append(Problem("safe_gains_confirmed", "must be confirmed by the person who verified the safe gains"))
     if not new.statement.strip():
-        problems.append(Problem("statement", "must name the reviewer"))
+        problems.append(Problem("statement", "must state who verified them, and how"))
     if problems:
         raise UnconfirmedError(
             f"{new.name} is a real vehicle, and each of its flights ends with {format_gains(gains)}. A person must "

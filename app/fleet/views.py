@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
-from app.common.states import VEHICLE_ACTIONS, VehicleState
+from app.common.states import VEHICLE_ACTIONS, FlightState, VehicleState
 from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.fleet import repository
 from app.fleet.control import control_of
@@ -161,7 +161,7 @@ def _of_flight(row: FlightRow) -> GivenGains:
         act_id=None,
         asked=row.gains,
         read_back=row.read_back,
-        outcome=row.state,
+        outcome="record invalid" if row.state == FlightState.LANDED and row.trial.ending == "invalid" else row.state,
         asked_at=row.claimed_at,
     )
 

@@ -128,8 +128,8 @@ def run_table(name: str, figure: str, on_progress: Progress) -> Result:
         },
         notes=(
             (
-                "Flown without noise. The reference is Gainline's own target: within 1.5 % on jsbsim, within 1 % on "
-                "the twin."
+                "Flown without noise. The reference is Gainline's own target: within 1.5 % on the JSBSim "
+                "quadrotor, within 1 % on the twin."
             ),
             (
                 "Every gain set is checked by a campaign's gate first. ki = 1356 and similar values can overflow "

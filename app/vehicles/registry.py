@@ -6,7 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NoReturn
 
-from app.core.errors import InputError, Problem
+from app.core.errors import GainlineError, InputError, Problem
 from app.core.formatting import format_gains
 from app.core.policy import Gains
 from app.vehicles.base import OptionValue, SafeGainsError, Vehicle, VehicleError, find_mismatch
@@ -87,12 +87,13 @@ def open_vehicle(
 def restore_safe_gains(vehicle: Vehicle) -> dict[str, float]:
     """Write the safe gains and return the values read back. Raises SafeGainsError if they differ."""
     wanted = dict(vehicle.safe_gains)
-    hint = "Do not fly it. Set its gains by hand, read them back, then release it."
+    hint = "Do not fly it before its gains have been set and read back."
     try:
         held = vehicle.stage(wanted)
     except Exception as error:
+        why = error.message if isinstance(error, GainlineError) else error
         raise SafeGainsError(
-            f"The vehicle's safe gains ({format_gains(wanted)}) could not be set: {error}", hint=hint
+            f"The vehicle's safe gains ({format_gains(wanted)}) could not be set: {why}", hint=hint
         ) from error
     if mismatch := find_mismatch(held, wanted):
         raise SafeGainsError(f"The vehicle does not hold its safe gains: {mismatch}.", hint=hint)

@@ -1,4 +1,4 @@
-"""Staging, takeoff, unstaging and abort are acts of a vehicle too."""
+"""Changed settings, and staging, takeoff, unstaging and abort of flights, are acts of a vehicle too."""
 
 from typing import Any
 
@@ -10,23 +10,23 @@ down_revision = "0007"
 branch_labels = None
 depends_on = None
 
-_BETWEEN_FLIGHTS = (
+_OLD = (
     *("connect", "disconnect", "check", "restore", "parameters", "release", "land", "motors off"),
     *("safe gains", "control"),
 )
-_OF_FLIGHTS = ("stage", "take-off", "unstage", "abort")
+_NEW = ("settings", "stage", "take-off", "unstage", "abort")
 _UNDER_WAY = "state IN ('requested', 'running')"
 
 
 def upgrade() -> None:
-    """What was asked of flights from before stays in the flights alone."""
-    _rebuild(_BETWEEN_FLIGHTS + _OF_FLIGHTS)
+    """What was asked before of flights stays in the flights alone."""
+    _rebuild((*_OLD, *_NEW))
 
 
 def downgrade() -> None:
-    """The older table has no place for commands of flights: they are deleted."""
-    op.execute(f"DELETE FROM vehicle_act WHERE kind IN ({_quoted(_OF_FLIGHTS)})")  # noqa: S608  our own names
-    _rebuild(_BETWEEN_FLIGHTS)
+    """The older table has no place for these: they are deleted."""
+    op.execute(f"DELETE FROM vehicle_act WHERE kind IN ({_quoted(_NEW)})")  # noqa: S608  our own names
+    _rebuild(_OLD)
 
 
 def _rebuild(kinds: tuple[str, ...]) -> None:

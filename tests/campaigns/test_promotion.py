@@ -30,7 +30,7 @@ def test_gains_that_flew_better_become_the_safe_ones_and_the_act_says_from_which
 ) -> None:
     vehicle = create_connected(client, database)
     campaign = create_campaign_on(client, database, vehicle)
-    assert "nothing to set" in promote(client, campaign)["detail"]
+    assert "shown to be better" in promote(client, campaign)["detail"]
     create_flown_trial(client, database, campaign["id"], 3.0)
     best = create_flown_trial(client, database, campaign["id"], 1.0)
     assert get(client, f"/api/campaigns/{campaign['id']}/statistics")["comparison"]["verdict"] == "better"

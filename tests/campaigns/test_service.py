@@ -39,7 +39,7 @@ def test_a_vehicles_ledger_outlives_the_wish_to_delete_a_campaign(client: TestCl
         )
     answer = client.delete(f"{path}?version=1")
     assert answer.status_code == 409
-    assert "ledger" in answer.json()["detail"]
+    assert "gain history" in answer.json()["detail"]
     assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}/ledger")["total"] == 1
     with pytest.raises(IntegrityError), database.write() as session:
         session.delete(session.get_one(CampaignRow, campaign["id"]))

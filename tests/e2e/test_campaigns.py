@@ -256,7 +256,7 @@ def test_what_blocks_a_new_campaign_stands_beside_its_button(dashboard: Dashboar
     name = page.get_by_label("Name", exact=True)
     name.fill(" ")
     expect(create).to_be_disabled()
-    expect(blocked).to_have_text("Enter a name. Enter a number for kp maximum.")
+    expect(blocked).to_have_text("Enter a name. Enter a valid number for kp maximum.")
     expect(blocked).to_be_in_viewport()
     expect(name).to_have_attribute("aria-invalid", "true")
     name.fill("Bee")

@@ -112,7 +112,7 @@ def rehearse(dashboard: Dashboard, states: States, campaign_id: int) -> None:
     dashboard.when_ready(dashboard.campaign_id)
     states.rehearse(campaign_id)
     expect(page.get_by_text("Rehearsal passed")).to_be_visible()
-    page.get_by_role("link", name=f"{NAME} on Number 1").click()
+    page.get_by_role("link", name=f"Open {NAME}").click()
     expect(page.get_by_role("button", name=OPEN)).to_be_visible()
 
 

@@ -79,7 +79,7 @@ RECORD_SCREENS = """() => {
 def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
     take_control(dashboard)
     stage(dashboard, len(TRIED))
-    expect(dashboard.page.get_by_text("33 s", exact=True)).to_be_visible()
+    expect(dashboard.page.get_by_text("32.6 s", exact=True)).to_be_visible()
     assert dashboard.get(f"/vehicles/{vehicle_id}")["control"]["operator"] == "Ada"
     expect(line_of(dashboard)).to_contain_text("[300 20 90]safe [283 13 82]")
     hold_until_it_flies(dashboard, trial_id)

@@ -43,7 +43,7 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     dashboard.when_ready(rehearsal)
     states.rehearse(real)
     expect(page.get_by_text("Rehearsal passed")).to_be_visible()
-    expect(page.get_by_role("link", name=re.compile("^Open .* on Number 1$"))).to_be_visible()
+    expect(page.get_by_role("link", name=re.compile("^Open Takeoff to 3 m"))).to_be_visible()
     expect(page.get_by_role("main").locator("button[data-variant=filled]")).to_have_count(0)
     page.get_by_role("link", name="Number 1").last.click()
     expect(page.get_by_role("link", name="Open fly screen")).to_be_visible()

@@ -106,7 +106,7 @@ def test_unusable_fields_are_named(client: TestClient) -> None:
 
     assert refusal(kind="balloon") == {"kind"}
     assert refusal(kind="twin") == {"kind"}
-    assert refusal(options={"simulated": True, "system_id": 999, "wings": 2}) == {"options.system_id", "options.wings"}
+    assert refusal(options={"system_id": 999, "wings": 2}) == {"options.system_id", "options.wings"}
     assert refusal(safe_gains={"kp": 283, "ki": 13}) == {"safe_gains.kd"}
     assert refusal(safe_gains={"kp": 1e9, "ki": 13, "kd": 82}) == {"safe_gains.kp"}
 
@@ -128,9 +128,10 @@ def test_everything_that_is_wrong_with_a_registration_is_named_at_once(client: T
         "options.address",
         "safe_gains.kp",
         "name",
-        "safe_gains_confirmed",
-        "statement",
     ]
+    asked["options"] = {}
+    fields = [problem["field"] for problem in client.post("/api/vehicles", json=asked).json()["problems"]]
+    assert fields == ["safe_gains.kp", "name", "safe_gains_confirmed", "statement"]
     asked["options"] = {"autopilot": "px5"}
     fields = [problem["field"] for problem in client.post("/api/vehicles", json=asked).json()["problems"]]
     assert fields[0] == "options.autopilot"
@@ -218,6 +219,14 @@ def test_the_link_changes_only_while_it_is_closed_and_pins_the_identity_anew(
     with database.write() as session:
         commands.record_connected(session, vehicle["id"], IDENTITY)
     assert seen(client, vehicle)["identity"]["system_id"] == 1
+
+
+def test_changed_settings_are_in_the_command_log(client: TestClient) -> None:
+    vehicle = register(client)
+    edit = {"version": vehicle["version"], "options": {"radius_m": 7.0}}
+    assert client.patch(f"/api/vehicles/{vehicle['id']}", json=edit).status_code == 200
+    newest = get(client, f"/api/vehicles/{vehicle['id']}/acts")["items"][0]
+    assert (newest["kind"], newest["reason"], newest["state"]) == ("settings", "radius_m 7.0", "done")
 
 
 def test_a_simulated_vehicle_never_becomes_a_real_one(client: TestClient) -> None:

@@ -98,7 +98,7 @@ def test_a_used_link_unlocks_no_other_browser_and_shows_how_to_get_another(
     assert refused.status_code == 403
     assert "set-cookie" not in refused.headers
     assert "gainline unlock" in refused.text
-    assert "which cannot command real vehicles in this browser" in refused.text
+    assert "it cannot command real vehicles from this browser" in refused.text
     assert not get(stranger, "/api/access")["may_command"]
 
 

@@ -199,7 +199,8 @@ def _flown_again(experiment: Experiment, now: ComparisonState) -> Confirmation:
 def _only_once(now: ComparisonState) -> str:
     """Why a difference that looks certain is flown again while no gains were repeated."""
     if any(group.size > 1 for group in now.groups):
-        return ""
+        is_resolved = now.comparison is not None and now.comparison.verdict != "unresolved"
+        return ", because they were flown only once" if now.winner.size == 1 and is_resolved else ""
     assumed = ", and the confidence assumes a prior estimate of the scatter" if now.scatter.known else ""
     return f", because each gain set was flown only once{assumed}"
 

@@ -260,7 +260,7 @@ def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy
         if trustworthy
         else "; the gradient is not trustworthy: most flights changed the error in the other direction"
     )
-    counted = ", ".join(parts)
+    counted = "; ".join(parts)
     return f"{counted[:1].upper()}{counted[1:]}{ending}."
 
 

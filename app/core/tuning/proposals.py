@@ -152,14 +152,17 @@ def _confirmed(
     group = now.winner if wanted.phase == "repeat" else now.baseline
     gate = check_policy(definition, experiment, space, group.gains, flights, spread=spread)
     if not gate.passed:
-        return again(now.winner, "none", Explanation(summary=f"{wanted.why} {_refused(group, gate)}"))
+        return again(now.winner, "none", Explanation(summary=_refused(group, gate)))
     lesson = "Whether the best gains are better than the first."
     return again(group, wanted.phase, Explanation(summary=wanted.why, base_flight=group.numbers[0], lesson=lesson))
 
 
 def _refused(group: Group, gate: GateResult) -> str:
     reasons = " ".join(check.sentence for check in gate.refusals)
-    return f"But {format_gains(group.gains)} cannot be flown again, because the gate refuses them: {reasons}"
+    return (
+        f"The best gains cannot be confirmed: {format_gains(group.gains)} cannot be flown again, because the gate "
+        f"refuses them: {reasons}"
+    )
 
 
 def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | None) -> Proposal:

@@ -90,7 +90,8 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
         raise VehicleError(
             f"{_named(makes)} {'answers' if len(makes) == 1 else 'answer'} at {address}, not {radio.profile.title}; "
             "nothing was sent.",
-            hint="Check that the right autopilot is selected, and that no other vehicle sends to this address.",
+            hint="If this is the vehicle, register it again as what it is: a vehicle's autopilot cannot be changed. "
+            "Otherwise check that no other vehicle sends to this address.",
         )
     raise VehicleError(
         f"{RESPONSES[Failure.NO_HEARTBEAT].text} Waited {within_s:g} s at {address} for {radio.profile.title}.",
@@ -382,7 +383,7 @@ def _single_vehicle_item(radio: AutopilotLink) -> CheckItem:
         title="System id",
         passed=not duplicate_reason,
         found=duplicate_reason.removesuffix(".") or f"one vehicle uses system id {radio.target.system}",
-        needed="one vehicle per system id",
+        needed="one vehicle per system id on this link",
         hint=_ONE_VEHICLE if duplicate_reason else "",
     )
 
@@ -529,5 +530,5 @@ def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
         passed=value is not None and requirement.is_met(value),
         found="not reported" if value is None else f"{value:g}" if value else "off",
         needed=requirement.what,
-        hint="Set it in the autopilot: if the link is lost, only its own failsafe lands the vehicle.",
+        hint="Set this in the autopilot: if the link is lost, only its own failsafe lands the vehicle.",
     )

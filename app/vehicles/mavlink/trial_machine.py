@@ -332,7 +332,7 @@ def _disarming(trial: Trial, event: Event) -> Step:
     now_s = event.now_s
     trial = _answered(_doubting(trial), event)
     if _is_stopped(trial, event):
-        confirmed = " It confirmed that its motors have stopped." if trial.stopped else ""
+        confirmed = " The vehicle confirmed that its motors have stopped." if trial.stopped else ""
         return enter(replace(trial, why=trial.why + confirmed), State.RESTORE, now_s), (RestoreGains(),)
     airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     if airborne and not trial.stopped:

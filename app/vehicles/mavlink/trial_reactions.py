@@ -349,10 +349,11 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     if trial.commanded_s is None:
         return ""
     if watch.last is not None and watching.is_airborne(watch, now_s, ground_m):
-        return f"It was {watch.last.altitude_m - ground_m:.1f} m above the ground: inspect it before it flies again."
+        height_m = watch.last.altitude_m - ground_m
+        return f"The vehicle was {height_m:.1f} m above the ground: inspect it before it flies again."
     if watching.is_grounded(watch, now_s, ground_m) and not watching.is_said_to_fly(watch, now_s, ground_m):
         return ""
-    return "It was not known to be on the ground: inspect it before it flies again."
+    return "The vehicle was not known to be on the ground: inspect it before it flies again."
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:

@@ -639,7 +639,7 @@ class MavlinkVehicle:
     def _require_not_quarantined(self) -> None:
         if self._state is State.QUARANTINE:
             raise SafeGainsError(
-                f"The vehicle is quarantined: {self._why}",
+                f"Nothing is written to a vehicle that may be in the air: {self._why}",
                 hint="Land it if it is flying, check that its motors have stopped, verify its gains, then release it.",
             )
         if self._state is State.OBSERVE:

@@ -31,7 +31,7 @@ describe("a browser with read-only access", () => {
   });
 
   it("is told on another device where the vehicle is commanded", () => {
-    expect(readOnlyReason(REMOTE, real)).toContain("on the computer that runs Gainline");
+    expect(readOnlyReason(REMOTE, real)).toContain("from the computer that runs Gainline");
     expect(readOnlyReason(REMOTE, null)).toBeNull();
   });
 

@@ -55,6 +55,22 @@ export interface Evaluation {
   gate: Evaluated<Gate>;
 }
 
+/** Why the gate refuses one of the gain sets, in a sentence; empty if it passes all, or while that is not known. */
+export function useGateRefusal(campaignId: number, sets: readonly GainSet[]): string {
+  const { data } = useQuery({
+    queryKey: ["evaluation", "refusal", campaignId, sets],
+    queryFn: async () => {
+      const path = { campaign_id: campaignId };
+      const gates = await Promise.all(sets.map((gains) => answer(evaluateGate({ path, body: { gains } }))));
+      return gates.flatMap(({ checks }) => checks).find(({ passed }) => !passed)?.sentence ?? "";
+    },
+    enabled: sets.length > 0,
+    gcTime: KEPT_MS,
+    retry: false,
+  });
+  return data ?? "";
+}
+
 /** Evaluates the gains beside a proposal; nothing while there are none. */
 export function useEvaluation(campaignId: number, proposalId: number, gains: GainSet | null): Evaluation {
   const [rested] = useDebouncedValue(gains, AT_REST_MS);

@@ -140,6 +140,21 @@ export const ABORT_LABELS: Record<AbortStage, string> = {
   accepted: "ABORTING",
 };
 
-/** What ABORT does while nothing is received from the vehicle. */
-export const ABORT_WITHOUT_LINK =
-  "The link is lost: an abort is sent again until the vehicle confirms it. Use the vehicle's own remote control.";
+const ABORT_SAYS: Record<AbortStage, string> = {
+  none: "ABORT or Space ends the flight immediately: safe gains and Land are sent until the vehicle confirms.",
+  sending: "Sending the abort to the worker.",
+  "not confirmed": "The abort is not confirmed. It is sent again until the worker confirms it.",
+  accepted: "Sending safe gains and Land until the vehicle confirms.",
+};
+
+/** What ABORT does, or is doing, while the worker can be reached or not, and the vehicle's link is lost or not. */
+export function abortText(stage: AbortStage, isReached: boolean, isLinkLost: boolean): string {
+  if (!isReached && stage === "none")
+    return "An abort cannot be sent: the worker cannot be reached. Use the vehicle's own remote control.";
+  if (!isReached && stage === "accepted") return "The worker has confirmed the abort, but cannot be reached now.";
+  if (isLinkLost && stage === "none")
+    return "Nothing is received from the vehicle. An abort would be sent until the vehicle confirms it. Use the vehicle's own remote control.";
+  if (isLinkLost && stage === "accepted")
+    return "Nothing is received from the vehicle. The abort is sent until the vehicle confirms it. Use the vehicle's own remote control.";
+  return ABORT_SAYS[stage];
+}

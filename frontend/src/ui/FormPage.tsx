@@ -33,7 +33,7 @@ export function MissingEntries({ numbers, texts = [] }: { numbers: readonly stri
   if (numbers.length + texts.length === 0) return null;
   return (
     <p role="status" className={classes["missing"]}>
-      {[...texts, ...(numbers.length > 0 ? [`Enter a number for ${numbers.join(", ")}.`] : [])].join(" ")}
+      {[...texts, ...(numbers.length > 0 ? [`Enter a valid number for ${numbers.join(", ")}.`] : [])].join(" ")}
     </p>
   );
 }

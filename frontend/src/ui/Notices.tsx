@@ -1,5 +1,5 @@
 import { IconAlertTriangle, IconEye, IconLockOpen } from "@tabler/icons-react";
-import { formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
+import { type FieldProblem, formProblem, otherProblems, type Problem, problemOf } from "../api/problems";
 import { asSentence, stopped } from "./format";
 import classes from "./Notices.module.css";
 
@@ -37,6 +37,17 @@ const LABELS: Readonly<Record<string, string>> = {
   time_s: "The record",
 };
 
+/** Reasons of the gate are sentences of their own, the others continue the field's name. */
+const isSentence = (reason: string): boolean => /^\p{Lu}/u.test(reason);
+
+function Named({ field, reason }: FieldProblem) {
+  return (
+    <>
+      {LABELS[field] ?? <code>{field}</code>} {stopped(reason)}
+    </>
+  );
+}
+
 function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly string[] }) {
   const others = otherProblems(problem, shown).filter(({ field }) => field !== "version");
   return (
@@ -49,7 +60,7 @@ function ProblemNotice({ problem, shown }: { problem: Problem; shown: readonly s
           <ul>
             {others.map(({ field, reason }) => (
               <li key={`${field} ${reason}`}>
-                {LABELS[field] ?? <code>{field}</code>} {stopped(reason)}
+                {isSentence(reason) ? stopped(reason) : <Named field={field} reason={reason} />}
               </li>
             ))}
           </ul>

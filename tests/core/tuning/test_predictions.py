@@ -143,7 +143,7 @@ def test_the_record_counts_flights_inside_their_interval_and_predicted_direction
     assert (record.inside, record.of, record.share) == (1, 2, 0.5)
     assert (record.agreeing, record.disagreeing, record.trustworthy) == (1, 1, True)
     assert record.sentence == (
-        "1 of 2 flights ended inside their predicted interval, 1 of 2 changed the error in the predicted direction."
+        "1 of 2 flights ended inside their predicted interval; 1 of 2 changed the error in the predicted direction."
     )
 
 
@@ -152,11 +152,11 @@ def test_the_record_counts_flights_inside_their_interval_and_predicted_direction
     [
         (
             0.32,
-            "The only predicted flight ended inside its interval, the only change of the error had the predicted sign.",
+            "The only predicted flight ended inside its interval; the only change of the error had the predicted sign.",
         ),
         (
             0.6,
-            "The only predicted flight ended outside its interval, the only change of the error had the opposite sign.",
+            "The only predicted flight ended outside its interval; the only change of the error had the opposite sign.",
         ),
     ],
 )

@@ -513,9 +513,10 @@ def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() ->
             vehicle.stage(OWN_SAFE["ardupilot"])
             record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
             assert record.ending == "aborted"
-            stopped = "Motors off was requested: people below. It confirmed that its motors have stopped."
+            stopped = "Motors off was requested: people below. The vehicle confirmed that its motors have stopped."
             assert re.fullmatch(
-                f"{stopped} It was 2.[0-9] m above the ground: inspect it before it flies again.", record.reason
+                f"{stopped} The vehicle was 2.[0-9] m above the ground: inspect it before it flies again.",
+                record.reason,
             )
             forced = [
                 at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
@@ -566,7 +567,9 @@ def test_motors_off_is_heard_also_after_the_program_failed_while_the_vehicle_lan
                 at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
             ]
             assert forced[0] - asked[0] < 0.3
-            assert vehicle.concern.endswith(" It was 3.2 m above the ground: inspect it before it flies again.")
+            assert vehicle.concern.endswith(
+                " The vehicle was 3.2 m above the ground: inspect it before it flies again."
+            )
             vehicle.release()
             assert (vehicle.concern, vehicle.read_gains()) == ("", OWN_SAFE["ardupilot"])
 

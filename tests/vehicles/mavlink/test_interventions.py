@@ -71,7 +71,7 @@ def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_to_be_inspected() -> 
     """Seen: stopped at 3.2 m, its safe gains were restored in the debris, and it was ready for its next flight."""
     walk = slide(STAGES[State.RECORD]()).disarm().restore()
     assert (walk.state, ending_of(walk.trial)) == (State.QUARANTINE, "aborted")
-    assert walk.trial.why.endswith("It was 2.9 m above the ground: inspect it before it flies again.")
+    assert walk.trial.why.endswith("The vehicle was 2.9 m above the ground: inspect it before it flies again.")
 
 
 def test_a_vehicle_whose_motors_were_stopped_on_the_ground_may_fly_again() -> None:
@@ -83,7 +83,7 @@ def test_a_vehicle_whose_motors_were_stopped_on_the_ground_may_fly_again() -> No
 
 def test_a_vehicle_whose_motors_were_stopped_while_it_was_not_heard_is_to_be_inspected() -> None:
     walk = slide(STAGES[State.LINK_LOST]())
-    assert walk.trial.doubt == "It was not known to be on the ground: inspect it before it flies again."
+    assert walk.trial.doubt == "The vehicle was not known to be on the ground: inspect it before it flies again."
 
 
 def test_motors_off_that_is_not_obeyed_quarantines_the_vehicle() -> None:

@@ -110,9 +110,9 @@ def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_s
 
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
         assert not rig.drone.autopilot.armed
-        stopped = "Motors off was requested: people below. It confirmed that its motors have stopped."
+        stopped = "Motors off was requested: people below. The vehicle confirmed that its motors have stopped."
         assert re.fullmatch(
-            f"{stopped} It was 1.[0-9] m above the ground: inspect it before it flies again.", record.reason
+            f"{stopped} The vehicle was 1.[0-9] m above the ground: inspect it before it flies again.", record.reason
         )
 
 

@@ -89,9 +89,9 @@ export type Access = {
  * ActKind
  *
  * Kinds of acts: what a person asked of a registered vehicle, or decided about it. The last four belong to flights,
- * which carry them out; the others are carried out between flights.
+ * which carry them out; the others to the time between flights.
  */
-export type ActKind = 'connect' | 'disconnect' | 'check' | 'restore' | 'parameters' | 'release' | 'land' | 'motors off' | 'safe gains' | 'control' | 'stage' | 'take-off' | 'unstage' | 'abort';
+export type ActKind = 'connect' | 'disconnect' | 'check' | 'restore' | 'parameters' | 'release' | 'land' | 'motors off' | 'safe gains' | 'control' | 'settings' | 'stage' | 'take-off' | 'unstage' | 'abort';
 
 /**
  * ActState

@@ -1,5 +1,6 @@
 import { Button, Stack } from "@mantine/core";
 import { IconArchive, IconRepeat } from "@tabler/icons-react";
+import { useGateRefusal } from "../../api/evaluation";
 import { useArchive, useReopen } from "../../api/mutations";
 import { useStatistics } from "../../api/queries";
 import type { Campaign, CampaignStatistics, RepeatGroup } from "../../api/types";
@@ -40,7 +41,9 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
   const groups = statistics?.groups ?? [];
   const [winner, first] = [groups.find(({ is_best }) => is_best), groups.find(({ is_baseline }) => is_baseline)];
   const missing = campaign.standing === "candidate" ? confirmationOf(winner, first) : [];
-  const isCandidate = missing.length > 0;
+  const wanted = missing.flatMap((kind) => (kind === "repeat" ? winner : first) ?? []).map(({ gains }) => gains);
+  const refusal = useGateRefusal(campaign.id, wanted);
+  const isCandidate = missing.length > 0 && refusal === "";
   const further = isCandidate ? missing.length : FURTHER_FLIGHTS;
   const experiment = campaign.definition.experiment ?? "";
   const bestFlight = winner === undefined ? null : bestFlightOf(winner);
@@ -59,6 +62,11 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
           </Aside>
         )}
         {isCandidate && <Note fz="body">{confirmationText(missing)}</Note>}
+        {refusal !== "" && !reason.includes(refusal) && (
+          <Note fz="body">
+            The best gains cannot be confirmed: the gate refuses another flight that it needs. {refusal}
+          </Note>
+        )}
         {campaign.actions.includes("reopen") && !isPending && (
           <Button
             variant={isCandidate && !isSecondary ? "filled" : "default"}

@@ -6,12 +6,14 @@ import classes from "./NextFlight.module.css";
 interface Props {
   proposal: Proposal;
   chosen: ChoiceName;
+  /** Whether the gate refuses the chosen gains. */
+  isRefused: boolean;
   disabled: boolean;
   onChoose: (choice: ChoiceName) => void;
 }
 
 /** One choice of what to fly next. */
-export function FlightChoices({ proposal, chosen, disabled, onChoose }: Props) {
+export function FlightChoices({ proposal, chosen, isRefused, disabled, onChoose }: Props) {
   const recommended = proposal.choices.find((choice) => choice.recommended)?.kind;
   return (
     <Chip.Group value={chosen} onChange={(name) => onChoose(name as ChoiceName)}>
@@ -26,7 +28,7 @@ export function FlightChoices({ proposal, chosen, disabled, onChoose }: Props) {
             classNames={{ label: classes["choice"] ?? "" }}
           >
             {CHOICES[name].label}
-            {name === recommended && " (recommended)"}
+            {name === recommended && !(isRefused && name === chosen) && " (recommended)"}
           </Chip>
         ))}
       </Group>

@@ -15,9 +15,9 @@ export function FlightMarkers({ trial }: { trial: Trial }) {
 
 const ICONS = { inside: IconCircleCheck, above: IconCircleArrowUp, below: IconCircleArrowDown } as const;
 const PREDICTION_LABELS = {
-  inside: "inside the interval",
-  above: "above the interval",
-  below: "below the interval",
+  inside: "inside the predicted interval",
+  above: "above the predicted interval",
+  below: "below the predicted interval",
 } as const;
 
 /** Whether the error is inside its predicted interval. */

@@ -60,7 +60,7 @@ export function FlightReview({ trial, trials, campaign }: Props) {
         <p>
           The record of an invalid flight is kept, but not used for any computation.{" "}
           <strong>{consequenceOf(trial, trials, "invalid")}</strong>
-          {isEndedByRule && " The campaign may reopen."} Why is it invalid?
+          {isEndedByRule && " The campaign reopens if its stop rule is no longer met."} Why is it invalid?
         </p>
         <Chip.Group value={reason} onChange={(value) => setReason(value)}>
           <div className={classes["chips"]}>
@@ -142,7 +142,7 @@ export function AbortCause({ trial }: { trial: Trial }) {
               loading={judge.isPending}
               onClick={() => judge.mutate({ trial, cause })}
             >
-              {LABELS[cause]}
+              {trial.abort_cause === "operator" ? LABELS[cause] : `Change to: ${LABELS[cause].toLowerCase()}`}
             </Button>
           ))}
         </Stack>

@@ -1,11 +1,11 @@
 import { Button, Stack } from "@mantine/core";
 import { Link, useOutletContext } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
-import { ABORT_WITHOUT_LINK, type AbortControl, abortStage } from "../../live/flights";
-import { useIsCurrent, useLiveFlight, useVehicleStatus } from "../../live/store";
+import { type AbortControl, abortStage, abortText } from "../../live/flights";
+import { useConnection, useIsCurrent, useLiveFlight, useVehicleStatus } from "../../live/store";
 import { isSaturated, readingOf } from "../../live/telemetry";
 import { withUnit } from "../../ui/format";
-import { gainsInBrackets } from "../../ui/gains";
+import { GainList } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
 import { intervalText, percent } from "../../ui/uncertainty";
@@ -23,7 +23,8 @@ interface Props {
 /** Live values of the flight in progress. The ABORT button is in the header of every page. */
 export function FlyingCard({ campaign, trial, step }: Props) {
   const abort = useOutletContext<AbortControl>();
-  const isAborting = abortStage(step.trialId, abort) === "accepted";
+  const aborting = abortStage(step.trialId, abort);
+  const { state, worker } = useConnection();
   const live = useLiveFlight(step.trialId);
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
@@ -43,8 +44,8 @@ export function FlyingCard({ campaign, trial, step }: Props) {
             <dd>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</dd>
           </div>
           <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>{isAborting ? "Error" : "Error so far"}</dt>
-            <dd>{isAborting ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
+            <dt>{aborting === "accepted" ? "Error" : "Error so far"}</dt>
+            <dd>{aborting === "accepted" ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
           </div>
           <div className={classes["reading"]}>
             <dt>Predicted error</dt>
@@ -66,8 +67,8 @@ export function FlyingCard({ campaign, trial, step }: Props) {
         </dl>
         {trial && (
           <Note fz="body" className="numbers">
-            Gains {Object.keys(trial.gains).join(", ")} {gainsInBrackets(trial.gains)}
-            {trial.read_back && ", read back from the vehicle"}.
+            <GainList gains={trial.gains} experiment={campaign.definition.experiment ?? ""} />
+            {trial.read_back && ", read back from the vehicle"}
           </Note>
         )}
         {registered && (
@@ -76,11 +77,7 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           </Button>
         )}
         {stage !== STAGED && (
-          <Note fz="body">
-            {status?.isCurrent === false
-              ? ABORT_WITHOUT_LINK
-              : "ABORT or Space ends the flight immediately: the safe gains are sent and the vehicle lands."}
-          </Note>
+          <Note fz="body">{abortText(aborting, state === "live" && worker, status?.isCurrent === false)}</Note>
         )}
       </Stack>
     </Panel>

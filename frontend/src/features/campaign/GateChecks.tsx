@@ -61,7 +61,7 @@ export function GateChecks({ gate, isCurrent = true }: GateChecksProps) {
 function Facts({ check }: { check: Check }) {
   const offered = Object.entries(check.offer ?? {}).map(([name, value]) => `${name} ${gainText(value)}`);
   const parts = [
-    check.case ? `simulated with ${check.case}` : "",
+    check.case && !check.sentence.includes(check.case) ? `simulated with ${check.case}` : "",
     offered.length > 0 ? `would pass: ${offered.join(", ")}` : "",
   ].filter((part) => part !== "");
   return parts.length === 0 ? null : <small className="numbers">{parts.join(" · ")}</small>;

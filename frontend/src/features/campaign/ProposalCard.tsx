@@ -1,11 +1,13 @@
-import { Button, Stack } from "@mantine/core";
+import { Anchor, Button, Stack } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import { IconPlaneDeparture } from "@tabler/icons-react";
+import { Link } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { type RecordUpload, useCreateTrial } from "../../api/mutations";
 import { offersOf } from "../../api/problems";
 import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
+import { useVehicles } from "../../api/vehicles";
 import { useConnection } from "../../live/store";
 import { flightsText } from "../../ui/format";
 import { sameHeld } from "../../ui/gains";
@@ -13,7 +15,7 @@ import { Note } from "../../ui/Note";
 import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useHasModel, useUnits } from "../../ui/units";
-import { isDoubtful, isRepeat, refusalOf, repeatSource, trialOf } from "./choices";
+import { groundedReason, isDoubtful, isRepeat, refusalOf, repeatSource, trialOf } from "./choices";
 import { FlightChoices } from "./FlightChoices";
 import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
@@ -66,7 +68,13 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   return (
     <Panel title={`Next: flight ${number}`}>
       <Stack gap={10} mod={{ compact: isCompact }} className={classes["proposal"] ?? ""}>
-        <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
+        <FlightChoices
+          proposal={proposal}
+          chosen={chosen.name}
+          isRefused={isRefused}
+          disabled={isReadOnly}
+          onChoose={chosen.choose}
+        />
         {!isReasonLater && reason}
         <GainTable
           rows={chosen.rows}
@@ -86,6 +94,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             predicted={chosen.predicted}
             isCurrent={chosen.isPredicted}
             best={isBestAgain ? null : (reference?.mean ?? null)}
+            bestTitle={isBestOutside ? "the best in bounds" : "the best"}
             source={repeatSource(chosen.name, group)}
             unit={units.error}
             hasModel={hasModel}
@@ -99,9 +108,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           error={chosen.error}
           labels={chosen.entry ? Object.fromEntries(chosen.rows.map(({ name }) => [name, name])) : {}}
         />
-        {isRefused && chosen.gate !== null && chosen.choice === undefined && (
-          <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />
-        )}
+        {isRefused && chosen.gate !== null && <Refusal chosen={chosen} problem={refusalOf(chosen.gate)} />}
         <FlightButtons
           campaign={campaign}
           proposal={proposal}
@@ -121,9 +128,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
               gains={proposal.gains}
             />
           )}
-          {isEvaluated && (chosen.choice !== undefined || !isRefused) && (
-            <GateChecks gate={chosen.gate} isCurrent={chosen.isChecked} />
-          )}
+          {isEvaluated && !isRefused && <GateChecks gate={chosen.gate} isCurrent={chosen.isChecked} />}
         </div>
         {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
       </Stack>
@@ -139,10 +144,10 @@ function PriorScatter({ campaignId }: { campaignId: number }) {
 }
 
 function Refusal({ chosen, problem }: { chosen: ChosenFlight; problem: ReturnType<typeof refusalOf> }) {
-  const names = chosen.rows.map(({ name }) => name);
+  const names = chosen.entry === undefined ? [] : chosen.rows.map(({ name }) => name);
   return (
     <GateRefusal
-      problem={problem}
+      problem={chosen.entry === undefined ? { ...problem, hint: "Select custom gains to fly others." } : problem}
       offers={names.flatMap((name) => offersOf(problem).filter(([gain]) => gain === name))}
       onUse={(offers) => chosen.use(Object.fromEntries(offers))}
     />
@@ -163,7 +168,8 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   const [speed, setSpeed] = useSpeed();
   const create = useCreateTrial(campaign);
   const { worker } = useConnection();
-  const { can_fly, is_real, needs_staging, registered } = campaign.vehicle;
+  const { can_fly, id, is_real, needs_staging, registered } = campaign.vehicle;
+  const grounded = groundedReason(useVehicles().data?.find((one) => one.id === id));
   const { gains, gate, isChecked, isPredicted } = chosen;
   const isReady = gains !== null && isChecked && isPredicted && gate?.passed === true;
   const trial = trialOf(proposal, chosen.choice, gains ?? {});
@@ -177,7 +183,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
       variant={isMain && isAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
       loading={create.isPending}
-      disabled={!isReady || !worker}
+      disabled={!isReady || !worker || (isMain && grounded !== "")}
       onClick={onClick}
     >
       {label}
@@ -197,6 +203,14 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   }
   return (
     <>
+      {grounded !== "" && (
+        <Note fz="body">
+          {grounded}{" "}
+          <Anchor component={Link} to={`/vehicles/${id}`}>
+            Open vehicle
+          </Anchor>
+        </Note>
+      )}
       {!needs_staging &&
         button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
       {registered ? (

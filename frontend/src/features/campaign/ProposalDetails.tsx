@@ -16,6 +16,8 @@ interface PredictedErrorProps {
   isCurrent: boolean;
   /** Mean error of the best gains; null if nothing is to be compared with it. */
   best: number | null;
+  /** Whose error that is. */
+  bestTitle: string;
   /** What the prediction is, if it is no model's. */
   source: string;
   unit: string;
@@ -25,11 +27,13 @@ interface PredictedErrorProps {
 
 function unpredicted(best: number | null, hasModel: boolean): string {
   if (!hasModel) return "No predicted error: Gainline has no model of this controller.";
-  return best === null ? "No predicted error before the first valid flight." : "No prediction for these gains.";
+  return best === null
+    ? "No predicted error: before the first valid flight, the model is too uncertain for these gains."
+    : "No prediction for these gains.";
 }
 
 /** Predicted error with its interval; grey while it belongs to other gains. */
-export function PredictedError({ predicted, isCurrent, best, source, unit, hasModel }: PredictedErrorProps) {
+export function PredictedError({ predicted, isCurrent, best, bestTitle, source, unit, hasModel }: PredictedErrorProps) {
   const { predicted_error: error = null, interval = null } = predicted ?? {};
   const change = percentChange(error, best);
   if (error === null && isCurrent) return <Note fz="body">{unpredicted(best, hasModel)}</Note>;
@@ -48,7 +52,7 @@ export function PredictedError({ predicted, isCurrent, best, source, unit, hasMo
           </small>
         )}
         {isCurrent && source && <small>{source}</small>}
-        {change !== null && <small>{against(change, "the best")}</small>}
+        {change !== null && <small>{against(change, bestTitle)}</small>}
       </span>
     </div>
   );

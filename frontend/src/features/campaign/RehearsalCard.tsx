@@ -52,7 +52,12 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
   );
 }
 
-const WRAPPED = { h: "auto", mih: 56, py: 8, styles: { label: { whiteSpace: "normal" } } } as const;
+const WRAPPED = {
+  h: "auto",
+  mih: 56,
+  py: 8,
+  styles: { root: { display: "grid", placeItems: "center" }, label: { whiteSpace: "normal" } },
+} as const;
 
 const STANDING: Partial<Record<Campaign["rehearsal"]["state"], string>> = {
   missing: "Not passed yet:",
@@ -67,7 +72,7 @@ export function RehearsalNote({ real }: { real: Campaign }) {
     return (
       <Panel title="Rehearsal passed">
         <Button component={Link} to={`/campaigns/${real.id}`} fullWidth size="lg" {...WRAPPED}>
-          Open {name}
+          Open {real.name}
         </Button>
       </Panel>
     );

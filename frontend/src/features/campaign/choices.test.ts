@@ -83,7 +83,7 @@ test.each([
   [4, 4, "same"],
   [0, 12, "+12"],
   [-2, 1, "+3"],
-  [0.5, 0.25, "×0.5"],
+  [0.5, 0.25, "÷2"],
   [2, 0, "−2"],
 ])("the change from %d to %d is %s", (now, then, text) => {
   expect(changeText(now, then)).toBe(text);

@@ -2,7 +2,7 @@
 
 import type { GainSet } from "../../api/evaluation";
 import type { Problem } from "../../api/problems";
-import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal, RepeatGroup } from "../../api/types";
+import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal, RepeatGroup, Vehicle } from "../../api/types";
 import { flightsText, gainText, readNumber } from "../../ui/format";
 
 type FlownGains = Pick<RepeatGroup, "trial_numbers">;
@@ -80,12 +80,12 @@ export function gainRows(
   });
 }
 
-/** `×1.27`, `÷76.3` below a tenth; the difference where a factor says nothing. */
+/** `×1.27`, `÷76.3`; the difference where a factor says nothing. */
 export function changeText(now: number, next: number): string {
   if (now === next) return "same";
-  const factor = Number((next / now).toPrecision(3));
-  if (factor > 0 && factor < 0.1) return `÷${Number((now / next).toPrecision(3))}`;
-  if (factor > 0 && Number.isFinite(factor) && factor !== 1) return `×${factor}`;
+  const factor = next / now;
+  const rounded = Number((factor < 1 ? now / next : factor).toPrecision(3));
+  if (factor > 0 && Number.isFinite(factor) && rounded !== 1) return `${factor < 1 ? "÷" : "×"}${rounded}`;
   return `${next > now ? "+" : "−"}${gainText(Math.abs(next - now))}`;
 }
 
@@ -121,6 +121,12 @@ export function readGains(
   const reasons = Object.fromEntries(readings.flatMap(([name, { reason }]) => (reason ? [[name, reason]] : [])));
   const isRead = Object.keys(reasons).length === 0;
   return { values, reasons, gains: isRead ? (values as Record<string, number>) : null };
+}
+
+/** Why the campaign's vehicle cannot fly now, whatever the gains; empty if it can. */
+export function groundedReason(vehicle: Pick<Vehicle, "name" | "state" | "registered"> | undefined): string {
+  if (vehicle?.state === "quarantined") return `${vehicle.name} is quarantined.`;
+  return vehicle?.registered && vehicle.state === "disconnected" ? `${vehicle.name} is not connected.` : "";
 }
 
 /** The gate's refusal in the form of a refused request. */

@@ -89,7 +89,6 @@ export function runColumns(
       value: ({ error }) => error,
       cell: ({ error }) => withUnit(error, unit),
     },
-    ...measures,
     {
       id: "predicted",
       title: "Predicted",
@@ -104,6 +103,7 @@ export function runColumns(
       value: ({ state }) => trialStateLabel(state).word,
       cell: (trial) => <State trial={trial} />,
     },
+    ...measures,
     {
       id: "flown",
       title: "Flown",

@@ -211,7 +211,7 @@ export function promotable(
   if (verdict === null)
     return {
       possible: false,
-      why: "The best gains so far are the first flight's, so there is nothing to set. Fly other gains first.",
+      why: "The best gains so far are the first flight's. Only gains that are shown to be better than these can become the safe gains: fly others first.",
     };
   return {
     possible: false,

@@ -90,7 +90,7 @@ function NotConnected({ vehicle }: { vehicle: Vehicle }) {
           uses this address: disconnect it first.
         </p>
       )}
-      {failure && <p className={classes["bad"]}>The last request failed. {failure}</p>}
+      {failure && other === null && <p className={classes["bad"]}>The last request failed. {failure}</p>}
       <Note>
         {isWanted ? `Connecting${failure ? "" : ": no vehicle has answered yet"}. ` : "Not connected. "}
         {vehicle.identity === null

@@ -23,6 +23,7 @@ import {
   type VehicleForm,
   vehicleRequest,
   withAutopilot,
+  withSimulation,
 } from "./fleet";
 import { AddressField, FurtherFields, furtherLabels, NameField, PLAIN_LABELS } from "./VehicleFields";
 
@@ -100,7 +101,7 @@ function NewVehicleForm({ catalogue }: { catalogue: Catalogue }) {
           label={LABELS["options.simulated"]}
           checked={simulated}
           error={reasons["options.simulated"]}
-          onChange={(event) => setOption("simulated", event.currentTarget.checked)}
+          onChange={(event) => setForm(withSimulation(form, event.currentTarget.checked))}
         />
       </div>
       <GainFields

@@ -113,7 +113,7 @@ interface FormProps {
   onDone: () => void;
 }
 
-const DECIDED_BY = "Decided by, and based on which flights";
+const DECIDED_BY = "Decided by, and why";
 
 function SafeGainsForm({ vehicle, entered, onDone }: FormProps) {
   const [gains, setGains] = useState<Record<string, NumberEntry>>({ ...vehicle.safe_gains, ...entered });

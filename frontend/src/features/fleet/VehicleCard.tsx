@@ -36,7 +36,10 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
           {isLinked && <Fact title="Link" value={linkText(status)} />}
           {isLinked && <Fact title="Battery" value={withUnit(status?.status.batteryV, "V", 1)} />}
           {vehicle.registered && (isKnown || isLinked) && (
-            <Fact title="Current gains" value={isKnown ? gainsInBrackets(held, names) : "not read"} />
+            <Fact
+              title={isLinked ? "Current gains" : "Gains, last read"}
+              value={isKnown ? gainsInBrackets(held, names) : "not read"}
+            />
           )}
           <Fact title={`Safe ${names.join(", ")}`} value={gainsInBrackets(vehicle.safe_gains)} />
           {vehicle.registered && <Fact title="In control" value={vehicle.control?.operator ?? "no operator"} />}

@@ -30,7 +30,7 @@ export function AddressField({ value, error, onChange }: FieldProps<OptionValue 
   return (
     <TextInput
       label={PLAIN_LABELS["options.address"]}
-      description="udp:HOST:PORT@LOCALPORT, udpin:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD"
+      description="udp:HOST:PORT@LOCALPORT (the vehicle sends to LOCALPORT of this computer), udpin:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD"
       inputWrapperOrder={["label", "input", "description", "error"]}
       value={String(value ?? "")}
       error={error}
@@ -54,7 +54,7 @@ export function FurtherFields({ catalogue, options, reasons, onChange }: Further
   return (
     <FoldedSection title="Advanced: identity, limits, motion capture, signing" forcedOpen={refused}>
       <div className={classes["pair"]}>
-        {furtherOptions(catalogue).map((option) => (
+        {furtherOptions(catalogue, String(options["autopilot"] ?? "")).map((option) => (
           <OptionField
             key={option.name}
             option={option}

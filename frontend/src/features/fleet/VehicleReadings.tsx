@@ -11,14 +11,23 @@ import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
 import { parametersOf } from "./fleet";
 
-/** All items of the last preflight check. */
-export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicle }) {
+/** After this, what was found then says nothing of the vehicle. */
+const OUTDATED: Partial<Record<Vehicle["state"], string>> = {
+  quarantined: ", before the quarantine: outdated",
+  disconnected: ", before the vehicle was disconnected: outdated",
+};
+
+/** All items of the last preflight check; outdated ones are grey. */
+export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle: Vehicle }) {
   if (checks === null) {
     return <Note>Not checked yet. All items are checked again before every flight.</Note>;
   }
   return (
     <>
-      <div className={table["scroll"]}>
+      <div
+        className={table["scroll"]}
+        style={state in OUTDATED ? { filter: "grayscale(1)", opacity: 0.75 } : undefined}
+      >
         <table className={`${table["table"]} ${classes["table"]}`}>
           <thead>
             <tr>
@@ -55,7 +64,8 @@ export function CheckList({ vehicle: { checks, checked_at } }: { vehicle: Vehicl
         </table>
       </div>
       <Note>
-        Checked <Time at={checked_at} />.
+        Checked <Time at={checked_at} />
+        {OUTDATED[state] ?? ""}.
       </Note>
     </>
   );

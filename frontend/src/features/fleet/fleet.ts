@@ -36,6 +36,7 @@ export const ACTS: Record<ActKind, string> = {
   land: "Land",
   "motors off": "Motors off",
   "safe gains": "Set safe gains",
+  settings: "Change settings",
   control: "Take over control",
   stage: "Stage",
   "take-off": "Take off",
@@ -116,6 +117,16 @@ export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot
   };
 }
 
+const SIMULATED_ADDRESS = "udp:127.0.0.1:4245@4244";
+
+/** Register a simulation or a real vehicle: updates an unedited address. */
+export function withSimulation(form: VehicleForm, simulated: boolean): VehicleForm {
+  const [from, to] = [ADDRESSES["paparazzi"], SIMULATED_ADDRESS];
+  const [usual, wanted] = simulated ? [from, to] : [to, from];
+  const address = form.options["address"] === usual ? (wanted ?? "") : (form.options["address"] ?? "");
+  return { ...form, options: { ...form.options, simulated, address } };
+}
+
 /** The local port that an address needs for itself; the whole address if it names none. */
 function portOf(vehicle: Pick<Vehicle, "options">): string {
   const address = String(vehicle.options["address"] ?? "");
@@ -130,16 +141,24 @@ export function vehicleAtSameAddress(vehicle: Vehicle, all: readonly Vehicle[]):
   return others.find((other) => portOf(other) === portOf(vehicle)) ?? null;
 }
 
-/** Why the last request to connect has failed; empty if it has not, or is not the newest one. */
+/** Why the last request to connect has failed; empty if it has not, or the settings were changed since. */
 export function connectFailure(acts: readonly VehicleAct[]): string {
-  const newest = acts.find(({ kind }) => kind === "connect" || kind === "disconnect");
+  const newest = acts.find(({ kind }) => kind === "connect" || kind === "disconnect" || kind === "settings");
   return newest?.kind === "connect" ? newest.problem : "";
 }
 
-/** Options of the collapsed section. */
-export function furtherOptions(catalogue: Catalogue): OptionInfo[] {
+/** Beginnings of the titles of options that an autopilot does not have. */
+const OTHERS: Readonly<Record<string, readonly string[]>> = {
+  paparazzi: ["ArduCopter, PX4:"],
+  ardupilot: ["Paparazzi:", "Paparazzi's"],
+  px4: ["Paparazzi:", "Paparazzi's"],
+};
+
+/** Options of the collapsed section; those of this autopilot alone, if one is given. */
+export function furtherOptions(catalogue: Catalogue, autopilot = ""): OptionInfo[] {
   const options = catalogue.vehicle_kinds.find(({ name }) => name === KIND)?.options ?? [];
-  return options.filter(({ name }) => !PLAIN.has(name));
+  const others = OTHERS[autopilot] ?? [];
+  return options.filter(({ name, title }) => !PLAIN.has(name) && !others.some((start) => title.startsWith(start)));
 }
 
 export function isSimulated(form: VehicleForm): boolean {

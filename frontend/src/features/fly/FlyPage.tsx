@@ -3,7 +3,7 @@ import { IconAlertOctagonFilled, IconChevronLeft } from "@tabler/icons-react";
 import { useCallback, useMemo, useRef } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
-import { useCampaign, useCampaignFigure, useTrial } from "../../api/queries";
+import { useCampaign, useCampaignFigure, useCatalogue, useTrial } from "../../api/queries";
 import type { Campaign, Trial, Vehicle } from "../../api/types";
 import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicle } from "../../api/vehicles";
@@ -18,6 +18,7 @@ import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ReadOnlyNotice } from "../../ui/Notices";
 import { useGainTitles, useUnits } from "../../ui/units";
 import { useTitle } from "../../ui/useTitle";
+import { windowOf } from "../campaign/definition";
 import { CommandResult, LandNow, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
 import { type FlyStep, flyStateLabel, flyStep, gainsShown, hasLanded, isAbortStep, isAirborneStep } from "./flyScreen";
@@ -65,6 +66,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const experiment = campaign.definition.experiment ?? "takeoff";
   const unit = useUnits(experiment).error;
   const titles = useGainTitles(experiment);
+  const windowS = windowOf(campaign.definition, useCatalogue().data);
   const { figure, summary } = useTakeoffs(campaign, trial);
   const step = flyStep(trial, live?.phase ?? null);
   const concern = status?.status.concern || vehicle?.concern || "";
@@ -108,7 +110,12 @@ function Screen({ campaign, trial, vehicle }: Props) {
         <p className="visually-hidden" role="status">
           Flight {trial.number}: {word}
         </p>
-        {readiness !== null && <ReadinessStepper readiness={readiness} />}
+        {readiness !== null && (
+          <ReadinessStepper
+            readiness={readiness}
+            needsOperator={vehicle !== null && (vehicle.is_real || vehicle.control !== null)}
+          />
+        )}
         {vehicle === null && <VehicleBadge isReal={campaign.vehicle.is_real} title={campaign.vehicle.title} />}
       </div>
       <div className={classes["watch"]}>
@@ -120,6 +127,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           vehicle={vehicle}
           isFlying={isFlying}
           isAborted={isAborted}
+          windowS={windowS}
           endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}
         />
         <div className={classes["chart"]}>

@@ -25,11 +25,20 @@ function standingOf(step: ReadinessStep, { steps, lost }: Readiness): keyof type
   return lost.includes(step) ? "lost" : "open";
 }
 
+/** Steps of an operator, which a simulation does not need. */
+const OPERATORS: ReadonlySet<ReadinessStep> = new Set(["control", "held"]);
+
+interface Props {
+  readiness: Readiness;
+  /** Whether an operator must be in control, and hold the button to fly. */
+  needsOperator: boolean;
+}
+
 /** How far a flight has come, and what was taken back. */
-export function ReadinessStepper({ readiness }: { readiness: Readiness }) {
+export function ReadinessStepper({ readiness, needsOperator }: Props) {
   return (
     <ol className={classes["stepper"]} aria-label="Readiness">
-      {STEPS.map((step) => {
+      {STEPS.filter((step) => needsOperator || !OPERATORS.has(step)).map((step) => {
         const standing = standingOf(step, readiness);
         const { Icon, word } = STANDINGS[standing];
         return (

@@ -24,6 +24,8 @@ interface Props {
   isAborted: boolean;
   /** Planned length of the record, s; null if unknown. */
   endS: number | null;
+  /** Scored window, s; null if unknown. */
+  windowS: number | null;
 }
 
 interface ReadingProps {
@@ -66,7 +68,7 @@ function useLastKnown(value: number | null | undefined): number | null | undefin
 }
 
 /** Large readings: altitude and error, then the rest. Stale readings are grey. */
-export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAborted, endS }: Props) {
+export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAborted, endS, windowS }: Props) {
   const hasLink = vehicle !== null;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const linked = status?.status;
@@ -81,7 +83,9 @@ export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAbort
   const lastOutput = useLastKnown(output);
   const isScored = isFlying && !isAborted;
   const error = isFlying ? live?.errorSoFar : trial.error;
-  const predicted = trial.predicted_error === null ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
+  // The error so far is no mean over the scored window yet, as the predicted one is.
+  const predicted =
+    trial.predicted_error === null || isScored ? "" : ` · predicted ${withUnit(trial.predicted_error, unit)}`;
   return (
     <div className={`${classes["readouts"]} numbers`}>
       <dl className={classes["row"]}>
@@ -121,7 +125,7 @@ export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAbort
         {!isFlying && (
           <Reading
             title={trial.record === null ? "Scored window" : "Record length"}
-            value={recordLength(trial, endS)}
+            value={recordLength(trial, windowS)}
           />
         )}
       </dl>
@@ -129,10 +133,10 @@ export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAbort
   );
 }
 
-/** Length of the record; before the flight the planned one. */
+/** Length of the record; before the flight that of its scored window. */
 function recordLength({ flown_at, record }: Trial, plannedS: number | null): string {
   if (record !== null) return withUnit(record.duration_s, "s", 1);
-  return flown_at === null ? withUnit(plannedS, "s", 0) : NOTHING;
+  return flown_at === null ? withUnit(plannedS, "s", 1) : NOTHING;
 }
 
 interface HeldGainsProps {

@@ -6,10 +6,11 @@ import { useFlyTrial } from "../../api/mutations";
 import { useTrials } from "../../api/queries";
 import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
-import { ABORT_LABELS, ABORT_WITHOUT_LINK, type AbortControl, type AbortStage, abortStage } from "../../live/flights";
+import { ABORT_LABELS, type AbortControl, abortStage, abortText } from "../../live/flights";
 import { useConnection, useVehicleStatus } from "../../live/store";
 import { StateBadge } from "../../ui/Badges";
 import { asSentence } from "../../ui/format";
+import { sameHeld } from "../../ui/gains";
 import { HoldButton } from "../../ui/HoldButton";
 import { ErrorNotice } from "../../ui/Notices";
 import { trialStateLabel } from "../../ui/states";
@@ -75,13 +76,15 @@ export function LinkedSteps({
 /** Whether the vehicle was left with its safe gains. */
 function SafeGainsResult({ trial, vehicle }: { trial: Trial; vehicle: Vehicle }) {
   const { flight, flown_at } = trial;
+  const status = useVehicleStatus(vehicle.id);
   if (flight === null || flown_at === null) return null;
   if (flight.safe_gains_restored === true)
     return <p className={classes["quiet"]}>Safe gains restored and read back.</p>;
-  if (areReadBackSince(trial, vehicle)) {
+  const areReported = status?.isCurrent === true && sameHeld(status.status.held, vehicle.safe_gains);
+  if (areReported || areReadBackSince(trial, vehicle)) {
     return (
       <p className={classes["quiet"]}>
-        The safe gains were not confirmed at the end of the flight. They have been read back since.
+        The safe gains were not confirmed at the end of the flight. The vehicle has reported them since.
       </p>
     );
   }
@@ -234,19 +237,6 @@ function TakeOff({ trial, vehicle, isReady }: { trial: Trial; vehicle: Vehicle; 
       <ErrorNotice error={takeOff.error ?? unstage.error} />
     </Stack>
   );
-}
-
-const ABORT_SAYS: Record<AbortStage, string> = {
-  none: "Ends the flight immediately: sends safe gains and Land until the vehicle confirms.",
-  sending: "Sending the abort to the worker.",
-  "not confirmed": "The abort is not confirmed. It is sent again until the worker confirms it.",
-  accepted: "Sending safe gains and Land until the vehicle confirms.",
-};
-
-function abortText(stage: AbortStage, isReached: boolean, isLinkLost: boolean): string {
-  if (isReached && isLinkLost && (stage === "none" || stage === "accepted")) return ABORT_WITHOUT_LINK;
-  if (stage !== "accepted" || isReached) return ABORT_SAYS[stage];
-  return "The worker has confirmed the abort, but cannot be reached now.";
 }
 
 interface AbortProps {
