@@ -11,7 +11,7 @@ export interface StateLabel {
 
 const CAMPAIGN: Record<CampaignState, StateLabel> = {
   draft: { word: "Preparing", tone: "busy" },
-  ready: { word: "Ready to fly", tone: "quiet" },
+  ready: { word: "Not flown yet", tone: "quiet" },
   flying: { word: "In flight", tone: "busy" },
   deciding: { word: "Between flights", tone: "quiet" },
   finished: { word: "Finished", tone: "good" },

@@ -11,10 +11,14 @@ import { useGainTitles, useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import { FlightProblem } from "./FlightProblem";
 import { FlightWindow } from "./FlightWindow";
+import { GroundedNote, useGroundedReason } from "./GroundedNote";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
 import { speedOf, watched } from "./nextStep";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
+
+/** Letters of a gain's name, above which it needs a wider tile. */
+const LONG = 8;
 
 interface Props {
   campaign: Campaign;
@@ -30,11 +34,13 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
   const titles = useGainTitles(experiment);
   const fly = useFlyTrial(campaign);
   const cancel = useCancelTrial();
-  const { can_fly, needs_staging, registered } = campaign.vehicle;
+  const { can_fly, id, needs_staging, registered } = campaign.vehicle;
+  const isLong = Object.keys(trial.gains).some((name) => name.length > LONG);
+  const isGrounded = useGroundedReason(id) !== "";
   return (
     <Panel title={`Flight ${trial.number} is planned`} tools={<FlightMarkers trial={trial} />}>
       <Stack gap={14}>
-        <dl className={`${classes["big"]} numbers`}>
+        <dl className={`${classes["big"]} numbers`} data-long={isLong || undefined}>
           {Object.entries(trial.gains).map(([name, value]) => (
             <div key={name} className={classes["reading"]}>
               <dt>
@@ -57,12 +63,13 @@ export function PlannedCard({ campaign, trial, upload }: Props) {
         <FlightProblem flight={trial.flight} />
         {can_fly ? (
           <>
+            <GroundedNote vehicleId={id} />
             {!needs_staging && (
               <Button
                 size="lg"
                 leftSection={<IconPlaneDeparture size={22} aria-hidden />}
                 loading={fly.isPending}
-                disabled={!trial.actions.includes("fly")}
+                disabled={!trial.actions.includes("fly") || isGrounded}
                 onClick={() => watched(fly.mutateAsync({ trialId: trial.id, speed: speedOf(speed) }))}
               >
                 Fly flight {trial.number}

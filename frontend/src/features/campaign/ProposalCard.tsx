@@ -1,13 +1,11 @@
-import { Anchor, Button, Stack } from "@mantine/core";
+import { Button, Stack } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import { IconPlaneDeparture } from "@tabler/icons-react";
-import { Link } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
 import { type RecordUpload, useCreateTrial } from "../../api/mutations";
 import { offersOf } from "../../api/problems";
 import { useStatistics } from "../../api/queries";
 import type { Campaign, Proposal, Trial } from "../../api/types";
-import { useVehicles } from "../../api/vehicles";
 import { useConnection } from "../../live/store";
 import { flightsText } from "../../ui/format";
 import { sameHeld } from "../../ui/gains";
@@ -15,11 +13,12 @@ import { Note } from "../../ui/Note";
 import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useHasModel, useUnits } from "../../ui/units";
-import { groundedReason, isDoubtful, isRepeat, refusalOf, repeatSource, trialOf } from "./choices";
+import { isDoubtful, isRepeat, refusalOf, repeatSource, trialOf } from "./choices";
 import { FlightChoices } from "./FlightChoices";
 import { FlightWindow } from "./FlightWindow";
 import { GainTable } from "./GainTable";
 import { GateChecks, GateRefusal } from "./GateChecks";
+import { GroundedNote, useGroundedReason } from "./GroundedNote";
 import { ImportRecord } from "./ImportRecord";
 import classes from "./NextFlight.module.css";
 import { speedOf, watched } from "./nextStep";
@@ -169,7 +168,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   const create = useCreateTrial(campaign);
   const { worker } = useConnection();
   const { can_fly, id, is_real, needs_staging, registered } = campaign.vehicle;
-  const grounded = groundedReason(useVehicles().data?.find((one) => one.id === id));
+  const isGrounded = useGroundedReason(id) !== "";
   const { gains, gate, isChecked, isPredicted } = chosen;
   const isReady = gains !== null && isChecked && isPredicted && gate?.passed === true;
   const trial = trialOf(proposal, chosen.choice, gains ?? {});
@@ -183,7 +182,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
       variant={isMain && isAdvised ? "filled" : "default"}
       leftSection={<IconPlaneDeparture size={22} aria-hidden />}
       loading={create.isPending}
-      disabled={!isReady || !worker || (isMain && grounded !== "")}
+      disabled={!isReady || !worker || (isMain && isGrounded)}
       onClick={onClick}
     >
       {label}
@@ -203,14 +202,7 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   }
   return (
     <>
-      {grounded !== "" && (
-        <Note fz="body">
-          {grounded}{" "}
-          <Anchor component={Link} to={`/vehicles/${id}`}>
-            Open vehicle
-          </Anchor>
-        </Note>
-      )}
+      <GroundedNote vehicleId={id} />
       {!needs_staging &&
         button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
       {registered ? (
