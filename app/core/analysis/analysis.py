@@ -195,8 +195,12 @@ def rules(flight: LoggedFlight) -> dict[str, dict[str, float]]:
     return {
         "ArduCopter's default gains": _with_names((1.0, 5.0, 0.5, 1.0)),
         f"P = {'0.1 ' if flight.has_newer_names else ''}hover throttle, I = 2 P": by_hover,
-        **{f"Fixed set {', '.join(f'{value:g}' for value in flight.named(gains).values())}": gains for gains in fixed},
+        **{f"For comparison: {_in_order(flight.named(gains))}": gains for gains in fixed},
     }
+
+
+def _in_order(gains: Mapping[str, float]) -> str:
+    return ", ".join(f"{value:g}" for value in gains.values())
 
 
 def _with_names(values: Sequence[float]) -> dict[str, float]:

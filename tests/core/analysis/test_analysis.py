@@ -170,7 +170,7 @@ def test_among_gains_that_deviate_alike_those_with_more_margin_are_proposed() ->
     """On the binary's vehicle 3, 8, 0.85, 3 has the least deviation, at a margin of 2.0; 3, 8, 0.5, 3 deviates 0.1 mm
     more."""
     found = analyze(recorded_steps())
-    stiff = next(each for each in found.assessments if each.name == "Fixed set 3, 8, 0.5, 3")
+    stiff = next(each for each in found.assessments if each.name == "For comparison: 3, 8, 0.5, 3")
     assert found.proposed is not None
     assert found.proposed.prediction.error_m < 1.05 * stiff.prediction.error_m
     assert found.proposed.margin >= stiff.margin > 3.0

@@ -160,6 +160,7 @@ function Against({ pair, first, unit }: { pair: FlightPair | null; first: string
       {difference !== null && (
         <small className={classes["small"]}>
           {plusMinus(Math.abs(difference), standard_error, unit)} {difference < 0 ? "lower" : "higher"}
+          {basis === "repeats" && ", these two flights"}
         </small>
       )}
       {confidence !== null && (
