@@ -190,8 +190,8 @@ def _why_apart(side: ComparisonFlight, against: ComparisonFlight) -> tuple[str, 
 def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) -> FlightPair:
     """Compare two flights of the same gains in one campaign: whether anything has changed between them."""
     errors = dict(zip(group.numbers, group.errors, strict=True))
-    numbers = (against.row.number, side.row.number)
-    found = drift_of([Group(group.gains, numbers, (errors[numbers[0]], errors[numbers[1]]))], side.scatter)
+    earlier, later = sorted((against.row.number, side.row.number))
+    found = drift_of([Group(group.gains, (earlier, later), (errors[earlier], errors[later]))], side.scatter)
     assert found is not None
     amount = measured(abs(found.difference), found.standard_error, side.experiment.error_unit)
     relation = (
@@ -206,7 +206,7 @@ def _repeats(side: ComparisonFlight, against: ComparisonFlight, group: Group) ->
         against,
         "repeats",
         sentence,
-        difference=found.difference,
+        difference=found.difference if side.row.number == later else -found.difference,
         standard_error=found.standard_error,
         confidence=found.confidence,
     )

@@ -97,13 +97,13 @@ class ErrorsFigure:
         return {"yaxis2": strip}
 
     def _span(self) -> RobustRange:
-        """Range up to the first flight's error, every other one that is no outlier, and the next flight's interval."""
+        """Range up to the first flight's error, every other one that is no outlier, and what was or is predicted."""
         errors = [flight.error for flight in self.history.flights if flight.error is not None]
         first = [flight.error for flight in self.history.valid[:1] if flight.error is not None]
-        proposal = self.history.proposal
-        expected = [] if proposal is None or proposal.interval is None else [proposal.interval.high]
+        expected = [interval.high for _, interval in self._expected()]
+        expected += [value for _, value in self._predictions()]
         high = max(first, default=min(errors))
-        return robust_range(errors, low=0.0, high=max([high, *(value for value in expected if value < 1.5 * high)]))
+        return robust_range(errors, low=0.0, high=max([high, *(value for value in expected if value < 2.0 * high)]))
 
     def _measured(self, palette: Palette) -> list[Trace]:
         flights, best = self.history.valid, self.history.best
@@ -316,12 +316,9 @@ class ErrorsFigure:
         ]
 
     def _predicted(self, palette: Palette, top: float) -> list[Trace]:
-        """The predicted error of each flight, or only the next one's if there are many; at the edge if it is higher."""
-        flights = () if self._is_crowded else self.history.flights
-        pairs = [(flight.number, flight.predicted_error) for flight in flights]
-        if self.history.proposal is not None:
-            pairs.append((self.history.proposal.number, self.history.proposal.predicted_error))
-        known = [(number, round(value, 6)) for number, value in pairs if value is not None]
+        """The predicted error of each flight, or only the next one's if there are many: a diamond, or where it is off
+        the scale, a triangle at the edge."""
+        known = self._predictions()
         if not known and self.history.proposal is None:
             return []
         return [
@@ -333,11 +330,24 @@ class ErrorsFigure:
                 visible=bool(known),
                 mode="markers",
                 text=[f"{value:.4f}" for _, value in known],
-                marker={"size": 13, "symbol": "diamond-open", "color": palette.prediction, "line": {"width": 1.75}},
+                marker={
+                    "size": 13,
+                    "symbol": ["triangle-up-open" if value > top else "diamond-open" for _, value in known],
+                    "color": palette.prediction,
+                    "line": {"width": 1.75},
+                },
                 cliponaxis=False,
                 hovertemplate=f"<b>Flight %{{x}}, predicted</b><br>%{{text}} {self.history.error_unit}<extra></extra>",
             )
         ]
+
+    def _predictions(self) -> list[tuple[int, float]]:
+        """Predicted errors by the number of their flight."""
+        flights = () if self._is_crowded else self.history.flights
+        pairs = [(flight.number, flight.predicted_error) for flight in flights]
+        if self.history.proposal is not None:
+            pairs.append((self.history.proposal.number, self.history.proposal.predicted_error))
+        return [(number, round(value, 6)) for number, value in pairs if value is not None]
 
     def _summary(self) -> str:
         best, valid = self.history.best, self.history.valid

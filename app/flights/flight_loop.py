@@ -53,6 +53,9 @@ LOCK_TIMEOUT_S: Final = 10.0
 """How long a simulation waits for another process that still holds it, such as one that is landing it after its worker
 was killed."""
 MESSAGES_PER_S: Final = 25
+ROWS_PER_MESSAGE: Final = 500
+"""Limit of the samples in one message: a simulation at full speed computes a whole flight between two messages, which
+would be longer than a line of the live link may be."""
 
 
 class PipeClosedError(Exception):
@@ -288,7 +291,7 @@ def hold_vehicle_lock(
 
 
 class FlightMonitor:
-    """Collects one flight's samples and publishes them in at most 25 messages a second, with the error so far.
+    """Collects one flight's samples and publishes them in about 25 messages a second, with the error so far.
 
     The error so far is the trapezoidal mean of |set point − output| from the command to the newest sample (its integral
     where the experiment's error is one), within the time that the experiment scores. The flight's own error is computed
@@ -321,7 +324,7 @@ class FlightMonitor:
         self._columns = ["time_s", output, *others]
         self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
         now_s = self._clock.now_s()
-        if now_s >= self._due_s:
+        if now_s >= self._due_s or len(self._rows) >= ROWS_PER_MESSAGE:
             self._due_s = max(self._due_s + 1.0 / MESSAGES_PER_S, now_s)
             self.flush()
 

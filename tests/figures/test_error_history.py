@@ -38,7 +38,7 @@ def test_the_threshold_is_what_the_stop_rule_asks_of_the_next_flight() -> None:
 def test_predictions_of_flown_and_of_the_next_flight_are_open_diamonds() -> None:
     drawn = trace(ErrorsFigure(history(*TABLE_1, proposal=proposal(6))).compute(), "predicted")
     assert (drawn["x"], drawn["y"]) == ([1, 2, 6], [0.33, 0.2, 0.12])
-    assert drawn["marker"]["symbol"] == "diamond-open"
+    assert set(drawn["marker"]["symbol"]) == {"diamond-open"}
 
 
 def test_a_prediction_far_above_all_flights_is_drawn_at_the_edge_with_its_value() -> None:
@@ -46,6 +46,15 @@ def test_a_prediction_far_above_all_flights_is_drawn_at_the_edge_with_its_value(
     drawn = trace(card, "predicted")
     assert drawn["y"] == pytest.approx([layout(card)["yaxis"]["range"][1]], abs=1e-6)
     assert drawn["text"] == ["2.0000"]
+    assert drawn["marker"]["symbol"] == ["triangle-up-open"]
+
+
+def test_the_axis_covers_what_was_predicted_of_a_single_flight_that_was_better() -> None:
+    """Observed defect: the diamond of 0.1135 m stood at 0.107 m, the end of the axis."""
+    card = ErrorsFigure(history(flight(1, 0.1, predicted_error=0.115))).compute()
+    drawn = trace(card, "predicted")
+    assert drawn["y"] == [0.115]
+    assert layout(card)["yaxis"]["range"][1] > 0.115
     assert "%{text} m<" in drawn["hovertemplate"]
 
 

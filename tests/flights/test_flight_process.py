@@ -11,12 +11,14 @@ import pytest
 
 from app.common.data_folder import vehicle_lock
 from app.core.experiments import get_experiment
+from app.flights.flight_loop import FlightMonitor
 from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
-from app.live.messages import FlightPhase, Telemetry
+from app.live.messages import MAX_LINE_BYTES, FlightPhase, Telemetry, encode
 from app.processes.locks import exclusive
-from app.vehicles.base import FlightOptions, VehicleError
+from app.vehicles.base import FlightOptions, Sample, VehicleError
 from app.vehicles.registry import open_vehicle
+from tests.clocks import ManualClock
 
 GAINS: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 
@@ -90,6 +92,21 @@ def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(
     assert isinstance(landed, FlightLanded)
     # 50 Hz telemetry against the 512 Hz record
     assert last.error_so_far == pytest.approx(get_experiment("takeoff").error(landed.record.trajectory), abs=2e-4)
+
+
+def test_a_flight_computed_at_once_is_sent_in_messages_that_the_live_link_takes() -> None:
+    """Observed defect: a pitch flight at full speed came as one message, longer than a line of the link may be."""
+    heard: list[Telemetry] = []
+    monitor = FlightMonitor(
+        flight_of(), lambda said: heard.append(said) if isinstance(said, Telemetry) else None, ManualClock()
+    )
+    channels = {"altitude_m": 1.0 / 3.0, **{f"channel_{number}": 1.0 / 3.0 for number in range(10)}}
+    sent = [Sample(number / 500.0, channels) for number in range(4000)]
+    for sample in sent:
+        monitor.sample(sample)
+    monitor.flush()
+    assert [row[0] for said in heard for row in said.samples] == [sample.time_s for sample in sent]
+    assert max(len(encode(said)) for said in heard) < MAX_LINE_BYTES
 
 
 def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(

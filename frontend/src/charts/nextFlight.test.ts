@@ -13,7 +13,13 @@ const errors: PlotlyFigure = {
       y: [0.15, 0.25, null, 0.1, 0.14, null],
       text: ["a", "a", "a", "b", "b", "b"],
     },
-    { meta: { role: "predicted", next: 3 }, x: [2, 3], y: [0.2, 0.12], text: ["0.2000", "0.1200"] },
+    {
+      meta: { role: "predicted", next: 3 },
+      x: [2, 3],
+      y: [0.2, 0.12],
+      text: ["0.2000", "0.1200"],
+      marker: { size: 13, symbol: ["diamond-open", "diamond-open"] },
+    },
   ],
   layout: { yaxis: { range: [0, 0.35] } },
 };
@@ -28,7 +34,11 @@ test("the next flight has the predicted error of the gains that are chosen, with
   });
   expect(drawn.data[2]).toMatchObject({ x: [2, 3], y: [0.2, 0.3], text: ["0.2000", "0.3000"] });
   const high = withNextError(errors, { ...NOTHING, predictedError: 2 });
-  expect(high.data[2]).toMatchObject({ y: [0.2, 0.35], text: ["0.2000", "2.0000"] });
+  expect(high.data[2]).toMatchObject({
+    y: [0.2, 0.35],
+    text: ["0.2000", "2.0000"],
+    marker: { size: 13, symbol: ["diamond-open", "triangle-up-open"] },
+  });
 });
 
 test("gains without a prediction leave those of the flights that have flown", () => {

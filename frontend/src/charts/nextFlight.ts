@@ -12,6 +12,8 @@ export interface NextFlight {
 interface Points {
   y: (number | null)[];
   text: string[];
+  /** Markers, where each point has its own. */
+  symbols?: string[];
 }
 
 /** A bar, which ends with a gap, cut at the top of the axis. */
@@ -22,12 +24,23 @@ function bar(interval: NextFlight["interval"], top: number): Points {
   return { y: [Math.max(0, lower), Math.min(top, upper), null], text: [text, text, text] };
 }
 
+/** A diamond, or a triangle at the edge where the error is off the scale. */
 function diamond(error: number | null, top: number): Points {
-  return error === null ? { y: [], text: [] } : { y: [Math.min(top, error)], text: [error.toFixed(4)] };
+  if (error === null) return { y: [], text: [], symbols: [] };
+  return {
+    y: [Math.min(top, error)],
+    text: [error.toFixed(4)],
+    symbols: [error > top ? "triangle-up-open" : "diamond-open"],
+  };
 }
 
-function withLast(trace: Trace, number: number, { y, text }: Points): Trace {
-  const { x = [], y: values = [], text: texts = [] } = trace as Trace & { text?: unknown[] };
+function withLast(trace: Trace, number: number, { y, text, symbols }: Points): Trace {
+  const {
+    x = [],
+    y: values = [],
+    text: texts = [],
+    marker = {},
+  } = trace as Trace & { text?: unknown[]; marker?: { symbol?: string[] } };
   const place = x.indexOf(number);
   const kept = place < 0 ? x.length : place;
   const numbers = [...x.slice(0, kept), ...y.map((value) => (value === null ? null : number))];
@@ -36,6 +49,7 @@ function withLast(trace: Trace, number: number, { y, text }: Points): Trace {
     x: numbers,
     y: [...values.slice(0, kept), ...y],
     text: [...texts.slice(0, kept), ...text],
+    ...(symbols && { marker: { ...marker, symbol: [...(marker.symbol ?? []).slice(0, kept), ...symbols] } }),
     visible: numbers.length > 0,
   };
 }
