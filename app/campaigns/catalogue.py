@@ -53,6 +53,7 @@ class OptionInfo(Schema):
 
     name: str
     title: str
+    label: str = Field(default="", description="the title without the help for entering a value; empty if it has none")
     unit: str = ""
     default: OptionValue
     choices: list[OptionValue] = Field(default=[])

@@ -237,7 +237,12 @@ def _set_options(
             problems=(Problem("options", "would change whether the vehicle is real"),),
         )
     _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has other gains
-    changed = ", ".join(f"{name} {value}" for name, value in options.items() if value != settings_of(row)[name])
+    before = settings_of(row)
+    changed = "; ".join(
+        f"{option.label or option.title}: {options[option.name] or 'none'}{f' {option.unit}' if option.unit else ''}"
+        for option in kind.options
+        if options[option.name] != before[option.name]
+    )
     row.options, row.identity, row.checks, row.checked_at = options, None, None, None
     record_act(session, row, ActKind.SETTINGS, by=by, reason=changed)
 

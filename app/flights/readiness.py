@@ -26,6 +26,7 @@ LossKind = Literal[
     "link silent",
     "gains unknown",
     "battery low",
+    "checks failed",
     "quarantined",
     "control ended",
     "controlled by other",
@@ -82,6 +83,11 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             way_on="Insert a charged battery, then stage the flight again.",
             keeps="staged",
         ),
+        "checks failed": LossText(
+            what="A preflight check has failed.",
+            way_on="Correct what it names, then select Check now on the vehicle's page.",
+            keeps="staged",
+        ),
         "quarantined": LossText(
             what="The vehicle is quarantined.",
             way_on="Inspect it, then release it on its page.",
@@ -131,6 +137,8 @@ class Standing:
     command it; `is_controlled_by_other`: may not, because another operator is in control. `min_battery_v`: below it
     the vehicle does not take off. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe
     gains are being restored instead. `abort_cause_open`: nobody has stated yet why the flight was aborted.
+    `has_failed_checks`: at the last preflight check. `was_lost_in_flight`: the record ends before the landing, and
+    nothing was heard of the vehicle since.
     """
 
     trial: TrialState
@@ -142,6 +150,8 @@ class Standing:
     take_off_requested: bool = False
     standing_down: bool = False
     abort_cause_open: bool = False
+    has_failed_checks: bool = False
+    was_lost_in_flight: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,8 +187,8 @@ def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
     elif standing.trial is TrialState.ABORTED and standing.abort_cause_open:
         reached = "landed"
     steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
-    if standing.trial is TrialState.LOST:  # whether it has landed is not known
-        return Readiness(steps=steps[:-1], lost=steps[-1:], losses=())
+    if standing.trial is TrialState.LOST or standing.was_lost_in_flight:  # whether it has landed is not known
+        return Readiness(steps=STEPS[: _IN_FLIGHT + 1], lost=("landed",), losses=())
     if len(steps) > _IN_FLIGHT + 1 or not steps:
         return Readiness(steps=steps, lost=(), losses=())
     kinds = _losses(standing, report)
@@ -206,6 +216,8 @@ def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
         found.append(link)
     elif link is None and _is_battery_low(standing, report):
         found.append("battery low")
+    if standing.has_failed_checks and link is None and not is_quarantined:
+        found.append("checks failed")
     if is_quarantined:
         found.append("quarantined")
     if not standing.has_control and standing.trial is not TrialState.PLANNED:

@@ -166,8 +166,15 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         take_off_requested=active is not None and active.take_off_at is not None,
         standing_down=active is not None and bool(active.stand_down),
         abort_cause_open=row.abort_cause == "operator",
+        has_failed_checks=any(not check["passed"] for check in vehicle.checks or ()),
+        was_lost_in_flight=_was_lost_in_flight(row, flight),
     )
     return readiness_of(standing, report_of(vehicle.id))
+
+
+def _was_lost_in_flight(row: TrialRow, flight: FlightRow | None) -> bool:
+    """Whether the vehicle was not heard again after a flight whose measurement broke off."""
+    return flight is not None and row.ending == "invalid" and flight.restored is None and flight.vehicle.registered
 
 
 def take_off_trial(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> Trial:

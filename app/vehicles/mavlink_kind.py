@@ -142,7 +142,7 @@ def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
     if scored not in SCORED:
         return (Problem("scored_source", f"must be {' or '.join(SCORED)}, got {scored}"),)
     if not place:
-        return (Problem("scored_source", "mocap needs a second_source"),) if scored == "mocap" else ()
+        return (Problem("scored_source", "needs a second source of altitude"),) if scored == "mocap" else ()
     try:
         sources.parse(place)
     except InputError as error:

@@ -174,5 +174,7 @@ def test_a_card_clones_a_campaign_onto_another_vehicle_and_archives_a_finished_o
     dashboard.open("/")
     card.get_by_text("Clone or archive").click()
     card.get_by_role("button", name="Archive").click()
+    expect(card).to_contain_text("not reopened")
+    card.get_by_role("button", name="Archive").click()
     expect(card).to_have_count(0)
     assert dashboard.get(f"/campaigns/{campaign_id}")["state"] == "archived"

@@ -226,7 +226,11 @@ def test_changed_settings_are_in_the_command_log(client: TestClient) -> None:
     edit = {"version": vehicle["version"], "options": {"radius_m": 7.0}}
     assert client.patch(f"/api/vehicles/{vehicle['id']}", json=edit).status_code == 200
     newest = get(client, f"/api/vehicles/{vehicle['id']}/acts")["items"][0]
-    assert (newest["kind"], newest["reason"], newest["state"]) == ("settings", "radius_m 7.0", "done")
+    assert (newest["kind"], newest["reason"], newest["state"]) == (
+        "settings",
+        "Maximum distance from the start: 7.0 m",
+        "done",
+    )
 
 
 def test_a_simulated_vehicle_never_becomes_a_real_one(client: TestClient) -> None:

@@ -144,6 +144,22 @@ def test_control_that_ends_takes_everything_back(name: str) -> None:
     assert [each.kind for each in found.losses] == ["control ended"]
 
 
+def test_a_vehicle_whose_preflight_check_has_failed_is_never_ready() -> None:
+    """Observed defect: “Staged, ready to fly” beside a failed check, and the takeoff was refused after its start."""
+    staged = replace(standing(TrialState.STAGED, {}), has_failed_checks=True)
+    found = readiness_of(staged, GOOD)
+    assert (found.steps, found.lost, found.is_ready) == (("control", "staged"), (), False)
+    assert [each.kind for each in found.losses] == ["checks failed"]
+    assert not readiness_of(replace(staged, trial=TrialState.PLANNED), GOOD).is_ready
+    assert readiness_of(replace(staged, trial=TrialState.FLYING), GOOD).losses == ()
+
+
+def test_a_vehicle_that_was_not_heard_again_after_its_flight_is_not_said_to_have_landed() -> None:
+    """Observed defect: “Landed” and “Reviewed” were ticked for a drone last heard at 3.2 m."""
+    found = readiness_of(replace(standing(TrialState.INVALID, {}), was_lost_in_flight=True), GOOD)
+    assert (found.steps, found.lost) == (up_to("in flight"), ("landed",))
+
+
 @pytest.mark.parametrize("name", ["staged", "held"])
 def test_who_watches_another_operators_flight_sees_what_it_has_reached_and_cannot_fly_it(name: str) -> None:
     """Observed defect: a second tab said “Control: lost” although the operator in the first one had it."""

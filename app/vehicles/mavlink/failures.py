@@ -161,7 +161,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
 
 HELP: Final = "fly it manually, or stop its motors"
 """What the operator can still do if a vehicle does not respond to Land."""
-NOT_DESCENDING: Final = f"It was commanded to land but does not descend: {HELP}."
+NOT_DESCENDING: Final = f"It was commanded to land but was not seen to descend: {HELP}."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

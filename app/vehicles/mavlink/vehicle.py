@@ -48,6 +48,7 @@ _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
 _ANOTHER: Final = "Check which vehicle it is, then try again."
 _LAND_REPEATED: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
+_LAND_WAS_REPEATED: Final = "Land was still being repeated when this record ended."
 _RESTARTED: Final = "It restarted: its gains have not been read since."
 _STAGE_AGAIN: Final = "Press Stage gains so that they are written and read back again."
 _SET_BY_HAND: Final = "Set its gains by hand, read them back, then release it."
@@ -622,7 +623,7 @@ class MavlinkVehicle:
             ending=records.ending_of(trial),
             reason=" ".join(
                 part
-                for part in (reason, _LAND_REPEATED if self._requested == _LAND_REPEATED else "", both.remark)
+                for part in (reason, _LAND_WAS_REPEATED if self._requested == _LAND_REPEATED else "", both.remark)
                 if part
             ),
             settings={**self._options, **both.settings},

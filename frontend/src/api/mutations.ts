@@ -12,6 +12,7 @@ import {
   computeProposal,
   createCampaign,
   createTrial,
+  deleteCampaign,
   editCampaign,
   finishCampaign,
   flyTrial,
@@ -166,6 +167,18 @@ export function useFinish(campaignId: number) {
   return useMutation({
     mutationFn: () => answer(finishCampaign({ path: { campaign_id: campaignId }, body: {} })),
     onSuccess: settled.campaign,
+  });
+}
+
+/** Delete a campaign that has not flown. */
+export function useDeleteCampaign({ id, version }: Campaign, onDeleted: () => void) {
+  const queries = useQueryClient();
+  return useMutation({
+    mutationFn: () => answer(deleteCampaign({ path: { campaign_id: id }, query: { version } })),
+    onSuccess: () => {
+      onDeleted();
+      void queries.invalidateQueries({ queryKey: ["campaigns"] });
+    },
   });
 }
 

@@ -294,7 +294,7 @@ def test_an_unreadable_signing_key_is_refused_without_being_quoted() -> None:
     [
         ({"signing_key_file": "key.txt"}, "signing_key_file", "Paparazzi uses MAVLink 1"),
         ({"scored_source": "gps"}, "scored_source", "must be vehicle or mocap, got gps"),
-        ({"scored_source": "mocap"}, "scored_source", "needs a second_source"),
+        ({"scored_source": "mocap"}, "scored_source", "needs a second source"),
         ({"second_source": "camera"}, "second_source", "must be natnet:HOST?body=ID"),
         ({"simulated": True, "address": "udp:10.0.0.2:4245"}, "simulated", "must be off for udp:10.0.0.2:4245"),
         (

@@ -2583,6 +2583,12 @@ export type OptionInfo = {
      */
     title: string;
     /**
+     * Label
+     *
+     * the title without the help for entering a value; empty if it has none
+     */
+    label?: string;
+    /**
      * Unit
      */
     unit?: string;
@@ -2915,7 +2921,7 @@ export type ReadinessLoss = {
     /**
      * Kind
      */
-    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'quarantined' | 'control ended' | 'controlled by other';
+    kind: 'worker away' | 'not connected' | 'process silent' | 'link silent' | 'gains unknown' | 'battery low' | 'checks failed' | 'quarantined' | 'control ended' | 'controlled by other';
     /**
      * What
      */

@@ -1,7 +1,7 @@
 import { Button, Stack } from "@mantine/core";
-import { IconArchive, IconRepeat } from "@tabler/icons-react";
+import { IconRepeat } from "@tabler/icons-react";
 import { useGateRefusal } from "../../api/evaluation";
-import { useArchive, useReopen } from "../../api/mutations";
+import { useReopen } from "../../api/mutations";
 import { useStatistics } from "../../api/queries";
 import type { Campaign, CampaignStatistics, RepeatGroup } from "../../api/types";
 import { Aside } from "../../ui/Aside";
@@ -14,6 +14,7 @@ import { campaignStateLabel } from "../../ui/states";
 import { confidenceText, plusMinus } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
 import { CloneForm } from "../campaigns/CloneForm";
+import { ArchiveCampaign } from "../campaigns/EndCampaign";
 import classes from "./NextFlight.module.css";
 import { PromoteGains } from "./PromoteGains";
 import { confirmationOf, confirmationText, endingOf, VERDICTS } from "./verdict";
@@ -35,7 +36,6 @@ interface Props {
 
 /** The campaign's result, and its next actions. */
 export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
-  const archive = useArchive(campaign.id);
   const reopen = useReopen(campaign.id);
   const { data: statistics, isPending } = useStatistics(campaign.id);
   const groups = statistics?.groups ?? [];
@@ -86,19 +86,7 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
         <PromoteGains campaign={campaign} />
         <Note fz="body">A clone is a new campaign with the same settings.</Note>
         <CloneForm {...campaign} experiment={experiment} bestFlight={bestFlight} />
-        {campaign.actions.includes("archive") && (
-          <Button
-            variant="subtle"
-            color="gray"
-            c="var(--dim)"
-            leftSection={<IconArchive size={18} aria-hidden />}
-            loading={archive.isPending}
-            onClick={() => archive.mutate()}
-          >
-            Archive
-          </Button>
-        )}
-        <ErrorNotice error={archive.error} />
+        {campaign.actions.includes("archive") && <ArchiveCampaign campaignId={campaign.id} />}
       </Stack>
     </Panel>
   );

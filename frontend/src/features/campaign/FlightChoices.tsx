@@ -6,15 +6,15 @@ import classes from "./NextFlight.module.css";
 interface Props {
   proposal: Proposal;
   chosen: ChoiceName;
-  /** Whether the gate refuses the chosen gains. */
-  isRefused: boolean;
   disabled: boolean;
   onChoose: (choice: ChoiceName) => void;
 }
 
 /** One choice of what to fly next. */
-export function FlightChoices({ proposal, chosen, isRefused, disabled, onChoose }: Props) {
-  const recommended = proposal.choices.find((choice) => choice.recommended)?.kind;
+export function FlightChoices({ proposal, chosen, disabled, onChoose }: Props) {
+  const recommended = proposal.choices.find(
+    (choice) => choice.recommended && (!choice.proposed || proposal.gate.passed),
+  )?.kind;
   return (
     <Chip.Group value={chosen} onChange={(name) => onChoose(name as ChoiceName)}>
       <Group gap={8} role="radiogroup" aria-label="Gains to fly">
@@ -28,7 +28,7 @@ export function FlightChoices({ proposal, chosen, isRefused, disabled, onChoose 
             classNames={{ label: classes["choice"] ?? "" }}
           >
             {CHOICES[name].label}
-            {name === recommended && !(isRefused && name === chosen) && " (recommended)"}
+            {name === recommended && " (recommended)"}
           </Chip>
         ))}
       </Group>

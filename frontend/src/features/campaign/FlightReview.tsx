@@ -135,6 +135,7 @@ export function AbortCause({ trial }: { trial: Trial }) {
       <p role="status">{sentence}</p>
       {causes.length > 0 && (
         <Stack gap={8}>
+          {trial.abort_cause !== "operator" && <small>Change the cause to:</small>}
           {causes.map((cause) => (
             <Button
               key={cause}
@@ -142,7 +143,7 @@ export function AbortCause({ trial }: { trial: Trial }) {
               loading={judge.isPending}
               onClick={() => judge.mutate({ trial, cause })}
             >
-              {trial.abort_cause === "operator" ? LABELS[cause] : `Change to: ${LABELS[cause].toLowerCase()}`}
+              {LABELS[cause]}
             </Button>
           ))}
         </Stack>

@@ -13,6 +13,7 @@ import { Note } from "../../ui/Note";
 import { ErrorNotice, FormErrorNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useGainTitles, useHasModel, useUnits } from "../../ui/units";
+import { DeleteCampaign, StopCampaign } from "../campaigns/EndCampaign";
 import { isDoubtful, isRepeat, refusalOf, repeatSource, trialOf } from "./choices";
 import { FlightChoices } from "./FlightChoices";
 import { FlightWindow } from "./FlightWindow";
@@ -25,7 +26,6 @@ import { speedOf, watched } from "./nextStep";
 import { OverruleGate } from "./OverruleGate";
 import { PredictedError, ProposalExplanation, Reason } from "./ProposalDetails";
 import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
-import { StopCampaign } from "./StopCampaign";
 import { type ChosenFlight, type ShowPreview, useNextFlight } from "./useNextFlight";
 import { isPriorScatter } from "./verdict";
 
@@ -67,13 +67,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   return (
     <Panel title={`Next: flight ${number}`}>
       <Stack gap={10} mod={{ compact: isCompact }} className={classes["proposal"] ?? ""}>
-        <FlightChoices
-          proposal={proposal}
-          chosen={chosen.name}
-          isRefused={isRefused}
-          disabled={isReadOnly}
-          onChoose={chosen.choose}
-        />
+        <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         {!isReasonLater && reason}
         <GainTable
           rows={chosen.rows}
@@ -130,6 +124,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           {isEvaluated && !isRefused && <GateChecks gate={chosen.gate} isCurrent={chosen.isChecked} />}
         </div>
         {campaign.actions.includes("finish") && <StopCampaign campaignId={campaign.id} />}
+        {campaign.actions.includes("delete") && <DeleteCampaign campaign={campaign} />}
       </Stack>
     </Panel>
   );

@@ -78,6 +78,8 @@ export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
       </Aside>
     );
   }
+  const isRefused = isRecommended && chosen !== "own" && !proposal.gate.passed;
+  if (isRefused) return <Note fz="body">{why}</Note>;
   if (!isRecommended && kind !== "stop") return <Note fz="body">{CHOICES[chosen].hint}</Note>;
   const Icon = ICONS[kind];
   return (

@@ -67,7 +67,6 @@ const STANDING: Partial<Record<Campaign["rehearsal"]["state"], string>> = {
 
 /** Note on a rehearsal's page, with the way to the real campaign: the next action once the rehearsal has passed. */
 export function RehearsalNote({ real }: { real: Campaign }) {
-  const name = `${real.name} on ${real.vehicle.name}`;
   if (real.rehearsal.state === "passed") {
     return (
       <Panel title="Rehearsal passed">
@@ -84,7 +83,7 @@ export function RehearsalNote({ real }: { real: Campaign }) {
         <span>
           It must pass before the real vehicle can fly:{" "}
           <Anchor component={Link} to={`/campaigns/${real.id}`}>
-            {name}
+            {real.name}
           </Anchor>
         </span>
       </p>

@@ -113,7 +113,7 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
         </Text>
       )}
       {!isScored(trial) && <p className={classes["sentence"]}>{asSentence(sentenceOf(trial))}</p>}
-      {trial.verdict && trial.reason && !trial.verdict.includes(trial.reason) && (
+      {trial.verdict && trial.reason && !trial.verdict.toLowerCase().includes(trial.reason.toLowerCase()) && (
         <p className={classes["reason"]}>{asSentence(trial.reason)}</p>
       )}
       <AbortCause trial={trial} />

@@ -1,19 +1,17 @@
-import { Button, Stack } from "@mantine/core";
-import { IconArchive } from "@tabler/icons-react";
+import { Stack } from "@mantine/core";
 import { useState } from "react";
 import { Link } from "react-router";
-import { useArchive } from "../../api/mutations";
 import type { CampaignSummary } from "../../api/types";
 import { Sparkline } from "../../charts/Sparkline";
 import { StateBadge, VehicleBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
-import { ErrorNotice } from "../../ui/Notices";
 import { campaignStateLabel } from "../../ui/states";
 import { plusMinus } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
 import classes from "./CampaignCard.module.css";
 import { CloneForm } from "./CloneForm";
 import { progress } from "./campaignList";
+import { ArchiveCampaign } from "./EndCampaign";
 
 /** A campaign in the list: result, curves, next action. */
 export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
@@ -52,7 +50,6 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
 /** Actions on a campaign without opening it. */
 function More({ campaign }: { campaign: CampaignSummary }) {
   const [open, setOpen] = useState(false);
-  const archive = useArchive(campaign.id);
   return (
     <details className={classes["more"]} onToggle={(event) => setOpen(event.currentTarget.open)}>
       <summary aria-label={`More actions for ${campaign.name}`}>
@@ -61,17 +58,7 @@ function More({ campaign }: { campaign: CampaignSummary }) {
       {open && (
         <Stack gap={10} pb={12}>
           <CloneForm {...campaign} bestFlight={campaign.best?.trial_number ?? null} />
-          {campaign.state === "finished" && (
-            <Button
-              variant="default"
-              leftSection={<IconArchive size={18} aria-hidden />}
-              loading={archive.isPending}
-              onClick={() => archive.mutate()}
-            >
-              Archive
-            </Button>
-          )}
-          <ErrorNotice error={archive.error} />
+          {campaign.state === "finished" && <ArchiveCampaign campaignId={campaign.id} />}
         </Stack>
       )}
     </details>

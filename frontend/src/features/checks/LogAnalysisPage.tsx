@@ -25,7 +25,10 @@ export function LogAnalysisPage() {
   const { mutate, error, variables, isPending } = useAnalyzeLog();
   const analyze = (files: readonly File[]) => {
     const chosen = recordOf(files);
-    if (chosen && !isPending) mutate(chosen, { onSuccess: (analysis) => setShown({ analysis, files: chosen }) });
+    if (chosen && !isPending) {
+      setShown(null);
+      mutate(chosen, { onSuccess: (analysis) => setShown({ analysis, files: chosen }) });
+    }
     resetFile.current?.();
   };
   return (
@@ -69,6 +72,7 @@ export function LogAnalysisPage() {
             )}
           </FileButton>
         </Group>
+        {error !== null && <Text fw={650}>{variables?.file.name}</Text>}
         <ErrorNotice error={error} />
         <Text size="sm" c="dimmed">
           To compare a log with the replica of its controller, use the{" "}

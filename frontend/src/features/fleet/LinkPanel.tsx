@@ -87,7 +87,7 @@ function NotConnected({ vehicle }: { vehicle: Vehicle }) {
           <Anchor component={Link} to={`/vehicles/${other.id}`}>
             {other.name}
           </Anchor>{" "}
-          uses this address: disconnect it first.
+          uses the same local port: disconnect it, or change this address.
         </p>
       )}
       {failure && other === null && <p className={classes["bad"]}>The last request failed. {failure}</p>}

@@ -70,5 +70,7 @@ export function FurtherFields({ catalogue, options, reasons, onChange }: Further
 
 /** Titles of these options by field. */
 export function furtherLabels(catalogue: Catalogue): Record<string, string> {
-  return Object.fromEntries(furtherOptions(catalogue).map(({ name, title }) => [`options.${name}`, title]));
+  return Object.fromEntries(
+    furtherOptions(catalogue).map(({ name, title, label }) => [`options.${name}`, label || title]),
+  );
 }

@@ -78,6 +78,9 @@ function Line({ line }: { line: GivenGains }) {
   );
 }
 
+/** Requests whose outcome is that of their flight. */
+const OF_FLIGHTS: ReadonlySet<string> = new Set(["stage", "take-off", "unstage", "abort"]);
+
 /** What people asked of the vehicle: who, when, outcome. */
 export function RequestList({ vehicleId }: { vehicleId: number }) {
   const acts = useActs(vehicleId);
@@ -106,7 +109,7 @@ export function RequestList({ vehicleId }: { vehicleId: number }) {
                 {act.by && <small>by {act.by}</small>}
               </td>
               <td>
-                {act.state}
+                {OF_FLIGHTS.has(act.kind) && act.state === "done" ? "requested" : act.state}
                 {act.problem && <small>{act.problem}</small>}
               </td>
             </tr>

@@ -23,7 +23,7 @@ import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
 import { sentenceOf } from "../campaign/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
-import { areReadBackSince, type FlyStep } from "./flyScreen";
+import { areReadBackSince, type FlyStep, isAbortStep } from "./flyScreen";
 
 interface Props {
   campaign: Campaign;
@@ -249,7 +249,8 @@ interface AbortProps {
 /** Aborts without confirmation. */
 function Abort({ trial, abort, vehicle }: AbortProps) {
   const status = useVehicleStatus(vehicle?.id ?? null);
-  const stage = abortStage(trial.id, abort);
+  const own = abortStage(trial.id, abort);
+  const stage = own === "none" && isAbortStep(status?.status.step) ? "accepted" : own;
   const { state, worker } = useConnection();
   return (
     <Stack gap={12}>
