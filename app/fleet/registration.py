@@ -239,12 +239,20 @@ def _set_options(
     _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has other gains
     before = settings_of(row)
     changed = "; ".join(
-        f"{option.label or option.title}: {options[option.name] or 'none'}{f' {option.unit}' if option.unit else ''}"
+        f"{option.label or option.title}: {_shown(options[option.name], option.unit)}"
         for option in kind.options
         if options[option.name] != before[option.name]
     )
     row.options, row.identity, row.checks, row.checked_at = options, None, None, None
     record_act(session, row, ActKind.SETTINGS, by=by, reason=changed)
+
+
+def _shown(value: OptionValue, unit: str) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, str):
+        return value or "none"
+    return f"{value:g} {unit}".strip()
 
 
 def _set_safe_gains(

@@ -9,8 +9,8 @@ from app.fleet.control import record_act
 
 
 def record_flight_command(session: Session, trial_id: int, kind: ActKind, *, by: str, reason: str = "") -> None:
-    """Record a command to the vehicle of a trial; `by` is the operator, empty when the request was nobody's in
-    control. Shared simulations have no log. Raises NotFoundError."""
+    """Record a command to the vehicle of a trial; `by` is the operator in control, empty if the request came from
+    elsewhere. Shared simulations have no log. Raises NotFoundError."""
     trial = history.trial_row(session, trial_id)
     campaign = campaigns.get_row(session, trial.campaign_id)
     if campaign.vehicle.registered:

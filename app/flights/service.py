@@ -23,6 +23,7 @@ from app.common.states import (
     ActKind,
     FlightMode,
     FlightState,
+    TrialState,
 )
 from app.core.errors import GainlineError
 from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleRow
@@ -173,8 +174,10 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
 
 
 def _was_lost_in_flight(row: TrialRow, flight: FlightRow | None) -> bool:
-    """Whether the vehicle was not heard again after a flight whose measurement broke off."""
-    return flight is not None and row.ending == "invalid" and flight.restored is None and flight.vehicle.registered
+    """Whether the vehicle was not heard again after a flight that no person has reviewed."""
+    if flight is None or row.ending != "invalid" or flight.restored is not None or not flight.vehicle.registered:
+        return False
+    return row.state == TrialState.CAPTURED or fleet.is_classed_automatically(flight.vehicle)
 
 
 def take_off_trial(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> Trial:

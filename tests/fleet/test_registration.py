@@ -228,7 +228,7 @@ def test_changed_settings_are_in_the_command_log(client: TestClient) -> None:
     newest = get(client, f"/api/vehicles/{vehicle['id']}/acts")["items"][0]
     assert (newest["kind"], newest["reason"], newest["state"]) == (
         "settings",
-        "Maximum distance from the start: 7.0 m",
+        "Maximum distance from the start: 7 m",
         "done",
     )
 
