@@ -8,8 +8,8 @@ from rich.markup import escape
 from app.cli.console import console, table, unwritable_error, write_json
 from app.cli.files import companion_of, unreadable_error
 from app.common.errors import InputError, Problem
+from app.log_analyses.content import ANALYSED, analyze_content
 from app.log_analyses.schemas import LogAnswer
-from app.log_analyses.service import ANALYSED, analyze_content
 
 
 def analyze_log(file: Path, *, json_out: Path | None, params_out: Path | None) -> None:

@@ -11,8 +11,6 @@ from sqlalchemy.orm import Session, undefer
 from app.common.errors import NotFoundError, StorageError
 from app.common.schemas import Gains, Page, Schema, decode_cursor, encode_cursor, uploaded_name
 from app.controller_checks.autopilot import Autopilot
-from app.controller_checks.check import AUTOPILOTS, examine_content, examine_file
-from app.controller_checks.paparazzi import parse_gains
 from app.controller_checks.results import FigureName, Result
 from app.db.models import ControllerCheckRow
 from app.figures.base import Card, card_of
@@ -94,6 +92,9 @@ def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: s
 
     Raises InputError that names what is wrong with it.
     """
+    from app.controller_checks.check import examine_content  # noqa: PLC0415 - imports every replica
+    from app.controller_checks.paparazzi import parse_gains  # noqa: PLC0415
+
     given = None if gains is None else parse_gains(gains)
     return run_limited(
         FILE, examine_content, content, name=uploaded_name(name, unnamed=_UNNAMED), companion=companion, given=given
@@ -102,6 +103,8 @@ def check_upload(content: bytes, *, name: str, companion: bytes | None, gains: s
 
 def examine_example() -> Result:
     """Check the takeoff that comes with the program, recorded from the autopilot's own code."""
+    from app.controller_checks.check import examine_file  # noqa: PLC0415 - imports every replica
+
     return examine_file(RECORDED_TAKEOFF)
 
 
@@ -169,6 +172,8 @@ def _result(row: ControllerCheckRow) -> Result:
 
 
 def _autopilot(result: Result) -> Autopilot:
+    from app.controller_checks.check import AUTOPILOTS  # noqa: PLC0415 - imports every replica
+
     return AUTOPILOTS[result.autopilot]
 
 

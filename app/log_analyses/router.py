@@ -3,7 +3,7 @@
 from fastapi import APIRouter, status
 
 from app.campaigns.schemas import Campaign
-from app.log_analyses import campaigns, service
+from app.log_analyses import service
 from app.log_analyses.schemas import LogAnalysis
 from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
 
@@ -24,5 +24,7 @@ def analyze_log(record: Record) -> LogAnalysis:
 def start_campaign(record: Record, asking: RequestContextDep) -> Campaign:
     """Create a campaign of a vehicle that is flown elsewhere, with the takeoffs of a Paparazzi log as its first
     flights."""
+    from app.log_analyses import campaigns  # noqa: PLC0415 - imports the models of an analysis
+
     found = service.read_upload(record.content(), record.read_companion(), name=record.name)
     return record.once(Campaign, lambda session: campaigns.start_campaign(session, found, asking, name=record.name))

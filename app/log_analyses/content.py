@@ -1,0 +1,39 @@
+"""Content of an uploaded log, in the process that reads it: its takeoffs, and its analysis."""
+
+import io
+from typing import Final
+
+from app.core.analysis.analysis import analyze
+from app.core.analysis.takeoffs import analyze_takeoffs
+from app.core.errors import Problem, TrajectoryError
+from app.log_analyses.manoeuvres import AnalysedManoeuvres
+from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
+from app.logs.ardupilot_flight import read_ardupilot_flight
+from app.logs.dataflash import is_dataflash
+from app.logs.paparazzi import is_paparazzi
+from app.logs.readers import HEAD_BYTES, READERS, read_takeoffs
+from app.logs.takeoffs import Takeoff
+from app.logs.tlog import is_tlog
+
+TAKEOFFS: Final = "Paparazzi's .data or .tlog log of a takeoff"
+ANALYSED: Final = f"ArduCopter's .bin log, or {TAKEOFFS}; logs of PX4 are not analysed yet"
+
+
+def read_content(content: bytes, companion: bytes | None, name: str, *, usable: str) -> list[Takeoff]:
+    """Read every takeoff of a Paparazzi log in memory. Raises TrajectoryError, which asks for a `usable` log."""
+    head = content[:HEAD_BYTES]
+    if is_tlog(head) or is_paparazzi(head):
+        beside = None if companion is None else io.BytesIO(companion)
+        return list(read_takeoffs(io.BytesIO(content), name=name, companion=beside))
+    kind = next((f" ({reader.title})" for reader in READERS if reader.recognises(head)), "")
+    other = f"is another kind of log{kind}" if kind else "is not a log" if head else "is empty"
+    raise TrajectoryError(f"{name} cannot be used.", hint=f"Use {usable}.", problems=(Problem("file", other),))
+
+
+def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
+    """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
+    if is_dataflash(content[:HEAD_BYTES]):
+        flight = read_ardupilot_flight(io.BytesIO(content), name=name)
+        return AnalysedManoeuvres(analyze(flight), name, flight.parameters.hover_throttle)
+    found = read_content(content, companion, name, usable=ANALYSED)
+    return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)
