@@ -224,9 +224,9 @@ def _listed(campaigns: Sequence[str]) -> str:
 def _set_options(
     session: Session, row: VehicleRow, asked: Mapping[str, OptionValue], context: RequestContext, *, by: str
 ) -> None:
-    kind = VEHICLE_KINDS[row.kind]
-    options = kind.check({**settings_of(row), **asked}, field="options", simulation_hosts=context.simulation_hosts)
-    if options == settings_of(row):
+    kind, before = VEHICLE_KINDS[row.kind], settings_of(row)
+    options = kind.check({**before, **asked}, field="options", simulation_hosts=context.simulation_hosts)
+    if options == before:
         return
     _require_unlinked(row, "its settings cannot be changed")
     if kind.is_real_with(options, context.simulation_hosts) != row.is_real:
@@ -237,7 +237,6 @@ def _set_options(
             problems=(Problem("options", "would change whether the vehicle is real"),),
         )
     _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has other gains
-    before = settings_of(row)
     changed = "; ".join(
         f"{option.label or option.title}: {_shown(options[option.name], option.unit)}"
         for option in kind.options

@@ -5,14 +5,15 @@ from sqlalchemy.orm import Session
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.common.states import ActKind
+from app.db.models import CampaignRow, TrialRow
 from app.fleet.control import record_act
 
 
-def record_flight_command(session: Session, trial_id: int, kind: ActKind, *, by: str, reason: str = "") -> None:
+def record_flight_command(
+    session: Session, campaign: CampaignRow, trial: TrialRow, kind: ActKind, *, by: str, reason: str = ""
+) -> None:
     """Record a command to the vehicle of a trial; `by` is the operator in control, empty if the request came from
-    elsewhere. Shared simulations have no log. Raises NotFoundError."""
-    trial = history.trial_row(session, trial_id)
-    campaign = campaigns.get_row(session, trial.campaign_id)
+    elsewhere. Shared simulations have no log."""
     if campaign.vehicle.registered:
         flight = f"flight {trial.number} of {campaign.name}"
         record_act(session, campaign.vehicle, kind, by=by, reason=f"{flight}: {reason}" if reason else flight)
@@ -20,4 +21,6 @@ def record_flight_command(session: Session, trial_id: int, kind: ActKind, *, by:
 
 def record_abort(session: Session, trial_id: int, reason: str) -> None:
     """Record an abort, which everyone may request; `reason` says who did. Raises NotFoundError."""
-    record_flight_command(session, trial_id, ActKind.ABORT, by="", reason=reason)
+    trial = history.trial_row(session, trial_id)
+    campaign = campaigns.get_row(session, trial.campaign_id)
+    record_flight_command(session, campaign, trial, ActKind.ABORT, by="", reason=reason)

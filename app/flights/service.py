@@ -142,7 +142,7 @@ def request_flight(
         )
     )
     session.flush()
-    record_flight_command(session, row.id, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
+    record_flight_command(session, campaign, row, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
@@ -202,7 +202,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
         by = require_not_controlled_by_other(vehicle, context)
     require_ready(_readiness(session, row, context, report_of))
     flight.take_off_at = utc_now()
-    record_flight_command(session, row.id, ActKind.TAKE_OFF, by=by)
+    record_flight_command(session, campaign, row, ActKind.TAKE_OFF, by=by)
     return trial_view(session, campaign, row)
 
 
@@ -219,7 +219,7 @@ def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOC
     _staged(session, row).stand_down = reason
     operator = control_of(campaign.vehicle) if is_in_control(campaign.vehicle, context) else None
     by = "" if operator is None else operator.operator
-    record_flight_command(session, row.id, ActKind.UNSTAGE, by=by, reason="" if by else reason)
+    record_flight_command(session, campaign, row, ActKind.UNSTAGE, by=by, reason="" if by else reason)
     return trial_view(session, campaign, row)
 
 

@@ -1,12 +1,13 @@
 import { Anchor } from "@mantine/core";
 import { Link } from "react-router";
-import { useVehicles } from "../../api/vehicles";
+import { useVehicle } from "../../api/vehicles";
 import { Note } from "../../ui/Note";
-import { groundedReason } from "./choices";
 
 /** Why the vehicle cannot fly now, whatever the gains; empty if it can. */
 export function useGroundedReason(vehicleId: number): string {
-  return groundedReason(useVehicles().data?.find(({ id }) => id === vehicleId));
+  const vehicle = useVehicle(vehicleId);
+  if (vehicle?.state === "quarantined") return `${vehicle.name} is quarantined.`;
+  return vehicle?.registered && vehicle.state === "disconnected" ? `${vehicle.name} is not connected.` : "";
 }
 
 /** The reason, with a link to the vehicle; renders nothing without one. */

@@ -2,7 +2,7 @@
 
 import type { GainSet } from "../../api/evaluation";
 import type { Problem } from "../../api/problems";
-import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal, RepeatGroup, Vehicle } from "../../api/types";
+import type { FlightChoice, GainInfo, Gate, NewTrial, Proposal, RepeatGroup } from "../../api/types";
 import { flightsText, gainText, readNumber } from "../../ui/format";
 
 type FlownGains = Pick<RepeatGroup, "trial_numbers">;
@@ -121,12 +121,6 @@ export function readGains(
   const reasons = Object.fromEntries(readings.flatMap(([name, { reason }]) => (reason ? [[name, reason]] : [])));
   const isRead = Object.keys(reasons).length === 0;
   return { values, reasons, gains: isRead ? (values as Record<string, number>) : null };
-}
-
-/** Why the campaign's vehicle cannot fly now, whatever the gains; empty if it can. */
-export function groundedReason(vehicle: Pick<Vehicle, "name" | "state" | "registered"> | undefined): string {
-  if (vehicle?.state === "quarantined") return `${vehicle.name} is quarantined.`;
-  return vehicle?.registered && vehicle.state === "disconnected" ? `${vehicle.name} is not connected.` : "";
 }
 
 /** The gate's refusal in the form of a refused request. */

@@ -13,12 +13,11 @@ interface QuestionProps {
   act: string;
   question: string;
   otherwise: string;
-  error: unknown;
-  isPending: boolean;
-  onYes: () => void;
+  /** Does it, and how far that has come. */
+  mutation: { error: unknown; isPending: boolean; mutate: () => void };
 }
 
-function Question({ act, question, otherwise, error, isPending, onYes }: QuestionProps) {
+function Question({ act, question, otherwise, mutation }: QuestionProps) {
   const [asking, setAsking] = useState(false);
   if (!asking) {
     return (
@@ -34,41 +33,35 @@ function Question({ act, question, otherwise, error, isPending, onYes }: Questio
         <Button variant="default" onClick={() => setAsking(false)}>
           {otherwise}
         </Button>
-        <Button color="red" loading={isPending} onClick={onYes}>
+        <Button color="red" loading={mutation.isPending} onClick={() => mutation.mutate()}>
           {act}
         </Button>
       </Group>
-      <ErrorNotice error={error} />
+      <ErrorNotice error={mutation.error} />
     </Stack>
   );
 }
 
 /** Ends the campaign between flights; planned trials are cancelled. */
 export function StopCampaign({ campaignId }: { campaignId: number }) {
-  const { error, isPending, mutate } = useFinish(campaignId);
   return (
     <Question
       act="Stop campaign"
       question="Stop this campaign? Its flights are kept, and it can be reopened."
       otherwise="Continue campaign"
-      error={error}
-      isPending={isPending}
-      onYes={() => mutate()}
+      mutation={useFinish(campaignId)}
     />
   );
 }
 
 /** Moves a finished campaign to the archive. */
 export function ArchiveCampaign({ campaignId }: { campaignId: number }) {
-  const { error, isPending, mutate } = useArchive(campaignId);
   return (
     <Question
       act="Archive"
       question="Archive this campaign? It stays readable and can be cloned, but not reopened or reviewed any more."
       otherwise="Cancel"
-      error={error}
-      isPending={isPending}
-      onYes={() => mutate()}
+      mutation={useArchive(campaignId)}
     />
   );
 }
@@ -76,15 +69,12 @@ export function ArchiveCampaign({ campaignId }: { campaignId: number }) {
 /** Deletes a campaign that has not flown. */
 export function DeleteCampaign({ campaign }: { campaign: Campaign }) {
   const navigate = useNavigate();
-  const { error, isPending, mutate } = useDeleteCampaign(campaign, () => void navigate("/"));
   return (
     <Question
       act="Delete campaign"
       question="Delete this campaign? It has not flown, and nothing of it is kept."
       otherwise="Cancel"
-      error={error}
-      isPending={isPending}
-      onYes={() => mutate()}
+      mutation={useDeleteCampaign(campaign, () => void navigate("/"))}
     />
   );
 }
