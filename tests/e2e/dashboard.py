@@ -32,7 +32,9 @@ gd => gd.data.map(trace => ({
 
 SETTLES_WITHIN_MS: Final = 60_000
 _SETTLED: Final = """async ([ink, within]) => {
-  const frame = () => new Promise(requestAnimationFrame);
+  const until = performance.now() + within;
+  const later = ms => new Promise(done => setTimeout(done, ms));
+  const frame = () => Promise.race([new Promise(requestAnimationFrame), later(1000)]);
   const all = (what, within = document) => Array.from(within.querySelectorAll(what));
   const isDrawn = plot => plot.dataset.drawn && (!ink || !plot.layout || plot.layout.font.color === ink);
   const undrawn = () => all("[role=group] > div:last-child").filter(one => !isDrawn(one));
@@ -43,7 +45,7 @@ _SETTLED: Final = """async ([ink, within]) => {
   }).join(";");
   const isMoving = () => document.getAnimations().some(
     one => one.playState === "running" && one.effect?.getComputedTiming().endTime < Infinity);
-  await document.fonts.ready;
+  await Promise.race([document.fonts.ready, later(within)]);
   const [x, y] = [scrollX, scrollY];
   window.seenInTest ??= new WeakSet();
   for (const section of all("main section").filter(one => !window.seenInTest.has(one))) {
@@ -52,7 +54,6 @@ _SETTLED: Final = """async ([ink, within]) => {
     await frame();
     await frame();
   }
-  const until = performance.now() + within;
   for (let same = 0, last = ""; same < 3;) {
     await frame();
     const late = waiting();
@@ -68,7 +69,8 @@ _SETTLED: Final = """async ([ink, within]) => {
   scrollTo(x, y);
   await frame();
 }"""
-"""Until everything is fetched and drawn, in view or not, and nothing has moved for three frames."""
+"""Until everything is fetched and drawn, in view or not, and nothing has moved for three frames. A frame that
+the browser does not give is waited for one second."""
 
 
 def printed(value: float, uncertainty: float | None, unit: str = "m") -> str:

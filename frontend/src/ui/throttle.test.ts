@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { throttled } from "./throttle";
+import { afterPaint, throttled } from "./throttle";
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -19,6 +19,17 @@ test("many askings are served twice: at once, and once more for the last", async
   expect(runs).toBe(2);
   await vi.advanceTimersByTimeAsync(500);
   expect(runs).toBe(2);
+});
+
+test("a browser that paints nothing delays work by half a second", async () => {
+  vi.stubGlobal("requestAnimationFrame", () => 0);
+  const drawn = vi.fn();
+  void afterPaint().then(drawn);
+  await vi.advanceTimersByTimeAsync(499);
+  expect(drawn).not.toHaveBeenCalled();
+  await vi.advanceTimersByTimeAsync(1);
+  expect(drawn).toHaveBeenCalledOnce();
+  vi.unstubAllGlobals();
 });
 
 test("nothing runs after it was stopped", async () => {

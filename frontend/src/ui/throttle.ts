@@ -43,8 +43,16 @@ export function throttled(work: () => Promise<unknown>, shortestMs: number): Thr
   };
 }
 
-/** Resolves after the next paint, so that heavy work does not delay the display of earlier changes. */
+const LONGEST_PAINT_MS = 500;
+
+/**
+ * Resolves after the next paint, so that heavy work does not delay the display of earlier changes. A browser that paints
+ * nothing (a hidden tab, a covered window, a stalled compositor) delays it for half a second and no longer.
+ */
 export async function afterPaint(): Promise<void> {
-  if (document.visibilityState === "hidden") return; // nothing is painted
-  await new Promise<void>((done) => requestAnimationFrame(() => setTimeout(done)));
+  if (document.visibilityState === "hidden") return;
+  await new Promise<void>((done) => {
+    requestAnimationFrame(() => setTimeout(done));
+    setTimeout(done, LONGEST_PAINT_MS);
+  });
 }
