@@ -196,6 +196,11 @@ def ids_of_name(session: Session, name: str) -> list[int]:
     return list(session.scalars(select(CampaignRow.id).where(same).order_by(CampaignRow.id).limit(20)))
 
 
+def names_beginning(session: Session, beginning: str) -> set[str]:
+    """Names of all campaigns that begin so."""
+    return set(session.scalars(select(CampaignRow.name).where(CampaignRow.name.startswith(beginning, autoescape=True))))
+
+
 def campaign_page(
     session: Session,
     *,

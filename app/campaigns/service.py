@@ -4,7 +4,9 @@ A rehearsal is the same campaign on a simulation, for a campaign on a real vehic
 safe gains once flights have shown that they are better.
 """
 
+import re
 from collections.abc import Collection
+from itertools import count
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -149,12 +151,20 @@ def add_campaign(
     return row
 
 
+def _name_of_clone(session: Session, name: str) -> str:
+    """`Twin (2)` for a clone of `Twin`, or the next number that no campaign has."""
+    base = re.sub(r" \(\d+\)$", "", name)[:110]
+    taken = repository.names_beginning(session, base)
+    numbered = (f"{base} ({number})" for number in count(2))
+    return next(one for one in numbered if one not in taken)
+
+
 def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign:
     """Create a draft with the same definition, linked to its origin; with `warm_start` it starts from the origin's best
     flight."""
     origin = repository.get_campaign(session, campaign_id)
     vehicle = clone.vehicle or _choice_of(origin)
-    name = clone.name or f"{origin.name[:110]} (again)"
+    name = clone.name or _name_of_clone(session, origin.name)
     definition = Definition.model_validate(origin.definition)
     if clone.warm_start:
         definition = definition.model_copy(update={"start": Start(kind="campaign", donor=Donor(campaign_id=origin.id))})

@@ -194,7 +194,8 @@ def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
     kinds = _losses(standing, report)
     texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        return Readiness(steps=steps, lost=(), losses=_in_flight(kinds, texts))
+        is_arming = report.status is not None and report.status.step == "arm"
+        return Readiness(steps=steps[:_IN_FLIGHT] if is_arming else steps, lost=(), losses=_in_flight(kinds, texts))
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
     kept = min((_count(texts[kind].keeps) for kind in kinds), default=len(steps))

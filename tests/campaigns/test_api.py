@@ -211,10 +211,12 @@ def test_a_campaign_can_be_stopped_archived_and_continued_as_a_clone(client: Tes
     assert client.post(f"{path}/archive").json()["state"] == "archived"
     clone = client.post(f"{path}/clone", json={"vehicle": {"kind": "jsbsim"}})
     assert clone.status_code == 201
-    assert (clone.json()["parent_id"], clone.json()["name"]) == (campaign["id"], "Test (again)")
+    assert (clone.json()["parent_id"], clone.json()["name"]) == (campaign["id"], "Test (2)")
     assert clone.json()["definition"] == campaign["definition"]
     assert clone.json()["vehicle"]["kind"] == "jsbsim"
     assert clone.json()["definition_digest"] is None
+    again = [client.post(f"/api/campaigns/{origin}/clone", json={}) for origin in (campaign["id"], clone.json()["id"])]
+    assert [one.json()["name"] for one in again] == ["Test (3)", "Test (4)"]
 
 
 def test_reclassing_a_flight_recomputes_what_came_after(client: TestClient, database: Database) -> None:

@@ -169,7 +169,7 @@ def test_a_card_clones_a_campaign_onto_another_vehicle_and_archives_a_finished_o
     card.get_by_text("Clone or archive").click()
     card.get_by_label("Clone to vehicle").select_option("jsbsim")
     card.get_by_role("button", name="Clone").click()
-    expect(page.get_by_role("heading", name="On the twin (again)")).to_be_visible()
+    expect(page.get_by_role("heading", name="On the twin (2)")).to_be_visible()
     assert dashboard.get(f"/campaigns/{dashboard.campaign_id}")["vehicle"]["kind"] == "jsbsim"
     dashboard.open("/")
     card.get_by_text("Clone or archive").click()

@@ -19,12 +19,13 @@ def status(
     *,
     age_s: float = 0.1,
     battery_v: float | None = 11.1,
+    step: str = "idle",
 ) -> VehicleStatus:
     return VehicleStatus(
         vehicle_id=1,
         state=state,
         at="2026-11-24T12:00:00Z",
-        step="idle",
+        step=step,
         unready=unready,
         age_s=age_s,
         battery_v=battery_v,
@@ -125,6 +126,17 @@ def test_in_flight_a_loss_takes_nothing_back_and_says_what_to_do_now(name: str, 
     expected = [(kind, text.what_in_flight, text.way_on_in_flight)] if text.what_in_flight else []
     assert [(each.kind, each.what, each.way_on) for each in found.losses] == expected
     assert "Stage" not in "".join(each.way_on for each in found.losses)
+
+
+def test_a_vehicle_that_still_arms_is_not_in_flight_yet_but_is_spoken_of_as_one_that_may_take_off() -> None:
+    state, flags, _ = REACHED["in flight"]
+    arming, silent, taking_off = (
+        readiness_of(standing(state, flags), VehicleReport(worker=True, status=heard))
+        for heard in (status(step="arm"), status("gone", step="arm"), status(step="take-off"))
+    )
+    assert (arming.steps, arming.losses, arming.is_ready) == (up_to("held"), (), False)
+    assert [each.what for each in silent.losses] == [LOSSES["link silent"].what_in_flight]
+    assert taking_off.steps == up_to("in flight")
 
 
 @pytest.mark.parametrize("loss", REPORTS)

@@ -9,8 +9,9 @@ import {
 } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { ABORT_LABELS, type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
-import { type Connection, liveNow, useConnection, useIsCurrent, useLiveFlight } from "../live/store";
+import { type Connection, liveNow, useConnection, useIsCurrent, useLiveFlight, useVehicleStatus } from "../live/store";
 import { readingOf } from "../live/telemetry";
+import { isRestoring } from "../live/vehicleStatus";
 import { withUnit } from "../ui/format";
 import { Time } from "../ui/Time";
 import classes from "./Frame.module.css";
@@ -72,7 +73,8 @@ function withoutWorker(flying: readonly FlyingCampaign[]): string {
 export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: AbortControl }) {
   const live = useLiveFlight(flying.trialId);
   const isCurrent = useIsCurrent(live);
-  const stage = abortStage(flying.trialId, abort);
+  const status = useVehicleStatus(flying.vehicleId);
+  const stage = abortStage(flying.trialId, abort, status?.status.step);
   const time = live?.timeS.at(-1);
   const reading = readingOf(live?.channel ?? "");
   return (
@@ -97,11 +99,13 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
           </>
         )}
       </Link>
-      <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
-        <IconOctagonFilled size={20} aria-hidden />
-        {ABORT_LABELS[stage]}
-        {stage === "none" && <kbd>Space</kbd>}
-      </button>
+      {!isRestoring(status) && (
+        <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
+          <IconOctagonFilled size={20} aria-hidden />
+          {ABORT_LABELS[stage]}
+          {stage === "none" && <kbd>Space</kbd>}
+        </button>
+      )}
     </section>
   );
 }

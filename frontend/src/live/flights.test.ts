@@ -10,6 +10,16 @@ test("an abort is under way only once the worker has accepted it", () => {
   expect(abortStage(7, { ...asked, accepted: new Set([7]) })).toBe("accepted");
 });
 
+test("a vehicle that aborts by itself is shown like one whose abort was accepted", () => {
+  const none = { asked: new Set<number>(), accepted: new Set<number>(), trouble: null };
+  expect(["record", "abort-land", "link lost"].map((step) => abortStage(7, none, step))).toEqual([
+    "none",
+    "accepted",
+    "accepted",
+  ]);
+  expect(abortStage(7, { ...none, asked: new Set([7]) }, "abort-land")).toBe("sending");
+});
+
 test("an abort of an earlier attempt is forgotten, so that ABORT of the next one is not labelled as pressed", () => {
   const asked = new Set([7, 8]);
   expect([...stillUnderWay(asked, new Set([8, 9]))]).toEqual([8]);

@@ -9,6 +9,7 @@ import { problemOf } from "../api/problems";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { liveFlightsNow } from "./store";
+import { isAbortStep } from "./vehicleStatus";
 
 export interface FlyingCampaign {
   campaignId: number;
@@ -127,8 +128,13 @@ export type AbortControl = ReturnType<typeof useAbort>;
 /** How far an abort has come. not confirmed: it was refused, or perhaps not received, and is repeated. */
 export type AbortStage = "none" | "sending" | "not confirmed" | "accepted";
 
-export function abortStage(trialId: number, { asked, accepted, trouble }: Omit<AbortControl, "press">): AbortStage {
-  if (!asked.has(trialId)) return "none";
+/** `step` is the vehicle's, which also aborts by itself: at a limit, or without its link. */
+export function abortStage(
+  trialId: number,
+  { asked, accepted, trouble }: Omit<AbortControl, "press">,
+  step?: string,
+): AbortStage {
+  if (!asked.has(trialId)) return isAbortStep(step) ? "accepted" : "none";
   if (accepted.has(trialId)) return "accepted";
   return trouble === null ? "sending" : "not confirmed";
 }

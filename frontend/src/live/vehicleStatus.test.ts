@@ -1,10 +1,13 @@
 import { expect, test } from "vitest";
 import {
+  type Aged,
   aged,
   ageText,
   before,
   heldGains,
+  isAbortStep,
   isDisarmed,
+  isRestoring,
   type LastHeard,
   linkText,
   lowBattery,
@@ -129,4 +132,24 @@ test("a battery below the vehicle's minimum is low", () => {
   const vehicle = { options: { min_battery_v: 10.5 } };
   expect(lowBattery(vehicle, 9)).toBe("below 10.5 V");
   expect([lowBattery(vehicle, 10.5), lowBattery(vehicle, null), lowBattery({ options: {} }, 9)]).toEqual(["", "", ""]);
+});
+
+test("an aborted flight and one whose link is lost end before their record is complete", () => {
+  expect(["take-off", "record", "land", "abort-land", "link lost", undefined].map(isAbortStep)).toEqual([
+    false,
+    false,
+    false,
+    true,
+    true,
+    false,
+  ]);
+});
+
+test("ABORT stays until the motors are known to be off", () => {
+  const at = (step: string, isCurrent = true): boolean => isRestoring({ status: { step }, isCurrent } as Aged);
+  expect(["record", "land", "abort-land", "link lost", "disarm", "restore"].map((step) => at(step))).toEqual([
+    ...Array(5).fill(false),
+    true,
+  ]);
+  expect([at("restore", false), isRestoring(null)]).toEqual([false, false]);
 });

@@ -145,6 +145,18 @@ export function stepWord(step: string): string {
   return STEPS[step] ?? step;
 }
 
+const ABORTED: ReadonlySet<string> = new Set(["abort-land", "link lost"]);
+
+/** Whether the vehicle ends the flight before its record is complete. */
+export function isAbortStep(step: string | undefined): boolean {
+  return step !== undefined && ABORTED.has(step);
+}
+
+/** Whether the vehicle has landed and disarmed and receives its safe gains: there is nothing to abort any more. */
+export function isRestoring(known: Aged | null): boolean {
+  return known?.isCurrent === true && known.status.step === "restore";
+}
+
 function number(value: unknown): number | null {
   return typeof value === "number" && Number.isFinite(value) ? value : null;
 }

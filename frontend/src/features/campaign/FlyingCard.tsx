@@ -23,13 +23,13 @@ interface Props {
 /** Live values of the flight in progress. The ABORT button is in the header of every page. */
 export function FlyingCard({ campaign, trial, step }: Props) {
   const abort = useOutletContext<AbortControl>();
-  const aborting = abortStage(step.trialId, abort);
   const { state, worker } = useConnection();
   const live = useLiveFlight(step.trialId);
   const unit = useUnits(campaign.definition.experiment ?? "").error;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const { registered } = campaign.vehicle;
   const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
+  const aborting = abortStage(step.trialId, abort, status?.status.step);
   const stage = flyingStage(trial, live);
   const isStale = !useIsCurrent(live) && live !== null && live.timeS.length > 0;
   return (

@@ -59,6 +59,7 @@ export function useNextFlight(
 ): ChosenFlight {
   const [name, setName] = useState(() => preselected(proposal));
   const [texts, setTexts] = useState(() => typedGains(proposal.gains));
+  const [isEdited, setEdited] = useState(false);
   const experiment = useCatalogue().data?.experiments.find((one) => one.name === campaign.definition.experiment);
   const choice = proposal.choices.find(({ kind }) => kind === name);
   const known = experiment?.gains ?? NO_GAINS;
@@ -95,29 +96,27 @@ export function useNextFlight(
   const refused = (gate.isCurrent ? (gate.result?.checks ?? []) : []).flatMap(({ passed, gain }) =>
     passed || !gain ? [] : [gain],
   );
+  const edit = (changed: Record<string, string>): void => {
+    setTexts({ ...texts, ...changed });
+    setEdited(true);
+  };
   return {
     name,
     choice,
     choose: (next) => {
-      // Custom gains start from those shown.
-      if (next === "own" && choice !== undefined) setTexts(typedGains(choice.gains));
+      // Custom gains start from those shown, and are kept once they were edited.
+      if (next === "own" && choice !== undefined && !isEdited) setTexts(typedGains(choice.gains));
       setName(next);
     },
     rows,
     entry:
-      choice === undefined
-        ? { texts, reasons, refused, onText: (gain, text) => setTexts({ ...texts, [gain]: text }) }
-        : undefined,
+      choice === undefined ? { texts, reasons, refused, onText: (gain, text) => edit({ [gain]: text }) } : undefined,
     gains,
     predicted: isProposal ? proposal : predicted,
     isPredicted: isProposal || prediction.isCurrent,
     gate: isProposal ? proposal.gate : gate.result,
     isChecked: isProposal || gate.isCurrent,
     error,
-    use: (offers) =>
-      setTexts({
-        ...texts,
-        ...Object.fromEntries(Object.entries(offers).map(([gain, value]) => [gain, typed(value)])),
-      }),
+    use: (offers) => edit(Object.fromEntries(Object.entries(offers).map(([gain, value]) => [gain, typed(value)]))),
   };
 }

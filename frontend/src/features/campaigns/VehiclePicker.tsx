@@ -2,8 +2,9 @@ import { Anchor, Button, Input } from "@mantine/core";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
 import type { Vehicle, VehicleKindInfo } from "../../api/types";
-import { StateBadge, VehicleBadge } from "../../ui/Badges";
-import { autopilotTitle, vehicleStateLabel } from "../fleet/fleet";
+import { VehicleBadge } from "../../ui/Badges";
+import { autopilotTitle } from "../fleet/fleet";
+import { VehicleStateBadge } from "../fleet/VehicleStateBadge";
 import classes from "./NewCampaign.module.css";
 
 interface Props {
@@ -33,7 +34,7 @@ export function VehiclePicker({ kinds, registered, others, kind, vehicleId, erro
               line={autopilotTitle(vehicle)}
               onChoose={() => onVehicle(vehicle)}
             >
-              <StateBadge words={vehicleStateLabel(vehicle)} />
+              <VehicleStateBadge vehicle={vehicle} />
             </VehicleOption>
           ))}
           {kinds.map(({ name, title, line, is_real }) => (

@@ -6,13 +6,13 @@ import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
 import { heldGains, linkText } from "../../live/vehicleStatus";
 import { Aside } from "../../ui/Aside";
-import { StateBadge, VehicleBadge } from "../../ui/Badges";
+import { VehicleBadge } from "../../ui/Badges";
 import { withUnit } from "../../ui/format";
 import { gainsInBrackets } from "../../ui/gains";
 import { ErrorNotice } from "../../ui/Notices";
 import row from "../../ui/RowCard.module.css";
-import { vehicleStateLabel } from "./fleet";
 import classes from "./VehicleCard.module.css";
+import { VehicleStateBadge } from "./VehicleStateBadge";
 
 /** A vehicle in the list: state, gains, next action. */
 export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
@@ -30,7 +30,7 @@ export function VehicleCard({ vehicle }: { vehicle: Vehicle }) {
           <Anchor component={Link} to={`/vehicles/${vehicle.id}`}>
             {vehicle.name}
           </Anchor>
-          <StateBadge words={vehicleStateLabel(vehicle)} />
+          <VehicleStateBadge vehicle={vehicle} />
         </h3>
         <dl className={`${classes["facts"]} numbers`}>
           {isLinked && <Fact title="Link" value={linkText(status)} />}

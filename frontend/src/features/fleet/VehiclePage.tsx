@@ -5,19 +5,19 @@ import { useReadOnlyReason } from "../../api/access";
 import { useVehicleRequest, type VehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
-import { StateBadge, VehicleBadge } from "../../ui/Badges";
+import { VehicleBadge } from "../../ui/Badges";
 import { NotFoundPage } from "../../ui/NotFound";
 import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
 import { Panel } from "../../ui/Panel";
 import { useTitle } from "../../ui/useTitle";
 import classes from "./Fleet.module.css";
-import { vehicleStateLabel } from "./fleet";
 import { BatteryPanel, LinkPanel } from "./LinkPanel";
 import { OperatorControl } from "./OperatorControl";
 import { QuarantinePanel } from "./QuarantinePanel";
 import { SafeGains } from "./SafeGains";
 import { CalibrationHistory, LedgerTable, RequestList } from "./VehicleHistory";
 import { CheckList, ParameterPanel } from "./VehicleReadings";
+import { VehicleStateBadge } from "./VehicleStateBadge";
 
 export function VehiclePage() {
   const vehicleId = Number(useParams()["vehicleId"]);
@@ -43,7 +43,7 @@ function SharedView({ vehicle }: { vehicle: Vehicle }) {
           {vehicle.name}
         </Title>
         <VehicleBadge isReal={vehicle.is_real} />
-        <StateBadge words={vehicleStateLabel(vehicle)} />
+        <VehicleStateBadge vehicle={vehicle} />
       </Group>
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
@@ -71,7 +71,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           {vehicle.name}
         </Title>
         <VehicleBadge isReal={vehicle.is_real} />
-        <StateBadge words={vehicleStateLabel(vehicle)} />
+        <VehicleStateBadge vehicle={vehicle} />
         <div className={classes["acts"]}>
           <Button
             component={Link}

@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
 import type { Catalogue, Vehicle, VehicleAct } from "../../api/types";
+import type { Aged } from "../../live/vehicleStatus";
 import {
   connectFailure,
   furtherOptions,
@@ -98,9 +99,24 @@ test("a failed connection states its reason until a newer request", () => {
 });
 
 test("a registered vehicle without a link is not connected; what is flown elsewhere has no link", () => {
-  const words = (seen: Partial<Vehicle>): string => vehicleStateLabel(seen as Vehicle).word;
+  const words = (seen: Partial<Vehicle>): string => vehicleStateLabel(seen as Vehicle, null).word;
   expect(words({ state: "disconnected", registered: true })).toBe("Not connected");
   expect(words({ state: "disconnected", registered: false })).toBe("No link");
   expect(words({ state: "ready", registered: false })).toBe("Ready");
   expect(words({ state: "quarantined", registered: true })).toBe("Quarantined");
+});
+
+test("a vehicle from which nothing comes is never said to be in flight, staged or ready", () => {
+  const word = (state: Vehicle["state"], link: string, isCurrent = false): string =>
+    vehicleStateLabel({ state, registered: true } as Vehicle, { status: { state: link }, isCurrent } as Aged).word;
+  expect((["ready", "staged", "flying"] as const).map((state) => word(state, "gone"))).toEqual(
+    Array(3).fill("Link lost"),
+  );
+  expect(["connecting", "connected", "not answering"].map((link) => word("flying", link))).toEqual([
+    "Connecting",
+    "No data",
+    "Not responding",
+  ]);
+  expect(word("quarantined", "gone")).toBe("Quarantined");
+  expect(word("flying", "connected", true)).toBe("In flight");
 });

@@ -10,6 +10,7 @@ import type {
   VehicleAct,
   VehicleState,
 } from "../../api/types";
+import type { Aged } from "../../live/vehicleStatus";
 import type { NumberEntry, OptionValue } from "../../ui/Fields";
 import type { StateLabel } from "../../ui/states";
 
@@ -21,9 +22,20 @@ const STATES: Record<VehicleState, StateLabel> = {
   quarantined: { word: "Quarantined", tone: "bad" },
 };
 
-/** A shared vehicle has no permanent connection. */
-export function vehicleStateLabel({ state, registered }: Vehicle): StateLabel {
-  return !registered && state === "disconnected" ? { word: "No link", tone: "quiet" } : STATES[state];
+/** States that are known only while data comes from the vehicle. */
+const REPORTED: ReadonlySet<VehicleState> = new Set<VehicleState>(["ready", "staged", "flying"]);
+
+const SILENCES = {
+  connecting: { word: "Connecting", tone: "busy" },
+  connected: { word: "No data", tone: "bad" },
+  gone: { word: "Link lost", tone: "bad" },
+  "not answering": { word: "Not responding", tone: "bad" },
+} as const;
+
+/** A shared vehicle has no permanent connection. `status` is null if the vehicle has none, or it is not known yet. */
+export function vehicleStateLabel({ state, registered }: Vehicle, status: Aged | null): StateLabel {
+  if (!registered && state === "disconnected") return { word: "No link", tone: "quiet" };
+  return status !== null && !status.isCurrent && REPORTED.has(state) ? SILENCES[status.status.state] : STATES[state];
 }
 
 export const ACTS: Record<ActKind, string> = {

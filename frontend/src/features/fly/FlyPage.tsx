@@ -21,7 +21,7 @@ import { useTitle } from "../../ui/useTitle";
 import { windowOf } from "../campaign/definition";
 import { CommandResult, LandNow, MotorsOff } from "../fleet/QuarantinePanel";
 import classes from "./Fly.module.css";
-import { type FlyStep, flyStateLabel, flyStep, gainsShown, hasLanded, isAbortStep, isAirborneStep } from "./flyScreen";
+import { type FlyStep, flyStateLabel, flyStep, gainsShown, hasLanded, isAirborneStep } from "./flyScreen";
 import { ReadinessLosses, ReadinessStepper } from "./ReadinessStepper";
 import { HeldGains, Readouts } from "./Readouts";
 import { LinkedSteps, PlainSteps } from "./Steps";
@@ -76,14 +76,16 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const isHeld = readiness?.steps.includes("staged") === true;
   const flightId = trial.flight?.id ?? null;
   const wasAirborne = useLatched(flightId, isAirborneStep(status?.status.step));
+  const hasLostLink = useLatched(flightId, status?.status.step === "link lost");
   const { word, tone } = flyStateLabel(trial, step, status, {
     quarantined,
     readiness,
     hasFlown: wasAirborne || hasLanded(live?.phase ?? null),
+    hasLostLink,
     isStopped: orders.said?.order === "motors off" && orders.said.accepted,
   });
   const isFlying = step === "flying";
-  const isAborting = abortStage(trial.id, abort) === "accepted" || isAbortStep(status?.status.step);
+  const isAborting = abortStage(trial.id, abort, status?.status.step) === "accepted";
   const isAborted = useLatched(flightId, isFlying && isAborting);
   const watching = useReadOnlyReason(vehicle);
   const barred = BARRED.has(step) && (quarantined || watching !== null);

@@ -8,6 +8,7 @@ import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
 import { ABORT_LABELS, type AbortControl, abortStage, abortText } from "../../live/flights";
 import { useConnection, useVehicleStatus } from "../../live/store";
+import { isRestoring } from "../../live/vehicleStatus";
 import { StateBadge } from "../../ui/Badges";
 import { asSentence } from "../../ui/format";
 import { sameHeld } from "../../ui/gains";
@@ -23,7 +24,7 @@ import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
 import { sentenceOf } from "../campaign/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
-import { areReadBackSince, type FlyStep, isAbortStep } from "./flyScreen";
+import { areReadBackSince, type FlyStep } from "./flyScreen";
 
 interface Props {
   campaign: Campaign;
@@ -249,9 +250,9 @@ interface AbortProps {
 /** Aborts without confirmation. */
 function Abort({ trial, abort, vehicle }: AbortProps) {
   const status = useVehicleStatus(vehicle?.id ?? null);
-  const own = abortStage(trial.id, abort);
-  const stage = own === "none" && isAbortStep(status?.status.step) ? "accepted" : own;
+  const stage = abortStage(trial.id, abort, status?.status.step);
   const { state, worker } = useConnection();
+  if (isRestoring(status)) return <Waiting text="Landed, motors off. Writing the safe gains and reading them back." />;
   return (
     <Stack gap={12}>
       <button type="button" className={classes["abort"]} onClick={() => abort.press([trial.id])}>

@@ -9,7 +9,6 @@ import {
   gainsShown,
   gainTicks,
   hasLanded,
-  isAbortStep,
   isAirborneStep,
   secondsLeft,
 } from "./flyScreen";
@@ -72,6 +71,13 @@ test("the word in flight is the vehicle's own step, and a silent vehicle is neve
   );
 });
 
+test("a landing after a lost link names the loss, not an abort that nobody asked for", () => {
+  const trial = { state: "flying", flight } as const;
+  const word = (hasLostLink: boolean) =>
+    flyStateLabel(trial, "flying", statusAt("abort-land", 0.1), { quarantined: false, readiness: null, hasLostLink });
+  expect([word(false).word, word(true).word]).toEqual(["Aborted, landing", "Landing after link loss"]);
+});
+
 test("after touchdown it restores the safe gains, until the record is stored; it does not start again", () => {
   const trial = { state: "flying", flight } as const;
   const around = { quarantined: false, readiness: null };
@@ -90,17 +96,6 @@ test("a vehicle that refuses to arm has not been in the air", () => {
     true,
     true,
     false,
-    false,
-  ]);
-});
-
-test("an aborted flight and one whose link is lost end before their record is complete", () => {
-  expect(["take-off", "record", "land", "abort-land", "link lost", undefined].map(isAbortStep)).toEqual([
-    false,
-    false,
-    false,
-    true,
-    true,
     false,
   ]);
 });

@@ -2,7 +2,7 @@
 
 import type { Trial, TrialState, Vehicle } from "../../api/types";
 import type { Loss, Readiness } from "../../live/readiness";
-import { type Aged, stepWord } from "../../live/vehicleStatus";
+import { type Aged, isAbortStep, stepWord } from "../../live/vehicleStatus";
 import { sameHeld } from "../../ui/gains";
 import { type StateLabel, trialStateLabel } from "../../ui/states";
 
@@ -81,6 +81,8 @@ interface Around {
   hasFlown?: boolean;
   /** Whether this page has stopped its motors. */
   isStopped?: boolean;
+  /** Whether its link was lost during this flight. */
+  hasLostLink?: boolean;
 }
 
 /** Whether the flight is over, by its phase from the event stream. */
@@ -93,12 +95,13 @@ export function flyStateLabel(
   trial: Standing,
   step: FlyStep,
   status: Aged | null,
-  { quarantined, readiness, hasFlown = false, isStopped = false }: Around,
+  { quarantined, readiness, hasFlown = false, isStopped = false, hasLostLink = false }: Around,
 ): StateLabel {
   if (step === "flying" && status !== null) {
     const away = readiness?.losses.map(({ kind }) => AWAY[kind]).find((word) => word !== undefined);
     if (away !== undefined) return { word: away, tone: "bad" };
     if (!status.isCurrent) return { word: stepWord("link lost"), tone: "bad" };
+    if (status.status.step === "abort-land" && hasLostLink) return { word: "Landing after link loss", tone: "bad" };
     if (IN_FLIGHT.has(status.status.step)) {
       return { word: stepWord(status.status.step), tone: isAbortStep(status.status.step) ? "bad" : "busy" };
     }
@@ -115,13 +118,6 @@ const AIRBORNE: ReadonlySet<string> = new Set(["take-off", "record", "land", "ab
 /** Whether the vehicle is in the air in this step. */
 export function isAirborneStep(step: string | undefined): boolean {
   return step !== undefined && AIRBORNE.has(step);
-}
-
-const ABORTED: ReadonlySet<string> = new Set(["abort-land", "link lost"]);
-
-/** Whether the vehicle ends the flight before its record is complete. */
-export function isAbortStep(step: string | undefined): boolean {
-  return step !== undefined && ABORTED.has(step);
 }
 
 export interface GainTick {
