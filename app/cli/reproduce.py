@@ -2,11 +2,12 @@
 ones, and the replica of the autopilot's vertical loop beside recordings of the real one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
-from itertools import groupby
+from itertools import groupby, product
 from pathlib import Path
+from types import MappingProxyType
 from typing import BinaryIO, Final
 
 from rich.console import Console
@@ -97,25 +98,29 @@ def replay_files(files: Sequence[Path], json_out: Path | None) -> bool:
             checked[file] = examine_file(file)
         except InputError as error:
             show_error(error)
-    for name, autopilot in AUTOPILOTS.items():
-        if own := {file: each for file, each in checked.items() if each.autopilot == name}:
-            console(json_out).print(_replays_table(autopilot.title, own))
+    for (name, autopilot), (difference, differences) in product(AUTOPILOTS.items(), _DIFFERENCES.items()):
+        if own := {file: each for file, each in checked.items() if each.autopilot == name and differences(each)}:
+            title = f"{autopilot.title}: {difference} between recording and replica"
+            console(json_out).print(_replays_table(title, differences, own))
     write_json(json_out, {"files": [_replay_document(file, each) for file, each in checked.items()]})
     return len(checked) == len(files) and all(each.passed for each in checked.values())
 
 
-def _replays_table(title: str, checked: Mapping[Path, CheckResult]) -> Table:
+Differences = Callable[[CheckResult], dict[str, float]]
+
+
+def _replays_table(title: str, differences: Differences, checked: Mapping[Path, CheckResult]) -> Table:
     names = list(dict.fromkeys(signal.name for each in checked.values() for signal in each.signals))
     rows = [
         (
             file.name,
             str(each.rows),
-            *(_digits(_largest_differences(each).get(name)) for name in names),
+            *(_digits(differences(each).get(name)) for name in names),
             _verdict(each),
         )
         for file, each in checked.items()
     ]
-    return table(("file", "rows", *names, ""), rows, title=f"{title}: largest difference between recording and replica")
+    return table(("file", "rows", *names, ""), rows, title=title)
 
 
 def _digits(difference: float | None) -> str:
@@ -124,6 +129,17 @@ def _digits(difference: float | None) -> str:
 
 def _largest_differences(checked: CheckResult) -> dict[str, float]:
     return {signal.name: signal.largest_difference for signal in checked.signals}
+
+
+def _median_differences(checked: CheckResult) -> dict[str, float]:
+    """Of the signals that are judged by it."""
+    medians = {signal.name: signal.median_difference for signal in checked.signals}
+    return {name: median for name, median in medians.items() if median is not None}
+
+
+_DIFFERENCES: Final[Mapping[str, Differences]] = MappingProxyType(
+    {"largest difference": _largest_differences, "median difference": _median_differences}
+)
 
 
 def _verdict(checked: CheckResult) -> str:
@@ -144,6 +160,7 @@ def _replay_document(file: Path, checked: CheckResult) -> dict[str, object]:
         "passed": checked.passed,
         "exact": _exact(checked),
         "largest_difference": _largest_differences(checked),
+        "median_difference": _median_differences(checked),
         "tolerance": {signal.name: signal.tolerance for signal in checked.signals},
         "first_different_row": checked.first_different_row,
         "notes": list(checked.notes),

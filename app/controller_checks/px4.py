@@ -122,8 +122,7 @@ def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kin
     """The result of a flight; rows beyond what a median may be are marked, and decide nothing."""
     limited = {name: replace(each, tolerance=medians.get(name, each.tolerance)) for name, each in _SIGNALS.items()}
     result = result_of_trace(PX4.name, limited, replay, kind=kind)
-    judged = [_judged(signal, replay) for signal in result.signals if signal.name in medians]
-    signals = tuple(signal for signal, _ in judged)
+    signals = tuple(_judged(signal, replay) for signal in result.signals if signal.name in medians)
     differing = [signal.name for signal in signals if signal.verdict == "differs"]
     total = grouped(result.rows)
     sentence = (
@@ -137,28 +136,22 @@ def _judged_by_medians(replay: TraceReplay, medians: Mapping[str, float], *, kin
         passed=not differing,
         sentence=sentence,
         signals=signals,
-        notes=(*_notes(judged), *result.notes),
         first_different_row=result.first_different_row if differing else None,
     )
 
 
-def _judged(signal: SignalResult, replay: TraceReplay) -> tuple[SignalResult, float]:
-    """The signal judged by its median difference, and the median, over the rows with a value; where only one side has
-    one, they are infinitely apart in the median, and left out of the largest difference."""
+def _judged(signal: SignalResult, replay: TraceReplay) -> SignalResult:
+    """The signal judged by its median difference over the rows with a value; where only one side has one, they are
+    infinitely apart in the median, and left out of the largest difference."""
     recorded, computed = replay.recorded[signal.name], replay.replica[signal.name]
     apart = np.abs(np.asarray(recorded - computed, dtype=np.float64))
     largest = float(np.nanmax(apart, initial=0.0))
     given = np.isfinite(recorded) | np.isfinite(computed)
     median = float(np.median(np.where(np.isnan(apart), np.inf, apart)[given]))
     verdict = signal.verdict if signal.verdict == "exact" else "agrees" if median <= signal.tolerance else "differs"
-    judged = replace(signal, largest_difference=largest, allowance=_OF_A_FLIGHT, verdict=verdict)
-    return judged, median
-
-
-def _notes(judged: Iterable[tuple[SignalResult, float]]) -> Iterable[str]:
-    for signal, median in judged:
-        limit = f"{signal.tolerance:g} {signal.difference_unit}".strip()
-        yield f"{signal.name}: median difference {median:.2g}, at most {limit}."
+    return replace(
+        signal, largest_difference=largest, median_difference=median, allowance=_OF_A_FLIGHT, verdict=verdict
+    )
 
 
 PX4: Final = Autopilot(

@@ -47,7 +47,8 @@ Signals = Mapping[str, Signal]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SignalResult:
     """Result of one signal: the largest difference between recording and replica in `difference_unit`, the tolerance,
-    the number of samples that differ by more, and the time of the first of these, s."""
+    the number of samples that differ by more, and the time of the first of these, s. If the signal is judged by its
+    median difference, that is given, and the tolerance is the median's."""
 
     name: str
     title: str
@@ -58,6 +59,7 @@ class SignalResult:
     verdict: Verdict
     different: int
     first_different_s: float | None
+    median_difference: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -55,11 +55,16 @@ class CheckedSignal(Schema):
     title: str
     largest_difference: float
     difference_unit: str
-    tolerance: Annotated[float, Field(description="the largest difference allowed, in the same unit")]
+    tolerance: Annotated[
+        float, Field(description="the largest difference allowed, or the largest median if there is one, same unit")
+    ]
     allowance: Annotated[str, Field(description="description of the tolerance")]
     verdict: Literal["exact", "agrees", "differs"]
     different: Annotated[int, Field(description="number of samples that differ by more than the tolerance")]
     first_different_s: float | None
+    median_difference: Annotated[
+        float | None, Field(description="decides the verdict, if it is given; else the largest difference does")
+    ]
 
 
 class CheckFigure(Schema):

@@ -127,7 +127,9 @@ def test_the_loop_of_px4_alone_agrees_in_every_row_and_a_flight_in_its_medians(t
     assert (flight["rows"], flight["passed"], flight["first_different_row"]) == (10672, True, None)
     assert flight["largest_difference"]["out_thrust"] < 0.5
     assert flight["tolerance"]["out_thrust"] == 1e-3
-    assert flight["notes"][3].startswith("out_thrust: median difference")
+    assert set(flight["median_difference"]) == {"takeoff_state", "out_vz_m_s", "out_az_m_s2", "out_thrust"}
+    assert all(value <= flight["tolerance"][name] for name, value in flight["median_difference"].items())
+    assert (wild["median_difference"], "PX4: median difference" in result.stdout) == ({}, True)
 
 
 def test_a_flight_of_px4_with_other_gains_differs_in_its_medians(tmp_path: Path) -> None:

@@ -105,6 +105,7 @@ def test_the_log_of_a_px4_is_judged_by_medians(client: TestClient) -> None:
     )
     assert any(note.startswith("The acceleration target was not computed") for note in check["notes"])
     assert [signal["different"] for signal in check["signals"]] == [0, 0]
+    assert all(0.0 <= signal["median_difference"] <= signal["tolerance"] for signal in check["signals"])
     assert [card["state"] for card in figures(client, check)] == ["ready", "ready"]
     refused = send(client, "empty.ulg", content.replace(b"takeoff_status", b"xakeoff_status"))
     assert problems_of(refused) == {"takeoff_status": "is missing"}

@@ -575,7 +575,7 @@ export type CheckedSignal = {
     /**
      * Tolerance
      *
-     * the largest difference allowed, in the same unit
+     * the largest difference allowed, or the largest median if there is one, same unit
      */
     tolerance: number;
     /**
@@ -598,6 +598,12 @@ export type CheckedSignal = {
      * First Different S
      */
     first_different_s: number | null;
+    /**
+     * Median Difference
+     *
+     * decides the verdict, if it is given; else the largest difference does
+     */
+    median_difference: number | null;
 };
 
 /**

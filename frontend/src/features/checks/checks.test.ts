@@ -12,6 +12,7 @@ const signal = (more: Partial<CheckedSignal>): CheckedSignal => ({
   verdict: "exact",
   different: 0,
   first_different_s: null,
+  median_difference: null,
   ...more,
 });
 
@@ -30,6 +31,23 @@ describe("a controller check", () => {
     expect(signalsTable([signal({}), wrong]).rows).toEqual([
       ["thrust, commanded thrust", "0 counts", "0 counts", "exact", "–"],
       ["z_ref, reference altitude", "0.12 m", "0.01 m", "differs", "3 samples, from 1.953 s"],
+    ]);
+  });
+
+  it("shows the median beside the largest difference where it decides", () => {
+    const judged = signal({
+      largest_difference: 0.42,
+      difference_unit: "m/s²",
+      tolerance: 0.0005,
+      median_difference: 0.000021,
+      verdict: "agrees",
+      different: 3,
+      first_different_s: 1.5,
+    });
+    const { columns, rows } = signalsTable([judged]);
+    expect(columns.map(({ title }) => title)).toContain("Allowed median");
+    expect(rows).toEqual([
+      ["thrust, commanded thrust", "0.42 m/s²", "0.000021 m/s²", "0.0005 m/s²", "agrees", "3 samples, from 1.500 s"],
     ]);
   });
 

@@ -44,20 +44,27 @@ function brief(value: number): string {
   return gainText(Number.isInteger(value) ? value : Number(value.toPrecision(2)));
 }
 
-/** Table with one row per signal. */
+function medianText({ median_difference, difference_unit }: CheckedSignal): string {
+  return median_difference === null ? NOTHING : `${brief(median_difference)} ${difference_unit}`;
+}
+
+/** Table with one row per signal; with its median difference if that decides. */
 export function signalsTable(signals: readonly CheckedSignal[]): FigureTable {
   const column = (name: string, title: string) => ({ name, title, unit: "", digits: null });
+  const areMedians = signals.some(({ median_difference }) => median_difference !== null);
   return {
     columns: [
       column("signal", "Signal"),
       column("difference", "Largest difference"),
-      column("allowed", "Allowed"),
+      ...(areMedians ? [column("median", "Median difference")] : []),
+      column("allowed", areMedians ? "Allowed median" : "Allowed"),
       column("verdict", "Result"),
       column("where", "Differing samples"),
     ],
     rows: signals.map((one) => [
       `${one.name}, ${one.title.toLowerCase()}`,
       `${brief(one.largest_difference)} ${one.difference_unit}`,
+      ...(areMedians ? [medianText(one)] : []),
       `${gainText(one.tolerance)} ${one.difference_unit}`,
       one.verdict,
       one.first_different_s === null
