@@ -1,8 +1,8 @@
 """Acts: requests to a registered vehicle beside its flights. A person makes them; the worker carries them out.
 
     request_act → claim_act → finish_act
-                     └ with the outcome, in the same transaction: record_connected, record_disconnected,
-                       quarantine_vehicle, record_released, record_checks
+                     └ with the outcome, in the same transaction: record_disconnected, quarantine_vehicle,
+                       record_released, record_checks; of a connect by finish_connect instead
 
 Land and motors off bypass the database; `record_command` records them afterwards. At a worker's start: `withdraw_acts`,
 then `forget_connections`, then `request_reconnections`. Later, `list_vehicles_to_reconnect` lists those that are not
@@ -174,6 +174,17 @@ def finish_act(
     _end(act, problem=problem, still_wanted=act.vehicle.identity is not None)
 
 
+def finish_connect(
+    session: Session, task: ActTask, identity: Identity, *, concern: str = "", held: Mapping[str, float] | None = None
+) -> None:
+    """Record an open link as `record_connected`, and the outcome of its act.
+
+    In this order: connecting wrote gains only to a vehicle that was pinned before.
+    """
+    finish_act(session, task.act_id, read_back=held)
+    record_connected(session, task.vehicle.vehicle_id, identity, concern=concern, held=held)
+
+
 def withdraw_acts(session: Session) -> list[int]:
     """End all requested and running acts at a worker's start; they are not carried out later. Returns their ids."""
     found = repository.acts_under_way(session)
@@ -217,8 +228,8 @@ def record_reconnected(
     if row is None or not row.wanted_connected:
         return False
     read_back = dict(held) or None
-    record_connected(session, vehicle_id, identity, concern=concern, held=read_back)
     given = dict(row.safe_gains) if _was_given(row, read_back) else None
+    record_connected(session, vehicle_id, identity, concern=concern, held=read_back)
     act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is reachable again", asked=given)
     act.read_back = read_back
     return True

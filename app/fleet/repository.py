@@ -105,7 +105,7 @@ def ledger(
     """The newest `limit` + 1 lines before that position, each with its own position; and the total count.
 
     A flight is a line from its request on, and another one once the safe gains were restored after it, or it ended
-    without that although its gains were on the vehicle.
+    without that although its gains were on the vehicle. A connection that wrote nothing is a line if it read gains.
     """
     flight = FlightRow.vehicle_id == vehicle_id
     lines = union_all(
@@ -121,7 +121,7 @@ def ledger(
             VehicleActRow.vehicle_id == vehicle_id,
             VehicleActRow.kind.in_(GIVES_GAINS),
             VehicleActRow.claimed_at.is_not(null()),
-            VehicleActRow.asked.is_not(null()),
+            or_(VehicleActRow.asked.is_not(null()), VehicleActRow.read_back.is_not(null())),
         ),
     ).subquery()
     total = session.scalar(select(func.count()).select_from(lines)) or 0

@@ -156,7 +156,10 @@ Purpose = Literal["flight", "restore after flight", "connect", "restore", "relea
 
 
 class GivenGains(Schema):
-    """One line of a vehicle's ledger: the gains that were sent to it, for what purpose, and those that it read back."""
+    """One line of a vehicle's ledger: the gains that were sent to it, for what purpose, and those that it read back.
+
+    Nothing is sent when a vehicle is connected for the first time: `asked` is empty, and `read_back` what was found.
+    """
 
     purpose: Purpose
     flight_id: int | None

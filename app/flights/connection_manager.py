@@ -349,10 +349,7 @@ class VehicleConnectionManager:
 
 
 def _connected(transaction: Transaction, task: ActTask, opened: ConnectionOpened) -> None:
-    commands.record_connected(
-        transaction, task.vehicle.vehicle_id, opened.identity, concern=opened.concern, held=opened.held or None
-    )
-    commands.finish_act(transaction, task.act_id, read_back=opened.held or None)
+    commands.finish_connect(transaction, task, opened.identity, concern=opened.concern, held=opened.held or None)
 
 
 def _disconnected(transaction: Transaction, task: ActTask) -> None:

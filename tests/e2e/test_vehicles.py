@@ -80,8 +80,8 @@ def test_a_vehicle_is_registered_connected_checked_and_disconnected_by_hand(dash
         dashboard.until(lambda: dashboard.get(f"/vehicles/{vehicle_id}")["battery"] == "No. 3")
 
         given = dashboard.panel("Gain history").get_by_role("row").nth(1)
-        expect(given).to_contain_text("Safe gains at connection")
-        expect(given.get_by_role("cell", name=SAFE_IN_BRACKETS, exact=True)).to_have_count(2)
+        expect(given).to_contain_text("Found at connection, nothing sent")
+        expect(given.get_by_role("cell", name=SAFE_IN_BRACKETS, exact=True)).to_have_count(1)
 
         dashboard.button("Disconnect").click()
         expect(state_word(dashboard, "Not connected")).to_be_visible()

@@ -37,8 +37,7 @@ def connect(client: httpx2.Client, database: Database, vehicle: Json, *, concern
         task = commands.claim_act(session, WORKER)
         assert task is not None
         held = None if concern else task.vehicle.safe_gains
-        commands.record_connected(session, vehicle["id"], IDENTITY, concern=concern)
-        commands.finish_act(session, task.act_id, read_back=held)
+        commands.finish_connect(session, task, IDENTITY, concern=concern, held=held)
     return seen(client, vehicle)
 
 

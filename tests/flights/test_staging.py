@@ -376,7 +376,7 @@ def test_the_ledger_lists_every_gain_set_that_was_given(
         ("restore", better, better, "done"),
         ("restore after flight", DEFAULT_GAINS, DEFAULT_GAINS, "done"),
         ("flight", DEFAULT_GAINS, DEFAULT_GAINS, "landed"),
-        ("connect", DEFAULT_GAINS, DEFAULT_GAINS, "done"),
+        ("connect", {}, DEFAULT_GAINS, "done"),
     ]
     assert [line["trial_id"] for line in lines] == [None, planned["id"], planned["id"], None]
     assert seen(client, real)["held"] == better

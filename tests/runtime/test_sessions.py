@@ -41,10 +41,10 @@ def test_a_registered_vehicle_flies_and_holds_its_safe_gains_afterwards(serving:
         assert flown["record"]["duration_s"] > 32.0
         assert vehicle.in_state("ready")["held"] == SAFE
         given = serving.get(f"/vehicles/{vehicle.id}/ledger")["items"]
-        assert [(line["purpose"], line["read_back"]) for line in given] == [
-            ("restore after flight", SAFE),
-            ("flight", TRIED),
-            ("connect", SAFE),
+        assert [(line["purpose"], line["asked"], line["read_back"]) for line in given] == [
+            ("restore after flight", SAFE, SAFE),
+            ("flight", TRIED, TRIED),
+            ("connect", {}, SAFE),
         ]
         assert len(serving.api.get(f"/trials/{trial_id}/tlog").content) > 50_000
         assert vehicle.act("disconnect")["state"] == "done"

@@ -1958,6 +1958,8 @@ export type Gate = {
  * GivenGains
  *
  * One line of a vehicle's ledger: the gains that were sent to it, for what purpose, and those that it read back.
+ *
+ * Nothing is sent when a vehicle is connected for the first time: `asked` is empty, and `read_back` what was found.
  */
 export type GivenGains = {
     /**

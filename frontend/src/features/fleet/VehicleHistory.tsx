@@ -15,12 +15,13 @@ import { addPage } from "../../ui/paging";
 import { ScrollTable } from "../../ui/ScrollTable";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
-import { ACTS, PURPOSES } from "./fleet";
+import { ACTS, purposeOf } from "./fleet";
 
 /** All gain sets written to the vehicle, and the values read back. */
 export function LedgerTable({ vehicleId }: { vehicleId: number }) {
   const ledger = useLedger(vehicleId);
   const lines = ledger.data?.pages.flatMap((page) => page.items) ?? [];
+  const names = Object.keys(lines[0]?.read_back ?? lines[0]?.asked ?? {}).join(", ");
   return (
     <Panel title="Gain history" className={classes["wide"]}>
       <ErrorNotice error={ledger.error} />
@@ -31,7 +32,7 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
           <thead>
             <tr>
               <th scope="col">Purpose</th>
-              <th scope="col">Sent {Object.keys(lines[0]?.asked ?? {}).join(", ")}</th>
+              <th scope="col">Sent {names}</th>
               <th scope="col">Read back</th>
               <th scope="col">Outcome</th>
             </tr>
@@ -53,25 +54,26 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
 }
 
 function Line({ line }: { line: GivenGains }) {
-  const { campaign_id, trial_id, read_back } = line;
-  const differs = read_back !== null && !sameHeld(read_back, line.asked);
+  const { campaign_id, trial_id, read_back, asked } = line;
+  const names = Object.keys(asked);
+  const differs = read_back !== null && names.length > 0 && !sameHeld(read_back, asked);
   return (
     <tr>
       <td>
         {campaign_id !== null && trial_id !== null ? (
           <Anchor component={Link} to={`/campaigns/${campaign_id}/flights/${trial_id}`}>
-            {PURPOSES[line.purpose]}
+            {purposeOf(line)}
           </Anchor>
         ) : (
-          PURPOSES[line.purpose]
+          purposeOf(line)
         )}
         <small>
           <Time at={line.asked_at} />
         </small>
       </td>
-      <td className="numbers">{gainsInBrackets(line.asked)}</td>
+      <td className="numbers">{names.length === 0 ? NOTHING : gainsInBrackets(asked)}</td>
       <td className={`numbers ${differs ? classes["differs"] : ""}`}>
-        {read_back === null ? NOTHING : gainsInBrackets(read_back, Object.keys(line.asked))}
+        {read_back === null ? NOTHING : gainsInBrackets(read_back, names.length === 0 ? undefined : names)}
       </td>
       <td>{line.outcome}</td>
     </tr>

@@ -56,13 +56,18 @@ export const ACTS: Record<ActKind, string> = {
   abort: "Abort",
 };
 
-export const PURPOSES: Record<GivenGains["purpose"], string> = {
+const PURPOSES: Record<GivenGains["purpose"], string> = {
   flight: "Flight",
   "restore after flight": "Safe gains after flight",
   connect: "Safe gains at connection",
   restore: "Safe gains, on request",
   release: "Safe gains at release",
 };
+
+/** Purpose of a line of the gain history. */
+export function purposeOf({ purpose, asked }: Pick<GivenGains, "purpose" | "asked">): string {
+  return Object.keys(asked).length === 0 ? "Found at connection, nothing sent" : PURPOSES[purpose];
+}
 
 /** Usual address of each autopilot. */
 const ADDRESSES: Readonly<Record<string, string>> = {
