@@ -59,6 +59,7 @@ class OptionInfo(Schema):
     choices: list[OptionValue] = Field(default=[])
     lower: float | None = None
     upper: float | None = None
+    autopilots: list[str] = Field(default=[], description="the autopilots that have this option; empty: all")
 
 
 class ExperimentInfo(Schema):

@@ -127,6 +127,15 @@ def number(value: float | None, digits: int = 3) -> str:
     return NOTHING if value is None else _true_minus(f"{value:z.{digits}f}")
 
 
+def setting_text(value: bool | float | str, unit: str = "") -> str:
+    """A setting as its form shows it: `on` or `off`, `10.5 V`, a text as it is, or `none` if it is empty."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, str):
+        return value or "none"
+    return _true_minus(f"{value:g} {unit}".rstrip())
+
+
 def _true_minus(text: str) -> str:
     return text.replace("-", "−")
 

@@ -16,7 +16,7 @@ from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
-from app.core.formatting import format_gains
+from app.core.formatting import format_gains, setting_text
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow
 from app.fleet import repository
@@ -238,20 +238,12 @@ def _set_options(
         )
     _space(kind, options, row.safe_gains).check(row.safe_gains, field="safe_gains")  # another autopilot has other gains
     changed = "; ".join(
-        f"{option.label or option.title}: {_shown(options[option.name], option.unit)}"
+        f"{option.label or option.title}: {setting_text(options[option.name], option.unit)}"
         for option in kind.options
         if options[option.name] != before[option.name]
     )
     row.options, row.identity, row.checks, row.checked_at = options, None, None, None
     record_act(session, row, ActKind.SETTINGS, by=by, reason=changed)
-
-
-def _shown(value: OptionValue, unit: str) -> str:
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, str):
-        return value or "none"
-    return f"{value:g} {unit}".strip()
 
 
 def _set_safe_gains(

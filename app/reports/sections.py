@@ -17,7 +17,7 @@ from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, gain, gains, number, short_percent, without_word
+from app.core.formatting import count, gain, gains, number, setting_text, short_percent, without_word
 from app.core.policy import Gain, Gains
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow, TrialRow
@@ -187,15 +187,9 @@ def _options(chosen: Mapping[str, OptionValue], known: Iterable[_Described]) -> 
     for name, value in chosen.items():
         found = described.get(name)
         if value != "":
-            yield Fact(name, _setting(value)) if found is None else Fact(found.title, _setting(value, found.unit))
-
-
-def _setting(value: OptionValue, unit: str = "") -> str:
-    """Yes or no for switches, numbers in short form, texts unmodified."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    text = f"{value:g}".replace("-", "−") if isinstance(value, int | float) else value
-    return f"{text} {unit}" if unit else text
+            yield (
+                Fact(name, setting_text(value)) if found is None else Fact(found.title, setting_text(value, found.unit))
+            )
 
 
 def _start(start: Start) -> str:

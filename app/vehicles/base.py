@@ -25,7 +25,7 @@ Ending = Literal["completed", "aborted", "invalid"]
 @dataclass(frozen=True, slots=True)
 class VehicleOption:
     """One setting of a vehicle kind, with its unit, range or choices, and default. `label`: the title without the help
-    for entering a value, empty if it contains none."""
+    for entering a value, empty if it contains none. `autopilots`: those that have it, empty for all."""
 
     name: str
     title: str
@@ -35,6 +35,7 @@ class VehicleOption:
     upper: float | None = None
     choices: tuple[OptionValue, ...] = ()
     label: str = ""
+    autopilots: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

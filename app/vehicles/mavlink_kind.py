@@ -150,6 +150,8 @@ def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
     return ()
 
 
+_PAPARAZZI: Final = ("paparazzi",)
+
 MAVLINK: Final = VehicleKind(
     name="mavlink",
     title="Vehicle over MAVLink",
@@ -171,18 +173,44 @@ MAVLINK: Final = VehicleKind(
         VehicleOption("simulated", "Simulated vehicle on this computer", "", False),
         VehicleOption("system_id", "MAVLink system id; 0: the first autopilot received", "", 0.0, 0.0, 255.0),
         VehicleOption(
-            "aircraft_id", "Paparazzi's aircraft id (AC_ID); 0: the same as the system id", "", 0.0, 0.0, 255.0
+            "aircraft_id",
+            "Paparazzi's aircraft id (AC_ID); 0: the same as the system id",
+            "",
+            0.0,
+            0.0,
+            255.0,
+            autopilots=_PAPARAZZI,
         ),
         VehicleOption("telemetry_hz", "Requested rate of positions", "Hz", 50.0, 40.0, 200.0),
         VehicleOption(
-            "climb_waypoint", "Paparazzi: number of the waypoint that the takeoff climbs to", "", 2.0, 1.0, 254.0
+            "climb_waypoint",
+            "Paparazzi: number of the waypoint that the takeoff climbs to",
+            "",
+            2.0,
+            1.0,
+            254.0,
+            autopilots=_PAPARAZZI,
         ),
         VehicleOption("min_battery_v", "Lowest battery voltage to fly with", "V", 10.5, 0.0, 60.0),
         VehicleOption("radius_m", "Maximum distance from the start", "m", 5.0, 0.5, 100.0),
         VehicleOption(
-            "plan_radius_m", "Paparazzi: maximum distance from HOME in the flight plan", "m", 8.0, 0.5, 1000.0
+            "plan_radius_m",
+            "Paparazzi: maximum distance from HOME in the flight plan",
+            "m",
+            8.0,
+            0.5,
+            1000.0,
+            autopilots=_PAPARAZZI,
         ),
-        VehicleOption("plan_time_s", "Paparazzi: time limit of the flight plan's takeoff", "s", 45.0, 15.0, 600.0),
+        VehicleOption(
+            "plan_time_s",
+            "Paparazzi: time limit of the flight plan's takeoff",
+            "s",
+            45.0,
+            15.0,
+            600.0,
+            autopilots=_PAPARAZZI,
+        ),
         VehicleOption("clock_speed", "Speed of the vehicle's clock; 1 for a real vehicle", "×", 1.0, 0.1, 100.0),
         VehicleOption(
             "second_source",
@@ -198,6 +226,7 @@ MAVLINK: Final = VehicleKind(
             "",
             "",
             label="Signing key file",
+            autopilots=("ardupilot", "px4"),
         ),
         VehicleOption(
             "log_folder",

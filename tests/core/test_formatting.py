@@ -14,6 +14,7 @@ from app.core.formatting import (
     percent,
     plus_minus,
     relative_to,
+    setting_text,
     short,
     short_percent,
     signed,
@@ -100,3 +101,16 @@ def test_a_whole_gain_is_in_full_and_any_other_has_four_digits() -> None:
 def test_a_reason_does_not_repeat_the_word_of_the_state_before_it() -> None:
     reasons = ("aborted by the operator", "Aborted", "too high", "abortedly")
     assert [without_word(reason, "Aborted") for reason in reasons] == ["by the operator", "", "too high", "abortedly"]
+
+
+def test_a_setting_is_printed_as_its_form_shows_it() -> None:
+    settings = [(True, ""), (False, ""), (10.5, "V"), (-2.0, "m"), (45.0, ""), ("mocap", ""), ("", "")]
+    assert [setting_text(value, unit) for value, unit in settings] == [
+        "on",
+        "off",
+        "10.5 V",
+        "−2 m",
+        "45",
+        "mocap",
+        "none",
+    ]

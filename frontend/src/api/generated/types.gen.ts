@@ -2616,6 +2616,12 @@ export type OptionInfo = {
      * Upper
      */
     upper?: number | null;
+    /**
+     * Autopilots
+     *
+     * the autopilots that have this option; empty: all
+     */
+    autopilots?: Array<string>;
 };
 
 /**

@@ -3,7 +3,7 @@ import type { Catalogue } from "../../api/types";
 import { OptionField, type OptionValue } from "../../ui/Fields";
 import classes from "../../ui/Form.module.css";
 import { FoldedSection } from "../../ui/FormPage";
-import { furtherOptions } from "./fleet";
+import { autopilotOf, furtherOptions } from "./fleet";
 
 export const PLAIN_LABELS = { name: "Name", "options.address": "Address" };
 
@@ -54,7 +54,7 @@ export function FurtherFields({ catalogue, options, reasons, onChange }: Further
   return (
     <FoldedSection title="Advanced: identity, limits, motion capture, signing" forcedOpen={refused}>
       <div className={classes["pair"]}>
-        {furtherOptions(catalogue, String(options["autopilot"] ?? "")).map((option) => (
+        {furtherOptions(catalogue, autopilotOf({ options })).map((option) => (
           <OptionField
             key={option.name}
             option={option}

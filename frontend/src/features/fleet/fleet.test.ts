@@ -29,7 +29,14 @@ const catalogue = {
   vehicle_kinds: [
     {
       name: "mavlink",
-      options: [{ name: "autopilot" }, { name: "address" }, { name: "simulated" }, { name: "min_battery_v" }],
+      options: [
+        { name: "autopilot" },
+        { name: "address" },
+        { name: "simulated" },
+        { name: "min_battery_v", autopilots: [] },
+        { name: "aircraft_id", autopilots: ["paparazzi"] },
+        { name: "signing_key_file", autopilots: ["ardupilot", "px4"] },
+      ],
     },
   ],
 } as unknown as Catalogue;
@@ -69,7 +76,17 @@ test("a gain that is no number yet is named, and not sent", () => {
 });
 
 test("only what has no place of its own is folded away", () => {
-  expect(furtherOptions(catalogue).map(({ name }) => name)).toEqual(["min_battery_v"]);
+  expect(furtherOptions(catalogue).map(({ name }) => name)).toEqual([
+    "min_battery_v",
+    "aircraft_id",
+    "signing_key_file",
+  ]);
+});
+
+test("an autopilot is asked for no option of another one", () => {
+  const names = (autopilot: string): string[] => furtherOptions(catalogue, autopilot).map(({ name }) => name);
+  expect(names("paparazzi")).toEqual(["min_battery_v", "aircraft_id"]);
+  expect(names("px4")).toEqual(["min_battery_v", "signing_key_file"]);
 });
 
 test("parameters are read out of an act's result by their names in order, and there are none before it has one", () => {

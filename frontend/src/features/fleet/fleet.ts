@@ -98,8 +98,8 @@ export interface VehicleForm {
   statement: string;
 }
 
-export function autopilotOf(form: VehicleForm): string {
-  return String(form.options["autopilot"] ?? "paparazzi");
+export function autopilotOf({ options }: Pick<VehicleForm, "options">): string {
+  return String(options["autopilot"] ?? "paparazzi");
 }
 
 /** Gains of this autopilot's takeoff. */
@@ -164,18 +164,12 @@ export function connectFailure(acts: readonly VehicleAct[]): string {
   return newest?.kind === "connect" ? newest.problem : "";
 }
 
-/** Beginnings of the titles of options that an autopilot does not have. */
-const OTHERS: Readonly<Record<string, readonly string[]>> = {
-  paparazzi: ["ArduCopter, PX4:"],
-  ardupilot: ["Paparazzi:", "Paparazzi's"],
-  px4: ["Paparazzi:", "Paparazzi's"],
-};
-
 /** Options of the collapsed section; those of this autopilot alone, if one is given. */
-export function furtherOptions(catalogue: Catalogue, autopilot = ""): OptionInfo[] {
+export function furtherOptions(catalogue: Catalogue, autopilot?: string): OptionInfo[] {
   const options = catalogue.vehicle_kinds.find(({ name }) => name === KIND)?.options ?? [];
-  const others = OTHERS[autopilot] ?? [];
-  return options.filter(({ name, title }) => !PLAIN.has(name) && !others.some((start) => title.startsWith(start)));
+  const isOffered = ({ autopilots = [] }: OptionInfo): boolean =>
+    autopilot === undefined || autopilots.length === 0 || autopilots.includes(autopilot);
+  return options.filter((option) => !PLAIN.has(option.name) && isOffered(option));
 }
 
 export function isSimulated(form: VehicleForm): boolean {
