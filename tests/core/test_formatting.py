@@ -104,7 +104,15 @@ def test_a_reason_does_not_repeat_the_word_of_the_state_before_it() -> None:
 
 
 def test_a_setting_is_printed_as_its_form_shows_it() -> None:
-    settings = [(True, ""), (False, ""), (10.5, "V"), (-2.0, "m"), (45.0, ""), ("mocap", ""), ("", "")]
+    settings: list[tuple[bool | float | str, str]] = [
+        (True, ""),
+        (False, ""),
+        (10.5, "V"),
+        (-2.0, "m"),
+        (45.0, ""),
+        ("mocap", ""),
+        ("", ""),
+    ]
     assert [setting_text(value, unit) for value, unit in settings] == [
         "on",
         "off",
