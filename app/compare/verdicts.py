@@ -64,7 +64,8 @@ class LeadingPair:
         return max(1, self.policies - 1)
 
     def is_of(self, side: ComparisonFlight, against: ComparisonFlight) -> bool:
-        return {side.row.id, against.row.id} == {self.best.row.id, self.other.row.id}
+        """Whether the two flights have the gains of this pair."""
+        return {id(side.group), id(against.group)} == {id(self.best.group), id(self.other.group)}
 
 
 def find_leading_pair(sides: Sequence[ComparisonFlight]) -> LeadingPair | None:
@@ -90,8 +91,8 @@ def overall_verdict(leading: LeadingPair | None) -> tuple[Verdict | None, str]:
 
 
 def compare_pairs(sides: Sequence[ComparisonFlight], leading: LeadingPair | None) -> list[FlightPair]:
-    """Compare each flight with every earlier one of the list; the leading pair has the confidence of the overall
-    verdict, which allows for its choice."""
+    """Compare each flight with every earlier one of the list; the gains of the leading pair have the confidence of the
+    overall verdict, which allows for their choice."""
     return [
         compare_pair(
             later,
@@ -125,7 +126,9 @@ def _rank(side: ComparisonFlight) -> tuple[float, str]:
 
 
 def _among(best: ComparisonFlight, policies: int) -> str:
-    return f"{capitalised(best.name)} is the lowest of {policies} gain sets. " if policies > 2 else ""
+    if policies <= 2:
+        return ""
+    return f"{capitalised(best.name)} is the lowest of {policies} gain sets, and the confidence allows for this choice. "
 
 
 def _pair(

@@ -100,6 +100,8 @@ def file_name(campaign_id: int, ending: str) -> str:
 
 
 def _state(campaign: Campaign) -> str:
+    if campaign.state == "finished" and campaign.outcome == "converged" and campaign.verdict is None:
+        return "No better gains found"
     if campaign.state == "finished" and campaign.outcome is not None:
         return _OUTCOMES[campaign.outcome]
     return _STATES[campaign.state]

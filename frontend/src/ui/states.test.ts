@@ -1,14 +1,22 @@
 import { expect, test } from "vitest";
 import { campaignStateLabel } from "./states";
 
+const READY = { state: "ready", outcome: null, verdict: null } as const;
+const DECIDING = { ...READY, state: "deciding" } as const;
+const CONVERGED = { state: "finished", outcome: "converged", verdict: "better" } as const;
+
 test("a campaign on a real vehicle is headed by what comes next, not as ready to fly before its rehearsal", () => {
-  expect(campaignStateLabel("ready", null, "missing").word).toBe("Rehearsal required");
-  expect(campaignStateLabel("deciding", null, "under way").word).toBe("Rehearsal in progress");
-  expect(campaignStateLabel("ready", null, "failed").word).toBe("Rehearsal failed");
-  expect(campaignStateLabel("ready", null, "passed").word).toBe("Not flown yet");
-  expect(campaignStateLabel("ready", null).word).toBe("Not flown yet");
-  expect(campaignStateLabel("ready", null, "not needed", false).word).toBe("Ready");
-  expect(campaignStateLabel("deciding", null, "not needed", true, true).word).toBe("Rehearsal passed");
-  expect(campaignStateLabel("draft", null, "missing").word).toBe("Preparing");
-  expect(campaignStateLabel("finished", "converged", "missing").word).toBe("Converged");
+  expect(campaignStateLabel({ ...READY, rehearsal: "missing" }).word).toBe("Rehearsal required");
+  expect(campaignStateLabel({ ...DECIDING, rehearsal: "under way" }).word).toBe("Rehearsal in progress");
+  expect(campaignStateLabel({ ...READY, rehearsal: "failed" }).word).toBe("Rehearsal failed");
+  expect(campaignStateLabel({ ...READY, rehearsal: "passed" }).word).toBe("Not flown yet");
+  expect(campaignStateLabel(READY).word).toBe("Not flown yet");
+  expect(campaignStateLabel({ ...READY, canFly: false }).word).toBe("Ready");
+  expect(campaignStateLabel({ ...DECIDING, hasPassed: true }).word).toBe("Rehearsal passed");
+  expect(campaignStateLabel({ ...READY, state: "draft", rehearsal: "missing" }).word).toBe("Preparing");
+  expect(campaignStateLabel({ ...CONVERGED, rehearsal: "missing" }).word).toBe("Converged");
+});
+
+test("a campaign that ended with its first gains as the best is not said to have converged", () => {
+  expect(campaignStateLabel({ ...CONVERGED, verdict: null }).word).toBe("No better gains found");
 });

@@ -24,6 +24,9 @@ const OUTCOME: Record<string, StateLabel> = {
   stopped: { word: "Stopped by the operator", tone: "quiet" },
 };
 
+/** Of a campaign that converged without other gains that compare better: its first gains are its best. */
+const NOTHING_BETTER: StateLabel = { word: "No better gains found", tone: "quiet" };
+
 type RehearsalState = Campaign["rehearsal"]["state"];
 
 /** Labels of a real vehicle's campaign that waits for its rehearsal. */
@@ -33,15 +36,23 @@ const REHEARSAL: Partial<Record<RehearsalState, StateLabel>> = {
   failed: { word: "Rehearsal failed", tone: "bad" },
 };
 
-/** `canFly`: whether Gainline can fly the vehicle, rather than import its records; `hasPassed`: whether the campaign is a
- * rehearsal that has passed. */
-export function campaignStateLabel(
-  state: CampaignState,
-  outcome: string | null,
-  rehearsal: RehearsalState = "not needed",
+interface Standing extends Pick<Campaign, "state" | "outcome" | "verdict"> {
+  rehearsal?: RehearsalState;
+  /** Whether Gainline can fly the vehicle, rather than import its records. */
+  canFly?: boolean;
+  /** Whether the campaign is a rehearsal that has passed. */
+  hasPassed?: boolean;
+}
+
+export function campaignStateLabel({
+  state,
+  outcome,
+  verdict,
+  rehearsal = "not needed",
   canFly = true,
   hasPassed = false,
-): StateLabel {
+}: Standing): StateLabel {
+  if (state === "finished" && outcome === "converged" && verdict === null) return NOTHING_BETTER;
   if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
   const mayFly = state === "ready" || state === "deciding";
   if (mayFly && hasPassed) return { word: "Rehearsal passed", tone: "good" };

@@ -37,12 +37,11 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
       </Group>
       <div className={classes["facts"]}>
         <StateBadge
-          words={campaignStateLabel(
-            campaign.state,
-            campaign.outcome,
-            campaign.rehearsal.state,
-            campaign.vehicle.can_fly,
-          )}
+          words={campaignStateLabel({
+            ...campaign,
+            rehearsal: campaign.rehearsal.state,
+            canFly: campaign.vehicle.can_fly,
+          })}
         />
         <span>{count(campaign.trials.flown, "flight")}</span>
         <details className={classes["settings"]}>

@@ -47,7 +47,7 @@ export function FinishedCard({ campaign, onChoose, isSecondary }: Props) {
   const further = isCandidate ? missing.length : FURTHER_FLIGHTS;
   const experiment = campaign.definition.experiment ?? "";
   const bestFlight = winner === undefined ? null : bestFlightOf(winner);
-  const title = campaignStateLabel("finished", campaign.outcome).word;
+  const title = campaignStateLabel({ ...campaign, state: "finished", rehearsal: "not needed" }).word;
   const reason = endingOf(campaign, statistics?.comparison ?? null);
   return (
     <Panel title={title}>

@@ -15,14 +15,14 @@ import { ArchiveCampaign } from "./EndCampaign";
 
 /** A campaign in the list: result, curves, next action. */
 export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
-  const { id, name, state, outcome, vehicle, best, flights, rehearsal, next_action, spark } = campaign;
+  const { id, name, vehicle, best, flights, next_action, spark } = campaign;
   const hasPassed = campaign.has_passed_as_rehearsal;
   const units = useUnits(campaign.experiment);
   return (
     <li className={classes["card"]}>
       <div className={classes["top"]}>
         <VehicleBadge isReal={vehicle.is_real} />
-        <StateBadge words={campaignStateLabel(state, outcome, rehearsal, vehicle.can_fly, hasPassed)} />
+        <StateBadge words={campaignStateLabel({ ...campaign, canFly: vehicle.can_fly, hasPassed })} />
       </div>
       <h2 className={classes["name"]}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
