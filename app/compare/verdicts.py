@@ -128,7 +128,9 @@ def _rank(side: ComparisonFlight) -> tuple[float, str]:
 def _among(best: ComparisonFlight, policies: int) -> str:
     if policies <= 2:
         return ""
-    return f"{capitalised(best.name)} is the lowest of {policies} gain sets, and the confidence allows for this choice. "
+    return (
+        f"{capitalised(best.name)} is the lowest of {policies} gain sets, and the confidence allows for this choice. "
+    )
 
 
 def _pair(

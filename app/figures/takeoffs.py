@@ -91,7 +91,9 @@ class TrajectoriesFigure:
         traces += [*self._legend(palette, drawn), *self._prediction(palette)]
         traces += [self._empty(palette, "live", "Flying now"), self._empty(palette, "pointed", "Pointed at")]
         if is_step(history.set_point):
-            traces.append(self._empty(palette, "live deviation", "Flying now, deviation", yaxis="y2"))
+            # Plotly places an axis only if it has a trace with a point, even a missing one.
+            one_missing = ([None], [None])
+            traces.append(self._empty(palette, "live deviation", "Flying now, deviation", one_missing, yaxis="y2"))
         for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
             label, text = str(flight.number), f"Flight {flight.number}"
             part = part_off_scale(curve, low, high, OPENING_S[1]) or curve
@@ -313,11 +315,13 @@ class TrajectoriesFigure:
             )
         ]
 
-    def _empty(self, palette: Palette, role: str, name: str, **style: Any) -> Trace:
+    def _empty(
+        self, palette: Palette, role: str, name: str, points: tuple[list[None], list[None]] = ([], []), **style: Any
+    ) -> Trace:
         """An empty curve that the page fills."""
         return scatter(
             name,
-            ([], []),
+            points,
             role=role,
             showlegend=False,
             line=theme.line(palette.ink, 3.5),

@@ -197,7 +197,9 @@ def test_the_best_of_several_gets_no_credit_for_having_been_chosen(client: TestC
     assert pair["confidence"] == pytest.approx(1.0 - 2.0 * (1.0 - alone["confidence"]))
     for one in (pair, found):
         assert f"{100 * pair['confidence']:.0f}\u00a0% confidence" in one["sentence"]
-    assert found["sentence"].startswith("Flight 2 is the lowest of 3 gain sets, and the confidence allows for this choice.")
+    assert found["sentence"].startswith(
+        "Flight 2 is the lowest of 3 gain sets, and the confidence allows for this choice."
+    )
 
 
 def test_a_flight_without_an_error_stands_beside_the_others_without_a_verdict(

@@ -17,6 +17,13 @@ def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() ->
     assert trace(card, "live")["x"] == []
 
 
+def test_before_anything_is_predicted_the_panel_of_deviations_has_a_trace_by_which_it_is_placed() -> None:
+    """Observed: without one the browser drew its axis at NaN."""
+    card = TrajectoriesFigure(history()).compute()
+    assert [len(one["x"]) for one in traces(card) if one.get("yaxis") == "y2"] == [1]
+    assert layout(card)["xaxis"]["anchor"] == "y2"
+
+
 def test_a_drawn_curve_follows_the_record_within_a_tenth_of_a_millimetre() -> None:
     card = TrajectoriesFigure(history(flight(1, 0.3))).compute()
     drawn = trace(card, "flight", trial=1)
