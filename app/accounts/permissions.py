@@ -156,7 +156,7 @@ def _locked(act: Permission, vehicle: str) -> NotAllowedError:
         )
     return NotAllowedError(
         f"{vehicle} is a real vehicle, and this browser is not unlocked for it.",
-        hint=f"{UNLOCK_HINT} Abort and land need no key.",
+        hint=f"{UNLOCK_HINT} Abort and Land still work without it.",
         script_hint=f"{_FOR_SCRIPTS} Abort and land need no key.",
     )
 

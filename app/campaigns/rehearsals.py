@@ -99,5 +99,5 @@ def require_rehearsed(session: Session, campaign: CampaignRow) -> None:
             f"{campaign.vehicle.name} is a real vehicle, and campaign {campaign.id} has not passed its rehearsal "
             f"({result.reason}).",
             hint=f"Rehearse it {where} first: fly {FLIGHTS} valid flights, or fly it until its stop rule "
-            "ends it, with no aborted or invalid flight.",
+            "ends it, with no flight aborted, invalid or lost and no gains refused by the gate.",
         )

@@ -366,7 +366,7 @@ def analyze(
     ] = None,
     json_out: JsonOut = None,
 ) -> None:
-    """Find better altitude gains in the log of a flight, and say what the model predicts with them."""
+    """Propose better altitude gains from a flight log, and print what the model predicts for them."""
     from app.cli.analyze import analyze_log
 
     analyze_log(log, json_out=json_out, params_out=params)

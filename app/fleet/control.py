@@ -81,7 +81,7 @@ def require_not_controlled_by_other(row: VehicleRow, context: RequestContext) ->
     if context.token is None or not holds(row, context.token):
         raise ConflictError(
             f"{held.operator} is in control of {row.name}.",
-            hint="Ask them to do it or to release control. Abort, land and motors off need no control.",
+            hint="Ask them to do it or to release control. Abort, land, motors off and unstage do not require control.",
         )
     return held.operator
 

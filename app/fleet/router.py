@@ -112,7 +112,7 @@ def list_given_gains(session: Reader, vehicle_id: Id, limit: Limit = 50, cursor:
 @router.post("/{vehicle_id}/land", status_code=status.HTTP_202_ACCEPTED)
 async def land_vehicle(live: Live, vehicle_id: Id, body: VehicleOrder | None = None) -> OrderAnswer:
     """Land the vehicle now, whatever it is doing. Goes straight to the worker without waiting for storage."""
-    return await _order(live, vehicle_id, "land", body, "The land command is repeated until the vehicle accepts it.")
+    return await _order(live, vehicle_id, "land", body, "Land is repeated until the vehicle descends.")
 
 
 @router.post("/{vehicle_id}/motors-off", status_code=status.HTTP_202_ACCEPTED)

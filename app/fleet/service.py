@@ -159,7 +159,7 @@ _ACTS: Final[Mapping[str, str]] = MappingProxyType(
         ActKind.PARAMETERS: "its parameters are being read",
         ActKind.RELEASE: "it is being released",
         ActKind.LAND: "it is being commanded to land",
-        ActKind.MOTORS_OFF: "its motors are being commanded off",
+        ActKind.MOTORS_OFF: "its motors are being commanded to stop",
     }
 )
 

@@ -72,7 +72,7 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
             what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
-            way_on_in_flight=f"Land is repeated until the vehicle confirms it. {_BY_HAND}",
+            way_on_in_flight=f"Land is repeated until the vehicle descends. {_BY_HAND}",
         ),
         "gains unknown": LossText(
             what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
@@ -85,7 +85,7 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
         ),
         "checks failed": LossText(
             what="A preflight check has failed.",
-            way_on="Correct what it names, then select Check now on the vehicle's page.",
+            way_on="Correct the failed item, then select Check now on the vehicle's page.",
             keeps="staged",
         ),
         "quarantined": LossText(

@@ -56,7 +56,7 @@ class GainsInManoeuvre(AssessedGains):
         float,
         Field(
             description="factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most "
-            "critical of the vehicles that the log allows; 0: less than 1, 8: at least 8"
+            "critical of the vehicles consistent with the log; 0: less than 1, 8: at least 8"
         ),
     ]
 

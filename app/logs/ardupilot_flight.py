@@ -128,8 +128,8 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         (logged.is_sound, "PSCD", "has no rows of numbers beside rows of CTUN"),
         (_in_flight(tables, time_s), "EV", "has no takeoff, or nothing between takeoff and landing"),
         (_holding_altitude(tables, time_s), "MODE", "has no mode that holds altitude in flight"),
-        (~_compensating_vibration(tables, time_s), "ERR", "has vibration compensation in the whole flight"),
-        (logged.lean >= _LARGEST_LEAN, "ATT", "leans by more than 30° in the whole flight"),
+        (~_compensating_vibration(tables, time_s), "ERR", "has vibration compensation active throughout the flight"),
+        (logged.lean >= _LARGEST_LEAN, "ATT", "leans by more than 30° throughout the flight"),
     )
     usable = np.ones(len(time_s), dtype=np.bool_)
     for condition, field, reason in conditions:
@@ -141,8 +141,8 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         raise _refused(
             name,
             "PSCD",
-            f"has no {SHORTEST_PART_S:g} s in flight in a mode that holds altitude without a gap of "
-            f"{LONGEST_INTERVAL_S:g} s, a jump of the altitude or a change of parameters",
+            f"has no {SHORTEST_PART_S:g} s flown in an altitude-holding mode without a gap of {LONGEST_INTERVAL_S:g} s, a "
+            "jump in altitude or a parameter change",
         )
     manoeuvres = Manoeuvres(time_s, logged.up["DAD"])
     given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))

@@ -94,5 +94,5 @@ def _too_much(limits: Limits) -> InputError:
             Problem("file", f"needs more than {limits.processor_s} s or {limits.memory_bytes / 2**30:g} GiB to read"),
         ),
         hint="Check that it is the correct log. `gainline import` and `gainline controller check` read files "
-        "without limits.",
+        "without these limits of time and memory.",
     )

@@ -39,7 +39,9 @@ def read_order(order: object) -> Order:
     try:
         found = _ORDER.validate_python(order)
     except ValidationError as error:
-        raise GainlineError(f"The job's order {order!r} cannot be read.", hint="Run the reproduction again.") from error
+        raise GainlineError(
+            f"The job's request {order!r} cannot be read.", hint="Run the reproduction again."
+        ) from error
     if found.name not in REPRODUCTIONS:
         raise GainlineError(f"The reproduction {found.name} no longer exists.", hint="Run another reproduction.")
     return found

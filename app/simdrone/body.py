@@ -138,7 +138,7 @@ def new_body(vehicle: str, options: Mapping[str, OptionValue], *, seed: int) -> 
     """Return the body of a drone that flies as this vehicle kind. Raises InputError for an unknown kind or option."""
     if vehicle not in AIRFRAMES:
         raise InputError(
-            "A simulated drone cannot have this body.",
+            "A simulated drone cannot use this flight model.",
             problems=(Problem("vehicle", f"must be one of {', '.join(AIRFRAMES)}, got {vehicle!r}"),),
             hint="jsbsim has six degrees of freedom; twin is a simple model with the real flights' scatter.",
         )

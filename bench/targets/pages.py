@@ -37,7 +37,7 @@ that is possible on the vehicle.
 - The error compared is that of the gains that a method recommends after a number of flights, without noise. Gainline
   recommends the gains that it proposed last, the other methods the best that they have flown. The lowest possible error
   is found by a search on the vehicle itself, without noise.
-- A flight is unsafe if it rises above 3.75 m, is below 2.25 m later than 5 s after the command, or diverges. The first
+- A flight is unsafe if it rises above 3.75 m, is below 2.25 m more than 5 s after the command, or diverges. The first
   flight and repeated flights of the default gains do not count.
 - Gainline's proposals pass its gate as in a campaign, and the processor time of the gate is included. A refused
   proposal ends the tuning as a failure. The other methods have no gate.
@@ -50,7 +50,7 @@ that is possible on the vehicle.
 
 ![Share of vehicles within 5 % against flights]({figure})
 
-To make this page again (takes hours; with `--results FILE` the second command can be interrupted and continued):
+To regenerate this page (takes hours; with `--results FILE` the second command can be interrupted and continued):
 
     ./dev exec uv pip install --require-hashes -r requirements/bench.txt
     ./dev exec python -m bench.flights_to_target --vehicles 200 --twins 400 --methods all --seed {seed} --out docs

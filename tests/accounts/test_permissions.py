@@ -48,7 +48,7 @@ def test_a_refusal_names_the_vehicle_and_the_way_out() -> None:
     with pytest.raises(NotAllowedError, match="Bee is a real vehicle") as locked:
         require(Permission.REAL, Caller(), "Bee")
     assert "gainline unlock" in locked.value.hint
-    assert "Abort and land need no key" in locked.value.hint
+    assert "Abort and Land still work without it" in locked.value.hint
     assert "Bearer" not in locked.value.hint, "a page shows the hint"
     assert "Bearer" in locked.value.script_hint
     with pytest.raises(NotAllowedError, match=r"from another device \(192.0.2.9\)"):

@@ -308,7 +308,7 @@ def import_into_campaign(
         chosen = [trial for trial in trials if trial.state in waits]
     if len(chosen) > 1:
         raise InputError(
-            f"{len(chosen)} trials of campaign {campaign_id} wait for a record.",
+            f"{len(chosen)} trials of campaign {campaign_id} are waiting for a record.",
             hint="Specify the trial with --trial.",
             problems=tuple(Problem("trial", f"{trial.number}: {trial.state}") for trial in chosen),
         )

@@ -83,9 +83,9 @@ class TakeoffAnalysis:
         if self.proposed is None:
             return self.insufficient or ""
         error_m, interval = self.proposed.predicted_error_m, self.proposed.interval
-        refused = " The gate refuses those flown." if self.assessments[0].refusal else ""
+        refused = " The gate refuses the gains flown." if self.assessments[0].refusal else ""
         return (
-            f"Mean distance from 3 m: {self.best.error or 0.0:.3f} m flown. The model predicts {error_m:.3f} m "
+            f"Mean distance from 3 m: {self.best.error or 0.0:.3f} m measured. The model predicts {error_m:.3f} m "
             f"({interval.lower:.3f} … {interval.upper:.3f} m) for the proposed gains.{refused}"
         )
 

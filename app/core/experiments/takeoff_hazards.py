@@ -161,7 +161,8 @@ def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: flo
         if not passed
         else f"; {ceiling_m:.2f} m is allowed."
         if highest_m <= ceiling_m
-        else f", beyond {ceiling_m:.2f} m; every flight is compared with these gains, so they are allowed."
+        else f", beyond {ceiling_m:.2f} m; these gains are allowed all the same, because every flight is compared with "
+        "them."
     )
     return Check("altitude", passed, sentence, worst=highest_m, limit=ceiling_m, case=case)
 
@@ -306,8 +307,8 @@ def _refusals(refused: list[int], gains: list[int], wraps: Counts) -> Iterator[C
         case, explanation = _wrap_case(product, wraps[:, place])
         sentence = (
             f"{product.gain}·({product.error}) can reach {grouped(worst)} and overflow 32 bits "
-            f"({grouped(INT32_MAX)}): full up becomes full down. {explanation} The largest {product.gain} that cannot "
-            f"overflow is {offered}."
+            f"({grouped(INT32_MAX)}): full thrust becomes zero thrust, or the reverse. {explanation} "
+            f"The largest {product.gain} that cannot overflow is {offered}."
         )
         offer = {product.gain: offered if gains[place] > 0 else -offered}
         yield Check(

@@ -68,7 +68,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "arming refused, or not armed within 2 s", "disarm", "refused", "The vehicle did not arm."
         ),
         Failure.NO_LIFT_OFF: Response(
-            "takeoff refused, or still less than 0.15 m above the ground at the end of the autopilot's time",
+            "takeoff refused, or still less than 0.15 m above the ground when the lift-off time limit ends",
             "disarm",
             "aborted",
             "The vehicle did not lift off.",
@@ -131,7 +131,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.",
         ),
         Failure.INTERRUPTED: Response(
-            "one heartbeat in a manual mode, and the next in another; under ArduCopter and PX4 also a record that "
+            "one heartbeat in a manual mode, and the next in another; under ArduCopter and PX4 also a flight that "
             "never came within 1 m of the set point",
             "note",
             "invalid",

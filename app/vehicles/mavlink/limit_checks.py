@@ -217,7 +217,7 @@ def find_altitude_behind(watch: TrialObservation) -> Finding | None:
     """Find that a vehicle commanded to climb is on the ground by its altitude but climbs by its climb rate."""
     if not is_behind_climb_rate(watch):
         return None
-    why = f"By its climb rate it rose {watch.behind_m:.1f} m more than its altitude shows."
+    why = f"According to its climb rate it rose {watch.behind_m:.1f} m more than its altitude shows."
     return Finding(failure=Failure.LOST_POSITION, why=why)
 
 

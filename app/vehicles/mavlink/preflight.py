@@ -395,7 +395,7 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
         name="motors_off",
         title="Motors off",
         passed=bool(ways),
-        found=" and ".join(ways) or "the vehicle confirms no command that stops its motors",
+        found=" and ".join(ways) or "the vehicle did not confirm any command that stops its motors",
         needed="a confirmed way to stop its motors",
         hint="" if ways else "Build it with settings/rotorcraft_basic.xml (docs/real-flight.md), then connect again.",
     )

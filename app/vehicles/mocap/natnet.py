@@ -84,7 +84,7 @@ class NatNetSource:
         if not self._thread.is_alive():
             return f"Reception of {self.name} has stopped."
         if self._frame_s is not None and (silent_s := time.monotonic() - self._frame_s) > SILENT_S:
-            return f"Nothing was received of {self.name} for {silent_s:.0f} s."
+            return f"Nothing was received for {self.name} in the last {silent_s:.0f} s."
         newest = self._stream.newest
         return f"The cameras do not see {self.name}." if newest is not None and not newest.tracking_valid else ""
 

@@ -147,10 +147,10 @@ export const ABORT_LABELS: Record<AbortStage, string> = {
 };
 
 const ABORT_SAYS: Record<AbortStage, string> = {
-  none: "ABORT or Space ends the flight immediately: safe gains and Land are sent until the vehicle confirms.",
+  none: "ABORT or Space ends the flight immediately: the safe gains are sent, then Land until the vehicle descends.",
   sending: "Sending the abort to the worker.",
   "not confirmed": "The abort is not confirmed. It is sent again until the worker confirms it.",
-  accepted: "Sending safe gains and Land until the vehicle confirms.",
+  accepted: "Safe gains sent. Repeating Land until the vehicle descends.",
 };
 
 /** What ABORT does, or is doing, while the worker can be reached or not, and the vehicle's link is lost or not. */
@@ -159,8 +159,8 @@ export function abortText(stage: AbortStage, isReached: boolean, isLinkLost: boo
     return "An abort cannot be sent: the worker cannot be reached. Use the vehicle's own remote control.";
   if (!isReached && stage === "accepted") return "The worker has confirmed the abort, but cannot be reached now.";
   if (isLinkLost && stage === "none")
-    return "Nothing is received from the vehicle. An abort would be sent until the vehicle confirms it. Use the vehicle's own remote control.";
+    return "Nothing is received from the vehicle. An abort would be sent until the vehicle descends. Use the vehicle's own remote control.";
   if (isLinkLost && stage === "accepted")
-    return "Nothing is received from the vehicle. The abort is sent until the vehicle confirms it. Use the vehicle's own remote control.";
+    return "Nothing is received from the vehicle. The abort is sent until the vehicle descends. Use the vehicle's own remote control.";
   return ABORT_SAYS[stage];
 }

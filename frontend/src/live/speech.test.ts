@@ -66,7 +66,7 @@ test("a flight that has ended is looked up once", () => {
 });
 
 test("the outcome is said with its error in words", () => {
-  expect(outcomeSentence("captured", 0.2412, "m")?.text).toBe("Landed, captured, 0.24 metres.");
+  expect(outcomeSentence("captured", 0.2412, "m")?.text).toBe("Landed, needs review, 0.24 metres.");
   expect(outcomeSentence("aborted", 1.2, "m")).toEqual({ text: "Aborted, landed.", urgent: true });
   expect(outcomeSentence("valid", 0.0123, "rad·s")?.text).toBe("Landed, valid, 0.012 radian seconds.");
   expect(outcomeSentence("flying", null, "m")).toBeNull();

@@ -95,14 +95,14 @@ export function justDown(before: News, now: News): number[] {
 }
 
 const OUTCOMES: Readonly<Record<string, Sentence>> = {
-  captured: say("Landed, captured"),
+  captured: say("Landed, needs review"),
   valid: say("Landed, valid"),
   invalid: say("Landed, invalid"),
   aborted: shout("Aborted, landed"),
   lost: shout("Flight outcome unknown. Inspect the vehicle"),
 };
 
-/** `Landed, captured, 0.24 metres.`; null until the result is stored. */
+/** `Landed, needs review, 0.24 metres.`; null until the result is stored. */
 export function outcomeSentence(state: string, error: number | null, unit: string): Sentence | null {
   const outcome = OUTCOMES[state];
   if (outcome === undefined) return null;

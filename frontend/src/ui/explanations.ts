@@ -20,7 +20,7 @@ export const EXPLANATIONS = explained({
   altitude: {
     question: "What is the altitude measured from?",
     answer: [
-      "On the ground it is the vehicle's own altitude, whose zero may lie above or below the ground. From the takeoff command on, it is measured from the ground where the vehicle stood.",
+      "On the ground it is the vehicle's own altitude, whose zero may lie above or below the ground. In flight, the altitude of ArduCopter and PX4 is measured from the ground where the vehicle stood; under Paparazzi it keeps the autopilot's own zero.",
     ],
   },
   errorSoFar: {

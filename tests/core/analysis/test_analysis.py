@@ -105,7 +105,7 @@ def test_a_signal_that_nobody_recorded_is_refused(signal: str, named: str) -> No
 def test_another_controller_is_refused() -> None:
     flight = simulated_flight()
     (segment,) = flight.segments
-    assert "climb rate target other than" in refusal(changed(flight, v_t_m_s=segment.v_t_m_s + 0.1))
+    assert "climb rate target that does not follow" in refusal(changed(flight, v_t_m_s=segment.v_t_m_s + 0.1))
 
 
 def test_accelerations_that_nothing_explains_are_refused() -> None:

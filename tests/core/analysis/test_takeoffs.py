@@ -53,7 +53,7 @@ def test_the_recorded_takeoff_with_the_default_gains_finds_much_better_ones() ->
     assert found.proposed is not None
     assert 0.085 < found.proposed.predicted_error_m < 0.105
     assert found.proposed.refusal == ""
-    assert found.answer.startswith("Mean distance from 3 m: 0.330 m flown. The model predicts 0.09")
+    assert found.answer.startswith("Mean distance from 3 m: 0.330 m measured. The model predicts 0.09")
     hover = next(each for each in found.fitted if each.name == "hover_throttle")
     assert hover.value == pytest.approx(0.63, abs=0.01)
 
@@ -65,7 +65,7 @@ def test_gains_that_can_overflow_are_replaced_even_by_equally_good_ones() -> Non
     assert found.proposed is not None
     assert found.proposed.refusal == ""
     assert found.proposed.gains["ki"] <= 1073
-    assert found.answer.endswith("for the proposed gains. The gate refuses those flown.")
+    assert found.answer.endswith("for the proposed gains. The gate refuses the gains flown.")
 
 
 def test_gains_that_are_already_good_are_kept() -> None:

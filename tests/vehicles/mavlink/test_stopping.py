@@ -82,9 +82,12 @@ def test_a_vehicle_that_ignores_commands_is_stopped_by_its_setting(setting: str)
 def test_a_vehicle_that_confirms_no_way_to_stop_its_motors_is_not_flown() -> None:
     with LockstepRig(make=of(DeafToCommands, kill_setting="")) as rig, connected(rig) as vehicle:
         [stopping] = [item for item in vehicle.check() if item.name == "motors_off"]
-        assert (stopping.passed, stopping.found) == (False, "the vehicle confirms no command that stops its motors")
+        assert (stopping.passed, stopping.found) == (
+            False,
+            "the vehicle did not confirm any command that stops its motors",
+        )
         vehicle.stage(TUNED)
-        with pytest.raises(VehicleError, match="Motors off: the vehicle confirms no command"):
+        with pytest.raises(VehicleError, match="Motors off: the vehicle did not confirm any command"):
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert not rig.drone.autopilot.took_off
 

@@ -542,7 +542,7 @@ def test_an_altitude_that_stays_behind_its_climb_rate_is_lost_and_stops_no_motor
         walk.pass_s(STEP_S)
     walk.altitude_m, walk.climb_rate_m_s = ground_m, 0.0
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
-    assert walk.trial.why == "By its climb rate it rose 0.5 m more than its altitude shows."
+    assert walk.trial.why == "According to its climb rate it rose 0.5 m more than its altitude shows."
     walk.pass_s(60.0)
     assert walk.state is State.QUARANTINE
     assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)

@@ -115,7 +115,7 @@ def test_a_system_that_was_switched_off_is_troubled_and_heard_again_when_it_is_b
     with FakeMotive(unicast, clock_s=900.0):
         source = NatNetSource(unicast, CLOCK)
     with closing(source):
-        assert comes_true(lambda: "Nothing was received of rigid body 3" in source.trouble)
+        assert comes_true(lambda: "Nothing was received for rigid body 3" in source.trouble)
         with FakeMotive(unicast):
             assert comes_true(lambda: source.trouble == "")
             assert all(sample.advances for sample in news(source))

@@ -21,7 +21,7 @@ export function RehearsalCard({ campaign }: { campaign: Campaign }) {
         <Note fz="body">
           {campaign.vehicle.name} is a real vehicle. Before its first flight, the campaign must pass a rehearsal on a
           simulation with the same strategy, bounds, stop rule and gains: three valid flights (fewer if the stop rule
-          ends it), none aborted or invalid.
+          ends it), none aborted, invalid or lost, and none with gains that the gate refuses.
           {!hasModel &&
             " It flies on a registered simulated drone with the same autopilot (gainline sim-drone): register and connect it first."}
         </Note>

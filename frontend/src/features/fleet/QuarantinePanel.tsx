@@ -29,8 +29,10 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         <p>{vehicle.concern}</p>
       </div>
       <p>
-        It cannot be flown; Land, Motors off, Check now and Restore safe gains can still be sent.{" "}
-        {isDown ? "Inspect it, then release it." : "Land it, stop its motors, inspect it, then release it."}
+        It cannot be flown; Land, Motors off, Check now and Restore safe gains are still available.{" "}
+        {isDown
+          ? "Inspect it, then release it."
+          : "Land it, make sure that its motors have stopped, inspect it, then release it."}
       </p>
       <div className={classes["row"]}>
         <LandNow isDown={isDown} orders={orders} />

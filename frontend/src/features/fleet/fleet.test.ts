@@ -132,7 +132,7 @@ test("a vehicle from which nothing comes is never said to be in flight, staged o
   expect(["connecting", "connected", "not answering"].map((link) => word("flying", link))).toEqual([
     "Connecting",
     "No data",
-    "Not responding",
+    "Commands blocked",
   ]);
   expect(word("quarantined", "gone")).toBe("Quarantined");
   expect(word("flying", "connected", true)).toBe("In flight");

@@ -29,7 +29,7 @@ const SILENCES = {
   connecting: { word: "Connecting", tone: "busy" },
   connected: { word: "No data", tone: "bad" },
   gone: { word: "Link lost", tone: "bad" },
-  "not answering": { word: "Not responding", tone: "bad" },
+  "not answering": { word: "Commands blocked", tone: "bad" },
 } as const;
 
 /** A shared vehicle has no permanent connection. `status` is null if the vehicle has none, or it is not known yet. */

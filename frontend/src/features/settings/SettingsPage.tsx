@@ -90,7 +90,7 @@ function ThisBrowser() {
         label="Spoken announcements"
         description={
           canSpeak
-            ? "“Landed, captured, 0.24 metres.” After a reload, tap the page once to enable speech."
+            ? "“Landed, needs review, 0.24 metres.” After a reload, tap the page once to enable speech."
             : "This browser does not support speech. Screen readers still receive the announcements."
         }
         size="md"
