@@ -259,8 +259,8 @@ def _require_own_controller(flight: LoggedFlight) -> None:
         rows += len(targets)
     if differing > _OTHER_CONTROLLER_SHARE * rows:
         raise _unanswered(
-            f"has a climb rate target that does not follow from the logged parameters, in {differing} of {rows} rows: terrain "
-            "following, or a release with another position controller"
+            f"has a climb rate target that does not follow from the logged parameters, in {differing} of {rows} rows: "
+            "terrain following, or a release with another position controller"
         )
 
 

@@ -258,7 +258,8 @@ def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy
     ending = (
         ""
         if trustworthy
-        else "; the gradient is not trustworthy: most flights changed the error in the direction opposite to the prediction"
+        else "; the gradient is not trustworthy: most flights changed the error in the direction opposite to the "
+        "prediction"
     )
     counted = "; ".join(parts)
     return f"{counted[:1].upper()}{counted[1:]}{ending}."
