@@ -141,8 +141,8 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         raise _refused(
             name,
             "PSCD",
-            f"has no {SHORTEST_PART_S:g} s flown in an altitude-holding mode without a gap of {LONGEST_INTERVAL_S:g} s, "
-            "a jump in altitude or a parameter change",
+            f"has no {SHORTEST_PART_S:g} s flown in an altitude-holding mode without a gap of {LONGEST_INTERVAL_S:g} "
+            "s, a jump in altitude or a parameter change",
         )
     manoeuvres = Manoeuvres(time_s, logged.up["DAD"])
     given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
