@@ -1,4 +1,5 @@
 import { TextInput } from "@mantine/core";
+import { Fragment } from "react";
 import { gainText } from "../../ui/format";
 import { changeText, type GainRow, placeIn, sliderStep } from "./choices";
 import classes from "./NextFlight.module.css";
@@ -21,10 +22,13 @@ interface Props {
   entry?: GainEntry | undefined;
 }
 
+/** More gains than this are shown without their titles where the screen is low. */
+const FEW = 3;
+
 /** Gains of the best flight, else the vehicle's safe ones, and next, with the change of each as a factor and within the bounds. */
 export function GainTable({ rows, from, unit, titles, entry }: Props) {
   return (
-    <table className={classes["gains"]}>
+    <table className={classes["gains"]} data-many={rows.length > FEW || undefined}>
       <caption className="visually-hidden">{from} and next gains</caption>
       <thead>
         <tr>
@@ -39,8 +43,8 @@ export function GainTable({ rows, from, unit, titles, entry }: Props) {
       {rows.map((row) => (
         <tbody key={row.name}>
           <tr>
-            <th scope="row">
-              {row.name} {titles[row.name] && <small>{titles[row.name]}</small>}
+            <th scope="row" title={titles[row.name]}>
+              <GainName name={row.name} /> {titles[row.name] && <small>{titles[row.name]}</small>}
             </th>
             <td className={classes["now"]} title={String(row.now)}>
               {gainText(row.now)}
@@ -65,6 +69,22 @@ export function GainTable({ rows, from, unit, titles, entry }: Props) {
         </tbody>
       ))}
     </table>
+  );
+}
+
+/** A long name breaks after an underscore. */
+function GainName({ name }: { name: string }) {
+  const [first, ...others] = name.split("_");
+  return (
+    <>
+      {first}
+      {others.map((part) => (
+        <Fragment key={part}>
+          _<wbr />
+          {part}
+        </Fragment>
+      ))}
+    </>
   );
 }
 

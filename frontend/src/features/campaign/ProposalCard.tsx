@@ -63,6 +63,18 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isCompact = useMediaQuery(LOW_AND_NARROW, undefined, { getInitialValueInEffect: false }) ?? false;
   const isReasonLater = isCompact && proposal.recommended !== "stop" && !isDoubtful(proposal);
   const reason = <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />;
+  const isPredictionLater = isCompact && !hasModel;
+  const prediction = isEvaluated && (
+    <PredictedError
+      predicted={chosen.predicted}
+      isCurrent={chosen.isPredicted}
+      best={isBestAgain ? null : (reference?.mean ?? null)}
+      bestTitle={isBestOutside ? "the best in bounds" : "the best"}
+      source={repeatSource(chosen.name, group)}
+      unit={units.error}
+      hasModel={hasModel}
+    />
+  );
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
@@ -82,17 +94,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
             best gains within them.
           </Note>
         )}
-        {isEvaluated && (
-          <PredictedError
-            predicted={chosen.predicted}
-            isCurrent={chosen.isPredicted}
-            best={isBestAgain ? null : (reference?.mean ?? null)}
-            bestTitle={isBestOutside ? "the best in bounds" : "the best"}
-            source={repeatSource(chosen.name, group)}
-            unit={units.error}
-            hasModel={hasModel}
-          />
-        )}
+        {!isPredictionLater && prediction}
         {chosen.predicted?.interval && isEvaluated && isRepeat(chosen.name) && groups.length > 0 && (
           <PriorScatter campaignId={campaign.id} />
         )}
@@ -110,6 +112,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           upload={upload}
           isSecondary={isSecondary}
         />
+        {isPredictionLater && prediction}
         {isReasonLater && reason}
         {isCompact && <FlightWindow definition={campaign.definition} />}
         <div>
