@@ -120,6 +120,10 @@ _REACHED: Final[Mapping[TrialState, ReadinessStep | None]] = MappingProxyType(
     }
 )
 _IN_FLIGHT: Final = STEPS.index("in flight")
+_BEFORE_TAKEOFF: Final = frozenset({"preflight", "arm"})
+_ON_THE_GROUND: Final = frozenset({"restore", "idle"})
+_BEGINS_WITHIN_S: Final = 3.0
+"""A vehicle on the ground this long after the takeoff was requested has not taken off yet; later it has landed."""
 _WITHOUT_LINK: Final = LossText(
     what="The worker is not responding. Nothing can be flown.",
     way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again with "
@@ -138,7 +142,7 @@ class Standing:
     the vehicle does not take off. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe
     gains are being restored instead. `abort_cause_open`: nobody has stated yet why the flight was aborted.
     `has_failed_checks`: at the last preflight check. `was_lost_in_flight`: the record ends before the landing, and
-    nothing was heard of the vehicle since.
+    nothing was heard of the vehicle since. `flown_for_s`: time since a flying trial began.
     """
 
     trial: TrialState
@@ -152,6 +156,7 @@ class Standing:
     abort_cause_open: bool = False
     has_failed_checks: bool = False
     was_lost_in_flight: bool = False
+    flown_for_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,13 +199,22 @@ def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
     kinds = _losses(standing, report)
     texts = LOSSES if standing.has_link else {**LOSSES, "worker away": _WITHOUT_LINK}
     if len(steps) > _IN_FLIGHT:
-        is_arming = report.status is not None and report.status.step == "arm"
-        return Readiness(steps=steps[:_IN_FLIGHT] if is_arming else steps, lost=(), losses=_in_flight(kinds, texts))
+        steps = STEPS[: STEPS.index(_reached_in_flight(standing, report)) + 1]
+        return Readiness(steps=steps, lost=(), losses=_in_flight(kinds, texts))
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
     kept = min((_count(texts[kind].keeps) for kind in kinds), default=len(steps))
     losses = tuple(Loss(kind=kind, what=texts[kind].what, way_on=texts[kind].way_on) for kind in kinds)
     return Readiness(steps=steps[:kept], lost=steps[kept:], losses=losses)
+
+
+def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessStep:
+    """The step of a trial that flies, by the vehicle's own: it still arms, is in the air, or gets its safe gains."""
+    step = "" if report.status is None or not standing.has_link else report.status.step
+    is_starting = step == "idle" and standing.flown_for_s < _BEGINS_WITHIN_S
+    if step in _BEFORE_TAKEOFF or is_starting:
+        return "held"
+    return "landed" if step in _ON_THE_GROUND else "in flight"
 
 
 def require_ready(readiness: Readiness) -> None:

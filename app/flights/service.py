@@ -169,6 +169,7 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         abort_cause_open=row.abort_cause == "operator",
         has_failed_checks=any(not check["passed"] for check in vehicle.checks or ()),
         was_lost_in_flight=_was_lost_in_flight(row, flight),
+        flown_for_s=0.0 if row.flown_at is None else (utc_now() - row.flown_at).total_seconds(),
     )
     return readiness_of(standing, report_of(vehicle.id))
 

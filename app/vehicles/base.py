@@ -170,10 +170,10 @@ class Identity:
 class Condition:
     """Current state of a connected vehicle; None or empty where unknown.
 
-    `step` is the step of the trial ("idle", "arm", "take-off", "record", "land", "abort-land", "link lost", "disarm",
-    "restore", "quarantined"), or "observing" for a vehicle that is only observed. Ages are seconds since the last
-    packet, heartbeat and status text; `held` are the gains last read back, `said` is that text, `trouble` a fault of
-    the ground station.
+    `step` is the step of the trial ("idle", "preflight", "arm", "take-off", "record", "land", "abort-land", "link
+    lost", "disarm", "restore", "quarantined"), or "observing" for a vehicle that is only observed. Ages are seconds
+    since the last packet, heartbeat and status text; `held` are the gains last read back, `said` is that text,
+    `trouble` a fault of the ground station.
     """
 
     step: str

@@ -131,3 +131,23 @@ def test_gains_without_a_prediction_take_its_curve_away_and_no_other(dashboard: 
         dashboard.page.get_by_role("textbox", name="kp").fill(gain)
         expect(predicted).to_have_count(int(is_predicted))
         expect(flown).to_have_count(2)
+
+
+_BEYOND_ITS_CARD = """card => {
+  const edge = card.getBoundingClientRect().right;
+  return [...card.querySelectorAll("*")].filter(each => each.getBoundingClientRect().right > edge).length;
+}"""
+
+
+@pytest.mark.parametrize("choice", ["Step", "Repeat", "Custom gains"])
+def test_every_choice_fits_its_card_on_a_tablet_with_the_fly_button_in_view(
+    dashboard: Dashboard, states: States, choice: str
+) -> None:
+    """Observed: typed gains and the source of a predicted error ran past the card's edge, and the button below it."""
+    name = "AR.Drone takeoff to 3 m, a name that is longer than the line beside the exports"
+    dashboard.page.set_viewport_size({"width": 1024, "height": 768})
+    dashboard.open_campaign(states.campaign(name=name, seed=3, flights=1, stop=PATIENT))
+    card = card_of(dashboard, 2)
+    dashboard.choose(choice)
+    expect(dashboard.fly_button).to_be_in_viewport(ratio=1.0)
+    assert card.evaluate(_BEYOND_ITS_CARD) == 0

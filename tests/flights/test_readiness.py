@@ -19,7 +19,7 @@ def status(
     *,
     age_s: float = 0.1,
     battery_v: float | None = 11.1,
-    step: str = "idle",
+    step: str = "record",
 ) -> VehicleStatus:
     return VehicleStatus(
         vehicle_id=1,
@@ -130,13 +130,24 @@ def test_in_flight_a_loss_takes_nothing_back_and_says_what_to_do_now(name: str, 
 
 def test_a_vehicle_that_still_arms_is_not_in_flight_yet_but_is_spoken_of_as_one_that_may_take_off() -> None:
     state, flags, _ = REACHED["in flight"]
-    arming, silent, taking_off = (
+    checking, arming, silent, taking_off = (
         readiness_of(standing(state, flags), VehicleReport(worker=True, status=heard))
-        for heard in (status(step="arm"), status("gone", step="arm"), status(step="take-off"))
+        for heard in (status(step="preflight"), status(step="arm"), status("gone", step="arm"), status(step="take-off"))
     )
+    assert checking.steps == up_to("held")
     assert (arming.steps, arming.losses, arming.is_ready) == (up_to("held"), (), False)
     assert [each.what for each in silent.losses] == [LOSSES["link silent"].what_in_flight]
     assert taking_off.steps == up_to("in flight")
+
+
+def test_a_vehicle_on_the_ground_has_not_taken_off_yet_and_later_has_landed() -> None:
+    state, flags, _ = REACHED["in flight"]
+    on_ground = VehicleReport(worker=True, status=status(step="idle"))
+    restoring = VehicleReport(worker=True, status=status(step="restore"))
+    starting, over = (replace(standing(state, flags), flown_for_s=flown_for_s) for flown_for_s in (0.5, 20.0))
+    assert readiness_of(starting, on_ground).steps == up_to("held")
+    assert readiness_of(over, on_ground).steps == up_to("landed")
+    assert readiness_of(over, restoring).steps == up_to("landed")
 
 
 @pytest.mark.parametrize("loss", REPORTS)

@@ -223,11 +223,17 @@ class MavlinkVehicle:
             self._repeated.trouble if self._repeated is not None else "",
         )
         return self._status_reader.read(
-            step=(State.IDLE if step in _ON_THE_GROUND else step).value,
+            step=self._reported_step(step),
             datum_m=self._datum_m if self._flight is None else self._flight.datum_m,
             held=self._gains.held,
             trouble=" ".join(trouble for trouble in troubles if trouble),
         )
+
+    def _reported_step(self, state: State) -> str:
+        """The step of a trial: what comes before arming is one step, and none without a trial."""
+        if state not in _ON_THE_GROUND:
+            return state.value
+        return (State.IDLE if self._flight is None else State.PREFLIGHT).value
 
     def attend(self, timeout_s: float) -> None:
         """Receive for `timeout_s` while sending the ground station's heartbeats. A command of `land` or `motors_off` is

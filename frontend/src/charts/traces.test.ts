@@ -48,7 +48,7 @@ test("no line is drawn over an interval without samples, as while the server was
 
 test("the altitude limit is shown within the axis, and nothing changes without one", () => {
   const limit: Trace = { meta: { role: "limit" }, x: [0, 32], y: [4.5, 4.5], visible: false };
-  const drawn = withLimit({ data: [...traces, limit], layout: { yaxis: { range: [0, 3.5], nticks: 7 } } });
+  const drawn = withLimit({ data: [...traces, limit], layout: { yaxis: { range: [0, 3.5], nticks: 7 } } }, 0);
   expect(drawn.data.at(-1)?.["visible"]).toBe(true);
   const { range, nticks } = drawn.layout["yaxis"] as { range: [number, number]; nticks: number };
   expect(range[0]).toBe(0);
@@ -56,7 +56,7 @@ test("the altitude limit is shown within the axis, and nothing changes without o
   expect(range[1]).toBeLessThan(5);
   expect(nticks).toBe(7);
   const without = { data: traces, layout: {} };
-  expect(withLimit(without)).toBe(without);
+  expect(withLimit(without, 0)).toBe(without);
 });
 
 test("the only flight of a legend entry, once it is chosen, has its own entry alone", () => {

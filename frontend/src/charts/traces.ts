@@ -231,14 +231,16 @@ export function roomFor(range: readonly [number, number], values: readonly numbe
 const LIMIT_SHARE = 0.94;
 
 /** The figure with the altitude limit, which it hides otherwise, and room for it; unchanged without a limit. */
-export function withLimit(figure: PlotlyFigure): PlotlyFigure {
+export function withLimit(figure: PlotlyFigure, groundM: number): PlotlyFigure {
   const limit = figure.data[traceWithRole(figure.data, "limit")];
-  const highest = limit?.y?.[0];
-  if (typeof highest !== "number") return figure;
+  const aboveGround = limit?.y?.[0];
+  if (limit?.y === undefined || typeof aboveGround !== "number") return figure;
+  const highest = aboveGround + groundM;
+  const y = limit.y.map(() => highest);
   const { yaxis } = figure.layout as { yaxis?: { range?: [number, number] } };
   const [low, high] = yaxis?.range ?? [0, highest];
   return {
-    data: figure.data.map((trace) => (trace === limit ? { ...trace, visible: true } : trace)),
+    data: figure.data.map((trace) => (trace === limit ? { ...trace, y, visible: true } : trace)),
     layout: { ...figure.layout, yaxis: { ...yaxis, range: [low, Math.max(high, highest / LIMIT_SHARE)] } },
   };
 }

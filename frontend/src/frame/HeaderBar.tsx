@@ -10,8 +10,8 @@ import {
 import { Link } from "react-router";
 import { ABORT_LABELS, type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
 import { type Connection, liveNow, useConnection, useIsCurrent, useLiveFlight, useVehicleStatus } from "../live/store";
-import { readingOf } from "../live/telemetry";
-import { isRestoring } from "../live/vehicleStatus";
+import { outputNow, readingOf } from "../live/telemetry";
+import { isAfterRecord, isDown } from "../live/vehicleStatus";
 import { withUnit } from "../ui/format";
 import { Time } from "../ui/Time";
 import classes from "./Frame.module.css";
@@ -72,8 +72,10 @@ function withoutWorker(flying: readonly FlyingCampaign[]): string {
 /** Live readings of one flight and its abort button, which acts without confirmation. */
 export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: AbortControl }) {
   const live = useLiveFlight(flying.trialId);
-  const isCurrent = useIsCurrent(live);
   const status = useVehicleStatus(flying.vehicleId);
+  const isRecorded = useIsCurrent(live);
+  const isAfter = isAfterRecord(status?.status.step);
+  const isCurrent = isAfter ? status?.isCurrent === true : isRecorded;
   const stage = abortStage(flying.trialId, abort, status?.status.step);
   const time = live?.timeS.at(-1);
   const reading = readingOf(live?.channel ?? "");
@@ -93,13 +95,13 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
           <span>{live?.phase === "staging" || live?.phase === "staged" ? live.phase : "in flight"}</span>
         ) : (
           <>
-            <span className={classes["big"]}>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</span>
-            <span>{withUnit(time, "s", 1)}</span>
+            <span className={classes["big"]}>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</span>
+            {!isAfter && <span>{withUnit(time, "s", 1)}</span>}
             {!isCurrent && <span>last known</span>}
           </>
         )}
       </Link>
-      {!isRestoring(status) && (
+      {!isDown(status, time !== undefined) && (
         <button type="button" className={classes["abort"]} onClick={() => abort.press([flying.trialId])}>
           <IconOctagonFilled size={20} aria-hidden />
           {ABORT_LABELS[stage]}

@@ -47,11 +47,15 @@ export function SpokenAnnouncements() {
 
 function followNews(queries: QueryClient, tell: (sentence: Sentence) => void): () => void {
   let before: News | null = null;
+  const isArmed = (vehicleId: number): boolean => {
+    const status = before?.vehicles.get(vehicleId)?.status;
+    return status?.state === "connected" && status.armed === true;
+  };
   return onNews((now) => {
     const earlier = before ?? now;
     before = now;
     for (const sentence of newsSentences(earlier, now, (vehicleId) => knownOf(queries, vehicleId))) tell(sentence);
-    for (const trialId of justDown(earlier, now)) void readOutcome(queries, trialId, tell);
+    for (const trialId of justDown(earlier, now)) void readOutcome(queries, trialId, isArmed, tell);
   });
 }
 
@@ -62,13 +66,18 @@ function knownOf(queries: QueryClient, vehicleId: number): Known {
 }
 
 /** Announce the result of the flight once it is stored. A lost server is announced separately. */
-async function readOutcome(queries: QueryClient, trialId: number, tell: (sentence: Sentence) => void): Promise<void> {
+async function readOutcome(
+  queries: QueryClient,
+  trialId: number,
+  isArmed: (vehicleId: number) => boolean,
+  tell: (sentence: Sentence) => void,
+): Promise<void> {
   for (let look = 0; look < LOOKS; look += 1) {
     try {
       const trial = await answer(getTrial({ path: { trial_id: trialId } }));
       const campaign = await answer(getCampaign({ path: { campaign_id: trial.campaign_id } }));
       const units = unitsOf(queries.getQueryData<Catalogue>(["catalogue"]), campaign.definition.experiment);
-      const outcome = outcomeSentence(trial.state, trial.error, units.error);
+      const outcome = outcomeSentence(trial.state, trial.error, units.error, isArmed(campaign.vehicle.id));
       if (outcome !== null) return tell(outcome);
     } catch {
       // Retried below; a lost connection is announced separately.

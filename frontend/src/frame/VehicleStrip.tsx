@@ -45,7 +45,7 @@ function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
       {vehicle.state === "quarantined" && (
         <span className={classes["quarantined"]} title={vehicle.concern}>
           <IconAlertTriangle size={16} aria-hidden />
-          Quarantined
+          Quarantined{aged?.isCurrent && aged.status.armed && `, armed, ${withUnit(aged.status.altitudeM, "m", 1)}`}
         </span>
       )}
       {aged?.status.trouble && (

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { abortReason, abortStage, stillUnderWay } from "./flights";
+import { ABORT_LABELS, abortReason, abortStage, abortText, isCutShort, stillUnderWay } from "./flights";
 
 test("an abort is under way only once the worker has accepted it", () => {
   const none = { asked: new Set<number>(), accepted: new Set<number>(), trouble: null };
@@ -10,14 +10,25 @@ test("an abort is under way only once the worker has accepted it", () => {
   expect(abortStage(7, { ...asked, accepted: new Set([7]) })).toBe("accepted");
 });
 
-test("a vehicle that aborts by itself is shown like one whose abort was accepted", () => {
+test("a flight that ends without an abort, at a limit or because its link is lost, is not said to be aborting", () => {
   const none = { asked: new Set<number>(), accepted: new Set<number>(), trouble: null };
-  expect(["record", "abort-land", "link lost"].map((step) => abortStage(7, none, step))).toEqual([
-    "none",
-    "accepted",
-    "accepted",
-  ]);
+  const stages = ["record", "abort-land", "link lost"].map((step) => abortStage(7, none, step));
+  expect(stages).toEqual(["none", "landing", "link lost"]);
+  expect(stages.map((stage) => ABORT_LABELS[stage])).toEqual(["ABORT", "LANDING", "LINK LOST"]);
+  expect(stages.map(isCutShort)).toEqual([false, true, true]);
   expect(abortStage(7, { ...none, asked: new Set([7]) }, "abort-land")).toBe("sending");
+});
+
+test("after a link loss nobody is told that safe gains are being sent, and one way on is named", () => {
+  const text = abortText("link lost", true, true);
+  expect(text).toContain("Land is repeated until the vehicle descends. If it does not descend");
+  expect(text).not.toContain("gains");
+});
+
+test("only an abort that the worker has accepted is called confirmed once the worker is away", () => {
+  expect(abortText("accepted", false, false)).toContain("has confirmed the abort");
+  for (const stage of ["none", "landing", "link lost"] as const)
+    expect(abortText(stage, false, false)).toMatch(/^The worker cannot be reached\. An abort is sent until/);
 });
 
 test("an abort of an earlier attempt is forgotten, so that ABORT of the next one is not labelled as pressed", () => {
@@ -29,7 +40,7 @@ test("an abort of an earlier attempt is forgotten, so that ABORT of the next one
 test("an abort from a tab that is not the operator's says so", () => {
   const control = { operator: "Ada", until: "2026-05-04T10:00:00Z" };
   const real = { is_real: true, registered: true, control };
-  const elsewhere = { reason: "aborted from another browser" };
+  const elsewhere = { reason: "aborted from a browser that was not in control" };
   expect(abortReason(real, { operator: "Ada", token: "a" })).toEqual({});
   expect(abortReason(real, { operator: "Ben", token: "b" })).toEqual(elsewhere);
   expect(abortReason(real, undefined)).toEqual(elsewhere);

@@ -9,7 +9,6 @@ import { problemOf } from "../api/problems";
 import type { Vehicle } from "../api/types";
 import { useVehicles } from "../api/vehicles";
 import { liveFlightsNow } from "./store";
-import { isAbortStep } from "./vehicleStatus";
 
 export interface FlyingCampaign {
   campaignId: number;
@@ -56,7 +55,7 @@ export function abortReason(vehicle: Commanded | undefined, own: OwnLease | unde
   const { control, is_real, registered } = vehicle;
   const isOperators =
     control === null ? own !== undefined || !(is_real && registered) : own?.operator === control.operator;
-  return isOperators ? {} : { reason: "aborted from another browser" };
+  return isOperators ? {} : { reason: "aborted from a browser that was not in control" };
 }
 
 /** Why the worker did not accept the abort; null if it did. Without the hint, because the page repeats it itself. */
@@ -125,16 +124,26 @@ export function useAbort(flying: readonly FlyingCampaign[]) {
 
 export type AbortControl = ReturnType<typeof useAbort>;
 
-/** How far an abort has come. not confirmed: it was refused, or perhaps not received, and is repeated. */
-export type AbortStage = "none" | "sending" | "not confirmed" | "accepted";
+/**
+ * How far an abort has come. not confirmed: it was refused, or perhaps not received, and is repeated. landing, link
+ * lost: the flight was ended without it, at a limit or because its link is lost.
+ */
+export type AbortStage = "none" | "sending" | "not confirmed" | "accepted" | "landing" | "link lost";
 
-/** `step` is the vehicle's, which also aborts by itself: at a limit, or without its link. */
+const UNASKED: Readonly<Record<string, AbortStage>> = { "abort-land": "landing", "link lost": "link lost" };
+
+/** Whether the flight ends before its record is complete. */
+export function isCutShort(stage: AbortStage): boolean {
+  return stage === "accepted" || stage === "landing" || stage === "link lost";
+}
+
+/** `step` is the vehicle's. */
 export function abortStage(
   trialId: number,
   { asked, accepted, trouble }: Omit<AbortControl, "press">,
   step?: string,
 ): AbortStage {
-  if (!asked.has(trialId)) return isAbortStep(step) ? "accepted" : "none";
+  if (!asked.has(trialId)) return UNASKED[step ?? ""] ?? "none";
   if (accepted.has(trialId)) return "accepted";
   return trouble === null ? "sending" : "not confirmed";
 }
@@ -144,23 +153,31 @@ export const ABORT_LABELS: Record<AbortStage, string> = {
   sending: "ABORTING",
   "not confirmed": "NOT CONFIRMED",
   accepted: "ABORTING",
+  landing: "LANDING",
+  "link lost": "LINK LOST",
 };
+
+const LANDING = "Land is repeated until the vehicle descends.";
+const GAINS_AFTER = "The safe gains are restored after the landing at the latest.";
+const BY_HAND = "If it does not descend, use its own remote control.";
 
 const ABORT_SAYS: Record<AbortStage, string> = {
   none: "ABORT or Space ends the flight immediately: the safe gains are sent, then Land until the vehicle descends.",
   sending: "Sending the abort to the worker.",
   "not confirmed": "The abort is not confirmed. It is sent again until the worker confirms it.",
-  accepted: "Safe gains sent. Repeating Land until the vehicle descends.",
+  accepted: `${LANDING} ${GAINS_AFTER}`,
+  landing: `${LANDING} ${GAINS_AFTER}`,
+  "link lost": `${LANDING} ${BY_HAND}`,
 };
 
 /** What ABORT does, or is doing, while the worker can be reached or not, and the vehicle's link is lost or not. */
 export function abortText(stage: AbortStage, isReached: boolean, isLinkLost: boolean): string {
-  if (!isReached && stage === "none")
-    return "An abort cannot be sent: the worker cannot be reached. Use the vehicle's own remote control.";
-  if (!isReached && stage === "accepted") return "The worker has confirmed the abort, but cannot be reached now.";
-  if (isLinkLost && stage === "none")
-    return "Nothing is received from the vehicle. An abort would be sent until the vehicle descends. Use the vehicle's own remote control.";
-  if (isLinkLost && stage === "accepted")
-    return "Nothing is received from the vehicle. The abort is sent until the vehicle descends. Use the vehicle's own remote control.";
-  return ABORT_SAYS[stage];
+  if (stage === "sending" || stage === "not confirmed") return ABORT_SAYS[stage];
+  if (!isReached && stage === "accepted")
+    return `The worker has confirmed the abort, but cannot be reached now. Watch the vehicle. ${BY_HAND}`;
+  if (!isReached)
+    return `The worker cannot be reached. An abort is sent until it confirms it. Watch the vehicle. ${BY_HAND}`;
+  if (!isLinkLost) return ABORT_SAYS[stage];
+  const what = stage === "none" ? "An abort is sent until the vehicle descends." : LANDING;
+  return `Nothing is received from the vehicle. ${what} ${BY_HAND}`;
 }

@@ -48,7 +48,7 @@ function pageLoss({ answerAgeS, isServerAway, stalledS }: PageState, isInFlight:
     kind: "server away",
     what: "The server is not responding. The data on this page is out of date.",
     way_on: isInFlight
-      ? "If you press ABORT, it is re-sent until the server responds. If the vehicle does not descend, use its remote control."
+      ? "An abort is sent until the server responds. Watch the vehicle. If it does not descend, use its own remote control."
       : "No commands can be sent from here. Check the network and the computer that runs Gainline.",
   };
 }

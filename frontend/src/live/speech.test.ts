@@ -66,8 +66,13 @@ test("a flight that has ended is looked up once", () => {
 });
 
 test("the outcome is said with its error in words", () => {
-  expect(outcomeSentence("captured", 0.2412, "m")?.text).toBe("Landed, needs review, 0.24 metres.");
-  expect(outcomeSentence("aborted", 1.2, "m")).toEqual({ text: "Aborted, landed.", urgent: true });
-  expect(outcomeSentence("valid", 0.0123, "rad·s")?.text).toBe("Landed, valid, 0.012 radian seconds.");
-  expect(outcomeSentence("flying", null, "m")).toBeNull();
+  expect(outcomeSentence("captured", 0.2412, "m", false)?.text).toBe("Landed, needs review, 0.24 metres.");
+  expect(outcomeSentence("aborted", 1.2, "m", false)).toEqual({ text: "Flight aborted.", urgent: true });
+  expect(outcomeSentence("valid", 0.0123, "rad·s", false)?.text).toBe("Landed, valid, 0.012 radian seconds.");
+  expect(outcomeSentence("flying", null, "m", false)).toBeNull();
+});
+
+test("a vehicle that its pilot has taken over in the air is not said to have landed", () => {
+  const said = outcomeSentence("invalid", null, "m", true);
+  expect(said).toEqual({ text: "Flight over, but the vehicle is still armed.", urgent: true });
 });

@@ -39,6 +39,8 @@ const STEPS: Readonly<Record<string, Sentence>> = {
   quarantined: shout("Quarantined. Inspect the vehicle."),
 };
 
+const LANDING_UNHEARD = shout("Landing after link loss.");
+
 const UNITS: Readonly<Record<string, { word: string; digits: number }>> = {
   m: { word: "metres", digits: 2 },
   V: { word: "volts", digits: 1 },
@@ -74,7 +76,7 @@ function statusSentences(before: VehicleStatus, now: VehicleStatus, { name, minB
   if (before.state !== "connected" && before.state !== "connecting" && now.state === "connected")
     said.push(say(`Link to ${name} is back.`));
   if (before.armed === false && now.armed === true) said.push(say("Armed."));
-  const step = STEPS[now.step];
+  const step = before.step === "link lost" && now.step === "abort-land" ? LANDING_UNHEARD : STEPS[now.step];
   if (before.step !== now.step && step !== undefined) said.push(step);
   const wasLow = isLow(before.batteryV, minBatteryV);
   if (!wasLow && isLow(now.batteryV, minBatteryV)) said.push(shout(`Battery low, ${aloud(now.batteryV ?? 0, "V")}.`));
@@ -98,14 +100,20 @@ const OUTCOMES: Readonly<Record<string, Sentence>> = {
   captured: say("Landed, needs review"),
   valid: say("Landed, valid"),
   invalid: say("Landed, invalid"),
-  aborted: shout("Aborted, landed"),
+  aborted: shout("Flight aborted"),
   lost: shout("Flight outcome unknown. Inspect the vehicle"),
 };
 
-/** `Landed, needs review, 0.24 metres.`; null until the result is stored. */
-export function outcomeSentence(state: string, error: number | null, unit: string): Sentence | null {
+const NOT_LANDED: Sentence = shout("Flight over, but the vehicle is still armed.");
+
+/**
+ * `Landed, needs review, 0.24 metres.`; null until the result is stored. `isArmed`: whether the vehicle reports its
+ * motors armed, as one that its pilot has taken over does.
+ */
+export function outcomeSentence(state: string, error: number | null, unit: string, isArmed: boolean): Sentence | null {
   const outcome = OUTCOMES[state];
   if (outcome === undefined) return null;
+  if (isArmed) return NOT_LANDED;
   const tells = error !== null && (state === "captured" || state === "valid");
   return { ...outcome, text: `${outcome.text}${tells ? `, ${aloud(error, unit)}` : ""}.` };
 }

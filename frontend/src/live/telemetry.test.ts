@@ -4,11 +4,14 @@ import {
   extended,
   isSaturated,
   type LiveFlight,
+  outputNow,
   readingOf,
   telemetryFrom,
+  throttleNow,
   underWay,
   withFlight,
 } from "./telemetry";
+import type { Aged } from "./vehicleStatus";
 
 const line = JSON.stringify({
   type: "telemetry",
@@ -33,7 +36,6 @@ test("telemetry grows the curve and updates the readings", () => {
 });
 
 test("another experiment sends other columns, the scored one second", () => {
-  const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1, age_s: 0 };
   const columns = ["time_s", "pitch_error_rad", "elevator_rad"];
   const flight = extended(begun(1, 5), { ...news, columns, samples: [[1, -0.02, 0.1]] });
   expect([flight.channel, flight.measured, flight.throttle, flight.batteryV]).toEqual([
@@ -70,13 +72,37 @@ test("a line that is no telemetry is left alone", () => {
   expect(telemetryFrom("null")).toBeNull();
 });
 
+const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1, age_s: 0 };
+
 test("a reported throttle is shown until its reports end", () => {
-  const news = { campaign_id: 1, trial_id: 5, time_s: 1, error_so_far: 0.1, age_s: 0 };
   const reported = { ...news, columns: ["time_s", "altitude_m", "throttle"], samples: [[1, 0.5, 0.62]] };
   const flight = extended(begun(1, 5), reported);
   expect(flight.throttle).toBe(0.62);
   expect(extended(flight, { ...news, columns: ["time_s", "altitude_m"], samples: [] }).throttle).toBe(0.62);
   expect(extended(flight, { ...news, columns: ["time_s", "altitude_m"], samples: [[2, 0.6]] }).throttle).toBeNull();
+});
+
+test("a report of zero throttle just after the lift-off is from before it, and is not shown", () => {
+  const columns = ["time_s", "altitude_m", "throttle"];
+  const climb = [0.5, 1, 3, 6].map((time) => [time, time < 1 ? 0 : 0.5 * time, 0]);
+  const shown = climb.map((row) =>
+    extended(begun(1, 5), { ...news, columns, samples: [...climb.slice(0, climb.indexOf(row)), row] }),
+  );
+  expect(shown.map(({ throttle }) => throttle)).toEqual([0, null, null, 0]);
+  expect(
+    extended(begun(1, 5), { ...news, columns: ["time_s", "altitude_m", "thrust"], samples: climb.slice(0, 2) })
+      .throttle,
+  ).toBe(0);
+});
+
+test("once the record is complete the altitude is the vehicle's own, and its throttle is not known", () => {
+  const flight = { ...begun(1, 5), measured: [3.01], throttle: 0.6 };
+  const at = (step: string) => ({ status: { step, altitudeM: 1.2 } }) as Aged;
+  expect(["record", "abort-land", "land", "disarm"].map((step) => outputNow(flight, at(step)))).toEqual([
+    3.01, 3.01, 1.2, 1.2,
+  ]);
+  expect(["record", "land"].map((step) => throttleNow(flight, at(step)))).toEqual([0.6, null]);
+  expect([outputNow(flight, null), throttleNow(flight, null)]).toEqual([3.01, 0.6]);
 });
 
 test.each([

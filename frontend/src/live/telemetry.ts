@@ -1,6 +1,6 @@
 /** Telemetry of flights in progress, from the event stream. */
 
-import type { Moment } from "./vehicleStatus";
+import { type Aged, isRecordedStep, type Moment } from "./vehicleStatus";
 
 export interface LiveFlight {
   campaignId: number;
@@ -56,12 +56,14 @@ export function extended(flight: LiveFlight, news: Telemetry): LiveFlight {
   }
   const last = news.samples.at(-1);
   const latest = (column: string): number | undefined => last?.[news.columns.indexOf(column)];
+  const reported = latest("throttle");
+  const throttle = latest("thrust") ?? (reported === undefined ? null : reportedThrottle(reported, timeS, measured));
   return {
     ...flight,
     timeS,
     channel: news.columns[1] ?? flight.channel,
     measured,
-    throttle: last === undefined ? flight.throttle : (latest("thrust") ?? latest("throttle") ?? null),
+    throttle: last === undefined ? flight.throttle : throttle,
     batteryV: latest("battery_v") ?? flight.batteryV,
     errorSoFar: news.error_so_far ?? flight.errorSoFar,
   };
@@ -71,10 +73,31 @@ const FULL_THROTTLE = 0.995;
 const NO_THROTTLE = 0.005;
 const AIRBORNE_M = 0.1;
 
+/** A vehicle reports its throttle this seldom: a report of zero may be older than the lift-off. */
+const REPORT_S = 4;
+
+/** Reported throttle; null if it is zero and may be from before the lift-off. */
+function reportedThrottle(share: number, timeS: readonly number[], measured: readonly number[]): number | null {
+  const liftedS = timeS[measured.findIndex((altitude) => altitude > AIRBORNE_M)];
+  const isDoubtful = share <= NO_THROTTLE && liftedS !== undefined && (timeS.at(-1) ?? 0) - liftedS <= REPORT_S;
+  return isDoubtful ? null : share;
+}
+
 /** Whether the throttle is at its maximum, or at zero in the air. */
 export function isSaturated({ throttle, measured }: LiveFlight): boolean {
   if (throttle === null) return false;
   return throttle >= FULL_THROTTLE || (throttle <= NO_THROTTLE && (measured.at(-1) ?? 0) > AIRBORNE_M);
+}
+
+/** The scored channel now: its last sample while it is recorded, else the altitude that the vehicle reports. */
+export function outputNow(live: LiveFlight | null, status: Aged | null): number | null | undefined {
+  if (status === null || isRecordedStep(status.status.step)) return live?.measured.at(-1);
+  return status.status.altitudeM;
+}
+
+/** Throttle of the flight now; null once its samples have ended. */
+export function throttleNow(live: LiveFlight, status: Aged | null): number | null {
+  return status === null || isRecordedStep(status.status.step) ? live.throttle : null;
 }
 
 /** Display of channels: title, unit and decimal places. */

@@ -7,7 +7,7 @@ import {
   heldGains,
   isAbortStep,
   isDisarmed,
-  isRestoring,
+  isDown,
   type LastHeard,
   linkText,
   lowBattery,
@@ -146,10 +146,12 @@ test("an aborted flight and one whose link is lost end before their record is co
 });
 
 test("ABORT stays until the motors are known to be off", () => {
-  const at = (step: string, isCurrent = true): boolean => isRestoring({ status: { step }, isCurrent } as Aged);
+  const at = (step: string, isCurrent = true, hasSamples = true): boolean =>
+    isDown({ status: { step }, isCurrent } as Aged, hasSamples);
   expect(["record", "land", "abort-land", "link lost", "disarm", "restore"].map((step) => at(step))).toEqual([
     ...Array(5).fill(false),
     true,
   ]);
-  expect([at("restore", false), isRestoring(null)]).toEqual([false, false]);
+  expect([at("restore", false), isDown(null, true)]).toEqual([false, false]);
+  expect([at("idle"), at("idle", true, false)]).toEqual([true, false]);
 });

@@ -128,6 +128,7 @@ export function linkText(one: Aged | null): string {
 
 const STEPS: Readonly<Record<string, string>> = {
   idle: "On the ground",
+  preflight: "Preflight checks",
   arm: "Arming",
   "take-off": "Taking off",
   record: "In flight",
@@ -145,6 +146,20 @@ export function stepWord(step: string): string {
   return STEPS[step] ?? step;
 }
 
+const RECORDED: ReadonlySet<string> = new Set(["take-off", "record", "abort-land"]);
+
+/** Whether samples of the flight arrive in this step; in others the vehicle's own messages tell where it is. */
+export function isRecordedStep(step: string): boolean {
+  return RECORDED.has(step);
+}
+
+const ENDED: ReadonlySet<string> = new Set(["land", "disarm", "restore"]);
+
+/** Whether the record has ended in this step, and the vehicle lands, or has landed. */
+export function isAfterRecord(step: string | undefined): boolean {
+  return step !== undefined && ENDED.has(step);
+}
+
 const ABORTED: ReadonlySet<string> = new Set(["abort-land", "link lost"]);
 
 /** Whether the vehicle ends the flight before its record is complete. */
@@ -152,9 +167,10 @@ export function isAbortStep(step: string | undefined): boolean {
   return step !== undefined && ABORTED.has(step);
 }
 
-/** Whether the vehicle has landed and disarmed and receives its safe gains: there is nothing to abort any more. */
-export function isRestoring(known: Aged | null): boolean {
-  return known?.isCurrent === true && known.status.step === "restore";
+/** Whether the vehicle has landed and disarmed after samples of its flight: there is nothing to abort any more. */
+export function isDown(known: Aged | null, hasSamples: boolean): boolean {
+  if (known?.isCurrent !== true) return false;
+  return known.status.step === "restore" || (hasSamples && known.status.step === "idle");
 }
 
 function number(value: unknown): number | null {

@@ -48,6 +48,10 @@ export function percent(share: number): string {
   return percentText(100 * share, share > 0.99 && share < 1 ? 1 : 0);
 }
 
+export function percentOrNothing(share: number | null): string {
+  return share === null ? NOTHING : percent(share);
+}
+
 /** A confidence as text; never 100 %. */
 export function confidenceText(confidence: number): string {
   return confidence > 0.999 ? `more than ${percent(0.999)}` : percent(confidence);

@@ -20,12 +20,12 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const catalogue = useCatalogue().data;
   return (
     <header className={classes["header"]}>
-      <Group gap="0 16px" align="center">
+      <Group gap="0 16px" align="center" className={renaming ? undefined : (classes["heading"] ?? "")}>
         {renaming ? (
           <Rename campaign={campaign} onClose={() => setRenaming(false)} />
         ) : (
-          <Group gap={4} wrap="nowrap">
-            <Title order={1} lh={1.2} style={{ overflowWrap: "anywhere" }}>
+          <Group gap={4} wrap="nowrap" className={classes["named"] ?? ""}>
+            <Title order={1} lh={1.2} className={classes["name"] ?? ""} title={campaign.name}>
               {campaign.name}
             </Title>
             <ActionIcon color="gray" aria-label="Rename campaign" title="Rename" onClick={() => setRenaming(true)}>

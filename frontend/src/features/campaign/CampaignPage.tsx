@@ -94,6 +94,10 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
     button?.scrollIntoView({ block: "center" });
     button?.focus({ preventScroll: true });
   }, []);
+  const show = useCallback((number: number) => {
+    flushSync(() => setChosen(number));
+    results.current?.lastElementChild?.scrollIntoView({ block: "nearest" });
+  }, []);
   const selection = useSelectedFlights(campaign.id, shown);
   useFlightKeys(trials, shown?.id, ({ number }) => choose(number));
   useEffect(() => () => pointAt(null), []);
@@ -124,7 +128,7 @@ function CampaignView({ campaign, trials: read, trouble }: View) {
           )}
         </div>
         <div className={`${classes["column"]} ${classes["next"]}`}>
-          {standing !== null && <Next {...standing} onChoose={setChosen} onPreview={setPreview} onReview={review} />}
+          {standing !== null && <Next {...standing} onChoose={show} onPreview={setPreview} onReview={review} />}
           {standing === null &&
             (unproposed || trouble ? (
               <ErrorNotice error={unproposed ?? trouble} />

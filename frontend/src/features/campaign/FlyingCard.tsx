@@ -1,14 +1,15 @@
 import { Button, Stack } from "@mantine/core";
 import { Link, useOutletContext } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
-import { type AbortControl, abortStage, abortText } from "../../live/flights";
+import { type AbortControl, abortStage, abortText, isCutShort } from "../../live/flights";
 import { useConnection, useIsCurrent, useLiveFlight, useVehicleStatus } from "../../live/store";
-import { isSaturated, readingOf } from "../../live/telemetry";
+import { isSaturated, outputNow, readingOf, throttleNow } from "../../live/telemetry";
+import { isAfterRecord } from "../../live/vehicleStatus";
 import { withUnit } from "../../ui/format";
 import { GainList } from "../../ui/gains";
 import { Note } from "../../ui/Note";
 import { Panel } from "../../ui/Panel";
-import { intervalText, percent } from "../../ui/uncertainty";
+import { intervalText, percentOrNothing } from "../../ui/uncertainty";
 import { useUnits } from "../../ui/units";
 import { FlightMarkers } from "./FlightMarkers";
 import classes from "./NextFlight.module.css";
@@ -31,7 +32,9 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const status = useVehicleStatus(registered ? campaign.vehicle.id : null);
   const aborting = abortStage(step.trialId, abort, status?.status.step);
   const stage = flyingStage(trial, live);
-  const isStale = !useIsCurrent(live) && live !== null && live.timeS.length > 0;
+  const isAfter = isAfterRecord(status?.status.step);
+  const isRecordStale = !useIsCurrent(live) && live !== null && live.timeS.length > 0;
+  const isStale = isAfter ? status?.isCurrent !== true : isRecordStale;
   return (
     <Panel
       title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
@@ -41,11 +44,11 @@ export function FlyingCard({ campaign, trial, step }: Props) {
         <dl className={`${classes["big"]} numbers`}>
           <div className={classes["reading"]} data-wide data-stale={isStale || undefined}>
             <dt>{isStale ? `${reading.title}, last known` : reading.title}</dt>
-            <dd>{withUnit(live?.measured.at(-1), reading.unit, reading.digits)}</dd>
+            <dd>{withUnit(outputNow(live, status), reading.unit, reading.digits)}</dd>
           </div>
           <div className={classes["reading"]} data-stale={isStale || undefined}>
-            <dt>{aborting === "accepted" ? "Error" : "Error so far"}</dt>
-            <dd>{aborting === "accepted" ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
+            <dt>{isCutShort(aborting) ? "Error" : "Error so far"}</dt>
+            <dd>{isCutShort(aborting) ? "not scored" : withUnit(live?.errorSoFar, unit)}</dd>
           </div>
           <div className={classes["reading"]}>
             <dt>Predicted error</dt>
@@ -60,8 +63,8 @@ export function FlyingCard({ campaign, trial, step }: Props) {
           </div>
           {live !== null && live.throttle !== null && (
             <div className={classes["reading"]} data-stale={isStale || undefined}>
-              <dt>{isSaturated(live) ? "Throttle, saturated" : "Throttle"}</dt>
-              <dd>{percent(live.throttle)}</dd>
+              <dt>{isSaturated(live) && !isAfter ? "Throttle, saturated" : "Throttle"}</dt>
+              <dd>{percentOrNothing(throttleNow(live, status))}</dd>
             </div>
           )}
         </dl>

@@ -201,13 +201,13 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   return (
     <>
       <GroundedNote vehicleId={id} />
-      {!needs_staging &&
-        button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
-      {registered ? (
-        button("Open fly screen", needs_staging, () => create.mutate(trial))
-      ) : (
-        <SpeedSwitch value={speed} onChange={setSpeed} />
-      )}
+      <div className={classes["fly"]}>
+        {needs_staging
+          ? button("Open fly screen", true, () => create.mutate(trial))
+          : button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
+      </div>
+      {registered && !needs_staging && button("Open fly screen", false, () => create.mutate(trial))}
+      {!registered && <SpeedSwitch value={speed} onChange={setSpeed} />}
       {isChecked && gate?.passed === false && !is_real && (
         <OverruleGate
           pending={create.isPending}

@@ -9,10 +9,11 @@ import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicle } from "../../api/vehicles";
 import { Chart } from "../../charts/Chart";
 import { type PlotlyFigure, wholeFlight, withChosen, withLimit, withTimeRange } from "../../charts/traces";
-import { type AbortControl, abortStage } from "../../live/flights";
+import { type AbortControl, abortStage, isCutShort } from "../../live/flights";
 import { useReadiness } from "../../live/readiness";
 import { useLiveFlight, useVehicleStatus } from "../../live/store";
-import { isDisarmed } from "../../live/vehicleStatus";
+import { type LiveFlight, readingOf } from "../../live/telemetry";
+import { isAfterRecord, isDisarmed, isDown } from "../../live/vehicleStatus";
 import { VehicleBadge } from "../../ui/Badges";
 import { NotFound, NotFoundPage } from "../../ui/NotFound";
 import { ReadOnlyNotice } from "../../ui/Notices";
@@ -67,7 +68,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
   const unit = useUnits(experiment).error;
   const titles = useGainTitles(experiment);
   const windowS = windowOf(campaign.definition, useCatalogue().data);
-  const { figure, summary } = useTakeoffs(campaign, trial);
+  const { figure, summary } = useTakeoffs(campaign, trial, groundOf(live));
   const step = flyStep(trial, live?.phase ?? null);
   const concern = status?.status.concern || vehicle?.concern || "";
   const quarantined = vehicle !== null && (vehicle.state === "quarantined" || (status?.status.concern ?? "") !== "");
@@ -85,8 +86,9 @@ function Screen({ campaign, trial, vehicle }: Props) {
     isStopped: orders.said?.order === "motors off" && orders.said.accepted,
   });
   const isFlying = step === "flying";
-  const isAborting = abortStage(trial.id, abort, status?.status.step) === "accepted";
+  const isAborting = isCutShort(abortStage(trial.id, abort, status?.status.step));
   const isAborted = useLatched(flightId, isFlying && isAborting);
+  const isLanded = isFlying && isDown(status, (live?.timeS.length ?? 0) > 0);
   const watching = useReadOnlyReason(vehicle);
   const barred = BARRED.has(step) && (quarantined || watching !== null);
   const steps = {
@@ -95,6 +97,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
     step,
     abort,
     isReady,
+    isLanded,
     isBlocked: readiness?.losses.some(({ kind }) => kind !== "gains unknown") === true,
   };
   return (
@@ -129,6 +132,7 @@ function Screen({ campaign, trial, vehicle }: Props) {
           vehicle={vehicle}
           isFlying={isFlying}
           isAborted={isAborted}
+          isRecordOver={isLanded || isAfterRecord(status?.status.step)}
           windowS={windowS}
           endS={figure === null ? null : (wholeFlight(figure)?.[1] ?? null)}
         />
@@ -174,16 +178,26 @@ function useLatched(flightId: number | null, isSeen: boolean): boolean {
   return flightId !== null && seen.current === flightId;
 }
 
-function useTakeoffs(campaign: Campaign, trial: Trial): { figure: PlotlyFigure | null; summary: string } {
+/** Altitude of the ground where the vehicle stood at the command, to 0.1 m: the altitude limit counts from it. */
+function groundOf(live: LiveFlight | null): number {
+  const [firstM = 0] = live?.measured ?? [];
+  return live !== null && readingOf(live.channel).unit === "m" ? Math.round(10 * firstM) / 10 : 0;
+}
+
+function useTakeoffs(
+  campaign: Campaign,
+  trial: Trial,
+  groundM: number,
+): { figure: PlotlyFigure | null; summary: string } {
   const theme = useComputedColorScheme("light");
   const card = useCampaignFigure(campaign.id, "takeoffs", theme).data;
   const raw = card?.figure;
   const dress = useCallback(
     (drawn: PlotlyFigure): PlotlyFigure => {
-      const { data, layout } = withLimit(drawn);
+      const { data, layout } = withLimit(drawn, groundM);
       return { data: withChosen(data, trial.number), layout: withTimeRange(layout, wholeFlight(drawn)) };
     },
-    [trial.number],
+    [trial.number, groundM],
   );
   const figure = useMemo(() => (raw ? dress(raw as unknown as PlotlyFigure) : null), [raw, dress]);
   return { figure, summary: card?.summary ?? "" };

@@ -2,14 +2,14 @@ import { IconCircleCheckFilled, IconCircleDashed } from "@tabler/icons-react";
 import { useRef } from "react";
 import type { Trial, Vehicle } from "../../api/types";
 import { useIsCurrent } from "../../live/store";
-import { isSaturated, type LiveFlight, readingOf } from "../../live/telemetry";
+import { isSaturated, type LiveFlight, outputNow, readingOf, throttleNow } from "../../live/telemetry";
 import { type Aged, ageText, linkText, lowBattery } from "../../live/vehicleStatus";
 import type { Topic } from "../../ui/explanations";
 import { gainText, NOTHING, withUnit } from "../../ui/format";
 import { HelpTip } from "../../ui/HelpTip";
-import { percent } from "../../ui/uncertainty";
+import { percentOrNothing } from "../../ui/uncertainty";
 import classes from "./Fly.module.css";
-import { type GainTick, gainTicks, isAirborneStep, secondsLeft } from "./flyScreen";
+import { type GainTick, gainTicks, secondsLeft } from "./flyScreen";
 
 interface Props {
   trial: Trial;
@@ -22,6 +22,8 @@ interface Props {
   isFlying: boolean;
   /** Whether the flight was aborted: its error is not scored from then on, and its record has no known end. */
   isAborted: boolean;
+  /** Whether the record is complete, and the vehicle lands or has landed. */
+  isRecordOver: boolean;
   /** Planned length of the record, s; null if unknown. */
   endS: number | null;
   /** Scored window, s; null if unknown. */
@@ -68,20 +70,30 @@ function useLastKnown(value: number | null | undefined): number | null | undefin
 }
 
 /** Large readings: altitude and error, then the rest. Stale readings are grey. */
-export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAborted, endS, windowS }: Props) {
+export function Readouts({
+  trial,
+  unit,
+  live,
+  status,
+  vehicle,
+  isFlying,
+  isAborted,
+  isRecordOver,
+  endS,
+  windowS,
+}: Props) {
   const hasLink = vehicle !== null;
   const reading = readingOf(live?.channel ?? "altitude_m");
   const linked = status?.status;
-  // After its motors have stopped, the record's last altitude is not the vehicle's.
-  const isRecorded = isFlying && (!hasLink || isAirborneStep(linked?.step) || linked?.armed === true);
-  const measured = isRecorded ? live?.measured.at(-1) : undefined;
   const batteryV = linked?.batteryV ?? live?.batteryV;
   const low = vehicle === null ? "" : lowBattery(vehicle, batteryV);
   const isCurrent = useIsCurrent(live);
   const stale = hasLink ? !(status?.isCurrent ?? false) : isFlying && !isCurrent;
-  const output = measured ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
+  const output = (isFlying ? outputNow(live, status) : null) ?? (reading.unit === "m" ? linked?.altitudeM : undefined);
   const lastOutput = useLastKnown(output);
-  const isScored = isFlying && !isAborted;
+  const hasThrottle = (useLastKnown(live?.throttle) ?? null) !== null;
+  const isScored = isFlying && !isAborted && !isRecordOver;
+  const saturated = live !== null && isScored && isSaturated(live);
   const error = isFlying ? live?.errorSoFar : trial.error;
   // The error so far is no mean over the scored window yet, as the predicted one is.
   const predicted =
@@ -105,12 +117,12 @@ export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAbort
         />
       </dl>
       <dl className={classes["row"]}>
-        {live !== null && live.throttle !== null && (
+        {hasThrottle && live !== null && (
           <Reading
-            title={isFlying && isSaturated(live) ? "Throttle, saturated" : "Throttle"}
+            title={saturated ? "Saturated" : "Throttle"}
             topic="throttle"
-            value={isFlying ? percent(live.throttle) : NOTHING}
-            bad={isFlying && isSaturated(live)}
+            value={percentOrNothing(isFlying ? throttleNow(live, status) : null)}
+            bad={saturated}
             stale={stale}
           />
         )}
@@ -121,7 +133,9 @@ export function Readouts({ trial, unit, live, status, vehicle, isFlying, isAbort
           bad={low !== "" && !stale}
         />
         {hasLink && <LinkReading status={status} />}
-        {isScored && <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} />}
+        {isScored && (
+          <Reading title="Ends in" value={withUnit(secondsLeft(live?.timeS.at(-1), endS), "s", 0)} stale={stale} />
+        )}
         {!isFlying && (
           <Reading
             title={trial.record === null ? "Scored window" : "Record length"}

@@ -2,13 +2,13 @@ import { Anchor, Button, Loader, Stack } from "@mantine/core";
 import { IconAlertTriangle, IconOctagonFilled, IconPlaneDeparture, IconUpload } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link } from "react-router";
+import { useReadOnlyReason } from "../../api/access";
 import { useFlyTrial } from "../../api/mutations";
 import { useTrials } from "../../api/queries";
 import type { Campaign, Trial, Vehicle, VehicleCheck } from "../../api/types";
 import { useFlyActions } from "../../api/vehicleCommands";
 import { ABORT_LABELS, type AbortControl, abortStage, abortText } from "../../live/flights";
 import { useConnection, useVehicleStatus } from "../../live/store";
-import { isRestoring } from "../../live/vehicleStatus";
 import { StateBadge } from "../../ui/Badges";
 import { asSentence } from "../../ui/format";
 import { sameHeld } from "../../ui/gains";
@@ -34,6 +34,8 @@ interface Props {
   isReady: boolean;
   /** Whether something must be put right first, as the stepper says. */
   isBlocked: boolean;
+  /** Whether the vehicle has landed and gets its safe gains. */
+  isLanded: boolean;
 }
 
 /** Actions of the current step for a vehicle with a link: control, staging, takeoff, review. */
@@ -44,6 +46,7 @@ export function LinkedSteps({
   abort,
   isReady,
   isBlocked,
+  isLanded,
   vehicle,
 }: Props & { vehicle: Vehicle }) {
   switch (step) {
@@ -62,13 +65,14 @@ export function LinkedSteps({
     case "unstaging":
       return <Waiting text="Writing the safe gains and reading them back. The flight is then planned again." />;
     case "flying":
+      if (isLanded) return <Waiting text="Landed, motors off. Writing the safe gains and reading them back." />;
       return <Abort trial={trial} abort={abort} vehicle={vehicle} />;
     case "judge":
     case "over":
       return (
         <>
           <SafeGainsResult trial={trial} vehicle={vehicle} />
-          <FlightReviewCard campaign={campaign} trial={trial} />
+          <FlightReviewCard campaign={campaign} trial={trial} said={vehicle.concern} />
         </>
       );
   }
@@ -173,7 +177,6 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
         </Anchor>
       )}
       <FlightProblem flight={trial.flight} />
-      <PreflightChecks checks={vehicle.checks ?? []} />
       <Button
         size="xl"
         leftSection={<IconUpload size={24} aria-hidden />}
@@ -188,6 +191,7 @@ function Plan({ campaign, trial, vehicle, isBlocked }: PlanProps) {
           ? "Take control first."
           : "Writes these gains to the landed, disarmed vehicle and reads each back. It does not move."}
       </p>
+      <PreflightChecks checks={vehicle.checks ?? []} />
       <ErrorNotice error={stage.error} />
     </Stack>
   );
@@ -252,10 +256,9 @@ function Abort({ trial, abort, vehicle }: AbortProps) {
   const status = useVehicleStatus(vehicle?.id ?? null);
   const stage = abortStage(trial.id, abort, status?.status.step);
   const { state, worker } = useConnection();
-  if (isRestoring(status)) return <Waiting text="Landed, motors off. Writing the safe gains and reading them back." />;
   return (
     <Stack gap={12}>
-      <button type="button" className={classes["abort"]} onClick={() => abort.press([trial.id])}>
+      <button type="button" className={classes["abort"]} data-stage={stage} onClick={() => abort.press([trial.id])}>
         <IconOctagonFilled size={40} aria-hidden />
         {ABORT_LABELS[stage]}
         {stage === "none" && <kbd>Space</kbd>}
@@ -298,11 +301,14 @@ function PreflightChecks({ checks }: { checks: readonly VehicleCheck[] }) {
 interface FlightReviewCardProps {
   campaign: Campaign;
   trial: Trial;
+  /** What the page says about the vehicle elsewhere: it is not repeated. */
+  said?: string;
 }
 
 /** Result of the flight, its review, and the link to the next flight. */
-function FlightReviewCard({ campaign, trial }: FlightReviewCardProps) {
+function FlightReviewCard({ campaign, trial, said = "" }: FlightReviewCardProps) {
   const trials = useTrials(campaign.id).data ?? [];
+  const watching = useReadOnlyReason(campaign.vehicle);
   const page = `/campaigns/${campaign.id}`;
   return (
     <Stack gap={12}>
@@ -311,12 +317,18 @@ function FlightReviewCard({ campaign, trial }: FlightReviewCardProps) {
         <PredictionResult trial={trial} />
         <FlightMarkers trial={trial} />
       </p>
-      {trial.state !== "captured" && <p className={classes["say"]}>{asSentence(sentenceOf(trial))}</p>}
-      <AbortCause trial={trial} />
-      <Stack gap={8}>
-        <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} campaign={campaign} />
-      </Stack>
-      <FlightNotes trial={trial} />
+      {trial.state !== "captured" && !(trial.reason !== "" && said.includes(trial.reason)) && (
+        <p className={classes["say"]}>{asSentence(sentenceOf(trial))}</p>
+      )}
+      {watching === null && (
+        <>
+          <AbortCause trial={trial} />
+          <Stack gap={8}>
+            <FlightReview key={`${trial.id} ${trial.state}`} trial={trial} trials={trials} campaign={campaign} />
+          </Stack>
+          <FlightNotes trial={trial} />
+        </>
+      )}
       <div className={classes["onward"]}>
         {trial.state !== "captured" && trial.state !== "lost" && (
           <Button component={Link} to={page} size="lg" fullWidth>

@@ -138,7 +138,8 @@ test("gains read back for a flight are told of the vehicle only while it has the
   expect(gainsShown("plan", onVehicle)).toEqual({ readBack: null, held: { kp: 300 }, areSet: false });
   expect(gainsShown("staged", onVehicle)).toEqual({ readBack: { kp: 283 }, held: { kp: 300 }, areSet: true });
   expect(gainsShown("staged", { ...onVehicle, isHeld: false }).readBack).toBeNull();
-  expect(gainsShown("flying", onVehicle).readBack).toEqual({ kp: 283 });
+  expect(gainsShown("flying", onVehicle)).toEqual({ readBack: null, held: { kp: 300 }, areSet: true });
+  expect(gainsShown("flying", { ...onVehicle, reported: {} }).readBack).toEqual({ kp: 283 });
   expect(gainsShown("unstaging", onVehicle)).toEqual({ readBack: null, held: { kp: 300 }, areSet: false });
   expect(gainsShown("judge", onVehicle)).toEqual({ readBack: null, held: {}, areSet: false });
 });

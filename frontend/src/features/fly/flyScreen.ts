@@ -49,6 +49,7 @@ const WORDS: Record<FlyStep, StateLabel> = {
 };
 
 const IN_FLIGHT: ReadonlySet<string> = new Set([
+  "preflight",
   "arm",
   "take-off",
   "record",
@@ -147,13 +148,15 @@ interface OnVehicle {
 }
 
 /** What the list of the flight's gains says of the vehicle: those read back for this flight count only while it has
- * them, not before they are staged and not after the flight, which ends with the safe gains. */
+ * them, not before they are staged and not after the flight, which ends with the safe gains. In flight the vehicle's own
+ * report counts, if there is one. */
 export function gainsShown(
   step: FlyStep,
   { isHeld, readBack, reported }: OnVehicle,
 ): { readBack: Gains | null; held: Gains; areSet: boolean } {
   const isOver = step === "judge" || step === "over";
-  const isOn = step === "flying" || (step === "staged" && isHeld);
+  const isUnknown = Object.keys(reported).length === 0;
+  const isOn = (step === "flying" && isUnknown) || (step === "staged" && isHeld);
   const areSet = step === "staging" || step === "staged" || step === "flying";
   return { readBack: isOn ? readBack : null, held: isOver ? {} : reported, areSet };
 }
