@@ -26,7 +26,7 @@ test("after a link loss nobody is told that safe gains are being sent, and one w
 });
 
 test("only an abort that the worker has accepted is called confirmed once the worker is away", () => {
-  expect(abortText("accepted", false, false)).toContain("has confirmed the abort");
+  expect(abortText("accepted", false, false)).toContain("The abort is confirmed");
   for (const stage of ["none", "landing", "link lost"] as const)
     expect(abortText(stage, false, false)).toMatch(/^The worker cannot be reached\. An abort is sent until/);
 });

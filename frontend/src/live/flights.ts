@@ -174,7 +174,7 @@ const ABORT_SAYS: Record<AbortStage, string> = {
 export function abortText(stage: AbortStage, isReached: boolean, isLinkLost: boolean): string {
   if (stage === "sending" || stage === "not confirmed") return ABORT_SAYS[stage];
   if (!isReached && stage === "accepted")
-    return `The worker has confirmed the abort, but cannot be reached now. Watch the vehicle. ${BY_HAND}`;
+    return `The abort is confirmed, but the worker cannot be reached now. Watch the vehicle. ${BY_HAND}`;
   if (!isReached)
     return `The worker cannot be reached. An abort is sent until it confirms it. Watch the vehicle. ${BY_HAND}`;
   if (!isLinkLost) return ABORT_SAYS[stage];
