@@ -148,7 +148,7 @@ def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
         expect(page.get_by_role("heading", name="Quarantined: do not fly")).to_be_visible()
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("armed")
         dashboard.button("Land now").click()
-        expect(page.get_by_text(re.compile("land command is repeated"))).to_be_visible()
+        expect(page.get_by_text(re.compile("Land is repeated until the vehicle descends"))).to_be_visible()
         expect(fact(dashboard, "Connection", "Altitude")).to_have_text(re.compile(r"^-?0\.[01]\d m$"), timeout=60_000)
         slide_to_its_end(dashboard, page.get_by_role("button", name="Motors off – the drone falls"))
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
