@@ -39,8 +39,8 @@ from tests.vehicles.mavlink.speaking import LOOPBACK
 
 SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "paparazzi": {"kp": 283, "ki": 13, "kd": 82},
-    "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_D": 0.0, "PSC_ACCZ_I": 1.0},
-    "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_D_ACC": 0.0, "MPC_Z_VEL_I_ACC": 2.0},
+    "ardupilot": {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5, "PSC_ACCZ_I": 1.0, "PSC_ACCZ_D": 0.0},
+    "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_I_ACC": 2.0, "MPC_Z_VEL_D_ACC": 0.0},
 }
 _TICKS_AT_ONCE: Final = 8
 _PATIENCE_S: Final = 0.5

@@ -217,6 +217,12 @@ def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_eve
             assert check_gains(gains, gain_set) == gains
 
 
+@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
+def test_the_gains_of_a_vehicle_have_the_order_of_its_experiment(profile: Profile) -> None:
+    for gain_set in profile.gain_sets:
+        assert tuple(gain.gain for gain in gain_set) == get_experiment(profile.experiment).space.names
+
+
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400])
 def test_what_is_no_number_is_never_written(value: float) -> None:
     for profile in PROFILES.values():

@@ -255,7 +255,7 @@ class Profile(Protocol):
 
     @property
     def gain_sets(self) -> tuple[GainSet, ...]:
-        """The gains by their names in the releases of the autopilot, newest last."""
+        """The gains by their names in the releases of the autopilot, newest last; in the order of its experiment."""
         ...
 
     @property

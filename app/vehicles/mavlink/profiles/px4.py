@@ -60,8 +60,8 @@ class Px4:
         (
             GainParameter("MPC_Z_P", "MPC_Z_P", 0.1, 1.5),
             GainParameter("MPC_Z_VEL_P_ACC", "MPC_Z_VEL_P_ACC", 2.0, 15.0),
-            GainParameter("MPC_Z_VEL_D_ACC", "MPC_Z_VEL_D_ACC", 0.0, 2.0),
             GainParameter("MPC_Z_VEL_I_ACC", "MPC_Z_VEL_I_ACC", 0.2, 3.0, integrates=True),
+            GainParameter("MPC_Z_VEL_D_ACC", "MPC_Z_VEL_D_ACC", 0.0, 2.0),
         ),
     )
     stop_settings: Final[tuple[str, ...]] = ()

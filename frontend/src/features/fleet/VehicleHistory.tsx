@@ -2,7 +2,7 @@ import { Anchor, Button, Skeleton, useComputedColorScheme } from "@mantine/core"
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { useActs, useLedger } from "../../api/fleet";
-import type { FigureCard, GivenGains } from "../../api/types";
+import type { FigureCard, GivenGains, Vehicle } from "../../api/types";
 import { useCalibration, useVehicleFigure } from "../../api/vehicles";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { Aside } from "../../ui/Aside";
@@ -18,10 +18,10 @@ import classes from "./Fleet.module.css";
 import { ACTS, purposeOf } from "./fleet";
 
 /** All gain sets written to the vehicle, and the values read back. */
-export function LedgerTable({ vehicleId }: { vehicleId: number }) {
-  const ledger = useLedger(vehicleId);
+export function LedgerTable({ vehicle }: { vehicle: Pick<Vehicle, "id" | "safe_gains"> }) {
+  const ledger = useLedger(vehicle.id);
   const lines = ledger.data?.pages.flatMap((page) => page.items) ?? [];
-  const names = Object.keys(lines[0]?.read_back ?? lines[0]?.asked ?? {}).join(", ");
+  const names = Object.keys(vehicle.safe_gains);
   return (
     <Panel title="Gain history" className={classes["wide"]}>
       <ErrorNotice error={ledger.error} />
@@ -32,14 +32,14 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
           <thead>
             <tr>
               <th scope="col">Purpose</th>
-              <th scope="col">Sent {names}</th>
+              <th scope="col">Sent {names.join(", ")}</th>
               <th scope="col">Read back</th>
               <th scope="col">Outcome</th>
             </tr>
           </thead>
           <tbody>
             {lines.map((line) => (
-              <Line key={`${line.purpose} ${line.flight_id ?? line.act_id}`} line={line} />
+              <Line key={`${line.purpose} ${line.flight_id ?? line.act_id}`} line={line} names={names} />
             ))}
           </tbody>
         </ScrollTable>
@@ -53,10 +53,10 @@ export function LedgerTable({ vehicleId }: { vehicleId: number }) {
   );
 }
 
-function Line({ line }: { line: GivenGains }) {
+function Line({ line, names }: { line: GivenGains; names: readonly string[] }) {
   const { campaign_id, trial_id, read_back, asked } = line;
-  const names = Object.keys(asked);
-  const differs = read_back !== null && names.length > 0 && !sameHeld(read_back, asked);
+  const isSent = Object.keys(asked).length > 0;
+  const differs = read_back !== null && isSent && !sameHeld(read_back, asked);
   return (
     <tr>
       <td>
@@ -71,9 +71,9 @@ function Line({ line }: { line: GivenGains }) {
           <Time at={line.asked_at} />
         </small>
       </td>
-      <td className="numbers">{names.length === 0 ? NOTHING : gainsInBrackets(asked)}</td>
+      <td className="numbers">{isSent ? gainsInBrackets(asked, names) : NOTHING}</td>
       <td className={`numbers ${differs ? classes["differs"] : ""}`}>
-        {read_back === null ? NOTHING : gainsInBrackets(read_back, names.length === 0 ? undefined : names)}
+        {read_back === null ? NOTHING : gainsInBrackets(read_back, names)}
       </td>
       <td>{line.outcome}</td>
     </tr>

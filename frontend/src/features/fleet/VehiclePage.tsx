@@ -48,7 +48,7 @@ function SharedView({ vehicle }: { vehicle: Vehicle }) {
       {vehicle.state === "quarantined" && <QuarantinePanel vehicle={vehicle} />}
       <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="var(--gap)" mt={14}>
         <CalibrationHistory vehicleId={vehicle.id} />
-        <LedgerTable vehicleId={vehicle.id} />
+        <LedgerTable vehicle={vehicle} />
       </SimpleGrid>
     </>
   );
@@ -133,7 +133,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           <CheckList vehicle={vehicle} />
         </Panel>
         <CalibrationHistory vehicleId={vehicle.id} />
-        <LedgerTable vehicleId={vehicle.id} />
+        <LedgerTable vehicle={vehicle} />
         <RequestList vehicleId={vehicle.id} />
         <ParameterPanel
           vehicleId={vehicle.id}
