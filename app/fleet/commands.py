@@ -247,10 +247,12 @@ def record_connected(
 
     Its identity is pinned at the first connection without a concern; version and hardware id are added when it first
     reports them. No gains are written to a vehicle that is not pinned, because no person has decided yet about the
-    gains that it was found with. `held`: its gains, where it reported them.
+    gains that it was found with. `held`: its gains, where it reported them. The last preflight check says nothing of
+    the vehicle that answers now.
     """
     row = repository.get_one(session, vehicle_id)
     row.concern = concern or row.concern
+    row.checks = row.checked_at = None
     if not concern:
         _pin(row, identity)
     if held is not None:
@@ -291,6 +293,12 @@ def record_checks(session: Session, vehicle_id: int, checks: Iterable[CheckItem]
     """Record the results of the preflight check."""
     row = repository.get_one(session, vehicle_id)
     row.checks, row.checked_at = [asdict(check) for check in checks], utc_now()
+
+
+def discard_checks(session: Session, vehicle_id: int) -> None:
+    """Discard the results of the preflight check: the vehicle has restarted since, perhaps with other settings."""
+    row = repository.get_one(session, vehicle_id)
+    row.checks = row.checked_at = None
 
 
 def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str, *, problem: str = "") -> None:

@@ -47,6 +47,8 @@ class VehicleSlot:
     reconnecting: VehicleConnection | None = None
     """A connection that is waiting for its vehicle to answer."""
     concern: str = ""
+    restarts: int | None = None
+    """Restarts of the vehicle that its connection has reported; None before its first status."""
 
     @property
     def live(self) -> VehicleConnection | None:
@@ -272,6 +274,7 @@ class VehicleConnectionManager:
         vehicle_id = vehicle.vehicle_id
         if slot.session is not None:
             slot.session.close()
+        slot.restarts = None
         self._publish_state(vehicle_id, "connecting")
         call = ConnectionRequest(
             vehicle_id=vehicle_id,
@@ -309,8 +312,11 @@ class VehicleConnectionManager:
     def _on_message(self, slot: VehicleSlot, vehicle_id: int, news: VehicleStatus | CommandForwarded) -> None:
         """Handle a message, on the connection's own thread."""
         match news:
-            case VehicleStatus(concern=concern):
+            case VehicleStatus(concern=concern, restarts=restarts):
                 self._publish(news)
+                if slot.restarts is not None and restarts > slot.restarts:
+                    self._record_in_background(lambda t: commands.discard_checks(t, vehicle_id))
+                slot.restarts = restarts
                 if concern and not slot.concern:
                     self._record_in_background(lambda t: commands.quarantine_vehicle(t, vehicle_id, concern))
                 slot.concern = concern

@@ -173,7 +173,7 @@ class Condition:
     `step` is the step of the trial ("idle", "preflight", "arm", "take-off", "record", "land", "abort-land", "link
     lost", "disarm", "restore", "quarantined"), or "observing" for a vehicle that is only observed. Ages are seconds
     since the last packet, heartbeat and status text; `held` are the gains last read back, `said` is that text,
-    `trouble` a fault of the ground station.
+    `trouble` a fault of the ground station, `restarts` how often the vehicle has restarted since the link was opened.
     """
 
     step: str
@@ -190,6 +190,7 @@ class Condition:
     said: str = ""
     said_age_s: float | None = None
     trouble: str = ""
+    restarts: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

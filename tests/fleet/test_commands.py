@@ -14,9 +14,10 @@ from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import commands
 from app.flights.abort import AbortRegistry
-from app.flights.connection_manager import VehicleConnectionManager
+from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot
 from app.flights.process_messages import ConnectionOpened
-from app.flights.vehicle_connection import VehicleConnection
+from app.flights.vehicle_connection import VehicleConnection, status_time
+from app.live.messages import VehicleStatus
 from app.main import create_app
 from app.vehicles.base import CheckItem, Identity
 from tests.builders import WORKER, Json, create_campaign, create_trial, get
@@ -175,6 +176,45 @@ def test_a_check_keeps_every_item_it_found(client: TestClient, database: Databas
         "hint": "Look",
     }
     assert newest(client, vehicle)["result"] == {"passed": False}
+
+
+FAILED = CheckItem(name="failsafe", title="FS_GCS_ENABLE", passed=False, found="off", needed="on")
+
+
+def test_a_check_says_nothing_of_a_vehicle_that_was_connected_since(client: TestClient, database: Database) -> None:
+    """Observed defect: a failed check from before a restart kept the vehicle from being staged."""
+    vehicle = create_connected(client, database)
+    with database.write() as session:
+        commands.record_checks(session, vehicle["id"], [FAILED])
+        commands.record_disconnected(session, vehicle["id"])
+    assert seen(client, vehicle)["checks"] is not None
+    connected = connect(client, database, vehicle)
+    assert (connected["checks"], connected["checked_at"]) == (None, None)
+
+
+def test_a_check_says_nothing_of_a_vehicle_that_has_restarted_since(
+    settings: Settings, client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    manager = VehicleConnectionManager(
+        database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
+    )
+
+    def checks_after(restarts: list[int]) -> object:
+        slot = VehicleSlot()
+        with database.write() as session:
+            commands.record_checks(session, vehicle["id"], [FAILED])
+        for count in restarts:
+            manager._on_message(
+                slot,
+                vehicle["id"],
+                VehicleStatus(vehicle_id=vehicle["id"], state="connected", at=status_time(), step="", restarts=count),
+            )
+        manager._record_executor.submit(lambda: None).result()
+        return seen(client, vehicle)["checks"]
+
+    assert checks_after([1, 1]) is not None, "it restarted before its connection was open"
+    assert checks_after([0, 0, 1]) is None
 
 
 def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: TestClient, database: Database) -> None:

@@ -349,6 +349,7 @@ class StatusReader:
             said=radio.seen.status_texts[-1] if radio.seen.status_texts else "",
             said_age_s=_age(now_s, radio.seen.status_text_s),
             trouble=trouble,
+            restarts=radio.seen.restarts,
         )
 
     def _mode(self, number: str) -> str:

@@ -20,7 +20,12 @@ const OUTDATED: Partial<Record<Vehicle["state"], string>> = {
 /** All items of the last preflight check; outdated ones are grey. */
 export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle: Vehicle }) {
   if (checks === null) {
-    return <Note>Not checked yet. All items are checked again before every flight.</Note>;
+    return (
+      <Note>
+        {state === "disconnected" ? "Not checked yet." : "Not checked since it was connected, restarted or released."}{" "}
+        All items are checked again before every flight.
+      </Note>
+    );
   }
   return (
     <>
