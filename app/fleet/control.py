@@ -12,7 +12,7 @@ from typing import Final
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
-from app.accounts.permissions import STAGED_BY_SCRIPT, Permission, RequestContext, require
+from app.accounts.permissions import STAGED_BY_SCRIPT, Permission, RequestContext, is_allowed, require
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.states import ActKind, ActState
 from app.db.models import VehicleActRow, VehicleRow
@@ -45,7 +45,7 @@ def take_control(session: Session, vehicle_id: int, asked: LeaseRequest, context
     if held is not None and not asked.take_over:
         raise ConflictError(
             f"{held.operator} is in control of {row.name}.",
-            hint="Ask them to release control, or take over; every operator sees a takeover.",
+            hint="Agree with them, then take over; every operator sees a takeover.",
         )
     if asked.token is not None and not asked.take_over:
         raise ConflictError(f"Your control of {row.name} has ended.", hint="Take control again.")
@@ -81,7 +81,7 @@ def require_not_controlled_by_other(row: VehicleRow, context: RequestContext) ->
     if context.token is None or not holds(row, context.token):
         raise ConflictError(
             f"{held.operator} is in control of {row.name}.",
-            hint="Ask them to do it or to release control. Abort, land, motors off and unstage do not require control.",
+            hint="Ask them to do it, or take over. Abort, land, motors off and unstage do not require control.",
         )
     return held.operator
 
@@ -110,11 +110,20 @@ def require_control(row: VehicleRow, context: RequestContext) -> str:
     return operator
 
 
+def may_command(row: VehicleRow, context: RequestContext) -> bool:
+    """Whether the client may command the vehicle, as far as its key and its place are concerned. Simulations without a
+    link are open to all."""
+    return not row.registered or is_allowed(_to_command(row), context.caller)
+
+
 def require_may_command(row: VehicleRow, context: RequestContext) -> None:
-    """Raise NotAllowedError when the client may not command a vehicle with a link; simulations without one are open to
-    all."""
+    """Raise NotAllowedError unless `may_command`."""
     if row.registered:
-        require(Permission.REAL if row.is_real else Permission.LINK, context.caller, row.name)
+        require(_to_command(row), context.caller, row.name)
+
+
+def _to_command(row: VehicleRow) -> Permission:
+    return Permission.REAL if row.is_real else Permission.LINK
 
 
 def require_may(act: Permission, row: VehicleRow, context: RequestContext) -> None:

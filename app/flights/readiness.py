@@ -35,10 +35,16 @@ LossKind = Literal[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LossText:
-    """What a loss means and the way on, on the ground and in flight. `keeps` is the last step that it leaves."""
+    """What a loss means and the way on, on the ground and in flight. `keeps` is the last step that it leaves.
+
+    `way_on_planned`: the way on for a flight that is not staged, `way_on_watching` for a client that may not command
+    the vehicle; both are `way_on` where they are empty.
+    """
 
     what: str
     way_on: str
+    way_on_planned: str = ""
+    way_on_watching: str = ""
     what_in_flight: str = ""
     way_on_in_flight: str = ""
     keeps: ReadinessStep | None = "control"
@@ -52,6 +58,8 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
             what="The worker is not responding. No commands can be sent.",
             way_on="Gainline restarts its own worker within seconds. If the worker runs separately, start it again "
             "with `gainline worker`. Then stage the flight again.",
+            way_on_planned="Gainline restarts its own worker within seconds. If the worker runs separately, start it "
+            "again with `gainline worker`.",
             what_in_flight="The worker is not responding.",
             way_on_in_flight="If the worker has stopped, the vehicle is landing now; if only the connection to the "
             "worker is lost, the flight continues. If in doubt, use the vehicle's own remote control.",
@@ -65,27 +73,32 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
         "process silent": LossText(
             what="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
             way_on="Wait until it responds. If it does not, restart the worker and stage the flight again.",
+            way_on_planned="Wait until it responds. If it does not, restart the worker.",
             what_in_flight="Gainline's connection to the vehicle is not responding: commands do not reach the vehicle.",
             way_on_in_flight="Use the vehicle's own remote control.",
         ),
         "link silent": LossText(
             what=f"No current data has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
             way_on="Check its power and its radio. It is ready again once its gains have been read back.",
+            way_on_planned="Check its power and its radio.",
             what_in_flight=f"Nothing has been received from the vehicle for more than {SILENT_AFTER_S:g} s.",
             way_on_in_flight=f"Land is repeated until the vehicle descends. {_BY_HAND}",
         ),
         "gains unknown": LossText(
             what="The gains on the vehicle are unknown: it has restarted, or they have not been read yet.",
-            way_on="Select Check now on its page, or stage the flight again.",
+            way_on="Stage the flight again.",
+            way_on_planned="Select Check now on its page, or stage the flight.",
         ),
         "battery low": LossText(
             what="The battery voltage is below the vehicle's minimum.",
             way_on="Insert a charged battery, then stage the flight again.",
+            way_on_planned="Insert a charged battery, then stage the flight.",
             keeps="staged",
         ),
         "checks failed": LossText(
             what="A preflight check has failed.",
-            way_on="Correct the failed item, then select Check now on the vehicle's page.",
+            way_on="Unstage the flight, correct the failed item, then select Check now on the vehicle's page.",
+            way_on_planned="Correct the failed item, then select Check now on the vehicle's page.",
             keeps="staged",
         ),
         "quarantined": LossText(
@@ -96,11 +109,13 @@ LOSSES: Final[Mapping[LossKind, LossText]] = MappingProxyType(
         "control ended": LossText(
             what="You are not in control of the vehicle.",
             way_on="Take control.",
+            way_on_watching="Only its operator can start the takeoff.",
             keeps=None,
         ),
         "controlled by other": LossText(
             what="Another operator is in control of the vehicle.",
             way_on="Only that operator can start the takeoff. To start it yourself, take over.",
+            way_on_watching="Only that operator can start the takeoff.",
             keeps="held",
         ),
     }
@@ -138,11 +153,12 @@ class Standing:
     """What readiness follows from: the stored state of a trial and its vehicle, and who asks.
 
     `has_link`: the vehicle is registered, with a process that keeps its link. `has_control`: the one who asks may
-    command it; `is_controlled_by_other`: may not, because another operator is in control. `min_battery_v`: below it
-    the vehicle does not take off. `take_off_requested`: by the operator of a staged flight. `standing_down`: its safe
-    gains are being restored instead. `abort_cause_open`: nobody has stated yet why the flight was aborted.
-    `has_failed_checks`: at the last preflight check. `was_lost_in_flight`: the record ends before the landing, and
-    nothing was heard of the vehicle since. `flown_for_s`: time since a flying trial began.
+    command it; `is_controlled_by_other`: may not, because another operator is in control; `may_command`: may take
+    control. `min_battery_v`: below it the vehicle does not take off. `take_off_requested`: by the operator of a staged
+    flight. `standing_down`: its safe gains are being restored instead. `abort_cause_open`: nobody has stated yet why
+    the flight was aborted. `failed_checks`: titles of the items that failed at the last preflight check.
+    `was_lost_in_flight`: the record ends before the landing, and nothing was heard of the vehicle since. `flown_for_s`:
+    time since a flying trial began.
     """
 
     trial: TrialState
@@ -150,11 +166,12 @@ class Standing:
     has_link: bool
     has_control: bool
     is_controlled_by_other: bool = False
+    may_command: bool = True
     min_battery_v: float = 0.0
     take_off_requested: bool = False
     standing_down: bool = False
     abort_cause_open: bool = False
-    has_failed_checks: bool = False
+    failed_checks: tuple[str, ...] = ()
     was_lost_in_flight: bool = False
     flown_for_s: float = 0.0
 
@@ -183,7 +200,16 @@ class Readiness:
 
 
 def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
-    """Evaluate how far a flight has come and which of it still holds."""
+    """Evaluate how far a flight has come and which of it still holds, for who asks: control is no step of theirs while
+    another operator has it."""
+    found = _readiness_of(standing, report)
+    if not standing.is_controlled_by_other:
+        return found
+    steps, lost = (tuple(step for step in each if step != "control") for each in (found.steps, found.lost))
+    return Readiness(steps=steps, lost=lost, losses=found.losses)
+
+
+def _readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
     reached = _REACHED[standing.trial]
     if standing.trial is TrialState.STAGED and standing.standing_down:
         reached = "control"
@@ -204,7 +230,9 @@ def readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
     if not standing.has_control and standing.trial is TrialState.PLANNED:
         steps = ()
     kept = min((_count(texts[kind].keeps) for kind in kinds), default=len(steps))
-    losses = tuple(Loss(kind=kind, what=texts[kind].what, way_on=texts[kind].way_on) for kind in kinds)
+    losses = tuple(
+        Loss(kind=kind, what=_what(kind, texts, standing), way_on=_way_on(texts[kind], standing)) for kind in kinds
+    )
     return Readiness(steps=steps[:kept], lost=steps[kept:], losses=losses)
 
 
@@ -223,15 +251,30 @@ def require_ready(readiness: Readiness) -> None:
         raise ConflictError(readiness.losses[0].what, hint=readiness.losses[0].way_on)
 
 
+_ENDED_BY_RELEASE: Final = frozenset({"not connected", "gains unknown"})
+"""A release needs the connection, and reads the gains back."""
+
+
+def _what(kind: LossKind, texts: Mapping[LossKind, LossText], standing: Standing) -> str:
+    what = texts[kind].what
+    return f"{what.removesuffix('.')}: {', '.join(standing.failed_checks)}." if kind == "checks failed" else what
+
+
+def _way_on(text: LossText, standing: Standing) -> str:
+    if text.way_on_watching and not standing.may_command:
+        return text.way_on_watching
+    return (text.way_on_planned if standing.trial is TrialState.PLANNED else "") or text.way_on
+
+
 def _losses(standing: Standing, report: VehicleReport) -> list[LossKind]:
     found: list[LossKind] = []
     is_quarantined = standing.vehicle is VehicleState.QUARANTINED
     link = _link_loss(standing, report)
-    if link is not None and not (is_quarantined and link == "not connected"):  # its release asks for the connection
+    if link is not None and not (is_quarantined and link in _ENDED_BY_RELEASE):
         found.append(link)
     elif link is None and _is_battery_low(standing, report):
         found.append("battery low")
-    if standing.has_failed_checks and link is None and not is_quarantined:
+    if standing.failed_checks and link is None and not is_quarantined:
         found.append("checks failed")
     if is_quarantined:
         found.append("quarantined")

@@ -32,6 +32,7 @@ from app.fleet import service as fleet
 from app.fleet.control import (
     control_of,
     is_in_control,
+    may_command,
     require_control,
     require_may_command,
     require_not_controlled_by_other,
@@ -163,11 +164,12 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         has_link=vehicle.registered,
         has_control=has_control,
         is_controlled_by_other=not has_control and control_of(vehicle) is not None,
+        may_command=may_command(vehicle, context),
         min_battery_v=float(vehicle.options.get("min_battery_v", 0.0)),
         take_off_requested=active is not None and active.take_off_at is not None,
         standing_down=active is not None and bool(active.stand_down),
         abort_cause_open=row.abort_cause == "operator",
-        has_failed_checks=any(not check["passed"] for check in vehicle.checks or ()),
+        failed_checks=tuple(str(check["title"]) for check in vehicle.checks or () if not check["passed"]),
         was_lost_in_flight=_was_lost_in_flight(row, flight),
         flown_for_s=0.0 if row.flown_at is None else (utc_now() - row.flown_at).total_seconds(),
     )

@@ -106,13 +106,13 @@ def test_before_take_off_a_loss_takes_steps_back_and_refuses_the_take_off(name: 
     kept = up_to(LOSSES[kind].keeps)
     assert found.steps == kept[: len(up_to(reached))]
     assert found.steps + found.lost == up_to(reached)
-    assert [(each.kind, each.what, each.way_on) for each in found.losses] == [
-        (kind, LOSSES[kind].what, LOSSES[kind].way_on)
-    ]
+    text = LOSSES[kind]
+    way_on = (text.way_on_planned if name == "planned" else "") or text.way_on
+    assert [(each.kind, each.what, each.way_on) for each in found.losses] == [(kind, text.what, way_on)]
     assert not found.is_ready
     with pytest.raises(ConflictError) as refused:
         require_ready(found)
-    assert str(refused.value) == f"{LOSSES[kind].what} {LOSSES[kind].way_on}"
+    assert str(refused.value) == f"{text.what} {way_on}"
 
 
 @pytest.mark.parametrize("loss", REPORTS)
@@ -169,11 +169,14 @@ def test_control_that_ends_takes_everything_back(name: str) -> None:
 
 def test_a_vehicle_whose_preflight_check_has_failed_is_never_ready() -> None:
     """Observed defect: “Staged, ready to fly” beside a failed check, and the takeoff was refused after its start."""
-    staged = replace(standing(TrialState.STAGED, {}), has_failed_checks=True)
+    staged = replace(standing(TrialState.STAGED, {}), failed_checks=("Failsafe", "Fence"))
     found = readiness_of(staged, GOOD)
     assert (found.steps, found.lost, found.is_ready) == (("control", "staged"), (), False)
-    assert [each.kind for each in found.losses] == ["checks failed"]
-    assert not readiness_of(replace(staged, trial=TrialState.PLANNED), GOOD).is_ready
+    [loss] = found.losses
+    assert (loss.kind, loss.what) == ("checks failed", "A preflight check has failed: Failsafe, Fence.")
+    assert loss.way_on.startswith("Unstage the flight"), "Check now is disabled while it is staged"
+    [loss] = readiness_of(replace(staged, trial=TrialState.PLANNED), GOOD).losses
+    assert "nstage" not in loss.way_on
     assert readiness_of(replace(staged, trial=TrialState.FLYING), GOOD).losses == ()
 
 
@@ -185,11 +188,12 @@ def test_a_vehicle_that_was_not_heard_again_after_its_flight_is_not_said_to_have
 
 @pytest.mark.parametrize("name", ["staged", "held"])
 def test_who_watches_another_operators_flight_sees_what_it_has_reached_and_cannot_fly_it(name: str) -> None:
-    """Observed defect: a second tab said “Control: lost” although the operator in the first one had it."""
+    """Observed defects: a second tab said “Control: lost” although the operator in the first one had it, and another
+    browser “Control: done” as soon as the operator had staged."""
     state, flags, reached = REACHED[name]
     watched = replace(standing(state, flags, has_control=False), is_controlled_by_other=True)
     found = readiness_of(watched, GOOD)
-    assert (found.steps, found.lost, found.is_ready) == (up_to(reached), (), False)
+    assert (found.steps, found.lost, found.is_ready) == (up_to(reached)[1:], (), False)
     assert [each.kind for each in found.losses] == ["controlled by other"]
     assert [each.kind for each in readiness_of(watched, VehicleReport(worker=False)).losses] == [
         "worker away",
@@ -197,8 +201,30 @@ def test_who_watches_another_operators_flight_sees_what_it_has_reached_and_canno
     ]
 
 
-def test_a_quarantined_vehicle_without_a_connection_has_one_way_on() -> None:
-    found = readiness_of(standing(TrialState.PLANNED, {}, VehicleState.QUARANTINED), REPORTS["connecting"][0])
+@pytest.mark.parametrize(("is_controlled_by_other", "kind"), [(True, "controlled by other"), (False, "control ended")])
+def test_who_may_not_command_the_vehicle_is_not_told_to_take_control(
+    is_controlled_by_other: bool, kind: LossKind
+) -> None:
+    """Observed defect: a browser with read-only access was told to take over."""
+    watched = replace(standing(TrialState.STAGED, {}, has_control=False), is_controlled_by_other=is_controlled_by_other)
+    [own] = readiness_of(watched, GOOD).losses
+    [read_only] = readiness_of(replace(watched, may_command=False), GOOD).losses
+    assert (own.kind, read_only.kind) == (kind, kind)
+    assert ("ake" in own.way_on, "ake c" in read_only.way_on, "ake o" in read_only.way_on) == (True, False, False)
+
+
+def test_a_flight_that_was_never_staged_is_not_to_be_staged_again() -> None:
+    """Observed defect: “stage the flight again” for a planned flight whose vehicle had restarted."""
+    for report, vehicle, _ in REPORTS.values():
+        for loss in readiness_of(standing(TrialState.PLANNED, {}, vehicle), report).losses:
+            assert "again." not in loss.way_on, loss.kind
+            assert "read back" not in loss.way_on, loss.kind
+
+
+@pytest.mark.parametrize("report", ["connecting", "restarted"])
+def test_a_quarantined_vehicle_has_one_way_on(report: str) -> None:
+    """Its release needs the connection, and reads the gains back."""
+    found = readiness_of(standing(TrialState.PLANNED, {}, VehicleState.QUARANTINED), REPORTS[report][0])
     assert [each.kind for each in found.losses] == ["quarantined"]
 
 

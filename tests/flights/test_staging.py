@@ -532,7 +532,7 @@ def test_who_watches_while_another_operator_is_in_control_sees_the_flight_as_sta
     report(client, staged)
     take_control(client, real, "Ada")
     readiness = get(client, f"/api/trials/{staged['id']}/readiness")
-    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (["control", "staged"], [], False)
+    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (["staged"], [], False)
     assert [loss["kind"] for loss in readiness["losses"]] == ["controlled by other"]
 
 
