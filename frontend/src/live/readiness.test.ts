@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { TrialReadiness } from "../api/types";
-import { type ReadinessStep, readinessNow } from "./readiness";
+import { hasEndedUnseen, type ReadinessStep, readinessNow } from "./readiness";
 
 const CURRENT = { answerAgeS: 0.3, isServerAway: false, stalledS: 0 };
 const AWAY = { ...CURRENT, isServerAway: true };
@@ -58,4 +58,13 @@ test("what the server has taken back stays so beside what the page takes back", 
 
 test("a stalled page says for how long", () => {
   expect(readinessNow(READY, STALLED).losses[0]?.what).toContain("was frozen for 12 s");
+});
+
+test("control that ended by its lease is read again while the page still shows an operator", () => {
+  const ended = { losses: [{ kind: "control ended" as const, what: "", way_on: "" }] };
+  const shown = (operator: string | null) => [{ id: 1, control: operator === null ? null : { operator, until: "" } }];
+  expect(hasEndedUnseen(ended, shown("Mia"), 1)).toBe(true);
+  expect(hasEndedUnseen(ended, shown(null), 1)).toBe(false);
+  expect(hasEndedUnseen({ losses: [] }, shown("Mia"), 1)).toBe(false);
+  expect(hasEndedUnseen(ended, undefined, 1)).toBe(false);
 });

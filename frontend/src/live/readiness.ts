@@ -1,11 +1,11 @@
 /** Readiness of a trial's vehicle: the server's answer, taken back by what only this page can tell. */
 
-import { useQuery } from "@tanstack/react-query";
+import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { answer } from "../api/client";
 import { getReadiness } from "../api/generated";
 import { controlHeader, useOwnLease } from "../api/leases";
-import type { TrialReadiness } from "../api/types";
+import type { TrialReadiness, Vehicle } from "../api/types";
 import { momentNow, useConnection, useMoment } from "./store";
 import { type Moment, secondsBetween } from "./vehicleStatus";
 
@@ -71,6 +71,16 @@ export function readinessNow(answered: TrialReadiness, page: PageState): Readine
   return { steps: kept, lost, losses, is_ready: false };
 }
 
+/** Whether control has ended by its lease, which no event reports, while the page still shows an operator. */
+export function hasEndedUnseen(
+  { losses }: Pick<TrialReadiness, "losses">,
+  shown: readonly Pick<Vehicle, "id" | "control">[] | undefined,
+  vehicleId: number | null,
+): boolean {
+  const operator = shown?.find(({ id }) => id === vehicleId)?.control ?? null;
+  return operator !== null && losses.some(({ kind }) => kind === "control ended");
+}
+
 /** Interval until the server is asked again. A tab in the background asks only from the hold to the landing. */
 function askAgainMs(answered: TrialReadiness | undefined): number | false {
   if (answered === undefined) return ASK_MS;
@@ -81,6 +91,7 @@ function askAgainMs(answered: TrialReadiness | undefined): number | false {
 /** Readiness at this moment; null until the first answer. */
 export function useReadiness(trialId: number, vehicleId: number | null): Readiness | null {
   const token = useOwnLease(vehicleId)?.token ?? "";
+  const queries = useQueryClient();
   const { state } = useConnection();
   const stall = useStall();
   const returnedAt = useReturn();
@@ -89,7 +100,11 @@ export function useReadiness(trialId: number, vehicleId: number | null): Readine
     queryFn: async () => {
       const at = momentNow();
       const headers = vehicleId === null ? {} : controlHeader(vehicleId);
-      return { readiness: await answer(getReadiness({ path: { trial_id: trialId }, headers })), at };
+      const readiness = await answer(getReadiness({ path: { trial_id: trialId }, headers }));
+      if (hasEndedUnseen(readiness, queries.getQueryData(["vehicles"]), vehicleId)) {
+        void queries.invalidateQueries({ queryKey: ["vehicles"] });
+      }
+      return { readiness, at };
     },
     refetchInterval: ({ state }) => askAgainMs(state.data?.readiness),
     refetchIntervalInBackground: true,

@@ -44,6 +44,7 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
     );
   }
   const other = vehicle.control?.operator ?? null;
+  const isSameName = other === name.trim();
   return (
     <form
       className={classes["form"]}
@@ -54,7 +55,10 @@ export function OperatorControl({ vehicle }: { vehicle: Vehicle }) {
     >
       {other !== null && (
         <Text lh={1.4}>
-          <strong>{other} is in control.</strong> Ask them to release control, or take over. All users see the takeover.
+          <strong>
+            {other} is in control{isSameName && ", in another tab or browser"}.
+          </strong>{" "}
+          {isSameName ? "Take over to continue here." : "Agree with them, then take over."} All users see the takeover.
         </Text>
       )}
       <div className={classes["take"]}>
