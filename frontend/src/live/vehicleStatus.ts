@@ -29,6 +29,8 @@ export interface VehicleStatus {
   trouble: string;
   /** Reason of the quarantine; empty if it may fly. */
   concern: string;
+  /** How often the vehicle has restarted since the connection was opened. */
+  restarts: number;
 }
 
 /** Two clocks: the wall clock runs while a tablet sleeps, the steady clock cannot be set back. */
@@ -82,6 +84,11 @@ export function heldGains(
 ): Readonly<Record<string, number>> {
   if (state === "disconnected" || known === null || (held === null && !known.isCurrent)) return held ?? {};
   return known.status.held;
+}
+
+/** Whether the vehicle was last known to be armed: nothing is written to it and nothing read from it then. */
+export function isArmed(known: Aged | null): boolean {
+  return known?.status.armed === true;
 }
 
 /** Whether the vehicle reports now that its motors are off. */
@@ -218,5 +225,6 @@ export function statusFrom(json: string): VehicleStatus | null {
     saidAgeS: number(found["said_age_s"]),
     trouble: text(found["trouble"]),
     concern: text(found["concern"]),
+    restarts: number(found["restarts"]) ?? 0,
   };
 }

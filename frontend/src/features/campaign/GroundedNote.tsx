@@ -2,12 +2,12 @@ import { Anchor } from "@mantine/core";
 import { Link } from "react-router";
 import { useVehicle } from "../../api/vehicles";
 import { Note } from "../../ui/Note";
+import { groundedReason } from "../fleet/fleet";
 
 /** Why the vehicle cannot fly now, whatever the gains; empty if it can. */
 export function useGroundedReason(vehicleId: number): string {
   const vehicle = useVehicle(vehicleId);
-  if (vehicle?.state === "quarantined") return `${vehicle.name} is quarantined.`;
-  return vehicle?.registered && vehicle.state === "disconnected" ? `${vehicle.name} is not connected.` : "";
+  return vehicle === null ? "" : groundedReason(vehicle);
 }
 
 /** The reason, with a link to the vehicle; renders nothing without one. */

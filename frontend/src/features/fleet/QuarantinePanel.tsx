@@ -4,9 +4,9 @@ import { useState } from "react";
 import { useReadOnlyReason } from "../../api/access";
 import { useRelease } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
-import { useVehicleCommands, type VehicleCommand } from "../../api/vehicleCommands";
+import { type CommandAnswer, useVehicleCommands, type VehicleCommand } from "../../api/vehicleCommands";
 import { useVehicleStatus } from "../../live/store";
-import { type Aged, isDisarmed } from "../../live/vehicleStatus";
+import { type Aged, isArmed, isDisarmed } from "../../live/vehicleStatus";
 import { ErrorNotice } from "../../ui/Notices";
 import { SlideToConfirm } from "../../ui/SlideToConfirm";
 import classes from "./Fleet.module.css";
@@ -29,7 +29,9 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
         <p>{vehicle.concern}</p>
       </div>
       <p>
-        It cannot be flown; Land, Motors off, Check now and Restore safe gains are still available.{" "}
+        {isArmed(status)
+          ? "It cannot be flown; Land and Motors off are still available, Check now and Restore safe gains once its motors have stopped."
+          : "It cannot be flown; Land, Motors off, Check now and Restore safe gains are still available."}{" "}
         {isDown
           ? "Inspect it, then release it."
           : "Land it, make sure that its motors have stopped, inspect it, then release it."}
@@ -61,6 +63,7 @@ export function QuarantinePanel({ vehicle }: { vehicle: Vehicle }) {
 }
 
 interface LandProps {
+  /** Whether the vehicle reports that its motors are off. */
   isDown: boolean;
   orders: ReturnType<typeof useVehicleCommands>;
 }
@@ -99,7 +102,7 @@ export function MotorsOff({ vehicle, status, orders, watching = false }: Props) 
         disabled={!enabled}
         onConfirm={() => orders.press("motors off")}
       />
-      <CommandResult orders={orders} />
+      <CommandResult orders={orders} isDown={isDisarmed(status)} />
     </div>
   );
 }
@@ -107,11 +110,17 @@ export function MotorsOff({ vehicle, status, orders, watching = false }: Props) 
 const COMMANDS: Record<VehicleCommand, string> = { land: "Land", "motors off": "Motors off" };
 
 /** Result of the last command, as an alert. */
-export function CommandResult({ orders: { said } }: { orders: ReturnType<typeof useVehicleCommands> }) {
+export function CommandResult({ orders: { said }, isDown }: LandProps) {
   if (said === null) return null;
   return (
     <p className={classes["said"]} data-bad={!said.accepted || undefined} role="alert">
-      {said.accepted ? said.sentence : `${COMMANDS[said.order]} not confirmed. ${said.sentence}`}
+      {commandText(said, isDown)}
     </p>
   );
+}
+
+/** The answer to the command; once the motors are off, that they are. */
+function commandText({ accepted, order, sentence }: CommandAnswer, isDown: boolean): string {
+  if (!accepted) return `${COMMANDS[order]} not confirmed. ${sentence}`;
+  return isDown ? "The motors are off." : sentence;
 }

@@ -5,7 +5,7 @@ import { useEditVehicle } from "../../api/fleet";
 import { problemOf, reasonsByField } from "../../api/problems";
 import type { Vehicle } from "../../api/types";
 import { useVehicleStatus } from "../../live/store";
-import { heldGains } from "../../live/vehicleStatus";
+import { heldGains, isArmed } from "../../live/vehicleStatus";
 import { type NumberEntry, NumberField } from "../../ui/Fields";
 import { gainText, NOTHING } from "../../ui/format";
 import { inOrder, RESTORED, safeGainsWritten, sameHeld } from "../../ui/gains";
@@ -16,6 +16,7 @@ import { Panel } from "../../ui/Panel";
 import table from "../../ui/ScrollTable.module.css";
 import { Time } from "../../ui/Time";
 import classes from "./Fleet.module.css";
+import { unknownGainsText } from "./fleet";
 
 interface Props {
   vehicle: Vehicle;
@@ -31,6 +32,7 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
   const held = inOrder(heldGains(vehicle, status), Object.keys(safe));
   const isCurrent = status?.isCurrent ?? false;
   const isKnown = Object.keys(held).length > 0;
+  const mayRestore = vehicle.actions.includes("restore");
   if (entered) return <SafeGainsForm vehicle={vehicle} entered={entered} onDone={() => setEntered(undefined)} />;
   return (
     <Panel title="Gains">
@@ -76,20 +78,14 @@ export function SafeGains({ vehicle, restoring, onRestore }: Props) {
             <>
               Read back <Time at={vehicle.held_at} />.
             </>
-          ) : vehicle.held === null ? (
-            "Gains not read."
           ) : (
-            "Gains not read since the vehicle restarted."
+            unknownGainsText(vehicle, status)
           )}{" "}
           {isKnown && !sameHeld(held, safe) ? safeGainsWritten(vehicle) : RESTORED}
+          {mayRestore && isArmed(status) && " They can be restored on request once its motors have stopped."}
         </Note>
         <Group gap={10}>
-          <Button
-            variant="default"
-            disabled={!vehicle.actions.includes("restore")}
-            loading={restoring}
-            onClick={onRestore}
-          >
+          <Button variant="default" disabled={!mayRestore || isArmed(status)} loading={restoring} onClick={onRestore}>
             Restore safe gains
           </Button>
           {isKnown && !sameHeld(held, safe) && (

@@ -5,6 +5,8 @@ import { useReadOnlyReason } from "../../api/access";
 import { useVehicleRequest, type VehicleRequest } from "../../api/fleet";
 import type { Vehicle } from "../../api/types";
 import { useVehicles } from "../../api/vehicles";
+import { useVehicleStatus } from "../../live/store";
+import { isArmed } from "../../live/vehicleStatus";
 import { VehicleBadge } from "../../ui/Badges";
 import { NotFoundPage } from "../../ui/NotFound";
 import { ErrorNotice, ReadOnlyNotice } from "../../ui/Notices";
@@ -58,6 +60,7 @@ function SharedView({ vehicle }: { vehicle: Vehicle }) {
 function VehicleView({ vehicle }: { vehicle: Vehicle }) {
   const ask = useVehicleRequest(vehicle.id);
   const watching = useReadOnlyReason(vehicle);
+  const status = useVehicleStatus(vehicle.id);
   const may = (act: VehicleRequest): boolean => watching === null && vehicle.actions.includes(act);
   const asking = ask.isPending ? ask.variables : null;
   return (
@@ -122,7 +125,7 @@ function VehicleView({ vehicle }: { vehicle: Vehicle }) {
           tools={
             <Button
               variant="default"
-              disabled={!may("check")}
+              disabled={!may("check") || isArmed(status)}
               loading={asking === "check"}
               onClick={() => ask.mutate("check")}
             >

@@ -5,8 +5,10 @@ import {
   connectFailure,
   furtherOptions,
   gainsFor,
+  groundedReason,
   parametersOf,
   startingVehicle,
+  unknownGainsText,
   unreadGains,
   vehicleAtSameAddress,
   vehicleRequest,
@@ -136,4 +138,41 @@ test("a vehicle from which nothing comes is never said to be in flight, staged o
   ]);
   expect(word("quarantined", "gone")).toBe("Quarantined");
   expect(word("flying", "connected", true)).toBe("In flight");
+});
+
+const failing = [
+  { title: "Fence", passed: true },
+  { title: "FS_GCS_ENABLE", passed: false },
+];
+
+test("a vehicle whose last preflight check has failed is not said to be ready", () => {
+  const word = (seen: object): string =>
+    vehicleStateLabel({ state: "ready", registered: true, checks: failing, ...seen } as Vehicle, null).word;
+  expect([
+    word({}),
+    word({ state: "quarantined" }),
+    word({ checks: failing.slice(0, 1) }),
+    word({ checks: null }),
+  ]).toEqual(["Preflight check failed", "Quarantined", "Ready", "Ready"]);
+});
+
+test("a campaign says why the takeoff of its vehicle would be refused", () => {
+  const reason = (seen: object): string =>
+    groundedReason({ name: "Drone", state: "ready", registered: true, checks: null, ...seen } as Vehicle);
+  expect(reason({})).toBe("");
+  expect(reason({ checks: failing })).toContain("its last preflight check failed (FS_GCS_ENABLE)");
+  expect(reason({ checks: failing, state: "disconnected" })).toBe("Drone is not connected.");
+  expect(reason({ state: "disconnected", registered: false })).toBe("");
+});
+
+test("a vehicle that has not restarted is not said to have restarted", () => {
+  const why = (status: object, isCurrent = true): string =>
+    unknownGainsText({ held: {} }, { status: { restarts: 0, ...status }, isCurrent } as Aged);
+  expect(why({ restarts: 1 })).toBe("Gains not read since the vehicle restarted.");
+  expect(why({ step: "observing", armed: true })).toBe(
+    "Gains not read since the connection was opened: while it is armed, the vehicle is only monitored.",
+  );
+  expect(why({ step: "observing", armed: false })).not.toContain("armed");
+  expect(why({}, false)).toBe("Gains not read: no data is received from the vehicle.");
+  expect(unknownGainsText({ held: null }, null)).toBe("Gains not read.");
 });

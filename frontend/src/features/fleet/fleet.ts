@@ -33,9 +33,38 @@ const SILENCES = {
 } as const;
 
 /** A shared vehicle has no permanent connection. `status` is null if the vehicle has none, or it is not known yet. */
-export function vehicleStateLabel({ state, registered }: Vehicle, status: Aged | null): StateLabel {
+export function vehicleStateLabel(vehicle: Vehicle, status: Aged | null): StateLabel {
+  const { state, registered } = vehicle;
   if (!registered && state === "disconnected") return { word: "No link", tone: "quiet" };
-  return status !== null && !status.isCurrent && REPORTED.has(state) ? SILENCES[status.status.state] : STATES[state];
+  if (status !== null && !status.isCurrent && REPORTED.has(state)) return SILENCES[status.status.state];
+  if (state === "ready" && failedChecks(vehicle).length > 0) return { word: "Preflight check failed", tone: "bad" };
+  return STATES[state];
+}
+
+/** Titles of the items that failed at the last preflight check. */
+function failedChecks({ checks }: Pick<Vehicle, "checks">): string[] {
+  return (checks ?? []).filter(({ passed }) => !passed).map(({ title }) => title);
+}
+
+/** Why the vehicle cannot fly now, whatever the gains; empty if it can. */
+export function groundedReason(vehicle: Vehicle): string {
+  const { name, state, registered } = vehicle;
+  if (state === "quarantined") return `${name} is quarantined.`;
+  if (registered && state === "disconnected") return `${name} is not connected.`;
+  const failed = failedChecks(vehicle).join(", ");
+  return failed === ""
+    ? ""
+    : `${name} would refuse the takeoff: its last preflight check failed (${failed}). Correct this, then select Check now on its page.`;
+}
+
+/** Why the gains that the vehicle holds are not known. */
+export function unknownGainsText({ held }: Pick<Vehicle, "held">, known: Aged | null): string {
+  if (held === null || known === null) return "Gains not read.";
+  const { armed, restarts, step } = known.status;
+  if (restarts > 0) return "Gains not read since the vehicle restarted.";
+  if (!known.isCurrent) return "Gains not read: no data is received from the vehicle.";
+  const why = step === "observing" ? `: ${armed ? "while it is armed, " : ""}the vehicle is only monitored` : "";
+  return `Gains not read since the connection was opened${why}.`;
 }
 
 export const ACTS: Record<ActKind, string> = {

@@ -222,7 +222,7 @@ function Quarantine({ vehicle, concern, isDown, orders }: QuarantineProps) {
         <p>{concern}</p>
       </div>
       <LandNow isDown={isDown} orders={orders} />
-      {orders.said?.order === "land" && <CommandResult orders={orders} />}
+      {orders.said?.order === "land" && <CommandResult orders={orders} isDown={isDown} />}
       <Anchor component={Link} to={`/vehicles/${vehicle.id}`} display="inline-block" py={12}>
         Inspect and release {vehicle.name}
       </Anchor>
