@@ -1,6 +1,8 @@
 """Input data of the figures, loaded from the database as plain data."""
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -12,7 +14,10 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.proposals import is_stale
+from app.campaigns.schemas import PredictedCurve
 from app.campaigns.trials import service as trials_service
+from app.campaigns.trials.service import Predict
+from app.common.errors import GainlineError
 from app.common.states import TrialState
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, Scatter
@@ -60,15 +65,20 @@ _CONFIDENCE: Final = 0.9
 _SPARSE_S: Final = 0.3
 """Interval of reports from which on the record's first samples after the command say nothing about it."""
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
+_PREDICTABLE: Final = _UNFLOWN | {TrialState.CAPTURED}
+"""States in which a trial has not changed what the flights predict."""
+_SAME: Final = 1e-6
+"""Relative difference of errors that are the same prediction, computed twice."""
 
 
 @dataclass(frozen=True, slots=True)
 class FigureView:
-    """View of a figure: the time range of the curves, s, None for all; and the number of a flight to be drawn
-    individually."""
+    """View of a figure: the time range of the curves, s, None for all; the number of a flight to be drawn
+    individually; and the number of the flight whose prediction is drawn, None for the next one."""
 
     window: Range | None = None
     chosen: int | None = None
+    predicted: int | None = None
 
 
 WHOLE_FLIGHT: Final = FigureView()
@@ -80,11 +90,15 @@ def campaign_figure(
     name: Literal["takeoffs", "errors", "gains"],
     theme: ThemeName,
     view: FigureView = WHOLE_FLIGHT,
+    predict: Predict | None = None,
 ) -> Card:
     """One of the campaign's figures. Raises NotFoundError for an unknown campaign."""
-    return card_of(
-        CAMPAIGN_FIGURES[name](history_of(session, campaign_id, curves=name == "takeoffs", view=view), theme)
+    past = (
+        history_of(session, campaign_id, curves=True, view=view, predict=predict)
+        if name == "takeoffs"
+        else history_of(session, campaign_id, curves=False)
     )
+    return card_of(CAMPAIGN_FIGURES[name](past, theme))
 
 
 def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
@@ -95,11 +109,19 @@ def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
     return card_of(FlightFigure(_flight_record(session, row, trials), theme))
 
 
-def history_of(session: Session, campaign_id: int, *, curves: bool, view: FigureView = WHOLE_FLIGHT) -> History:
+def history_of(
+    session: Session,
+    campaign_id: int,
+    *,
+    curves: bool,
+    view: FigureView = WHOLE_FLIGHT,
+    predict: Predict | None = None,
+) -> History:
     """Input data of the campaign's figures.
 
     Without `curves` no record is read. With them, full records are read only for the flights that are drawn
-    individually; the others have their coarse curves.
+    individually; the others have their coarse curves. Without `predict`, only the gains of a proposal have a predicted
+    curve.
     """
     campaign = repository.get_campaign(session, campaign_id)
     definition = definition_of(campaign)
@@ -115,7 +137,7 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         set_point=set_point,
         reference=reference,
         flights=tuple(_flight(row, corrected=history.is_corrected(rows, row.number)) for row in flown),
-        proposal=_next_flight(session, campaign, rows, experiment.output),
+        proposal=_predicted_flight(session, campaign, rows, experiment.output, view.predicted, predict),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
         curves_title=_CURVES.get(experiment.output, "Flight curves"),
@@ -212,25 +234,33 @@ def _goal(experiment: Experiment) -> tuple[Curve, Curve | None]:
     return set_point, Curve(model.time_s, model["reference_m"]) if "reference_m" in model.channels else None
 
 
-def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRow], output: str) -> NextFlight | None:
-    """The trial that is planned or flying, else the fresh proposal for the trial after the last one; None if there is
-    none."""
-    planned = next((row for row in rows if row.state in _UNFLOWN), None)
-    if planned is not None:
-        return _next(
+def _predicted_flight(
+    session: Session,
+    campaign: CampaignRow,
+    rows: Sequence[TrialRow],
+    output: str,
+    number: int | None,
+    predict: Predict | None,
+) -> NextFlight | None:
+    """The trial with that number; without one, the trial that is planned or flying, else the fresh proposal for the
+    trial after the last one. None if there is none."""
+    is_asked = (lambda row: row.state in _UNFLOWN) if number is None else (lambda row: row.number == number)
+    trial = next((row for row in rows if is_asked(row)), None)
+    if trial is not None:
+        return _informative(
             NextFlight(
-                number=planned.number,
-                gains=planned.gains,
-                predicted_error=planned.predicted_error,
-                interval=_interval(planned.predicted_interval),
-                **_predicted(session, _proposal_of(session, planned), output),
+                number=trial.number,
+                gains=trial.gains,
+                predicted_error=trial.predicted_error,
+                interval=_interval(trial.predicted_interval),
+                **_predicted_trial(session, campaign, trial, output, predict),
             ),
-            rows,
+            corrected=history.is_corrected(rows, trial.number),
         )
-    proposal = repository.latest_proposal(session, campaign.id)
+    proposal = None if number is not None else repository.latest_proposal(session, campaign.id)
     if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
         return None
-    return _next(
+    return _informative(
         NextFlight(
             number=max((row.number for row in rows), default=0) + 1,
             gains=proposal.gains,
@@ -238,13 +268,13 @@ def _next_flight(session: Session, campaign: CampaignRow, rows: Sequence[TrialRo
             interval=_interval(proposal.interval),
             **_predicted(session, proposal, output),
         ),
-        rows,
+        corrected=history.is_corrected(rows),
     )
 
 
-def _next(flight: NextFlight, rows: Sequence[TrialRow]) -> NextFlight:
+def _informative(flight: NextFlight, *, corrected: bool) -> NextFlight:
     """The flight without an error, interval and band that say nothing; the model's curve stays."""
-    if history.is_prediction_informative(None if flight.interval is None else flight.interval.low, rows):
+    if is_informative(None if flight.interval is None else flight.interval.low, corrected=corrected):
         return flight
     return replace(flight, predicted_error=None, interval=None, band=None)
 
@@ -254,6 +284,37 @@ class _Predicted(TypedDict):
     band: Band | None
 
 
+_NOT_PREDICTED: Final[_Predicted] = {"curve": None, "band": None}
+
+
+def _predicted_trial(
+    session: Session, campaign: CampaignRow, row: TrialRow, output: str, predict: Predict | None
+) -> _Predicted:
+    """Predicted curve of a trial and its band: its proposal's, which is stored, else those predicted again, as long as
+    the flights still predict the error with which it was planned."""
+    if row.proposal_id is not None:
+        return _predicted(session, _proposal_of(session, row), output)
+    if predict is None or row.state not in _PREDICTABLE:
+        return _NOT_PREDICTED
+    with suppress(GainlineError):
+        found = predict(session, campaign, row.gains)
+        if _is_same(found.predicted_error, row.predicted_error):
+            lower, upper = _points(found.lower), _points(found.upper)
+            band = None if lower is None or upper is None else Band(lower=lower, upper=upper)
+            return {"curve": _points(found.curve), "band": band}
+    return _NOT_PREDICTED
+
+
+def _is_same(found: float | None, planned: float | None) -> bool:
+    if found is None or planned is None:
+        return found is planned
+    return math.isclose(found, planned, rel_tol=_SAME)
+
+
+def _points(curve: PredictedCurve | None) -> Curve | None:
+    return None if curve is None else Curve(np.array(curve.time_s), np.array(curve.values))
+
+
 def _proposal_of(session: Session, row: TrialRow) -> ProposalRow | None:
     return None if row.proposal_id is None else repository.get_proposal_or_none(session, row.proposal_id)
 
@@ -261,10 +322,10 @@ def _proposal_of(session: Session, row: TrialRow) -> ProposalRow | None:
 def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _Predicted:
     """Predicted curve of a proposal and its band, where there are any."""
     if proposal is None or proposal.predicted_id is None:
-        return {"curve": None, "band": None}
+        return _NOT_PREDICTED
     predicted = trajectories.readable_of(session, [proposal.predicted_id]).get(proposal.predicted_id)
     if predicted is None:
-        return {"curve": None, "band": None}
+        return _NOT_PREDICTED
     lower, upper = band_channels(output)
     has_band = lower in predicted.channels and upper in predicted.channels
     band = Band(lower=_curve(predicted, lower), upper=_curve(predicted, upper)) if has_band else None

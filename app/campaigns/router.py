@@ -3,6 +3,7 @@
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Request, status
+from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, is_allowed
 from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, wear
@@ -25,6 +26,8 @@ from app.campaigns.wear import VehicleCalibration
 from app.common.errors import InputError, Problem
 from app.common.schemas import FigureCard, Page, figure_card
 from app.common.states import CampaignState
+from app.core.policy import Gains
+from app.db.models import CampaignRow
 from app.figures.data import Range
 from app.fleet import registration
 from app.fleet.schemas import Vehicle, VehicleEdit
@@ -166,6 +169,7 @@ FigureName = Literal["takeoffs", "errors", "gains"]
 @figures_router.get("/campaigns/{campaign_id}/figures/{name}")
 def get_campaign_figure(
     session: Reader,
+    predictors: Predictors,
     campaign_id: Id,
     name: FigureName,
     theme: Theme = "light",
@@ -174,14 +178,22 @@ def get_campaign_figure(
     flight: Annotated[
         int | None, Query(ge=1, le=2**31, description="number of a flight to draw as a separate curve")
     ] = None,
+    predicted: Annotated[
+        int | None,
+        Query(ge=1, le=2**31, description="number of the flight whose prediction is drawn instead of the next one's"),
+    ] = None,
 ) -> FigureCard:
     """All takeoffs over the set point, the error of each flight, or the gains of each flight.
 
     With more than 30 flights the takeoffs are drawn as an envelope; the first, the best, the latest and that `flight`
     are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
     """
-    view = figure_data.FigureView(window=_window(from_s, to_s), chosen=flight)
-    return figure_card(figure_data.campaign_figure(session, campaign_id, name, theme, view))
+    view = figure_data.FigureView(window=_window(from_s, to_s), chosen=flight, predicted=predicted)
+
+    def predict(session: Session, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
+        return flight_predictions.predict_flight(session, predictors, campaign, gains)
+
+    return figure_card(figure_data.campaign_figure(session, campaign_id, name, theme, view, predict))
 
 
 def _window(from_s: float | None, to_s: float | None) -> Range | None:

@@ -106,18 +106,21 @@ export function useTrial(trialId: number | null) {
   });
 }
 
-/** Detail of a figure: a time window at full resolution, and one flight drawn individually. */
+/** Detail of a figure: a time window at full resolution, one flight drawn individually, and the flight whose prediction
+ * is drawn instead of the next one's. */
 export interface FigureView {
-  window: TimeRange | null;
-  flight: number | null;
+  window?: TimeRange | null;
+  flight?: number | null;
+  predicted?: number;
 }
 
 export function useCampaignFigure(campaignId: number, name: FigureName, theme: Theme, view: FigureView | null = null) {
-  const { window = null, flight = null } = view ?? {};
+  const { window = null, flight = null, predicted } = view ?? {};
   const query = {
     theme,
     ...(window && { from_s: window[0], to_s: window[1] }),
     ...(flight !== null && { flight }),
+    ...(predicted !== undefined && { predicted }),
   };
   return useQuery({
     queryKey: ["campaign", campaignId, "figure", name, query],

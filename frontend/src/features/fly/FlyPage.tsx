@@ -190,7 +190,7 @@ function useTakeoffs(
   groundM: number,
 ): { figure: PlotlyFigure | null; summary: string } {
   const theme = useComputedColorScheme("light");
-  const card = useCampaignFigure(campaign.id, "takeoffs", theme).data;
+  const card = useCampaignFigure(campaign.id, "takeoffs", theme, { predicted: trial.number }).data;
   const raw = card?.figure;
   const dress = useCallback(
     (drawn: PlotlyFigure): PlotlyFigure => {
