@@ -1,6 +1,7 @@
 """The panel below a flight's output: its deviation from a set point that is a step."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from app.figures import theme
 from app.figures.base import Trace
 from app.figures.data import Curve, FlightData, Range
-from app.figures.overlays import Side, leaves_upward, off_scale, part_off_scale
+from app.figures.overlays import Side, leaves_upward, off_scale, part_off_scale, signed
 from app.figures.theme import Palette
 
 NEAR: Final = 0.05
@@ -18,8 +19,9 @@ MOST: Final = 0.5
 OPEN: Final = 0.2
 """The same before the first flight."""
 ROOM: Final = 1.1
-LABEL_S: Final = 1.2
-"""Width of a label."""
+LABEL_SHARE: Final = 0.145
+"""Width of a label, as a share of the visible time range."""
+DIGITS: Final = 2
 
 
 def is_step(set_point: Curve) -> bool:
@@ -57,58 +59,90 @@ def deviation_limit(curves: Sequence[Curve], set_point: Curve) -> float:
 
 
 def off_scale_deviations(
-    palette: Palette, flights: Sequence[FlightData], set_point: Curve, limit: float, *, unit: str, opening_s: float
+    palette: Palette, flights: Sequence[FlightData], set_point: Curve, limit: float, *, unit: str, window: Range
 ) -> list[Trace]:
-    """Marks at the edge of the panel for flights that leave it after the climb, labelled where there is room.
+    """Marks at the edge of the panel for flights that leave it after the climb, at their largest deviation in the
+    visible time range `window`.
 
-    They are at the largest deviation until `opening_s`, or of the whole flight if it leaves the panel only later.
+    They are labelled where there is room; one label names all flights at the same place with the same deviation.
     """
-    peaks = sorted(_peaks(flights, set_point, limit, opening_s), key=lambda peak: peak[:2])
-    marks, taken = list[Trace](), dict[bool, list[Range]]()
-    for time_s, number, deviation in peaks:
-        labels = taken.setdefault(leaves_upward(deviation.values, -limit, limit), [])
-        marks.append(
-            off_scale(
-                str(number),
-                deviation,
-                -limit,
-                limit,
-                palette.bad,
-                role="off scale deviation",
-                trial=number,
-                text=f"Deviation of flight {number}",
-                unit=unit,
-                digits=2,
-                side=_side(time_s, opening_s, labels),
-                yaxis="y2",
-            )
-        )
-    return marks
+    marks, labels = sorted(_marks(flights, set_point, limit, window), key=lambda mark: mark.time_s), list[_Label]()
+    for mark in marks:
+        _place(mark, [label for label in labels if label.mark.up == mark.up], labels, window)
+    of_mark = {label.mark.number: label for label in labels}
+    return [_trace(palette, mark, of_mark.get(mark.number), limit, unit) for mark in marks]
 
 
-def _side(time_s: float, opening_s: float, labels: list[Range]) -> Side | None:
-    """Where a mark's label fits into the chart and beside the `labels` at the same edge, to which it is added."""
-    sides: dict[Side, float] = {"right": 0.0, "center": LABEL_S / 2, "left": LABEL_S}
-    for side, before_s in sides.items():
-        own = Range(time_s - before_s, time_s + (LABEL_S - before_s))
-        is_inside = own.low >= 0.0 and own.high <= max(opening_s, time_s)
-        if is_inside and all(own.high <= other.low or own.low >= other.high for other in labels):
-            labels.append(own)
-            return side
-    return None
+@dataclass(frozen=True, slots=True)
+class _Mark:
+    """A flight that leaves the panel: its visible deviation, with the largest one and its time."""
+
+    number: int
+    deviation: Curve
+    time_s: float
+    peak: str
+    up: bool
 
 
-def _peaks(
-    flights: Sequence[FlightData], set_point: Curve, limit: float, opening_s: float
-) -> Iterator[tuple[float, int, Curve]]:
-    """Time of the mark, number and deviation of each flight that leaves the panel."""
+@dataclass(slots=True)
+class _Label:
+    """The label of a mark, which names the flights of `numbers`, with the time range that it covers."""
+
+    mark: _Mark
+    side: Side
+    covers: Range
+    numbers: list[int]
+
+
+def _marks(flights: Sequence[FlightData], set_point: Curve, limit: float, window: Range) -> Iterator[_Mark]:
+    """The mark of each flight that leaves the panel in the visible time range."""
     for flight in flights:
         if flight.curve is None:
             continue
-        settled = after_climb(deviation_of(flight.curve, set_point), set_point)
-        part = part_off_scale(settled, -limit, limit, opening_s)
+        part = part_off_scale(after_climb(deviation_of(flight.curve, set_point), set_point), -limit, limit, window)
         if part is not None:
-            yield float(part.time_s[np.abs(part.values).argmax()]), flight.number, part
+            place = int(np.abs(part.values).argmax())
+            peak = signed(float(part.values[place]), DIGITS)
+            up = leaves_upward(part.values, -limit, limit)
+            yield _Mark(flight.number, part, float(part.time_s[place]), peak, up)
+
+
+def _place(mark: _Mark, beside: Sequence[_Label], labels: list[_Label], window: Range) -> None:
+    """Add a label where it fits into the chart and between those `beside` it; else name the flight in one of them, if
+    that has the same deviation."""
+    width = LABEL_SHARE * (window.high - window.low)
+    sides: dict[Side, float] = {"right": 0.0, "center": width / 2, "left": width}
+    for side, before_s in sides.items():
+        covers = Range(mark.time_s - before_s, mark.time_s + (width - before_s))
+        is_inside = covers.low >= max(0.0, window.low) and covers.high <= window.high
+        if is_inside and not any(_overlaps(covers, label.covers) for label in beside):
+            labels.append(_Label(mark, side, covers, [mark.number]))
+            return
+    around = Range(mark.time_s - width, mark.time_s + width)
+    same = [label for label in beside if label.mark.peak == mark.peak and _overlaps(around, label.covers)]
+    if same:
+        same[-1].numbers.append(mark.number)
+
+
+def _overlaps(one: Range, other: Range) -> bool:
+    return one.low < other.high and other.low < one.high
+
+
+def _trace(palette: Palette, mark: _Mark, label: _Label | None, limit: float, unit: str) -> Trace:
+    return off_scale(
+        "" if label is None else ", ".join(map(str, sorted(label.numbers))),
+        mark.deviation,
+        -limit,
+        limit,
+        palette.bad,
+        role="off scale deviation",
+        trial=mark.number,
+        text=f"Deviation of flight {mark.number}",
+        unit=unit,
+        digits=DIGITS,
+        side=None if label is None else label.side,
+        yaxis="y2",
+    )
 
 
 def deviation_axis(palette: Palette, limit: float, unit: str, **more: object) -> dict[str, object]:

@@ -129,16 +129,12 @@ def _together(palette: Palette, flights: Sequence[FlightData], top: float, unit:
     )
 
 
-def part_off_scale(curve: Curve, low: float, high: float, opening_s: float) -> Curve | None:
-    """What leaves the scale `low` … `high`: the part until `opening_s`, which a chart shows first, or all of the curve.
-
-    None if all of it stays within the scale.
-    """
-    opening = curve.time_s <= opening_s
-    for part in (Curve(curve.time_s[opening], curve.values[opening]), curve):
-        if len(part.values) and (part.values.max() > high or part.values.min() < low):
-            return part
-    return None
+def part_off_scale(curve: Curve, low: float, high: float, window: Range) -> Curve | None:
+    """The part of a curve in the visible time range `window`, if it leaves the scale `low` … `high`; else None."""
+    visible = (window.low <= curve.time_s) & (curve.time_s <= window.high)
+    part = Curve(curve.time_s[visible], curve.values[visible])
+    leaves = len(part.values) > 0 and (part.values.max() > high or part.values.min() < low)
+    return part if leaves else None
 
 
 def leaves_upward(values: Samples, low: float, high: float) -> bool:
@@ -146,7 +142,7 @@ def leaves_upward(values: Samples, low: float, high: float) -> bool:
     return bool(values.max() - high >= low - values.min())
 
 
-def _signed(value: float, digits: int) -> str:
+def signed(value: float, digits: int) -> str:
     """A number with a true minus."""
     return f"{value:.{digits}f}".replace("-", "−")
 
@@ -173,14 +169,14 @@ def off_scale(
     values = curve.values
     up = leaves_upward(values, low, high)
     peak = int(values.argmax() if up else values.argmin())
-    name = f"{text} reaches {_signed(values[peak], 2)} {unit} at {curve.time_s[peak]:.1f} s"
+    name = f"{text} reaches {signed(values[peak], 2)} {unit} at {curve.time_s[peak]:.1f} s"
     return scatter(
         name,
         ([round(float(curve.time_s[peak]), 3)], [high if up else low]),
         role=role,
         about={"trial": trial},
         mode="markers" if side is None else "markers+text",
-        text=["" if side is None else f"{label} {'↑' if up else '↓'} {_signed(values[peak], digits)}\u00a0{unit}"],
+        text=["" if side is None else f"{label} {'↑' if up else '↓'} {signed(values[peak], digits)}\u00a0{unit}"],
         textposition=f"{'bottom' if up else 'top'} {side or 'center'}",
         marker={"symbol": "triangle-up" if up else "triangle-down", "size": 12, "color": colour},
         textfont=_readable(colour),

@@ -53,8 +53,9 @@ class TrajectoriesFigure:
     `flight-` and its number, that of its deviation `deviation-` and its number. The traces `live`, `live deviation` and
     `pointed` are empty: a page fills the first two during a flight, the last with the flight under the pointer if that
     one has no curve of its own. The altitude limit, `limit`, is hidden: the page on which a flight is observed shows
-    it. The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. A set
-    point of zero has no deviations: they would repeat the output.
+    it. The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. Marks off
+    scale are those within the history's window, else within the first 8 s. A set point of zero has no deviations: they
+    would repeat the output.
     """
 
     history: History
@@ -82,7 +83,6 @@ class TrajectoriesFigure:
             *self._goals(palette),
             *self._altitude_limit(palette),
         ]
-        curves = [flight.curve for flight in drawn if flight.curve is not None]
         low, high, outside = self._span(drawn)
         traces += self._deviations(palette, drawn)
         traces += [self._flight(palette, flight, points) for flight in sorted(drawn, key=self._weight)]
@@ -94,11 +94,8 @@ class TrajectoriesFigure:
             # Plotly places an axis only if it has a trace with a point, even a missing one.
             one_missing = ([None], [None])
             traces.append(self._empty(palette, "live deviation", "Flying now, deviation", one_missing, yaxis="y2"))
-        for flight, curve in [(drawn[index], curves[index]) for index in outside if index < len(drawn)]:
-            label, text = str(flight.number), f"Flight {flight.number}"
-            part = part_off_scale(curve, low, high, OPENING_S[1]) or curve
-            unit = self.history.output_unit
-            traces.append(off_scale(label, part, low, high, palette.bad, trial=flight.number, text=text, unit=unit))
+        leaving_top = self._off_scale(palette, [drawn[index] for index in outside if index < len(drawn)], low, high)
+        traces += leaving_top
         leaving = []
         if is_step(history.set_point):
             leaving = off_scale_deviations(
@@ -107,7 +104,7 @@ class TrajectoriesFigure:
                 history.set_point,
                 self._deviation_limit,
                 unit=history.output_unit,
-                opening_s=OPENING_S[1],
+                window=self._visible,
             )
         traces += leaving
         layout = theme.layout(
@@ -117,12 +114,21 @@ class TrajectoriesFigure:
             meta={"whole_s": self._whole_s},
             uirevision="takeoffs",
         )
-        summary = self._summary(sum(index < len(drawn) for index in outside), len(leaving))
+        summary = self._summary(len(leaving_top), len(leaving))
         return ready(self, _with_uids(traces), layout, summary=summary, table=self._table(drawn, envelope))
 
     @property
     def _lasts_s(self) -> float:
         return float(self.history.set_point.time_s[-1])
+
+    @property
+    def _opening_s(self) -> list[float]:
+        return [OPENING_S[0], min(OPENING_S[1], self._lasts_s)]
+
+    @property
+    def _visible(self) -> Range:
+        """The visible time range: the one asked for, else the one at first."""
+        return self.history.window or Range(*self._opening_s)
 
     @property
     def _whole_s(self) -> list[float]:
@@ -131,11 +137,12 @@ class TrajectoriesFigure:
     def _axes(self, palette: Palette, low: float, high: float) -> dict[str, object]:
         """The output on top, its deviation from the set point below it, over one axis of time."""
         history, unit = self.history, self.history.output_unit
-        opening = [OPENING_S[0], min(OPENING_S[1], self._lasts_s)]
         both = is_step(history.set_point)
         place = [DEVIATION_SHARE + _PANEL_GAP, 1.0] if both else [0.0, 1.0]
         axes: dict[str, object] = {
-            "xaxis": theme.titled(palette, "Time since the command (s)", range=opening, anchor="y2" if both else "y"),
+            "xaxis": theme.titled(
+                palette, "Time since the command (s)", range=self._opening_s, anchor="y2" if both else "y"
+            ),
             "yaxis": theme.titled(
                 palette, f"{history.output_title} ({unit})", domain=place, range=[low, high], nticks=7
             ),
@@ -143,6 +150,20 @@ class TrajectoriesFigure:
         if both:
             axes["yaxis2"] = deviation_axis(palette, self._deviation_limit, unit, domain=[0.0, DEVIATION_SHARE])
         return axes
+
+    def _off_scale(self, palette: Palette, flights: list[FlightData], low: float, high: float) -> list[Trace]:
+        """Marks of the flights that leave the upper panel in the visible time range."""
+        parts = (
+            (flight.number, part_off_scale(flight.curve, low, high, self._visible))
+            for flight in flights
+            if flight.curve is not None
+        )
+        unit = self.history.output_unit
+        return [
+            off_scale(str(number), part, low, high, palette.bad, trial=number, text=f"Flight {number}", unit=unit)
+            for number, part in parts
+            if part is not None
+        ]
 
     def _deviations(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
         """Output − set point of each flight and of the prediction, in the lower panel."""

@@ -183,15 +183,39 @@ def test_a_deviation_that_leaves_its_panel_after_the_climb_is_marked_at_the_edge
     assert card.summary.endswith("Deviation of 2 off scale, marked at the edge.")
 
 
-@pytest.mark.parametrize(
-    ("at_s", "side"), [(4.0, "top right"), (7.3, "top center"), (7.9, "top left"), (20.0, "top left")]
-)
+@pytest.mark.parametrize(("at_s", "side"), [(4.0, "top right"), (7.3, "top center"), (7.9, "top left")])
 def test_a_deviations_label_stays_within_the_panel_with_its_unit_and_a_true_minus(at_s: float, side: str) -> None:
     dip = np.minimum(3.0, 2.0 * TIME_S) - 0.9 * (np.abs(TIME_S - at_s) < 0.05)
     low = replace(flight(1, 0.4), curve=Curve(TIME_S, dip))
     card = TrajectoriesFigure(history(low, flight(2, 0.3), flight(3, 0.1))).compute()
     mark = trace(card, "off scale deviation", trial=1)
     assert (mark["text"], mark["textposition"]) == (["1 ↓ −0.90\u00a0m"], side)
+
+
+def aborted(number: int, at_s: float) -> FlightData:
+    """Never near the set point; descends from `at_s` on by 0.5 m/s until it stands on the ground."""
+    values = np.clip(np.minimum(2.0, 2.0 * TIME_S) - 0.5 * np.maximum(0.0, TIME_S - at_s), 0.0, None)
+    return replace(flight(number, None, outcome="aborted"), curve=Curve(TIME_S, values))
+
+
+def test_each_cut_deviation_is_marked_with_its_extreme_in_the_visible_time_range() -> None:
+    """Seen: −0.88 m at 8 s beside a flight that stands on the ground at 12 s, and a mark at 15.7 s in the first 8 s."""
+    past = history(flight(1, 0.1), *(aborted(number, at_s) for number, at_s in ((2, 7.0), (3, 12.0), (4, 12.1))))
+
+    def texts(window: Range | None) -> dict[int, tuple[float, str]]:
+        card = TrajectoriesFigure(replace(past, window=window)).compute()
+        marks = [one for one in traces(card) if one["meta"]["role"] == "off scale deviation"]
+        assert f"Deviation of {len(marks)} off scale" in card.summary
+        return {one["meta"]["trial"]: (one["x"][0], one["text"][0]) for one in marks}
+
+    first = texts(None)
+    assert first[2] == (8.0, "2 ↓ −1.50\u00a0m")
+    assert max(x for x, _ in first.values()) <= 8.0
+    whole = texts(Range(-0.3, 32.6))
+    assert whole[2] == (pytest.approx(11.0, abs=0.02), "2 ↓ −3.00\u00a0m")
+    assert whole[3] == (pytest.approx(16.0, abs=0.02), "3, 4 ↓ −3.00\u00a0m")
+    assert whole[4] == (pytest.approx(16.1, abs=0.02), "")
+    assert texts(Range(20.0, 25.0))[2][0] == 20.0
 
 
 def test_labels_at_opposite_edges_have_room_at_the_same_time() -> None:

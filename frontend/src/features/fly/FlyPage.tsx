@@ -1,9 +1,9 @@
 import { Anchor, Skeleton, useComputedColorScheme } from "@mantine/core";
 import { IconAlertOctagonFilled, IconChevronLeft } from "@tabler/icons-react";
-import { useCallback, useMemo, useRef } from "react";
+import { useCallback, useMemo, useRef, useState } from "react";
 import { Link, useOutletContext, useParams } from "react-router";
 import { useReadOnlyReason } from "../../api/access";
-import { useCampaign, useCampaignFigure, useCatalogue, useTrial } from "../../api/queries";
+import { type TimeRange, useCampaign, useCampaignFigure, useCatalogue, useTrial } from "../../api/queries";
 import type { Campaign, Trial, Vehicle } from "../../api/types";
 import { useVehicleCommands } from "../../api/vehicleCommands";
 import { useVehicle } from "../../api/vehicles";
@@ -190,8 +190,11 @@ function useTakeoffs(
   groundM: number,
 ): { figure: PlotlyFigure | null; summary: string } {
   const theme = useComputedColorScheme("light");
-  const card = useCampaignFigure(campaign.id, "takeoffs", theme, { predicted: trial.number }).data;
+  const [window, setWindow] = useState<TimeRange | null>(null);
+  const card = useCampaignFigure(campaign.id, "takeoffs", theme, { window, predicted: trial.number }).data;
   const raw = card?.figure;
+  const whole = raw ? wholeFlight(raw as unknown as PlotlyFigure) : null;
+  if (whole !== null && whole.join() !== window?.join()) setWindow(whole);
   const dress = useCallback(
     (drawn: PlotlyFigure): PlotlyFigure => {
       const { data, layout } = withLimit(drawn, groundM);
