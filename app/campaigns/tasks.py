@@ -73,12 +73,13 @@ class LandscapeJob:
             raise GainlineError("There is no model, or fewer than two gains are free.", hint="")
         points = survey.points()
         parts = np.array_split(points, -(-len(points) // POINTS_PER_BATCH))
-        errors, told_s = [], started_s
-        for done, part in enumerate(parts):
+        errors, done, told_s = [], 0, started_s
+        for part in parts:
             if monotonic() - told_s >= PROGRESS_EVERY_S:
                 told_s = monotonic()
-                self._report(job, done / len(parts), f"{done * POINTS_PER_BATCH} of {len(points)} gain sets evaluated")
+                self._report(job, done / len(points), f"{done} of {len(points)} gain sets evaluated")
             errors.append(self.pool.run(predict_points, survey.predict_errors, part))
+            done += len(part)
         result = landscapes.as_json(survey.landscape(np.concatenate(errors)), job.order)
         with self.database.write() as session:
             jobs.finish_job(session, job.id, worker=self.worker, result=result)

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from app.campaigns import landscapes
+from app.campaigns import landscapes, tasks
 from app.campaigns.tasks import LandscapeJob
 from app.core.tuning.landscape import plan_grid, predict_points
 from app.db.session import Database
@@ -107,6 +107,26 @@ def test_the_page_says_how_far_the_landscape_is(client: TestClient, database: Da
         jobs.report_progress(session, job.id, 0.4, "192 of 480 gain sets evaluated", worker=WORKER, lease_s=30.0)
     reason = card_of(client, campaign_id)["reason"]
     assert reason.startswith("40\u00a0% done: 192 of 480 gain sets evaluated.")
+
+
+def test_the_share_that_is_done_is_that_of_the_gain_sets_evaluated(
+    monkeypatch: pytest.MonkeyPatch, client: TestClient, database: Database, campaign_id: int
+) -> None:
+    """Seen: 68 % done, 624 of 867. The batches are not equally large."""
+    card_of(client, campaign_id)
+    told: list[tuple[float, str]] = []
+    monkeypatch.setattr(tasks, "PROGRESS_EVERY_S", 0.0)
+    monkeypatch.setattr(LandscapeJob, "_report", lambda _self, _job, share, doing: told.append((share, doing)))
+    with ComputePool(1, prepare=int) as pool:
+        runner = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER, lease_s=9.0),
+                    room=1, worker=WORKER, lease_s=30.0)  # fmt: skip
+        claimed = runner.claim()
+        assert claimed is not None
+        runner.carry_out(claimed)
+    assert len(told) > 2
+    for share, doing in told:
+        done, _, points, *_ = doing.split()
+        assert share == int(done) / int(points)
 
 
 def test_another_proposal_has_a_landscape_of_its_own(client: TestClient, database: Database, campaign_id: int) -> None:

@@ -40,6 +40,7 @@ from app.core.models.vertical_hazards import (
     FALLEN_STEP,
     HIGHEST_M,
     HIGHEST_STEP,
+    LOST_M,
     REPORT_SIZE,
     SWING_LAST_M_S,
     SWING_MIDDLE_M_S,
@@ -66,6 +67,9 @@ SMALLEST_SWING_M_S: Final = 0.1
 """A climb rate that swings by less counts as at rest."""
 UNDAMPED: Final = 0.95
 """An oscillation must decay by more than 5 % from the middle third of the flight to the last."""
+
+_CUT_OFF_M: Final = LOST_M - 0.2
+"""Least report of a flight that was simulated no further: without its last step."""
 
 _GOLDEN: Final = 0.6180339887498949
 
@@ -154,9 +158,10 @@ def undamped_swing(reports: "Matrix") -> Vector:
 def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: float, baseline: bool) -> Check:
     worst = int(np.argmax(runs.reports[:, HIGHEST_M]))
     highest_m = float(runs.reports[worst, HIGHEST_M])
-    case = _case(parameters, runs.models[worst], float(runs.reports[worst, HIGHEST_STEP]), "highest")
+    event = "highest" if highest_m < _CUT_OFF_M else f"above {LOST_M:.0f} m"
+    case = _case(parameters, runs.models[worst], float(runs.reports[worst, HIGHEST_STEP]), event)
     passed = baseline or highest_m <= ceiling_m
-    sentence = f"The highest of {len(runs.models)} simulated takeoffs rises to {highest_m:.2f} m" + (
+    sentence = f"The highest of {len(runs.models)} simulated takeoffs {_rises(highest_m)}" + (
         f", with {case}; at most {ceiling_m:.2f} m is allowed."
         if not passed
         else f"; {ceiling_m:.2f} m is allowed."
@@ -165,6 +170,13 @@ def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: flo
         "them."
     )
     return Check("altitude", passed, sentence, worst=highest_m, limit=ceiling_m, case=case)
+
+
+def _rises(highest_m: float) -> str:
+    """How high a simulated vehicle rises, as far as it is simulated."""
+    if highest_m >= _CUT_OFF_M:
+        return f"rises above {LOST_M:.0f} m, where the simulation ends"
+    return f"rises to {highest_m:.2f} m"
 
 
 def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m: float) -> Check:
@@ -198,16 +210,16 @@ def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
 
 
 _ABORTS: Final = {
-    HIGHEST_M: ("abort altitude", "m", "rises to"),
-    TOUCH_DOWN_M_S: ("abort touch-down", "m/s", "touches down at"),
+    HIGHEST_M: ("abort altitude", "m"),
+    TOUCH_DOWN_M_S: ("abort touch-down", "m/s"),
 }
-"""Name and unit of the check, and what the vehicle does, of each reported value of an abort."""
+"""Name and unit of the check of each reported value of an abort."""
 
 
 def _abort(place: int, runs: Runs, allowed: "Matrix", limits: Vector, parameters: Sequence["ModelParameter"]) -> Check:
     """Check the abort that exceeds the most what is `allowed` for its vehicle, shape (k, 2): the limit, or beyond it
     what the safe gains do."""
-    name, unit, what = _ABORTS[place]
+    name, unit = _ABORTS[place]
     values = runs.aborts[:, :, place]
     excess = values - allowed[:, [place]]
     run, instant = divmod(int(np.argmax(excess)), excess.shape[1])
@@ -215,7 +227,8 @@ def _abort(place: int, runs: Runs, allowed: "Matrix", limits: Vector, parameters
     passed = value <= limit
     case = _case(parameters, runs.models[run], float(runs.abort_steps[run, instant]), "aborted")
     why = "" if limit == limits[place] else ", as with the safe gains"
-    sentence = f"After an abort the vehicle {what} {value:.2f} {unit} in the worst case; {limit:.2f} {unit} is "
+    does = _rises(value) if place == HIGHEST_M else f"touches down at {value:.2f} {unit}"
+    sentence = f"After an abort the vehicle {does} in the worst case; {limit:.2f} {unit} is "
     sentence += f"allowed{why}." if passed else f"allowed{why}: {case}."
     return Check(name, passed, sentence, worst=value, limit=limit, case=case)
 

@@ -69,7 +69,7 @@ test("the only flight of a legend entry, once it is chosen, has its own entry al
 
 test("a chosen flight stands out and the others step back", () => {
   const drawn = withChosen(traces, 1);
-  expect(drawn[1]).toMatchObject({ line: { width: 3.5 } });
+  expect(drawn[1]).toMatchObject({ line: { width: 3.5 }, legendgroup: "chosen", showlegend: true });
   expect(drawn[2]?.opacity).toBeLessThan(0.5);
   expect(drawn[0]?.opacity).toBeUndefined();
 });

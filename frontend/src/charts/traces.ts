@@ -154,7 +154,13 @@ export function withChosen(traces: readonly Trace[], trial: number | null): Trac
     if (isAlone && role === "legend" && own === standing) return { ...trace, visible: false };
     if (!CURVES.has(trace.meta?.role ?? "")) return trace;
     return trace.meta?.trial === trial
-      ? { ...trace, line: { ...trace.line, width: 3.5 }, ...(trace.meta?.role === "flight" && { showlegend: true }) }
+      ? {
+          ...trace,
+          line: { ...trace.line, width: 3.5 },
+          // Entries of one group stand below each other, and leave a hole beside them.
+          legendgroup: "chosen",
+          ...(trace.meta?.role === "flight" && { showlegend: true }),
+        }
       : { ...trace, opacity: FADED };
   });
 }

@@ -130,6 +130,10 @@ def test_thrust_without_feedback_is_lost_to_the_sky() -> None:
     answers = checks((0, 0, 0), around(0.6), ceiling_m=100.0)
     assert refused(answers) == ["altitude", "divergence", "abort altitude"]
     assert answers["altitude"].worst == pytest.approx(LOST_M, abs=0.2)
+    end = "rises above 200 m, where the simulation ends"
+    assert answers["altitude"].sentence.startswith(f"The highest of {MODELS} simulated takeoffs {end}, with ")
+    assert "highest at" not in answers["altitude"].sentence
+    assert answers["abort altitude"].sentence.startswith(f"After an abort the vehicle {end} in the worst case; ")
     assert "diverges" in answers["divergence"].sentence
 
 

@@ -60,12 +60,13 @@ def propose(
     prediction = predict_flight(calibration, base, choice.gains)
     clipped = space.names_where((choice.optimum <= box.low) | (choice.optimum >= box.high))
     explanation = Explanation(
-        summary=_summary(experiment, base, choice, prediction, len(calibration.numbers)),
+        summary=_summary(experiment, base, choice, prediction, len(calibration.numbers))
+        + _describe_limit(fraction, flights),
         base_flight=base.number,
         gradient=_gradient(experiment, space, space.nearest(space.vector(base.gains)), models),
         direction=space.by_name(choice.gains - space.vector(base.gains)),
         clipped=clipped,
-        notes=(*choice.notes, *_notes(fraction, flights)),
+        notes=(*choice.notes, "The deviation of the best flight from the model is added inside the control loop."),
         lesson=_describe_lesson(calibration, prediction),
         fitted=calibration.fitted,
         trust_fraction=fraction,
@@ -163,13 +164,16 @@ def _summary(
     )
 
 
-def _notes(fraction: float, flights: Sequence[Flight]) -> tuple[str, ...]:
-    kept = "The deviation of the best flight from the model is added inside the control loop."
+def _describe_limit(fraction: float, flights: Sequence[Flight]) -> str:
+    """What the aborts that count against their gains leave of the trust region, as a further sentence."""
     aborted = [flight.number for flight in aborted_by_gains(flights)]
     if not aborted or fraction >= 1.0:
-        return (kept,)
-    did = "its abort halved the trust region" if len(aborted) == 1 else "each abort halved the trust region"
-    return kept, f"{named_flights(aborted).capitalize()} counted against the gains: {did}."
+        return ""
+    halved = "halved" if len(aborted) == 1 else "each halved"
+    return (
+        f" {named_flights(aborted).capitalize()} counted against the gains and {halved} the largest allowed step: now "
+        f"{percent(fraction)} of each gain's range."
+    )
 
 
 def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> str:

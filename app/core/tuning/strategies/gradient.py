@@ -234,7 +234,7 @@ GRADIENT: Final = Strategy(
     options=(
         Option(
             name="scaled",
-            title="Scale each gain (off: raw counts, as in the paper)",
+            title="Scale each gain (off: unscaled, as in the paper)",
             default=True,
             choices=(True, False),
         ),

@@ -111,7 +111,9 @@ def test_the_trust_region_bounds_the_step_after_an_abort_and_after_a_prediction_
     assert careful.explanation.trust_fraction == 0.5
     assert max(SPACE.change(careful.gains, DEFAULT).values()) <= 0.5
     assert careful.explanation.clipped
-    assert "Flight 2 counted against the gains: its abort halved the trust region." in careful.explanation.notes
+    assert careful.explanation.summary.endswith(
+        "Flight 2 counted against the gains and halved the largest allowed step: now 50\u00a0% of each gain's range."
+    )
     missed = replace(fly(2, {"kp": 290, "ki": 15, "kd": 82}), predicted=Prediction(error=0.1, lower=0.09, upper=0.11))
     after = next_proposal(CALM, [first, missed])
     assert after.explanation.trust_fraction == 0.5
