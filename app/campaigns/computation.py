@@ -54,7 +54,7 @@ def compute(past: CampaignHistory) -> ProposalComputation:
     experiment = experiment_of(definition)
     proposal = next_proposal(definition, flights, past.donor)
     stop_verdict = evaluate_stop_rule(
-        definition, flights, proposal, battery_v=past.battery_v, open_until_flight=past.open_until_flight
+        past.definition, flights, proposal, battery_v=past.battery_v, open_until_flight=past.open_until_flight
     )
     spread = known_distribution(experiment, flights) if proposal.spread is None else proposal.spread
     gate = check_policy(

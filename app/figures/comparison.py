@@ -106,7 +106,7 @@ class ComparisonFigure:
             ),
             yaxis2=theme.titled(
                 palette,
-                f"Minus {first} ({data.output_unit})",
+                f"Difference from {first} ({data.output_unit})",
                 domain=[0.0, 0.32],
                 nticks=5,
                 zeroline=True,

@@ -34,8 +34,8 @@ _OUTCOMES: Final = {
 _STATES: Final = {
     "draft": "Not flown yet",
     "ready": "Not flown yet",
-    "flying": "Not finished: a flight is in progress",
-    "deciding": "Not finished: between flights",
+    "flying": "Campaign still open: a flight is in progress",
+    "deciding": "Campaign still open: between flights",
     "finished": "Finished",
     "archived": "Finished and archived",
 }

@@ -17,8 +17,9 @@ from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, gain, gains, number, setting_text, short_percent, without_word
+from app.core.formatting import gain, gains, number, setting_text, short_percent, without_word
 from app.core.policy import Gain, Gains
+from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import TrialPhotoRow, TrialRow
 from app.figures.base import Card
@@ -171,7 +172,7 @@ def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, .
     facts.append(Fact("Maximum step", f"{first} of each gain's range until a flight is valid, then {later}"))
     if experiment.output == "altitude_m":
         facts.append(Fact("Gate ceiling", f"{definition.ceiling_m:g} m"))
-    facts.append(Fact("Stop rule", _stop(definition.stop)))
+    facts.append(Fact("Stop rule", _stop(definition.stop, campaign.open_until_flight)))
     if campaign.vehicle.can_fly and not campaign.vehicle.registered:
         facts.append(Fact("Seed", str(definition.seed)))
     return tuple(facts)
@@ -199,8 +200,8 @@ def _start(start: Start) -> str:
     return origin if start.gains is None else f"{origin}: {gains(start.gains)}"
 
 
-def _stop(stop: StopRule) -> str:
-    most = f"at most {count(stop.max_flights, 'flight')}, invalid ones not counted"
+def _stop(stop: StopRule, open_until_flight: int) -> str:
+    most = f"at most {describe_budget(stop.max_flights, open_until_flight)}, invalid ones not counted"
     match stop.kind:
         case "paper":
             rule = f"two consecutive flights less than {short_percent(stop.improvement)} better than the best; {most}"

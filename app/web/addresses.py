@@ -13,8 +13,9 @@ from app.common.settings import is_loopback
 
 EXPOSES: Final = (
     "anyone who can reach this computer over the network can view every campaign. Browsers unlocked with `gainline "
-    "unlock` can change and delete campaigns and start simulated flights. Gainline has no user accounts. Real "
-    "vehicles, and simulated ones with a link, fly only from a server on loopback (--host 127.0.0.1)."
+    "unlock` can change and delete campaigns and start simulated flights. Gainline has no user accounts. "
+    "Vehicles with a link, real or simulated, fly only from a browser on the computer that runs the server, which then "
+    "listens on loopback (--host 127.0.0.1)."
 )
 """Consequence of listening beyond loopback, as the second half of a sentence."""
 

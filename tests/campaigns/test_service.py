@@ -131,7 +131,7 @@ def test_a_finished_campaign_is_reopened_for_more_flights_and_ends_after_them(
     assert (reopened["state"], reopened["outcome"], reopened["stop_reason"]) == ("deciding", None, "")
     run_jobs(database)
     told = get(client, f"{path}/proposal")["proposal"]["stop_verdict"]
-    assert (told["stop"], told["sentence"]) == (False, "2 of 4 flights are left.")
+    assert (told["stop"], told["sentence"]) == (False, "Reopened for 2 more flights.")
     create_flown_trial(client, database, campaign["id"], 1.1)
     assert get(client, path)["state"] == "deciding"
     create_flown_trial(client, database, campaign["id"], 1.2)

@@ -273,7 +273,7 @@ def test_a_page_can_be_read_by_everybody_and_fits_its_screen(
     not os.environ.get("GAINLINE_README_IMAGE"), reason="set GAINLINE_README_IMAGE=1 to renew the image"
 )
 def test_the_image_of_the_readme_is_taken(dashboard: Dashboard, states: States) -> None:
-    campaign_id = states.campaign(name="AR.Drone takeoff to 3 m, twin of the real one", seed=4, flights=4)
+    campaign_id = states.campaign(name="AR.Drone takeoff to 3 m, twin", seed=4, flights=4)
     dashboard.open_campaign(campaign_id)
     dashboard.settled()
     README_IMAGE.parent.mkdir(parents=True, exist_ok=True)

@@ -53,7 +53,7 @@ def test_on_loopback_the_page_says_how_a_tablet_gets_in_and_what_that_opens(dash
     dashboard.open("/settings")
     panel = dashboard.panel("Open on a tablet")
     expect(panel).to_contain_text("gainline serve --host 0.0.0.0")
-    expect(panel).to_contain_text("fly only from a server on loopback")
+    expect(panel).to_contain_text("fly only from a browser on the computer that runs the server")
     expect(panel.locator("code", has_text="gainline unlock")).to_be_visible()
     expect(panel).not_to_contain_text("`")
     expect(panel.get_by_role("img")).to_have_count(0)

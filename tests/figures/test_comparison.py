@@ -50,7 +50,7 @@ def test_below_each_flight_stands_against_the_first_as_far_as_both_were_recorded
         assert drawn["line"] == trace(card, "flight", trial=trial)["line"]
     assert max(trace(card, "difference", trial=12)["x"]) == 10.0
     assert not [one for one in traces(card) if one["meta"] == {"role": "difference", "trial": 10}]
-    assert layout(card)["yaxis2"]["title"]["text"] == "Minus A (m)"
+    assert layout(card)["yaxis2"]["title"]["text"] == "Difference from A (m)"
     assert card.table is not None
     assert [column.name for column in card.table.columns] == [
         "time_s", "set_point", "a", "b", "c", "b_less_a", "c_less_a"

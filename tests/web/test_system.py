@@ -49,7 +49,7 @@ def test_a_server_on_loopback_has_no_address_for_a_tablet_and_says_what_another_
 ) -> None:
     system: Json = get(client, "/api/system")
     assert (system["is_exposed"], system["addresses"], system["host"]) == (False, [], "127.0.0.1")
-    assert "fly only from a server on loopback" in system["exposes"]
+    assert "fly only from a browser on the computer that runs the server" in system["exposes"]
     refused = client.get("/api/system/qr.svg", params={"address": TABLET})
     assert refused.status_code == 422
     assert problems_of(refused) == {"address": "is not one of the server's addresses"}

@@ -26,6 +26,7 @@ from app.core.definition import flight_seed
 from app.core.experiments import experiment_of
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable, space_of
+from app.core.tuning.stop_rules import describe_budget
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.fleet import service as fleet
 from app.fleet.control import require_may
@@ -125,10 +126,10 @@ def require_open(session: Session, campaign: CampaignRow, spent_by: Collection[T
     """Raise ConflictError unless the campaign can take another trial now; trials in `spent_by` use up its budget."""
     check_action(CAMPAIGN_ACTIONS, "plan", campaign.state, f"Campaign {campaign.id}")
     trials = history.trials_of(session, campaign.id)
-    budget = max(definition_of(campaign).stop.max_flights, campaign.open_until_flight)
-    if sum(row.state in spent_by for row in trials) >= budget:
+    most, open_until = definition_of(campaign).stop.max_flights, campaign.open_until_flight
+    if sum(row.state in spent_by for row in trials) >= max(most, open_until):
         raise ConflictError(
-            f"All {budget} flights in the budget of campaign {campaign.id} are flown or planned.",
+            f"The budget of campaign {campaign.id}, {describe_budget(most, open_until)}, is flown or planned.",
             hint="Cancel a planned trial, or reopen the campaign once it is finished.",
         )
     if (waiting := history.find_unreviewed(trials)) is not None:

@@ -49,12 +49,19 @@ def evaluate_stop_rule(
         proposal.kind,
         battery_v=battery_v,
         because=proposal.explanation.summary,
+        open_until_flight=open_until_flight,
     )
     if not verdict.stop or len(flights) >= open_until_flight:
         return verdict
     left = count(open_until_flight - len(flights), "more flight")
     warning = f" {verdict.why}" if verdict.reason == "battery low" else ""
     return replace(verdict, stop=False, reason=None, why=f"Reopened for {left}.{warning}")
+
+
+def describe_budget(max_flights: int, open_until_flight: int) -> str:
+    """`3 flights`; of a campaign that was reopened beyond them `3 flights and 1 more after reopening`."""
+    further = open_until_flight - max_flights
+    return count(max_flights, "flight") + (f" and {further} more after reopening" if further > 0 else "")
 
 
 def _is_repeat(flights: Sequence[Flight], place: int) -> bool:
@@ -84,11 +91,13 @@ def decide_stop(
     *,
     battery_v: float | None = None,
     because: str = "",
+    open_until_flight: int = 0,
 ) -> StopVerdict:
     """Apply a stop rule to the errors of the flights so far, in order.
 
     None stands for a flight without an error (aborted) or with gains flown before: it counts towards the budget, but
-    not as an improvement or a failure. `battery_v` is the voltage at which the last flight ended.
+    not as an improvement or a failure. `battery_v` is the voltage at which the last flight ended. `open_until_flight`,
+    the number of flights for which the campaign was reopened, is only named with its budget.
 
     `paper` is the paper's rule: stop when the error fails twice in a row to improve by more than 5 % on the
     best so far, or after 7 flights; also when the line search finds nothing better (its step 7). The first error is
@@ -109,7 +118,7 @@ def decide_stop(
     return StopVerdict(
         stop=reason is not None,
         reason=reason,
-        why=_sentence(rule, reason, len(errors), failures, battery_v, because),
+        why=_sentence(rule, reason, len(errors), failures, battery_v, because, open_until_flight),
         failures=failures,
         threshold=threshold,
     )
@@ -132,7 +141,13 @@ def _reason(
 
 
 def _sentence(
-    rule: StopRule, reason: Reason | None, flights: int, failures: int, battery_v: float | None, because: str
+    rule: StopRule,
+    reason: Reason | None,
+    flights: int,
+    failures: int,
+    battery_v: float | None,
+    because: str,
+    open_until_flight: int,
 ) -> str:
     by = f"more than {percent(rule.improvement)}"
     if reason is None and rule.kind == "paper" and failures:
@@ -141,9 +156,9 @@ def _sentence(
         left = rule.max_flights - flights
         return f"{left} of {rule.max_flights} flights {'is' if left == 1 else 'are'} left."
     sentences: dict[Reason, str] = {
-        "flight budget": "The budget of 1 flight has been flown."
-        if rule.max_flights == 1
-        else f"All {rule.max_flights} flights of the budget have been flown.",
+        "flight budget": f"All {rule.max_flights} flights of the budget have been flown."
+        if rule.max_flights > 1 and rule.max_flights >= open_until_flight
+        else f"The budget of {describe_budget(rule.max_flights, open_until_flight)} has been flown.",
         "not improving": f"The last {failures} consecutive flights did not improve on the best before them by {by}.",
         "nothing better": "The model predicts no improvement over the best flight.",
         "told from noise": "",

@@ -141,7 +141,11 @@ def test_no_rule_ends_a_campaign_before_the_flights_it_was_reopened_for(flown: i
     definition = Definition(stop=StopRule(kind="budget", max_flights=1))
     verdict = evaluate_stop_rule(definition, flights, STEP, open_until_flight=3)
     assert (verdict.stop, verdict.reason) == ((False, None) if flown < 3 else (True, "flight budget"))
-    assert verdict.why.startswith("Reopened for 1 more flight." if flown < 3 else "The budget of 1 flight")
+    assert verdict.why == (
+        "Reopened for 1 more flight."
+        if flown < 3
+        else "The budget of 1 flight and 2 more after reopening has been flown."
+    )
 
 
 def test_a_low_battery_ends_a_campaign_also_when_no_flight_counts() -> None:

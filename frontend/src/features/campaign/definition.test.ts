@@ -52,6 +52,9 @@ test("every setting that a proposal depends on is said in words", () => {
   expect(rows["Stop rule"]).toBe(
     "Two consecutive flights less than 5\u00a0% better than the best, or 7 flights, invalid ones not counted",
   );
+  expect(Object.fromEntries(settingsOf({ ...campaign, open_until_flight: 8 }, catalogue))["Stop rule"]).toBe(
+    "Two consecutive flights less than 5\u00a0% better than the best, or 7 flights and 1 more after reopening, invalid ones not counted",
+  );
 });
 
 test("a warm start and a stop on noise are said in words", () => {

@@ -49,8 +49,10 @@ function named(things: readonly Described[] | undefined, name: string): string {
   return things?.find((thing) => thing.name === name)?.title ?? name;
 }
 
-function stopText(stop: Definition["stop"]): string {
-  const most = `${count(stop?.max_flights ?? 0, "flight")}, invalid ones not counted`;
+function stopText(stop: Definition["stop"], openUntilFlight: number): string {
+  const flights = stop?.max_flights ?? 0;
+  const further = openUntilFlight > flights ? ` and ${openUntilFlight - flights} more after reopening` : "";
+  const most = `${count(flights, "flight")}${further}, invalid ones not counted`;
   switch (stop?.kind) {
     case "budget":
       return `After ${most}`;
@@ -88,7 +90,8 @@ export function windowOf(definition: Definition, catalogue?: Catalogue): number 
   return typeof seconds === "number" ? seconds : null;
 }
 
-export function settingsOf({ definition, vehicle, definition_digest }: Campaign, catalogue?: Catalogue): Row[] {
+export function settingsOf(campaign: Campaign, catalogue?: Catalogue): Row[] {
+  const { definition, vehicle, definition_digest, open_until_flight } = campaign;
   const { stop, start } = definition;
   const kind = catalogue?.vehicle_kinds.find(({ name }) => name === vehicle.kind);
   const strategy = catalogue?.strategies.find(({ name }) => name === definition.strategy);
@@ -102,7 +105,7 @@ export function settingsOf({ definition, vehicle, definition_digest }: Campaign,
     ["Strategy", named(catalogue?.strategies, definition.strategy)],
     ...optionRows(definition.options ?? {}, strategy?.options),
     ["Start", startText(start)],
-    ["Stop rule", stopText(stop)],
+    ["Stop rule", stopText(stop, open_until_flight)],
     ...(stop?.min_battery_v ? ([["Minimum battery voltage", `${stop.min_battery_v} V after a flight`]] as Row[]) : []),
     ...Object.entries(definition.bounds ?? {}).map(
       ([name, [low, high]]): Row => [`Bounds of ${name}`, valueText(`${low} … ${high}`, unitOf(name))],

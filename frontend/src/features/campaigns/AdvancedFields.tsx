@@ -11,6 +11,7 @@ import {
   type CampaignForm,
   gainsOf,
   hasModel,
+  isSeeded,
   optionsOf,
   type StopKind,
 } from "./newCampaign";
@@ -35,9 +36,6 @@ function Group({ title, children }: { title: string; children: ReactNode }) {
 export function AdvancedFields(props: Props) {
   const { form, catalogue, reasons, set } = props;
   const options = optionsOf(form, catalogue);
-  const isSimulated = catalogue.vehicle_kinds.some(
-    ({ name, can_fly, registered }) => name === form.vehicle && can_fly && !registered,
-  );
   const titled = (things: readonly { name: string; title: string }[], name: string): string =>
     things.find((thing) => thing.name === name)?.title ?? name;
   return (
@@ -68,7 +66,7 @@ export function AdvancedFields(props: Props) {
         prefix="vehicle.options"
         onChange={(vehicleOptions) => set({ vehicleOptions })}
       />
-      {isSimulated && (
+      {isSeeded(form, catalogue) && (
         <Group title="Random seed">
           <NumberField
             label={ADVANCED_LABELS.seed}
@@ -96,6 +94,10 @@ const STOPS: Record<StopKind, { label: string; line: string }> = {
   budget: { label: "Flight budget", line: "Ends after the maximum number of flights." },
 };
 
+/** The first stop rule for a strategy that proposes no steps. */
+const BY_HAND =
+  "Ends when the best and first gains have been flown again and one of them is better. The last two flights are reserved for that.";
+
 function StopFields({ form, catalogue, reasons, set }: Props) {
   const narrow = useMediaQuery("(max-width: 620px)", false, { getInitialValueInEffect: false });
   return (
@@ -109,7 +111,9 @@ function StopFields({ form, catalogue, reasons, set }: Props) {
         onChange={(value) => set({ stop: value as StopKind })}
         data={Object.entries(STOPS).map(([value, { label }]) => ({ value, label }))}
       />
-      <p className={classes["note"]}>{STOPS[form.stop].line}</p>
+      <p className={classes["note"]}>
+        {form.stop === "noise" && form.strategy === "manual" ? BY_HAND : STOPS[form.stop].line}
+      </p>
       <NumberField
         label={ADVANCED_LABELS["stop.max_flights"]}
         whole

@@ -49,7 +49,9 @@ export function DonorPicker({ experiment, donor, error, onChange }: Props) {
           if (usable[0] !== undefined && sought === search.trim()) choose(usable[0]);
         }}
       />
-      {donor === null && found.data !== undefined && <Offers campaigns={usable} onChoose={choose} />}
+      {donor === null && found.data !== undefined && (
+        <Offers campaigns={usable} isAll={sought === "" && !found.hasNextPage} onChoose={choose} />
+      )}
       {donor?.best && <Taken donor={donor} best={donor.best} experiment={experiment} />}
     </Stack>
   );
@@ -57,12 +59,21 @@ export function DonorPicker({ experiment, donor, error, onChange }: Props) {
 
 interface OffersProps {
   campaigns: readonly CampaignSummary[];
+  /** Whether these are all that there are. */
+  isAll: boolean;
   onChoose: (campaign: CampaignSummary) => void;
 }
 
-function Offers({ campaigns, onChoose }: OffersProps) {
-  if (campaigns.length === 0)
-    return <p role="status">No campaigns match. Only campaigns of this experiment with a valid flight are listed.</p>;
+function Offers({ campaigns, isAll, onChoose }: OffersProps) {
+  if (campaigns.length === 0) {
+    return (
+      <p role="status">
+        {isAll
+          ? "No campaign of this experiment has a valid flight yet."
+          : "No campaigns match. Only campaigns of this experiment with a valid flight are listed."}
+      </p>
+    );
+  }
   return (
     <ul className={classes["offers"]} aria-label="Campaigns to start from">
       {campaigns.slice(0, OFFERED).map((campaign) => (

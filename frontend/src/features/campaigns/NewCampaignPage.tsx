@@ -16,6 +16,7 @@ import { useTitle } from "../../ui/useTitle";
 import { AdvancedFields } from "./AdvancedFields";
 import { DonorPicker } from "./DonorPicker";
 import {
+  advancedTitle,
   type CampaignForm,
   fieldsOf,
   flyingOther,
@@ -61,6 +62,7 @@ export function NewCampaignPage() {
 }
 
 const ENTER_NAME = "Enter a name.";
+const CHOOSE_CAMPAIGN = "Choose a campaign.";
 
 const STARTS: Record<StartKind, string> = {
   default: "The vehicle's default gains",
@@ -98,6 +100,8 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   const recommended = strategies[0]?.name;
   const unread = unreadable(form, catalogue);
   const isNamed = form.name.trim() !== "";
+  const lacksDonor = form.start === "campaign" && form.donor === null;
+  const missing = [...(isNamed ? [] : [ENTER_NAME]), ...(lacksDonor ? [CHOOSE_CAMPAIGN] : [])];
   const isUnreadBelow = unread.some((label) => !(label in form.startGains));
   const isReal = vehicles.some(({ id, is_real }) => id === form.registered?.id && is_real);
   return (
@@ -162,7 +166,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         <DonorPicker
           experiment={form.experiment}
           donor={form.donor}
-          error={reasons["start.donor"]}
+          error={lacksDonor ? CHOOSE_CAMPAIGN : reasons["start.donor"]}
           onChange={(donor) => set({ donor })}
         />
       )}
@@ -176,16 +180,16 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
           onChange={(startGains) => set({ startGains })}
         />
       )}
-      <FoldedSection title="Advanced: stop rule, window, bounds, seed" forcedOpen={refusedBelow || isUnreadBelow}>
+      <FoldedSection title={advancedTitle(form, catalogue)} forcedOpen={refusedBelow || isUnreadBelow}>
         <AdvancedFields form={form} catalogue={catalogue} reasons={reasons} set={set} />
       </FoldedSection>
       <FormErrorNotice error={problem} labels={labels} />
       <div className={classes["create"]}>
-        <MissingEntries numbers={unread} texts={isNamed ? [] : [ENTER_NAME]} />
+        <MissingEntries numbers={unread} texts={missing} />
         <Button
           type="submit"
           size="lg"
-          disabled={unread.length > 0 || !isNamed}
+          disabled={unread.length > 0 || missing.length > 0}
           loading={create.isPending}
           leftSection={<IconPlus size={22} aria-hidden />}
         >

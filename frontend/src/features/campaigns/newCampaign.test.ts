@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { CampaignSummary, Catalogue, Vehicle } from "../../api/types";
 import {
+  advancedTitle,
   boundReasons,
   fieldsOf,
   firstPreset,
@@ -63,8 +64,8 @@ const catalogue = {
     { name: "manual", options: [], experiments: ["takeoff", "takeoff-px4", "pitch-tracking"] },
   ],
   vehicle_kinds: [
-    { name: "import", can_fly: false, options: [], experiments: ["takeoff", "takeoff-px4"] },
-    { name: "lti", can_fly: true, options: [], experiments: ["pitch-tracking"] },
+    { name: "import", title: "Flown elsewhere", can_fly: false, options: [], experiments: ["takeoff", "takeoff-px4"] },
+    { name: "lti", title: "F-16", can_fly: true, options: [], experiments: ["pitch-tracking"] },
     { name: "twin", can_fly: true, options: [], experiments: ["takeoff"] },
     { name: "jsbsim", can_fly: true, options: [{ name: "mass_kg" }], experiments: ["takeoff"] },
   ],
@@ -116,6 +117,20 @@ test("a wrong number is sent as it is, for the server to refuse", () => {
   expect(requestFrom(form, catalogue).definition?.stop).toMatchObject({ max_flights: -3, improvement: 0.075 });
 });
 
+test("a name of flights flown elsewhere is a sentence, and the advanced settings are named after what is there", () => {
+  const window = { name: "window_s", title: "Scored window", default: 32.6, choices: [] };
+  const offering = {
+    ...catalogue,
+    experiments: catalogue.experiments.map((one) => ({ ...one, options: one.name === "takeoff" ? [window] : [] })),
+  } as unknown as Catalogue;
+  const takeoff = startingForm(offering);
+  expect(advancedTitle(takeoff, offering)).toBe("Advanced: stop rule, window, bounds, seed");
+  expect(advancedTitle(withVehicle(takeoff, offering, "import"), offering)).toBe("Advanced: stop rule, window, bounds");
+  const f16 = withExperiment(takeoff, offering, "pitch-tracking");
+  expect(advancedTitle(f16, offering)).toBe("Advanced: stop rule, bounds, seed");
+  expect(withExperiment(takeoff, offering, "takeoff-px4").name).toBe("Takeoff under PX4, flown elsewhere");
+});
+
 test("a name follows the vehicle until somebody has changed it", () => {
   const form = startingForm(catalogue);
   expect(withVehicle(form, catalogue, "twin").name).toBe("Twin takeoff");
@@ -165,7 +180,7 @@ test("another experiment begins with its own gains, vehicle and strategy, and ke
     strategy: "gradient",
     startGains: { theta_3: -15 },
     maxFlights: 25,
-    name: "Pitch tracking, lti",
+    name: "Pitch tracking, F-16",
   });
   expect(requestFrom(form, catalogue).definition?.bounds).toEqual({});
 });

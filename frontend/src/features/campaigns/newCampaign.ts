@@ -96,8 +96,21 @@ function presetFor(catalogue: Catalogue, experiment: string, vehicle: string): P
 
 function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
   const title = catalogue.experiments.find(({ name }) => name === experiment)?.title ?? experiment;
-  const kind = catalogue.vehicle_kinds.find(({ name }) => name === vehicle)?.title;
-  return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${kind ?? vehicle}`;
+  const kind = catalogue.vehicle_kinds.find(({ name }) => name === vehicle);
+  const by = kind === undefined ? vehicle : kind.can_fly ? kind.title : kind.title.toLowerCase();
+  return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${by}`;
+}
+
+/** Whether flights of the form's vehicle are simulated by the server itself, and depend on the seed. */
+export function isSeeded({ vehicle }: CampaignForm, catalogue: Catalogue): boolean {
+  return catalogue.vehicle_kinds.some(({ name, can_fly, registered }) => name === vehicle && can_fly && !registered);
+}
+
+/** Title of the advanced settings: what is among them for this experiment and vehicle. */
+export function advancedTitle(form: CampaignForm, catalogue: Catalogue): string {
+  const hasWindow = optionsOf(form, catalogue).experiment.some(({ name }) => name === "window_s");
+  const parts = ["stop rule", hasWindow && "window", "bounds", isSeeded(form, catalogue) && "seed"];
+  return `Advanced: ${parts.filter(Boolean).join(", ")}`;
 }
 
 /** The preset that one click creates: the simulated takeoff. */
