@@ -79,9 +79,8 @@ REPORTS: dict[str, tuple[VehicleReport, VehicleState, LossKind]] = {
 def standing(
     state: TrialState, flags: dict[str, bool], vehicle: VehicleState = VehicleState.READY, *, has_control: bool = True
 ) -> Standing:
-    return Standing(
-        trial=state, vehicle=vehicle, has_link=True, has_control=has_control, min_battery_v=MIN_BATTERY_V, **flags
-    )
+    plain = Standing(trial=state, vehicle=vehicle, has_link=True, has_control=has_control, min_battery_v=MIN_BATTERY_V)
+    return replace(plain, **flags)
 
 
 def up_to(step: ReadinessStep | None) -> tuple[ReadinessStep, ...]:

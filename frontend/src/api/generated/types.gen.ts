@@ -7881,6 +7881,12 @@ export type GetCampaignFigureData = {
          * number of a flight to draw as a separate curve
          */
         flight?: number | null;
+        /**
+         * Predicted
+         *
+         * number of the flight whose prediction is drawn instead of the next one's
+         */
+        predicted?: number | null;
     };
     url: '/api/campaigns/{campaign_id}/figures/{name}';
 };
