@@ -1,6 +1,7 @@
 """Every state of a flight against every loss: what holds, what is taken back, and what is said."""
 
 from dataclasses import replace
+from typing import TypedDict
 
 import pytest
 
@@ -34,7 +35,14 @@ def status(
 
 GOOD = VehicleReport(worker=True, status=status())
 
-REACHED: dict[str, tuple[TrialState, dict[str, bool], ReadinessStep | None]] = {
+
+class Flags(TypedDict, total=False):
+    take_off_requested: bool
+    standing_down: bool
+    abort_cause_open: bool
+
+
+REACHED: dict[str, tuple[TrialState, Flags, ReadinessStep | None]] = {
     "planned": (TrialState.PLANNED, {}, "control"),
     "staged": (TrialState.STAGED, {}, "staged"),
     "held": (TrialState.STAGED, {"take_off_requested": True}, "held"),
@@ -77,10 +85,11 @@ REPORTS: dict[str, tuple[VehicleReport, VehicleState, LossKind]] = {
 
 
 def standing(
-    state: TrialState, flags: dict[str, bool], vehicle: VehicleState = VehicleState.READY, *, has_control: bool = True
+    state: TrialState, flags: Flags, vehicle: VehicleState = VehicleState.READY, *, has_control: bool = True
 ) -> Standing:
-    plain = Standing(trial=state, vehicle=vehicle, has_link=True, has_control=has_control, min_battery_v=MIN_BATTERY_V)
-    return replace(plain, **flags)
+    return Standing(
+        trial=state, vehicle=vehicle, has_link=True, has_control=has_control, min_battery_v=MIN_BATTERY_V, **flags
+    )
 
 
 def up_to(step: ReadinessStep | None) -> tuple[ReadinessStep, ...]:
