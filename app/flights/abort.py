@@ -1,6 +1,10 @@
 """Requests to abort a flight, in memory so that nothing blocks."""
 
 from collections.abc import Callable
+from typing import Final
+
+PROGRAM_STOPPED: Final = "Gainline was stopped"
+"""Reason of the aborts when the worker is stopped: its cause is neither the vehicle nor its operator."""
 
 
 class AbortFlag:

@@ -10,7 +10,7 @@ known. Each function is for a transaction of its own, and reads the flight's row
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Final
 
@@ -26,6 +26,7 @@ from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
+from app.flights.abort import PROGRAM_STOPPED
 from app.flights.process_messages import FlightRequest
 from app.vehicles.base import FlightRecord, find_mismatch
 
@@ -215,6 +216,7 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
     when the record cannot be stored.
     """
     flight, campaign = _read(session, flight_id)
+    outcome = _told_of_stop(flight, outcome)
     if flight.state == FlightState.RUNNING:
         if outcome.record is not None:
             _land(session, campaign, flight, outcome.record)
@@ -258,6 +260,26 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
         return
     _capture(session, campaign, flight, record)
     proposals.history_changed(session, campaign)
+
+
+def _told_of_stop(flight: FlightRow, outcome: FlightOutcome) -> FlightOutcome:
+    """Say what became of the vehicle where the reason is only that Gainline was stopped."""
+    if outcome.restored is None or outcome.restored != flight.safe_gains or outcome.concern:
+        return outcome
+    if outcome.record is None:
+        what = "It restored the safe gains before the takeoff. Request the flight again if it is still needed."
+        return replace(outcome, problem=_completed(outcome.problem, what))
+    has_flown = len(outcome.record.trajectory.time_s) > 1  # otherwise it is a single instant on the ground
+    what = "It landed the vehicle and restored the safe gains." if has_flown else "The vehicle had not taken off."
+    return replace(outcome, record=replace(outcome.record, reason=_completed(outcome.record.reason, what)))
+
+
+def _completed(reason: str, what: str) -> str:
+    """The reason, with `what` after the sentence that Gainline was stopped, if that is the reason."""
+    if not reason.startswith(PROGRAM_STOPPED):
+        return reason
+    remarks = reason.removeprefix(PROGRAM_STOPPED).removeprefix(".").strip()
+    return " ".join(part for part in (f"{PROGRAM_STOPPED}.", what, remarks) if part)
 
 
 def _land(session: Session, campaign: CampaignRow, flight: FlightRow, record: FlightRecord) -> None:
@@ -322,6 +344,8 @@ def _capture(session: Session, campaign: CampaignRow, flight: FlightRow, record:
         reason=record.reason,
         on_request=record.on_request,
     )
+    if record.on_request and record.reason.startswith(PROGRAM_STOPPED):
+        flight.trial.abort_cause = "something else"  # known: there is nothing to ask the operator
     flight.trial.settings = dict(record.settings)
     flight.battery_v_before = starting_battery_v(record.trajectory)
     flight.battery_v_after = landing_battery_v(record.trajectory)

@@ -34,7 +34,7 @@ from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
 from app.db.outbox import DatabaseWatch
 from app.db.session import RETRY_S, Database, retry_until_stored
-from app.flights.abort import AbortRegistry
+from app.flights.abort import PROGRAM_STOPPED, AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager
 from app.flights.runner import FlightRunner
 from app.jobs.runner import JobRunner, recover
@@ -122,13 +122,12 @@ def _install_signal_handlers(*signals: signal.Signals, ending: ShutdownRequest, 
     asked: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def note(number: int, _frame: FrameType | None) -> None:
-        asked.put(f"the worker was stopped ({signal.Signals(number).name})")
+        asked.put(signal.Signals(number).name)
 
     def handle_signals() -> None:
         while True:
-            reason = asked.get()
-            ending.set(reason)
-            abort_registry.abort_all(reason)
+            ending.set(f"the worker was stopped ({asked.get()})")
+            abort_registry.abort_all(PROGRAM_STOPPED)
 
     threading.Thread(target=handle_signals, name="signals", daemon=True).start()
     for number in signals:

@@ -186,7 +186,7 @@ def test_stopping_the_server_in_mid_flight_lands_and_records_it(tmp_path: Path) 
     assert not is_alive(worker)
     with Serving(tmp_path / "data") as again:
         trial = again.trial(trial_id, "aborted")
-        assert trial["reason"] == "the worker was stopped (SIGTERM)"
+        assert (trial["reason"], trial["abort_cause"]) == ("Gainline was stopped", "something else")
         assert trial["record"]["samples"] > 0
 
 
