@@ -91,9 +91,9 @@ def restore_safe_gains(vehicle: Vehicle) -> dict[str, float]:
     try:
         held = vehicle.stage(wanted)
     except Exception as error:
-        why = error.message if isinstance(error, GainlineError) else error
+        why = error.message if isinstance(error, GainlineError) else f"{error}."
         raise SafeGainsError(
-            f"The vehicle's safe gains ({format_gains(wanted)}) could not be set: {why}", hint=hint
+            f"The vehicle's safe gains ({format_gains(wanted)}) could not be set. {why}", hint=hint
         ) from error
     if mismatch := find_mismatch(held, wanted):
         raise SafeGainsError(f"The vehicle does not hold its safe gains: {mismatch}.", hint=hint)

@@ -129,7 +129,7 @@ def test_safe_gains_that_cannot_even_be_sent_are_reported_as_loudly(monkeypatch:
     deaf = replace(STUBBORN, name="deaf", open=opened_deaf)
     monkeypatch.setattr(opening, "VEHICLE_KINDS", {**VEHICLE_KINDS, "deaf": deaf})
     with (
-        pytest.raises(SafeGainsError, match="could not be set: the link is gone") as loud,
+        pytest.raises(SafeGainsError, match=r"could not be set\. the link is gone\.") as loud,
         open_vehicle("deaf", {}, safe_gains=SAFE) as vehicle,
     ):
         vehicle.stage(TUNED)

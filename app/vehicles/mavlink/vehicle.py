@@ -646,12 +646,12 @@ class MavlinkVehicle:
     def _require_not_quarantined(self) -> None:
         if self._state is State.QUARANTINE:
             raise SafeGainsError(
-                f"Nothing is written to a vehicle that may be in the air: {self._why}",
+                f"{self._why} Nothing is written to a vehicle that may be in the air.",
                 hint="Land it if it is flying, check that its motors have stopped, verify its gains, then release it.",
             )
         if self._state is State.OBSERVE:
             raise SafeGainsError(
-                f"The vehicle is only observed: {self._why}",
+                f"The vehicle is only observed. {self._why}",
                 hint="Check that it is on the ground with its motors stopped, then release it.",
             )
 
