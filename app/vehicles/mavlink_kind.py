@@ -19,6 +19,7 @@ from app.vehicles.base import (
 )
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
+from app.vehicles.mavlink.addresses import UdpAddress
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import check_gains
 from app.vehicles.mocap import addresses as sources
@@ -114,6 +115,13 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
         problems.append(Problem("autopilot", f"must be {', '.join(PROFILES)}, got {options['autopilot']}"))
     try:
         address = addresses.parse(str(options["address"]))
+        if options["autopilot"] == "paparazzi" and isinstance(address, UdpAddress) and address.local_port is None:
+            problems.append(
+                Problem(
+                    "address",
+                    f"must name the port of this computer that Paparazzi sends to: {address}@LOCALPORT, usually @4244",
+                )
+            )
         if options["simulated"] and not _may_simulate(address, simulation_hosts):
             here = " or ".join(("127.0.0.1", *sorted(simulation_hosts)))
             problems.append(Problem("simulated", f"must be off for {address}: a simulation has the address {here}"))

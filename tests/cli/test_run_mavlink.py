@@ -12,7 +12,7 @@ from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Vehic
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig
 
-VEHICLE = "mavlink:udp:127.0.0.1:4245"
+VEHICLE = "mavlink:udp:127.0.0.1:4245@4244"
 RUN = ("run", "ardrone-takeoff", "--strategy", "gradient", "--max-flights", "3")
 
 
@@ -47,11 +47,11 @@ def test_a_whole_campaign_is_flown_over_the_link(tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--vehicle", "mavlink:udp:127.0.0.1:4245"), "vehicle.kind: mavlink is not a simulation"),
-        (("--vehicle", "mavlink:udp:10.0.0.2:4245"), "vehicle.kind: mavlink is not a simulation"),
+        (("--vehicle", "mavlink:udp:127.0.0.1:4245@4244"), "vehicle.kind: mavlink is not a simulation"),
+        (("--vehicle", "mavlink:udp:10.0.0.2:4245@4244"), "vehicle.kind: mavlink is not a simulation"),
         (
-            ("--vehicle", "mavlink:udp:10.0.0.2:4245", "--set", "simulated=true"),
-            "vehicle.options.simulated: must be off for udp:10.0.0.2:4245",
+            ("--vehicle", "mavlink:udp:10.0.0.2:4245@4244", "--set", "simulated=true"),
+            "vehicle.options.simulated: must be off for udp:10.0.0.2:4245@4244",
         ),
         (("--vehicle", "mavlink:here"), "vehicle.options.address: must be udp:HOST:PORT"),
         (("--vehicle", "twin:udp:127.0.0.1:4245"), "vehicle.options.address: is not an option of twin"),

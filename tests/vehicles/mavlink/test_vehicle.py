@@ -268,7 +268,7 @@ def test_only_what_is_said_to_be_simulated_and_is_here_is_no_real_vehicle(
 
 
 def test_what_runs_on_the_administrators_simulation_hosts_is_no_real_vehicle() -> None:
-    hosts, options = frozenset({"10.0.0.2"}), {"simulated": True, "address": "udp:10.0.0.2:4245"}
+    hosts, options = frozenset({"10.0.0.2"}), {"simulated": True, "address": "udp:10.0.0.2:4245@4244"}
     complete = MAVLINK.check(options, field="options", simulation_hosts=hosts)
     assert MAVLINK.is_real_with(complete)
     assert not MAVLINK.is_real_with(complete, hosts)
@@ -296,7 +296,12 @@ def test_an_unreadable_signing_key_is_refused_without_being_quoted() -> None:
         ({"scored_source": "gps"}, "scored_source", "must be vehicle or mocap, got gps"),
         ({"scored_source": "mocap"}, "scored_source", "needs a second source"),
         ({"second_source": "camera"}, "second_source", "must be natnet:HOST?body=ID"),
-        ({"simulated": True, "address": "udp:10.0.0.2:4245"}, "simulated", "must be off for udp:10.0.0.2:4245"),
+        (
+            {"simulated": True, "address": "udp:10.0.0.2:4245@4244"},
+            "simulated",
+            "must be off for udp:10.0.0.2:4245@4244",
+        ),
+        ({"address": "udp:127.0.0.1:4265"}, "address", "must name the port of this computer that Paparazzi sends to"),
         (
             {"simulated": True, "address": "serial:/dev/ttyUSB0:57600"},
             "simulated",
