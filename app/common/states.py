@@ -132,6 +132,9 @@ class ActKind(StrEnum):
     ABORT = "abort"
 
 
+FLIGHT_COMMANDS: Final = frozenset({ActKind.STAGE, ActKind.TAKE_OFF, ActKind.UNSTAGE, ActKind.ABORT})
+"""Acts that a flight carries out: their outcome is the flight's."""
+
 GIVES_GAINS: Final = frozenset({ActKind.CONNECT, ActKind.RESTORE, ActKind.RELEASE})
 """Acts that write the safe gains to the vehicle and so belong in its ledger. A first connection only compares the
 gains; it is in the ledger if the vehicle was found with its safe gains."""

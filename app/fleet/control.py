@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from app.accounts.permissions import STAGED_BY_SCRIPT, Permission, RequestContext, is_allowed, require
 from app.common.errors import ConflictError, NotAllowedError
 from app.common.states import ActKind, ActState
-from app.db.models import VehicleActRow, VehicleRow
+from app.db.models import JsonObject, VehicleActRow, VehicleRow
 from app.db.types import utc_now
 from app.fleet import repository
 from app.fleet.schemas import Control, Lease, LeaseRequest
@@ -134,9 +134,17 @@ def require_may(act: Permission, row: VehicleRow, context: RequestContext) -> No
 
 
 def record_act(
-    session: Session, row: VehicleRow, kind: ActKind, *, by: str, reason: str, asked: dict[str, float] | None = None
+    session: Session,
+    row: VehicleRow,
+    kind: ActKind,
+    *,
+    by: str,
+    reason: str,
+    asked: dict[str, float] | None = None,
+    result: JsonObject | None = None,
 ) -> VehicleActRow:
-    """Record an act that is complete at once because it needs no answer from the vehicle."""
+    """Record an act that is complete at once because it needs no answer from the vehicle, or has that of its
+    flight."""
     now = utc_now()
     act = VehicleActRow(
         vehicle_id=row.id,
@@ -145,6 +153,7 @@ def record_act(
         by=by,
         reason=reason,
         asked=asked,
+        result=result,
         requested_at=now,
         finished_at=now,
     )

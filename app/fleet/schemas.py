@@ -135,8 +135,9 @@ class Vehicle(Schema):
 
 
 class VehicleAct(Schema):
-    """A request to a vehicle outside its flights: its operator, reason and outcome. `result` holds the items of a
-    check, or all parameters of the vehicle for `parameters`."""
+    """A request to a vehicle: its operator, reason and outcome. `result` holds the items of a check, all parameters of
+    the vehicle for `parameters`, or the `flight_id` of a command of a flight, whose outcome follows from the
+    flight's."""
 
     id: int
     vehicle_id: int

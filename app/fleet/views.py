@@ -6,7 +6,18 @@ from sqlalchemy.orm import Session
 
 from app.common.conflict_checks import allowed
 from app.common.schemas import OptionValue, Page, decode_cursor, encode_cursor
-from app.common.states import VEHICLE_ACTIONS, FlightState, VehicleState
+from app.common.states import (
+    ACTIVE_ACT_STATES,
+    ACTIVE_FLIGHT_STATES,
+    FLIGHT_COMMANDS,
+    FLOWN_FLIGHT_STATES,
+    VEHICLE_ACTIONS,
+    ActKind,
+    ActState,
+    FlightState,
+    TrialState,
+    VehicleState,
+)
 from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
 from app.fleet import repository
 from app.fleet.control import control_of
@@ -100,8 +111,37 @@ def options_of(row: CampaignRow) -> dict[str, OptionValue]:
     return settings_of(row.vehicle) if row.vehicle.registered else dict(row.vehicle_options)
 
 
-def act_view(row: VehicleActRow) -> VehicleAct:
-    return VehicleAct.model_validate(row, from_attributes=True)
+def act_view(row: VehicleActRow, flight: FlightRow | None = None) -> VehicleAct:
+    """The act; with the flight that it is a command of, its outcome follows from that of the flight."""
+    act = VehicleAct.model_validate(row, from_attributes=True)
+    if flight is None:
+        return act
+    state, problem = _command_outcome(row.kind, flight)
+    finished_at = None if state in ACTIVE_ACT_STATES else act.finished_at
+    return act.model_copy(update={"state": state, "problem": problem, "finished_at": finished_at})
+
+
+def _command_outcome(kind: ActKind, flight: FlightRow) -> tuple[ActState, str]:
+    """State of a command of a flight, and why it failed."""
+    is_over = flight.state not in ACTIVE_FLIGHT_STATES
+    is_done = {
+        ActKind.STAGE: flight.read_back == flight.gains,
+        ActKind.TAKE_OFF: flight.state in FLOWN_FLIGHT_STATES
+        or (not is_over and flight.trial.state == TrialState.FLYING),
+        ActKind.UNSTAGE: is_over and flight.restored is not None,
+        ActKind.ABORT: is_over and flight.state not in {FlightState.LANDED, FlightState.LOST},
+    }[kind]
+    if is_done:
+        return ActState.DONE, ""
+    if is_over:
+        return ActState.FAILED, flight.problem or "The flight had ended before."
+    return ActState.REQUESTED if flight.state == FlightState.REQUESTED else ActState.RUNNING, ""
+
+
+def _flight_id(row: VehicleActRow) -> int | None:
+    """The flight that an act is a command of; None for other acts."""
+    found = (row.result or {}).get("flight_id") if row.kind in FLIGHT_COMMANDS else None
+    return found if isinstance(found, int) else None
 
 
 def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[VehicleAct]:
@@ -110,7 +150,10 @@ def acts_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | No
     before = None if cursor is None else decode_cursor("-id", cursor, float)[1]
     rows, total = repository.acts(session, vehicle_id, before_id=before, limit=limit)
     following = encode_cursor("-id", (0, rows[limit - 1].id)) if len(rows) > limit else None
-    return Page(items=[act_view(row) for row in rows[:limit]], total=total, next_cursor=following)
+    of_flights = {row.id: flight_id for row in rows[:limit] if (flight_id := _flight_id(row)) is not None}
+    flights = repository.flights_by_id(session, list(of_flights.values()))
+    items = [act_view(row, flights.get(of_flights.get(row.id, 0))) for row in rows[:limit]]
+    return Page(items=items, total=total, next_cursor=following)
 
 
 def ledger_view(session: Session, vehicle_id: int, *, limit: int, cursor: str | None) -> Page[GivenGains]:

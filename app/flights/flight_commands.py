@@ -5,22 +5,30 @@ from sqlalchemy.orm import Session
 from app.campaigns import history
 from app.campaigns import service as campaigns
 from app.common.states import ActKind
-from app.db.models import CampaignRow, TrialRow
+from app.db.models import CampaignRow, FlightRow
 from app.fleet.control import record_act
 
 
 def record_flight_command(
-    session: Session, campaign: CampaignRow, trial: TrialRow, kind: ActKind, *, by: str, reason: str = ""
+    session: Session, campaign: CampaignRow, flight: FlightRow, kind: ActKind, *, by: str, reason: str = ""
 ) -> None:
-    """Record a command to the vehicle of a trial; `by` is the operator in control, empty if the request came from
-    elsewhere. Shared simulations have no log."""
+    """Record a command to the vehicle of a flight, which has its outcome; `by` is the operator in control, empty if the
+    request came from elsewhere. Shared simulations have no log."""
     if campaign.vehicle.registered:
-        flight = f"flight {trial.number} of {campaign.name}"
-        record_act(session, campaign.vehicle, kind, by=by, reason=f"{flight}: {reason}" if reason else flight)
+        named = f"flight {flight.trial.number} of {campaign.name}"
+        record_act(
+            session,
+            campaign.vehicle,
+            kind,
+            by=by,
+            reason=f"{named}: {reason}" if reason else named,
+            result={"flight_id": flight.id},
+        )
 
 
 def record_abort(session: Session, trial_id: int, reason: str) -> None:
     """Record an abort, which everyone may request; `reason` says who did. Raises NotFoundError."""
     trial = history.trial_row(session, trial_id)
     campaign = campaigns.get_row(session, trial.campaign_id)
-    record_flight_command(session, campaign, trial, ActKind.ABORT, by="", reason=reason)
+    if (flight := history.latest_flights(session, [trial_id]).get(trial_id)) is not None:
+        record_flight_command(session, campaign, flight, ActKind.ABORT, by="", reason=reason)

@@ -128,22 +128,21 @@ def request_flight(
     fleet.require_ready(session, vehicle, mode)
     by = require_not_controlled_by_other(vehicle, context)
     now = utc_now()
-    session.add(
-        FlightRow(
-            campaign_id=campaign.id,
-            trial_id=row.id,
-            vehicle_id=vehicle.id,
-            state=FlightState.REQUESTED,
-            mode=mode,
-            gains=row.gains,
-            speed=speed,
-            battery=vehicle.battery,
-            requested_at=now,
-            take_off_at=now if mode == "fly" else None,
-        )
+    flight = FlightRow(
+        campaign_id=campaign.id,
+        trial_id=row.id,
+        vehicle_id=vehicle.id,
+        state=FlightState.REQUESTED,
+        mode=mode,
+        gains=row.gains,
+        speed=speed,
+        battery=vehicle.battery,
+        requested_at=now,
+        take_off_at=now if mode == "fly" else None,
     )
+    session.add(flight)
     session.flush()
-    record_flight_command(session, campaign, row, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
+    record_flight_command(session, campaign, flight, ActKind.STAGE if mode == "stage" else ActKind.TAKE_OFF, by=by)
 
 
 def trial_readiness(session: Session, trial_id: int, context: RequestContext, report_of: ReportOf) -> TrialReadiness:
@@ -205,7 +204,7 @@ def take_off_trial(session: Session, trial_id: int, context: RequestContext, rep
         by = require_not_controlled_by_other(vehicle, context)
     require_ready(_readiness(session, row, context, report_of))
     flight.take_off_at = utc_now()
-    record_flight_command(session, campaign, row, ActKind.TAKE_OFF, by=by)
+    record_flight_command(session, campaign, flight, ActKind.TAKE_OFF, by=by)
     return trial_view(session, campaign, row)
 
 
@@ -219,10 +218,11 @@ def unstage_trial(session: Session, trial_id: int, context: RequestContext = LOC
     check_action(TRIAL_ACTIONS, "unstage", row.state, f"Flight {row.number}")
     campaign = campaigns.get_row(session, row.campaign_id)
     reason = f"unstaged {_origin(campaign.vehicle, context)}"
-    _staged(session, row).stand_down = reason
+    flight = _staged(session, row)
+    flight.stand_down = reason
     operator = control_of(campaign.vehicle) if is_in_control(campaign.vehicle, context) else None
     by = "" if operator is None else operator.operator
-    record_flight_command(session, campaign, row, ActKind.UNSTAGE, by=by, reason="" if by else reason)
+    record_flight_command(session, campaign, flight, ActKind.UNSTAGE, by=by, reason="" if by else reason)
     return trial_view(session, campaign, row)
 
 

@@ -17,6 +17,7 @@ from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import commands
 from app.flights import flight_rows
+from app.flights.flight_commands import record_abort
 from app.flights.flight_rows import FlightOutcome
 from app.live.messages import UnreadyReason, VehicleStatus, WorkerHello, live_address
 from app.live.server import LiveServer
@@ -464,14 +465,96 @@ def test_the_command_log_says_who_asked_what_of_a_flight(
     log = get(client, f"/api/vehicles/{real['id']}/acts")["items"]
     campaign = get(client, f"/api/campaigns/{planned['campaign_id']}")
     flight = f"flight {planned['number']} of {campaign['name']}"
-    assert [(act["kind"], act["by"], act["reason"]) for act in log[:6]] == [
-        ("abort", "", f"{flight}: too close"),
-        ("stage", "Ada", flight),
-        ("take-off", "Ada", flight),
-        ("stage", "Ada", flight),
-        ("unstage", "", f"{flight}: unstaged by a script"),
-        ("stage", "Ada", flight),
+    assert [(act["kind"], act["by"], act["reason"], act["state"], act["problem"]) for act in log[:6]] == [
+        ("abort", "", f"{flight}: too close", "done", ""),
+        ("stage", "Ada", flight, "failed", "too close"),
+        ("take-off", "Ada", flight, "failed", "unstaged by the operator"),
+        ("stage", "Ada", flight, "done", ""),
+        ("unstage", "", f"{flight}: unstaged by a script", "done", ""),
+        ("stage", "Ada", flight, "done", ""),
     ]
+
+
+def test_the_command_log_follows_a_flight(client: TestClient, database: Database, real: Json, planned: Json) -> None:
+    """Observed gap: every command of a flight stayed “requested” for ever."""
+    operator = {**OUR_PAGE, **control_header(client, real)}
+
+    def states(count: int) -> list[tuple[str, str, bool]]:
+        log = get(client, f"/api/vehicles/{real['id']}/acts")["items"][:count]
+        return [(act["kind"], act["state"], act["finished_at"] is not None) for act in reversed(log)]
+
+    client.post(f"/api/trials/{planned['id']}/stage", headers=operator)
+    assert states(1) == [("stage", "requested", False)]
+    task = claim(database)
+    assert states(1) == [("stage", "running", False)]
+    with database.write() as session:
+        flight_rows.record_staged(session, task.flight_id, dict(task.gains))
+    take_off(client, planned, operator)
+    assert states(2) == [("stage", "done", True), ("take-off", "running", False)]
+    with database.write() as session:
+        flight_rows.record_lift_off(session, task.flight_id)
+        record_abort(session, planned["id"], "too high")
+    assert states(2) == [("take-off", "done", True), ("abort", "running", False)]
+    with database.write() as session:
+        outcome = FlightOutcome(record=create_record(ending="aborted", reason="too high", on_request=True))
+        flight_rows.record_outcome(session, task.flight_id, outcome)
+    assert states(3) == [("stage", "done", True), ("take-off", "done", True), ("abort", "done", True)]
+
+
+LANDED = "Gainline was stopped. It landed the vehicle and restored the safe gains."
+
+
+def stopped(restored: Json | None = DEFAULT_GAINS, **fields: Any) -> FlightOutcome:
+    record = create_record(ending="aborted", on_request=True, until_s=4.0, **fields)
+    return FlightOutcome(record=record, restored=restored)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "reason", "cause"),
+    [
+        (
+            stopped(reason="Gainline was stopped"),
+            LANDED,
+            "something else",
+        ),
+        (
+            stopped(reason="Gainline was stopped 2 samples jumped and were dropped."),
+            f"{LANDED} 2 samples jumped and were dropped.",
+            "something else",
+        ),
+        (stopped(restored=None, reason="Gainline was stopped"), "Gainline was stopped", "something else"),
+        (stopped(reason="too close"), "too close", "operator"),
+    ],
+)
+def test_a_flight_that_ended_because_gainline_was_stopped_says_so_and_asks_for_no_cause(
+    client: TestClient,
+    database: Database,
+    real: Json,
+    planned: Json,
+    outcome: FlightOutcome,
+    reason: str,
+    cause: str,
+) -> None:
+    """Observed defect: “The worker was stopped (SIGTERM).”, and the question why the flight was aborted."""
+    assert client.post(f"/api/trials/{planned['id']}/stage").status_code == 202
+    task = stage_claimed(database)
+    take_off(client, planned, {**OUR_PAGE, **control_header(client, real)})
+    with database.write() as session:
+        flight_rows.record_lift_off(session, task.flight_id)
+        flight_rows.record_outcome(session, task.flight_id, outcome)
+    flown = trial(client, planned)
+    assert (flown["state"], flown["reason"], flown["abort_cause"]) == ("aborted", reason, cause)
+
+
+def test_a_staged_flight_whose_gainline_was_stopped_says_what_became_of_the_vehicle(
+    client: TestClient, database: Database, staged: Json
+) -> None:
+    outcome = FlightOutcome(withdrawn=True, problem="Gainline was stopped", restored=DEFAULT_GAINS)
+    with database.write() as session:
+        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
+    after = trial(client, staged)
+    assert after["state"] == "planned"
+    assert after["flight"]["problem"].startswith("Gainline was stopped. It restored the safe gains before the takeoff.")
 
 
 LOST = {

@@ -80,7 +80,7 @@ function Line({ line, names }: { line: GivenGains; names: readonly string[] }) {
   );
 }
 
-/** Requests whose outcome is that of their flight. */
+/** Requests whose outcome is that of their flight; those without a result are from before it was recorded. */
 const OF_FLIGHTS: ReadonlySet<string> = new Set(["stage", "take-off", "unstage", "abort"]);
 
 /** What people asked of the vehicle: who, when, outcome. */
@@ -111,7 +111,7 @@ export function RequestList({ vehicleId }: { vehicleId: number }) {
                 {act.by && <small>by {act.by}</small>}
               </td>
               <td>
-                {OF_FLIGHTS.has(act.kind) && act.state === "done" ? "requested" : act.state}
+                {OF_FLIGHTS.has(act.kind) && act.result === null ? "requested" : act.state}
                 {act.problem && <small>{act.problem}</small>}
               </td>
             </tr>
