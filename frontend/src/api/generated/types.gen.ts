@@ -4145,8 +4145,9 @@ export type Vehicle = {
 /**
  * VehicleAct
  *
- * A request to a vehicle outside its flights: its operator, reason and outcome. `result` holds the items of a
- * check, or all parameters of the vehicle for `parameters`.
+ * A request to a vehicle: its operator, reason and outcome. `result` holds the items of a check, all parameters of
+ * the vehicle for `parameters`, or the `flight_id` of a command of a flight, whose outcome follows from the
+ * flight's.
  */
 export type VehicleAct = {
     /**
