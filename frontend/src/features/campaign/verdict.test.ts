@@ -12,6 +12,7 @@ import {
   endingOf,
   heldGainsNotice,
   isWithdrawnByOperator,
+  leftGainsText,
   marksOf,
   otherClasses,
   predictionResult,
@@ -225,4 +226,13 @@ test("a flight that the operator unstaged did not fail", () => {
   expect(isWithdrawnByOperator(flight("cancelled", "it could not be started within 10 s"))).toBe(false);
   expect(isWithdrawnByOperator(flight("failed", "The vehicle did not arm."))).toBe(false);
   expect(isWithdrawnByOperator({ flight: null })).toBe(false);
+});
+
+test("a flight that a pilot took over left its own gains on the vehicle", () => {
+  const restored = (safe_gains_restored: boolean | null) => ({ safe_gains_restored });
+  expect(
+    leftGainsText(restored(null), "A pilot took manual control; no further commands were sent. Mode 0."),
+  ).toContain("left with the flight's gains");
+  expect(leftGainsText(restored(null), "The link was lost in flight.")).toContain("not known");
+  expect(leftGainsText(restored(false), "")).toContain("not on the vehicle");
 });

@@ -234,6 +234,21 @@ export function heldGainsNotice({
   return `${name} ${reading}. ${safeGainsWritten({ state, identity })}`;
 }
 
+/** How a reason begins if a pilot took over before Gainline had sent anything but the takeoff. */
+const TAKEN_OVER = "A pilot took manual control; no further commands were sent.";
+
+/** Which gains a flight left on the vehicle whose safe gains were not read back after it. */
+export function leftGainsText(
+  flight: Pick<NonNullable<Trial["flight"]>, "safe_gains_restored">,
+  reason: string,
+): string {
+  if (flight.safe_gains_restored === false)
+    return "The safe gains are not on the vehicle. Inspect it before the next flight.";
+  return reason.startsWith(TAKEN_OVER)
+    ? "The safe gains were not restored, because a pilot took control: the vehicle was left with the flight's gains. Once it has landed and its motors have stopped, restore them on the vehicle's page."
+    : "It is not known whether the safe gains were restored. Inspect the vehicle before the next flight.";
+}
+
 export const INVALID_REASONS = ["Wind gust", "Tracking glitch", "Wrong setup", "Low battery", "Collision"];
 
 /** Classes that a flight can be changed to. */

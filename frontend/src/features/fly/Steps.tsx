@@ -21,7 +21,7 @@ import { FlightProblem } from "../campaign/FlightProblem";
 import { AbortCause, FlightReview } from "../campaign/FlightReview";
 import { speedOf, wantsRehearsal } from "../campaign/nextStep";
 import { SpeedSwitch, useSpeed } from "../campaign/SpeedSwitch";
-import { sentenceOf } from "../campaign/verdict";
+import { leftGainsText, sentenceOf } from "../campaign/verdict";
 import { OperatorControl, useIsInControl } from "../fleet/OperatorControl";
 import classes from "./Fly.module.css";
 import { areReadBackSince, type FlyStep } from "./flyScreen";
@@ -95,10 +95,7 @@ function SafeGainsResult({ trial, vehicle }: { trial: Trial; vehicle: Vehicle })
   }
   return (
     <p role="alert" className={classes["checks"]}>
-      {flight.safe_gains_restored === null
-        ? "It is not known whether the safe gains were restored."
-        : "The safe gains are not on the vehicle."}{" "}
-      Inspect it before the next flight.
+      {leftGainsText(flight, trial.reason)}
     </p>
   );
 }
