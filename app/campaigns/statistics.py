@@ -73,7 +73,7 @@ def _scatter_source(
     prior, repeats = experiment.scatter, sum(group.size - 1 for group in groups)
     estimate = f"prior estimate of {prior.sd:.3g} {experiment.error_unit}"
     if not scatter.known:
-        return "Not measured for this autopilot, and no gain set has been flown twice. Fly a gain set again."
+        return "Not measured for this autopilot, and no gain set has two valid flights. Fly a gain set again."
     if scatter.identical:
         finding = f"{count(repeats, 'repeat')} gave the same error"
         if vehicle.is_real or not fleet.can_fly(vehicle):
@@ -84,7 +84,7 @@ def _scatter_source(
         return f"From {count(repeats, 'repeat')}."
     worth = f"{prior.degrees_of_freedom:g} degrees of freedom"
     if not repeats:
-        return f"From a {estimate} ({worth}): no gain set has been flown twice."
+        return f"From a {estimate} ({worth}): no gain set has two valid flights."
     return f"From {count(repeats, 'repeat')} and a {estimate} ({worth})."
 
 

@@ -8,6 +8,9 @@ from typing import Final, Literal
 
 NOTHING: Final = "–"
 
+GAIN_DIGITS: Final = 4
+EXACT_DIGITS: Final = 7
+"""Digits of a gain that is compared with another: those of a single-precision number."""
 _MAX_DIGITS: Final = 6
 _SHORT_DECIMALS: Final = 3
 _LISTED_RUNS: Final = 5
@@ -31,12 +34,12 @@ def plus_minus(value: float, standard_error: float, unit: str, *, sign: Literal[
 
 
 def short(value: float | None) -> str:
-    """An error without a stated uncertainty: three significant digits, at most three decimals as on the pages, but at
-    least one digit above zero; a dash for None."""
+    """An error without a stated uncertainty: three decimals as on the pages, but at least one digit above zero; a dash
+    for None."""
     if value is None:
         return NOTHING
     power = math.floor(math.log10(abs(value))) if value else 0
-    return _true_minus(f"{value:.{min(max(0, 2 - power), max(_SHORT_DECIMALS, -power))}f}")
+    return _true_minus(f"{value:.{max(_SHORT_DECIMALS, -power)}f}")
 
 
 def percent(share: float, digits: int = 0) -> str:
@@ -117,9 +120,9 @@ def grouped(amount: int, separator: str = " ") -> str:
     return f"{amount:,}".replace(",", separator)
 
 
-def format_gains(gains: Mapping[str, float]) -> str:
-    """`kp 283, ki 13, kd −82`, for sentences."""
-    return ", ".join(f"{name} {_true_minus(f'{value:g}')}" for name, value in gains.items())
+def format_gains(gains: Mapping[str, float], digits: int = GAIN_DIGITS) -> str:
+    """`kp 283, ki 13, kd −82`."""
+    return ", ".join(f"{name} {gain(value, digits)}" for name, value in gains.items())
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -149,12 +152,7 @@ def measured(value: float | None, uncertainty: float | None, unit: str) -> str:
     return f"{number(value, digits)}{margin} {unit}".rstrip()
 
 
-def gain(value: float) -> str:
-    """A gain for tables: an integer in full, any other with four significant digits."""
-    text = f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
+def gain(value: float, digits: int = GAIN_DIGITS) -> str:
+    """A gain as on the pages: an integer in full, any other with four significant digits."""
+    text = f"{value:.0f}" if float(value).is_integer() else f"{value:.{digits}g}"
     return _true_minus(text)
-
-
-def gains(values: Mapping[str, float]) -> str:
-    """`kp 283, ki 13, kd 82`, for tables."""
-    return ", ".join(f"{name} {gain(value)}" for name, value in values.items())

@@ -12,7 +12,7 @@ from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
 from app.figures.data import FlightData, History
-from app.figures.landscape_layout import holds, is_high, numbers, padded, to_edge
+from app.figures.landscape_layout import holds, number_position, numbers, padded, to_edge
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 LONGEST_PATH: Final = 60
@@ -115,6 +115,7 @@ class LandscapeFigure:
             return []
         unit, proposal = self.history.error_unit, self.history.proposal
         stars = [flight is best for flight in flights]
+        texts = numbers(flights, best, one, aside=None if proposal is None else proposal.gains)
         path = _marks(
             index,
             one,
@@ -129,9 +130,12 @@ class LandscapeFigure:
                 "color": palette.surface,
                 "line": {"width": 1.5, "color": palette.ink},
             },
-            text=numbers(flights, best, one, aside=None if proposal is None else proposal.gains),
-            textposition=["bottom center" if is_high(one, flight.gains) else "top center" for flight in flights],
-            textfont={"size": 12, "color": palette.ink, "weight": 700},
+            text=texts,
+            textposition=[
+                number_position(one, flight.gains, text) for flight, text in zip(flights, texts, strict=True)
+            ],
+            # The outline keeps a number readable over the label of a contour.
+            textfont={"size": 12, "color": palette.ink, "weight": 700, "shadow": "auto"},
             hovertext=[_hover_text(flight, unit) for flight in flights],
         )
         if best is None:

@@ -45,9 +45,12 @@ def spot(one: Slice, gains: Gains) -> PlotPosition:
     return x, y
 
 
-def is_high(one: Slice, gains: Gains) -> bool:
-    """Whether a number above these gains would be cut off at the top of the slice."""
-    return spot(one, gains)[1] > 1.0 - NUMBER_ROOM[1]
+def number_position(one: Slice, gains: Gains, text: str) -> str:
+    """Where a text of some numbers stands beside the mark at these gains, so that it lies within the slice."""
+    x, y = spot(one, gains)
+    width, height = (1 + text.count(",")) * NUMBER_ROOM[0], NUMBER_ROOM[1]
+    across = "left" if x + width / 2 > 1.0 + _EDGE else "right" if x - width / 2 < -_EDGE else "center"
+    return f"{'bottom' if y > 1.0 - height else 'top'} {across}"
 
 
 def _collide(one: PlotPosition, other: PlotPosition, count: int = 1) -> bool:

@@ -16,7 +16,7 @@ from app.common.schemas import OptionValue
 from app.common.states import VEHICLE_ACTIONS, ActKind, VehicleState
 from app.core.errors import GainlineError
 from app.core.experiments import get_experiment
-from app.core.formatting import format_gains, setting_text
+from app.core.formatting import EXACT_DIGITS, format_gains, setting_text
 from app.core.policy import PolicySpace
 from app.db.models import VehicleRow
 from app.fleet import repository
@@ -286,8 +286,8 @@ def _require_confirmed(new: NewVehicle, gains: Mapping[str, float]) -> None:
         problems.append(Problem("statement", "must state who verified them, and how"))
     if problems:
         raise UnconfirmedError(
-            f"{new.name} is a real vehicle, and each of its flights ends with {format_gains(gains)}. A person must "
-            "review these gains first.",
+            f"{new.name} is a real vehicle, and each of its flights ends with "
+            f"{format_gains(gains, EXACT_DIGITS)}. A person must review these gains first.",
             hint="Compare them with gains that fly well on this vehicle, then confirm them and give your name.",
             problems=tuple(problems),
         )

@@ -152,7 +152,7 @@ def _environment() -> "Environment":
         "settling_time": _settling_time,
         "interval": _interval,
         "gain": formatting.gain,
-        "gains": formatting.gains,
+        "gains": formatting.format_gains,
         "signed_gain": _signed_gain,
         "relative_to": formatting.relative_to,
         "count": formatting.count,

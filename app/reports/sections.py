@@ -17,7 +17,7 @@ from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
-from app.core.formatting import gain, gains, number, setting_text, short_percent, without_word
+from app.core.formatting import EXACT_DIGITS, format_gains, gain, number, setting_text, short_percent, without_word
 from app.core.policy import Gain, Gains
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
@@ -155,7 +155,11 @@ def describe_vehicle(
 
 def describe_safe_gains(frozen: Gains | None, now: Gains) -> str:
     """The vehicle's safe gains at the first flight, and those of now if they differ; only these before it."""
-    return gains(now) if frozen is None or frozen == now else f"{gains(frozen)} at the first flight, now {gains(now)}"
+    return (
+        format_gains(now)
+        if frozen is None or frozen == now
+        else f"{format_gains(frozen)} at the first flight, now {format_gains(now)}"
+    )
 
 
 def describe_method(campaign: Campaign, experiment: Experiment) -> tuple[Fact, ...]:
@@ -197,7 +201,7 @@ def _start(start: Start) -> str:
     origin = _STARTS[start.kind]
     if start.donor is not None:
         origin = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
-    return origin if start.gains is None else f"{origin}: {gains(start.gains)}"
+    return origin if start.gains is None else f"{origin}: {format_gains(start.gains)}"
 
 
 def _stop(stop: StopRule, open_until_flight: int) -> str:
@@ -231,7 +235,8 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
             refused = " ".join(check.sentence for check in trial.gate.checks if not check.passed)
             yield Anomaly(trial.number, "Gate overruled", f"{trial.overrule_reason} Refused by the gate: {refused}")
         if trial.read_back is not None and trial.read_back != trial.gains:
-            sentence = f"Planned {gains(trial.gains)}; read back from the vehicle: {gains(trial.read_back)}."
+            planned, held = (format_gains(gains, EXACT_DIGITS) for gains in (trial.gains, trial.read_back))
+            sentence = f"Planned {planned}; read back from the vehicle: {held}."
             yield Anomaly(trial.number, "Different gains read back", sentence)
         for glitch in trial.glitches:
             yield Anomaly(trial.number, "Glitch in the record", glitch.sentence)
@@ -276,7 +281,7 @@ def of_vehicle(
     numbers = {trial.id: trial.number for trial in trials}
     for line in ledger:
         if line.purpose == "restore after flight" and line.campaign_id == campaign.id and line.outcome == "failed":
-            sentence = f"Safe gains {gains(line.asked)} were not read back after the flight."
+            sentence = f"Safe gains {format_gains(line.asked)} were not read back after the flight."
             flight = None if line.trial_id is None else numbers.get(line.trial_id)
             yield Anomaly(flight, "Safe gains not verified", sentence)
     if vehicle.state == "quarantined":

@@ -80,7 +80,7 @@ def test_nothing_is_better_before_a_gain_set_was_flown_twice_under_an_autopilot_
     assert "Fly one of the gain sets again" in compared["sentence"]
     report = client.get(f"/api/campaigns/{campaign['id']}/report.html").text
     assert "Not known yet" in report
-    assert "no gain set has been flown twice" in report
+    assert "no gain set has two valid flights" in report
 
 
 def test_one_repeat_makes_the_scatter_known_from_these_flights_alone(client: TestClient, database: Database) -> None:

@@ -188,7 +188,7 @@ def test_repeats_of_a_simulation_without_scatter_get_none(client: TestClient, da
 
     found = fly()
     assert found["sigma"] == pytest.approx(0.0105)
-    assert found["scatter_source"] == f"From a {prior} (4 degrees of freedom): no gain set has been flown twice."
+    assert found["scatter_source"] == f"From a {prior} (4 degrees of freedom): no gain set has two valid flights."
     fly()
     found = fly()
     assert (found["sigma"], found["groups"][0]["standard_error"], found["drift"]) == (0.0, None, None)

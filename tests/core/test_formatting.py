@@ -6,7 +6,6 @@ from app.core.formatting import (
     decimals,
     format_gains,
     gain,
-    gains,
     grouped,
     measured,
     named_flights,
@@ -45,7 +44,7 @@ def test_a_drift_has_its_sign() -> None:
 
 def test_without_an_uncertainty_three_digits_are_enough() -> None:
     assert [short(value) for value in (0.41154, 0.0933, 3.3818, 152.3, 0.0, 2.1e-6, None)] == [
-        "0.412", "0.093", "3.38", "152", "0.00", "0.000002", "–"]  # fmt: skip
+        "0.412", "0.093", "3.382", "152.300", "0.000", "0.000002", "–"]  # fmt: skip
 
 
 def test_a_share_is_held_together_by_a_space_that_does_not_break() -> None:
@@ -94,7 +93,7 @@ def test_a_table_has_true_minus_signs_and_dashes() -> None:
 
 def test_a_whole_gain_is_in_full_and_any_other_has_four_digits() -> None:
     assert [gain(12345.0), gain(-0.123456)] == ["12345", "−0.1235"]
-    assert gains({"kp": 283.0, "ki": 1.5}) == "kp 283, ki 1.5"
+    assert format_gains({"theta_1": -49.4692}) == "theta_1 −49.47"
     assert format_gains({"kp": -50.0, "ki": 1.5}) == "kp −50, ki 1.5"
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures.landscape import LandscapeFigure, Search, Tried, lowest, scale_of
+from app.figures.landscape_layout import number_position
 from tests.figures.builders import flight, history, proposal, trace
 
 VALUES = tuple(float(value) for value in range(10))
@@ -64,3 +65,17 @@ def test_numbers_that_would_cover_each_other_are_left_out_but_never_the_first_be
     covering = history(*spread, proposal=replace(proposal(7), gains={"kp": 4.1, "ki": 5.2, "kd": 80.0}))
     card = LandscapeFigure(covering, land, Search(gradient={}, direction={})).compute()
     assert trace(card, "path")["text"] == ["1", "2", "3", "", "5", "6"]
+
+
+@pytest.mark.parametrize(
+    ("kp", "ki", "text", "position"),
+    [
+        (5.0, 5.0, "1, 4", "top center"),
+        (9.0, 5.0, "2, 3", "top left"),
+        (0.0, 5.0, "1, 4", "top right"),
+        (0.0, 9.0, "1", "bottom right"),
+        (9.0, 9.0, "2, 3", "bottom left"),
+    ],
+)
+def test_numbers_at_the_edge_stand_within_the_slice(kp: float, ki: float, text: str, position: str) -> None:
+    assert number_position(cliff(None), {"kp": kp, "ki": ki, "kd": 80.0}, text) == position

@@ -27,7 +27,7 @@ from app.common.errors import ConflictError, InputError, NotFoundError, Problem,
 from app.common.states import CAMPAIGN_ACTIONS, HISTORY_TRIAL_STATES, TRIAL_ACTIONS, CampaignState, Ending, TrialState
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, format_gains
+from app.core.formatting import EXACT_DIGITS, count, format_gains
 from app.core.policy import Gains
 from app.core.records.glitches import find_glitches, repaired
 from app.core.records.step_response import StepResponse, step_response
@@ -72,10 +72,11 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
         row.read_back = row.read_back or dict(row.gains)
         return
     if not confirmed:
+        held = format_gains(flown.gains, EXACT_DIGITS)
         raise UnconfirmedError(
-            f"The log was flown with {format_gains(flown.gains)}, not with the planned {format_gains(row.gains)}.",
+            f"The log was flown with {held}, not with the planned {format_gains(row.gains, EXACT_DIGITS)}.",
             hint="Choose the log of this flight, or confirm that the trial takes the gains in the log.",
-            problems=(Problem("confirm", f"the log was flown with {format_gains(flown.gains)}"),),
+            problems=(Problem("confirm", f"the log was flown with {held}"),),
         )
     row.read_back = dict(flown.gains)
     judged = check_flown_gains(session, campaign, flown.gains)

@@ -200,9 +200,9 @@ def _only_once(now: ComparisonState) -> str:
     """Why a difference that looks certain is flown again while no gains were repeated."""
     if any(group.size > 1 for group in now.groups):
         is_resolved = now.comparison is not None and now.comparison.verdict != "unresolved"
-        return ", because they were flown only once" if now.winner.size == 1 and is_resolved else ""
+        return ", because they have only one valid flight" if now.winner.size == 1 and is_resolved else ""
     assumed = ", and the confidence assumes a prior estimate of the scatter" if now.scatter.known else ""
-    return f", because each gain set was flown only once{assumed}"
+    return f", because no gain set has two valid flights{assumed}"
 
 
 def _obstacle_to_step(

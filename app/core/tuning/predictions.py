@@ -25,6 +25,7 @@ import numpy as np
 
 from app.core.definition import Flight, Prediction
 from app.core.experiments.base import Experiment, Matrix, ModelledExperiment, ParameterDistribution
+from app.core.formatting import count
 from app.core.models.vertical import ENTERED
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -251,10 +252,11 @@ def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy
         parts.append(f"the only predicted flight ended {'inside' if inside else 'outside'} its interval")
     elif of:
         parts.append(f"{inside} of {of} flights ended inside their predicted interval")
-    if agreeing + disagreeing == 1:
-        parts.append(f"the only change of the error had the {'predicted' if agreeing else 'opposite'} sign")
-    elif agreeing + disagreeing:
-        parts.append(f"{agreeing} of {agreeing + disagreeing} changed the error in the predicted direction")
+    if agreeing + disagreeing:
+        changed = (
+            f"{count(agreeing + disagreeing, 'flight')} with new gains changed the error in the predicted direction"
+        )
+        parts.append(f"{agreeing} of {changed} (repeats are not counted)")
     ending = (
         ""
         if trustworthy

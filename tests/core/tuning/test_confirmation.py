@@ -249,7 +249,7 @@ def test_gains_that_look_certainly_better_are_flown_again_for_a_reason_that_is_g
     confirmed = proposed(error=0.199)
     first = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.2)), confirmed)
     assert first.phase == "repeat"
-    assert "because each gain set was flown only once, and the confidence assumes a prior estimate" in first.why
+    assert "because no gain set has two valid flights, and the confidence assumes a prior estimate" in first.why
     then = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.2), (2, 0.2)), confirmed)
     assert then.phase == "baseline"
     assert "they were flown once, the best gains twice" in then.why

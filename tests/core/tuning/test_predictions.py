@@ -17,6 +17,8 @@ SCATTER = PooledScatter(sigma=0.01, degrees_of_freedom=4.0)
 T = float(stats.t.ppf(0.95, 4))
 WHY = Explanation(summary="Because.")
 
+CHANGED = "with new gains changed the error in the predicted direction (repeats are not counted)"
+
 
 def told(flight: Flight, error: float, half: float | None = None) -> Flight:
     edges = (None, None) if half is None else (error - half, error + half)
@@ -142,9 +144,7 @@ def test_the_record_counts_flights_inside_their_interval_and_predicted_direction
     record = track_record(flights_of(0.5, 0.32, 0.4, predicted=0.3))
     assert (record.inside, record.of, record.share) == (1, 2, 0.5)
     assert (record.agreeing, record.disagreeing, record.trustworthy) == (1, 1, True)
-    assert record.sentence == (
-        "1 of 2 flights ended inside their predicted interval; 1 of 2 changed the error in the predicted direction."
-    )
+    assert record.sentence == (f"1 of 2 flights ended inside their predicted interval; 1 of 2 flights {CHANGED}.")
 
 
 @pytest.mark.parametrize(
@@ -152,11 +152,11 @@ def test_the_record_counts_flights_inside_their_interval_and_predicted_direction
     [
         (
             0.32,
-            "The only predicted flight ended inside its interval; the only change of the error had the predicted sign.",
+            f"The only predicted flight ended inside its interval; 1 of 1 flight {CHANGED}.",
         ),
         (
             0.6,
-            "The only predicted flight ended outside its interval; the only change of the error had the opposite sign.",
+            f"The only predicted flight ended outside its interval; 0 of 1 flight {CHANGED}.",
         ),
     ],
 )

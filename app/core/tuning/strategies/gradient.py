@@ -70,10 +70,12 @@ _OUTSIDE: Final = "The correction is added outside the control loop, as a bias o
 
 @dataclass(frozen=True, slots=True)
 class _Metric:
-    """How step lengths are measured: the scale of each gain, shape (n,), and the ladder of lengths."""
+    """How step lengths are measured: the scale of each gain, shape (n,), the ladder of lengths, and the name of their
+    unit."""
 
     scale: Vector
     ladder: tuple[float, ...]
+    unit: str
 
 
 def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vector) -> Vector:
@@ -93,16 +95,20 @@ def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vec
     return np.asarray(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
 
 
+def _scaled_metric(space: PolicySpace) -> _Metric:
+    return _Metric(space.scale, SCALED_LADDER, "gain scales")
+
+
 def _raw_metric(space: PolicySpace) -> _Metric:
     whole = any(gain.integer for gain in space.gains)
-    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER)
+    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER, "gain units")
 
 
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
     """Propose the next gains on the line from the best flight. At least one flight must be valid."""
-    metric = _Metric(space.scale, SCALED_LADDER) if definition.options.get("scaled", True) else _raw_metric(space)
+    metric = _scaled_metric(space) if definition.options.get("scaled", True) else _raw_metric(space)
     base = best_flight(flights)
     base_gains = space.nearest(space.vector(base.gains))
     model, correction = _corrected(definition, experiment, base)
@@ -122,14 +128,14 @@ def propose(
         _first_allowed_step(line, best, flights, model, passes) if best.predicted_error < now else (None, ())
     )
     explanation = Explanation(
-        summary=_summary(experiment, base, best, chosen, len(ladder), refused, flights),
+        summary=_summary(experiment, base, best, chosen, metric, refused, flights),
         base_flight=base.number,
         gradient=space.by_name(slopes),
         direction=space.by_name(direction),
         ladder=ladder,
         chosen_length=chosen.length if chosen else None,
         clipped=chosen.clipped if chosen else (),
-        notes=(correction, *_notes(refused)),
+        notes=(correction, _describe_unit(space, metric), *_notes(refused)),
     )
     gains = space.mapping(base_gains) if chosen is None else chosen.gains
     trajectory, error = model.predict(space.vector(gains))
@@ -188,7 +194,7 @@ def _summary(
     base: Flight,
     best: LadderStep,
     chosen: LadderStep | None,
-    tried: int,
+    metric: _Metric,
     refused: Sequence[LadderStep],
     flights: Sequence[Flight],
 ) -> str:
@@ -202,14 +208,15 @@ def _summary(
         )
     if chosen is best:
         return (
-            f"{origin} Of {tried} step sizes along the negative gradient of the model, corrected by that flight, "
-            f"a step of {chosen.length:.4g} gives the lowest predicted error: {short(chosen.predicted_error)} {unit}."
+            f"{origin} Of {len(metric.ladder)} step sizes along the negative gradient of the model, corrected by that "
+            f"flight, a step of {chosen.length:.4g} {metric.unit} gives the lowest predicted error: "
+            f"{short(chosen.predicted_error)} {unit}."
         )
     aborted = aborted_by_gains(flights, best.gains)
     why = "is refused by the gate" if refused else "was aborted" if aborted else "did not improve on it"
     return (
         f"{origin} The longer step in the same direction {why}, so the next one is shorter, {chosen.length:.4g} "
-        f"instead of {best.length:.4g}; predicted error {short(chosen.predicted_error)} {unit}."
+        f"instead of {best.length:.4g} {metric.unit}; predicted error {short(chosen.predicted_error)} {unit}."
     )
 
 
@@ -221,6 +228,10 @@ def _corrected(definition: Definition, experiment: ModelledExperiment, base: Fli
         return inside, "The correction is added to the state in every step, inside the control loop."
     missing = f"flight {base.number} was recorded without all of its state and its command"
     return correct_by_bias(experiment, base), f"{_OUTSIDE}: inside is impossible because {missing}."
+
+
+def _describe_unit(space: PolicySpace, metric: _Metric) -> str:
+    return f"Step sizes are in {metric.unit}: one is {format_gains(space.by_name(metric.scale))}."
 
 
 def _notes(refused: Sequence[LadderStep]) -> tuple[str, ...]:

@@ -133,11 +133,11 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   );
 }
 
-/** Names the source of a repeat's interval while no gain set has been flown twice. */
+/** Names the source of a repeat's interval while no gain set has two valid flights. */
 function PriorScatter({ campaignId }: { campaignId: number }) {
   const statistics = useStatistics(campaignId).data;
   if (statistics === undefined || !isPriorScatter(statistics)) return null;
-  return <Note>The interval assumes the prior estimate of the scatter: no gain set has been flown twice.</Note>;
+  return <Note>The interval assumes the prior estimate of the scatter: no gain set has two valid flights.</Note>;
 }
 
 function Refusal({ chosen, problem }: { chosen: ChosenFlight; problem: ReturnType<typeof refusalOf> }) {

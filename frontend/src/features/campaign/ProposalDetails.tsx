@@ -203,7 +203,7 @@ function Tried({ explanation, unit, gains }: Omit<ProposalExplanationProps, "sai
                   <tr key={step.length} data-chosen={step.length === chosen || undefined}>
                     <td>{gainText(step.length)}</td>
                     <td>{gainsInBrackets(step.gains)}</td>
-                    <td>{withUnit(step.predicted_error, unit, 4)}</td>
+                    <td>{withUnit(step.predicted_error, unit)}</td>
                     <td>{step.clipped?.join(", ") || NOTHING}</td>
                   </tr>
                 ))}

@@ -20,7 +20,7 @@ export function predictionResult(trial: Trial): "inside" | "above" | "below" | n
   return error > interval.upper ? "above" : "inside";
 }
 
-/** Whether the scatter is only the prior estimate, because no gain set has been flown twice. */
+/** Whether the scatter is only the prior estimate, because no gain set has two valid flights. */
 export function isPriorScatter({ sigma, groups }: Pick<CampaignStatistics, "sigma" | "groups">): boolean {
   return sigma !== null && sigma > 0 && groups.every(({ errors }) => errors.length < 2);
 }
