@@ -22,6 +22,8 @@ ROOM: Final = 1.1
 LABEL_SHARE: Final = 0.145
 """Width of a label, as a share of the visible time range."""
 DIGITS: Final = 2
+SHARED_DIGITS: Final = 1
+"""Digits of a label that several flights share, which agree in these."""
 
 
 def is_step(set_point: Curve) -> bool:
@@ -64,7 +66,8 @@ def off_scale_deviations(
     """Marks at the edge of the panel for flights that leave it after the climb, at their largest deviation in the
     visible time range `window`.
 
-    They are labelled where there is room; one label names all flights at the same place with the same deviation.
+    They are labelled where there is room; one label names all flights at the same place with about the same
+    deviation.
     """
     marks, labels = sorted(_marks(flights, set_point, limit, window), key=lambda mark: mark.time_s), list[_Label]()
     for mark in marks:
@@ -75,7 +78,7 @@ def off_scale_deviations(
 
 @dataclass(frozen=True, slots=True)
 class _Mark:
-    """A flight that leaves the panel: its visible deviation, with the largest one and its time."""
+    """A flight that leaves the panel: its visible deviation, with the largest one, roughly, and its time."""
 
     number: int
     deviation: Curve
@@ -102,14 +105,14 @@ def _marks(flights: Sequence[FlightData], set_point: Curve, limit: float, window
         part = part_off_scale(after_climb(deviation_of(flight.curve, set_point), set_point), -limit, limit, window)
         if part is not None:
             place = int(np.abs(part.values).argmax())
-            peak = signed(float(part.values[place]), DIGITS)
+            peak = signed(float(part.values[place]), SHARED_DIGITS)
             up = leaves_upward(part.values, -limit, limit)
             yield _Mark(flight.number, part, float(part.time_s[place]), peak, up)
 
 
 def _place(mark: _Mark, beside: Sequence[_Label], labels: list[_Label], window: Range) -> None:
     """Add a label where it fits into the chart and between those `beside` it; else name the flight in one of them, if
-    that has the same deviation."""
+    that has about the same deviation."""
     width = LABEL_SHARE * (window.high - window.low)
     sides: dict[Side, float] = {"right": 0.0, "center": width / 2, "left": width}
     for side, before_s in sides.items():
@@ -139,7 +142,7 @@ def _trace(palette: Palette, mark: _Mark, label: _Label | None, limit: float, un
         trial=mark.number,
         text=f"Deviation of flight {mark.number}",
         unit=unit,
-        digits=DIGITS,
+        digits=SHARED_DIGITS if label is not None and len(label.numbers) > 1 else DIGITS,
         side=None if label is None else label.side,
         yaxis="y2",
     )
