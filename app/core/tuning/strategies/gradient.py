@@ -77,6 +77,10 @@ class _Metric:
     ladder: tuple[float, ...]
     unit: str
 
+    def describe(self, length: float) -> str:
+        """`1 gain scale`, `0.25 gain scales`."""
+        return f"{length:.4g} {self.unit}{'' if length == 1.0 else 's'}"
+
 
 def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vector) -> Vector:
     """∂error/∂gain at `base`, shape (n,), by central differences.
@@ -96,12 +100,12 @@ def gradient(model: CorrectedModel, space: PolicySpace, base: Vector, scale: Vec
 
 
 def _scaled_metric(space: PolicySpace) -> _Metric:
-    return _Metric(space.scale, SCALED_LADDER, "gain scales")
+    return _Metric(space.scale, SCALED_LADDER, "gain scale")
 
 
 def _raw_metric(space: PolicySpace) -> _Metric:
     whole = any(gain.integer for gain in space.gains)
-    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER, "gain units")
+    return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER, "gain unit")
 
 
 def propose(
@@ -209,14 +213,14 @@ def _summary(
     if chosen is best:
         return (
             f"{origin} Of {len(metric.ladder)} step sizes along the negative gradient of the model, corrected by that "
-            f"flight, a step of {chosen.length:.4g} {metric.unit} gives the lowest predicted error: "
+            f"flight, a step of {metric.describe(chosen.length)} gives the lowest predicted error: "
             f"{short(chosen.predicted_error)} {unit}."
         )
     aborted = aborted_by_gains(flights, best.gains)
     why = "is refused by the gate" if refused else "was aborted" if aborted else "did not improve on it"
     return (
         f"{origin} The longer step in the same direction {why}, so the next one is shorter, {chosen.length:.4g} "
-        f"instead of {best.length:.4g} {metric.unit}; predicted error {short(chosen.predicted_error)} {unit}."
+        f"instead of {metric.describe(best.length)}; predicted error {short(chosen.predicted_error)} {unit}."
     )
 
 
@@ -231,7 +235,7 @@ def _corrected(definition: Definition, experiment: ModelledExperiment, base: Fli
 
 
 def _describe_unit(space: PolicySpace, metric: _Metric) -> str:
-    return f"Step sizes are in {metric.unit}: one is {format_gains(space.by_name(metric.scale))}."
+    return f"Step sizes are in {metric.unit}s: one is {format_gains(space.by_name(metric.scale))}."
 
 
 def _notes(refused: Sequence[LadderStep]) -> tuple[str, ...]:
