@@ -84,9 +84,9 @@ def predict_ahead(session: Session, cache: PredictorCache, campaign_id: int, ask
     return DatedPrediction(read.question.digest, _predict(cache, read))
 
 
-def predict_flight(session: Session, cache: PredictorCache, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
-    """The same of a trial that is planned already. Raises as `predict_gains` does."""
-    return predict_ahead(session, cache, campaign.id, gains).prediction
+def predict_again(cache: PredictorCache) -> Callable[[Session, CampaignRow, Gains], GainsPrediction]:
+    """The same for trials that are planned already, as a function of session, campaign and gains."""
+    return lambda session, campaign, gains: predict_ahead(session, cache, campaign.id, gains).prediction
 
 
 def predict_planned(

@@ -3,7 +3,6 @@
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Request, status
-from sqlalchemy.orm import Session
 
 from app.accounts.permissions import Permission, is_allowed
 from app.campaigns import figure_data, flight_predictions, landscapes, proposals, service, wear
@@ -26,8 +25,6 @@ from app.campaigns.wear import VehicleCalibration
 from app.common.errors import InputError, Problem
 from app.common.schemas import FigureCard, Page, figure_card
 from app.common.states import CampaignState
-from app.core.policy import Gains
-from app.db.models import CampaignRow
 from app.figures.data import Range
 from app.fleet import registration
 from app.fleet.schemas import Vehicle, VehicleEdit
@@ -189,10 +186,7 @@ def get_campaign_figure(
     are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
     """
     view = figure_data.FigureView(window=_window(from_s, to_s), chosen=flight, predicted=predicted)
-
-    def predict(session: Session, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
-        return flight_predictions.predict_flight(session, predictors, campaign, gains)
-
+    predict = flight_predictions.predict_again(predictors)
     return figure_card(figure_data.campaign_figure(session, campaign_id, name, theme, view, predict))
 
 
