@@ -161,6 +161,7 @@ test("a campaign says why the takeoff of its vehicle would be refused", () => {
     groundedReason({ name: "Drone", state: "ready", registered: true, checks: null, ...seen } as Vehicle);
   expect(reason({})).toBe("");
   expect(reason({ checks: failing })).toContain("its last preflight check failed (FS_GCS_ENABLE)");
+  expect(reason({ checks: [...failing, ...failing] })).toContain("failed (FS_GCS_ENABLE and 1 more)");
   expect(reason({ checks: failing, state: "disconnected" })).toBe("Drone is not connected.");
   expect(reason({ state: "disconnected", registered: false })).toBe("");
 });

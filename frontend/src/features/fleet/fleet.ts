@@ -51,10 +51,10 @@ export function groundedReason(vehicle: Vehicle): string {
   const { name, state, registered } = vehicle;
   if (state === "quarantined") return `${name} is quarantined.`;
   if (registered && state === "disconnected") return `${name} is not connected.`;
-  const failed = failedChecks(vehicle).join(", ");
-  return failed === ""
-    ? ""
-    : `${name} would refuse the takeoff: its last preflight check failed (${failed}). Correct this, then select Check now on its page.`;
+  const [first, ...others] = failedChecks(vehicle);
+  if (first === undefined) return "";
+  const failed = others.length === 0 ? first : `${first} and ${others.length} more`;
+  return `${name} would refuse the takeoff: its last preflight check failed (${failed}). Correct this, then select Check now on its page.`;
 }
 
 /** Why the gains that the vehicle holds are not known. */
