@@ -216,7 +216,7 @@ def record_outcome(session: Session, flight_id: int, outcome: FlightOutcome) -> 
     when the record cannot be stored.
     """
     flight, campaign = _read(session, flight_id)
-    outcome = _told_of_stop(flight, outcome)
+    outcome = _with_stop_explained(flight, outcome)
     if flight.state == FlightState.RUNNING:
         if outcome.record is not None:
             _land(session, campaign, flight, outcome.record)
@@ -262,7 +262,7 @@ def recover_record(session: Session, flight_id: int, record: FlightRecord) -> No
     proposals.history_changed(session, campaign)
 
 
-def _told_of_stop(flight: FlightRow, outcome: FlightOutcome) -> FlightOutcome:
+def _with_stop_explained(flight: FlightRow, outcome: FlightOutcome) -> FlightOutcome:
     """Say what became of the vehicle where the reason is only that Gainline was stopped."""
     if outcome.restored is None or outcome.restored != flight.safe_gains or outcome.concern:
         return outcome
