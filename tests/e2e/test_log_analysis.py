@@ -64,7 +64,7 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(page_o
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"))
     article = page.get_by_role("article", name="Analysis of takeoff.tlog")
-    expect(article).to_contain_text("Mean distance from 3 m: 0.330 m flown.", timeout=60_000)
+    expect(article).to_contain_text("Mean distance from 3 m: 0.330 m measured.", timeout=60_000)
     expect(article).to_contain_text("hover throttle 0.63")
     rows = article.get_by_role("region", name="Gains compared").locator("tbody tr")
     expect(rows).to_have_count(2)

@@ -29,8 +29,11 @@ import { SpeedSwitch, useSpeed } from "./SpeedSwitch";
 import { type ChosenFlight, type ShowPreview, useNextFlight } from "./useNextFlight";
 import { isPriorScatter } from "./verdict";
 
-/** A tablet on its side: the button is to be seen without scrolling. */
+/** The fly button is to be seen without scrolling: what explains the gains follows below it. */
+const LOW = "(max-height: 920px)";
+/** A tablet on its side. */
 const LOW_AND_NARROW = "(max-width: 1200px) and (max-height: 860px)";
+const AT_ONCE = { getInitialValueInEffect: false };
 
 interface Props {
   campaign: Campaign;
@@ -60,9 +63,18 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isBestAgain = isRepeat(chosen.name) && group !== undefined && group === reference;
   const outside = groups.find(({ is_best }) => is_best);
   const isBestOutside = outside !== undefined && reference !== undefined && outside !== reference;
-  const isCompact = useMediaQuery(LOW_AND_NARROW, undefined, { getInitialValueInEffect: false }) ?? false;
-  const isReasonLater = isCompact && proposal.recommended !== "stop" && !isDoubtful(proposal);
+  const isCompact = useMediaQuery(LOW_AND_NARROW, undefined, AT_ONCE) ?? false;
+  const isLow = useMediaQuery(LOW, undefined, AT_ONCE) ?? false;
+  const isReasonLater = isLow && proposal.recommended !== "stop" && !isDoubtful(proposal);
   const reason = <Reason proposal={proposal} chosen={chosen.name} isFirst={trials.length === 0} />;
+  const conditions = (
+    <>
+      {chosen.predicted?.interval && isEvaluated && isRepeat(chosen.name) && groups.length > 0 && (
+        <PriorScatter campaignId={campaign.id} />
+      )}
+      <FlightWindow definition={campaign.definition} />
+    </>
+  );
   const isPredictionLater = isCompact && !hasModel;
   const prediction = isEvaluated && (
     <PredictedError
@@ -78,7 +90,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
   const isAnnounced = trials.length === 0 && chosen.choice?.recommended === true;
   return (
     <Panel title={`Next: flight ${number}`}>
-      <Stack gap={10} mod={{ compact: isCompact }} className={classes["proposal"] ?? ""}>
+      <Stack gap={isCompact ? 5 : 10} mod={{ compact: isCompact }} className={classes["proposal"] ?? ""}>
         <FlightChoices proposal={proposal} chosen={chosen.name} disabled={isReadOnly} onChoose={chosen.choose} />
         {!isReasonLater && reason}
         <GainTable
@@ -95,10 +107,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
           </Note>
         )}
         {!isPredictionLater && prediction}
-        {chosen.predicted?.interval && isEvaluated && isRepeat(chosen.name) && groups.length > 0 && (
-          <PriorScatter campaignId={campaign.id} />
-        )}
-        {!isCompact && <FlightWindow definition={campaign.definition} />}
+        {!isLow && conditions}
         <FormErrorNotice
           error={chosen.error}
           labels={chosen.entry ? Object.fromEntries(chosen.rows.map(({ name }) => [name, name])) : {}}
@@ -114,7 +123,7 @@ export function ProposalCard({ campaign, proposal, trials, upload, onPreview, is
         />
         {isPredictionLater && prediction}
         {isReasonLater && reason}
-        {isCompact && <FlightWindow definition={campaign.definition} />}
+        {isLow && conditions}
         <div>
           {chosen.choice?.proposed && (
             <ProposalExplanation
@@ -201,13 +210,13 @@ function FlightButtons({ campaign, proposal, chosen, number, upload, isSecondary
   return (
     <>
       <GroundedNote vehicleId={id} />
-      <div className={classes["fly"]}>
-        {needs_staging
-          ? button("Open fly screen", true, () => create.mutate(trial))
-          : button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
-      </div>
-      {registered && !needs_staging && button("Open fly screen", false, () => create.mutate(trial))}
-      {!registered && <SpeedSwitch value={speed} onChange={setSpeed} />}
+      {!needs_staging &&
+        button(`Fly flight ${number}`, true, () => watched(create.mutateAsync({ ...trial, ...order })))}
+      {registered ? (
+        button("Open fly screen", needs_staging, () => create.mutate(trial))
+      ) : (
+        <SpeedSwitch value={speed} onChange={setSpeed} />
+      )}
       {isChecked && gate?.passed === false && !is_real && (
         <OverruleGate
           pending={create.isPending}
