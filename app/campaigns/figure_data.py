@@ -186,6 +186,7 @@ def _noise(rows: Sequence[TrialRow], prior: Scatter) -> Noise | None:
             Repeats(group.numbers, group.mean, group.standard_error(scatter)) for group in groups if group.size > 1
         ),
         around_best=Range(best.mean - half, best.mean + half),
+        best_numbers=best.numbers,
     )
 
 

@@ -106,13 +106,15 @@ class Repeats:
 class Noise:
     """Scatter of the errors.
 
-    `sd` is that of a single flight, `repeats` are the repeated flights, `around_best` is the range in which another
-    flight of the best gains would lie with 90 % probability. Without repeats all of it is the prior's.
+    `sd` is that of a single flight, `repeats` are the repeated flights, `best_numbers` the flights of the gains with
+    the best mean, `around_best` is the range in which another flight of them would lie with 90 % probability. Without
+    repeats all of it is the prior's.
     """
 
     sd: float
     repeats: tuple[Repeats, ...] = ()
     around_best: Range | None = None
+    best_numbers: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,6 +152,13 @@ class History:
     def best(self) -> FlightData | None:
         """The valid flight with the lowest error, the earliest of equals."""
         return min(self.valid, key=_error, default=None)
+
+    @property
+    def is_best_of_best_gains(self) -> bool:
+        """Whether the best flight has the gains with the best mean, as far as the scatter is known."""
+        if self.best is None or self.noise is None or not self.noise.best_numbers:
+            return True
+        return self.best.number in self.noise.best_numbers
 
     @property
     def latest(self) -> FlightData | None:

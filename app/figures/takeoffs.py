@@ -247,7 +247,7 @@ class TrajectoriesFigure:
         assert flight.curve is not None
         standing = self._standing(flight)
         label = {
-            "best": f"{flight.number} · best",
+            "best": f"{flight.number} · {'best' if self.history.is_best_of_best_gains else 'lowest error'}",
             "latest": f"{flight.number} · latest",
             "baseline": f"{flight.number} · latest, baseline",
             "earlier": f"{flight.number}",

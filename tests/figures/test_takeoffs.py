@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.figures.data import Curve, FlightData, NextFlight, Range
+from app.figures.data import Curve, FlightData, NextFlight, Noise, Range
 from app.figures.scale import robust_range, thinned
 from app.figures.takeoffs import TrajectoriesFigure
 from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, layout, proposal, trace, traces
@@ -74,6 +74,17 @@ def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
     ).compute()
     entries = [one["name"] for one in traces(card) if one.get("showlegend", True)]
     assert entries == ["Set point", "Reference", "Flight 5 · best", "Earlier", "Not counted"]
+
+
+def test_a_lucky_flight_of_other_gains_is_not_called_the_best() -> None:
+    """The best gains are those with the best mean; the page says so beside the chart."""
+    flights = (flight(1, 0.3), flight(2, 0.11), flight(3, 0.12), flight(4, 0.10))
+    names = [
+        [one["name"] for one in traces(TrajectoriesFigure(history(*flights, noise=noise)).compute())]
+        for noise in (None, Noise(sd=0.01, best_numbers=(4,)), Noise(sd=0.01, best_numbers=(2, 3)))
+    ]
+    assert ["Flight 4 · best" in each for each in names] == [True, True, False]
+    assert "Flight 4 · lowest error" in names[2]
 
 
 def test_an_unreviewed_flight_is_not_drawn_like_an_excluded_one() -> None:

@@ -92,13 +92,14 @@ export function VerdictPanel({ trial, trials, isBest, unit, experiment, own = fa
   const campaign = useCampaign(trial.campaign_id).data;
   const hasModel = useHasModel(experiment);
   const group = statistics?.groups.find(({ trial_numbers }) => trial_numbers.includes(trial.number));
+  const bestWord = group === undefined || group.is_best ? "best" : "lowest error";
   const asked = repeatPurpose(trial);
   const without = standingWithout(trial, trials);
   const scatter = trial.state === "valid" ? statistics?.sigma : null;
   const isCompared = trial.comparisons.some(({ against }) => against === "best before");
   return (
     <Panel
-      title={`Flight ${trial.number}${isBest && trial.state === "valid" ? " · best so far" : ""}`}
+      title={`Flight ${trial.number}${isBest && trial.state === "valid" ? ` · ${bestWord} so far` : ""}`}
       tools={
         <span className={classes["when"]}>
           <Time at={trial.flown_at} />
