@@ -9,7 +9,14 @@ import {
 } from "@tabler/icons-react";
 import { Link } from "react-router";
 import { ABORT_LABELS, type AbortControl, abortStage, type FlyingCampaign } from "../live/flights";
-import { type Connection, liveNow, useConnection, useIsCurrent, useLiveFlight, useVehicleStatus } from "../live/store";
+import {
+  type Connection,
+  liveNow,
+  useConnection,
+  useIsOutputCurrent,
+  useLiveFlight,
+  useVehicleStatus,
+} from "../live/store";
 import { outputNow, readingOf } from "../live/telemetry";
 import { isAfterRecord, isDown } from "../live/vehicleStatus";
 import { withUnit } from "../ui/format";
@@ -73,9 +80,8 @@ function withoutWorker(flying: readonly FlyingCampaign[]): string {
 export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: AbortControl }) {
   const live = useLiveFlight(flying.trialId);
   const status = useVehicleStatus(flying.vehicleId);
-  const isRecorded = useIsCurrent(live);
+  const isCurrent = useIsOutputCurrent(live, status);
   const isAfter = isAfterRecord(status?.status.step);
-  const isCurrent = isAfter ? status?.isCurrent === true : isRecorded;
   const stage = abortStage(flying.trialId, abort, status?.status.step);
   const time = live?.timeS.at(-1);
   const reading = readingOf(live?.channel ?? "");

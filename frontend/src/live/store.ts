@@ -9,6 +9,7 @@ import {
   aged,
   before,
   CURRENT_S,
+  isAfterRecord,
   type LastHeard,
   type Moment,
   secondsBetween,
@@ -118,4 +119,10 @@ export function useIsCurrent(live: LiveFlight | null): boolean {
   const now = useMoment();
   if (live === null || live.heardAt === null) return true;
   return state === "live" && worker && secondsBetween(live.heardAt, now) <= CURRENT_S;
+}
+
+/** Whether `outputNow` is current: the samples while they are recorded, else what the vehicle reports. */
+export function useIsOutputCurrent(live: LiveFlight | null, status: Aged | null): boolean {
+  const isRecordCurrent = useIsCurrent(live);
+  return isAfterRecord(status?.status.step) ? status?.isCurrent === true : isRecordCurrent;
 }

@@ -2,7 +2,7 @@ import { Button, Stack } from "@mantine/core";
 import { Link, useOutletContext } from "react-router";
 import type { Campaign, Trial } from "../../api/types";
 import { type AbortControl, abortStage, abortText, isCutShort } from "../../live/flights";
-import { useConnection, useIsCurrent, useLiveFlight, useVehicleStatus } from "../../live/store";
+import { useConnection, useIsOutputCurrent, useLiveFlight, useVehicleStatus } from "../../live/store";
 import { isSaturated, outputNow, readingOf, throttleNow } from "../../live/telemetry";
 import { isAfterRecord } from "../../live/vehicleStatus";
 import { withUnit } from "../../ui/format";
@@ -33,8 +33,8 @@ export function FlyingCard({ campaign, trial, step }: Props) {
   const aborting = abortStage(step.trialId, abort, status?.status.step);
   const stage = flyingStage(trial, live);
   const isAfter = isAfterRecord(status?.status.step);
-  const isRecordStale = !useIsCurrent(live) && live !== null && live.timeS.length > 0;
-  const isStale = isAfter ? status?.isCurrent !== true : isRecordStale;
+  const hasOutput = isAfter || (live !== null && live.timeS.length > 0);
+  const isStale = !useIsOutputCurrent(live, status) && hasOutput;
   return (
     <Panel
       title={`Flight ${step.trialNumber}: ${stage.toLowerCase()}`}
