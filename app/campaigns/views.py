@@ -31,7 +31,7 @@ from app.campaigns.statistics import best_trial, standing_of, standing_within_bo
 from app.campaigns.variants import choices_of
 from app.common.conflict_checks import allowed
 from app.common.schemas import Gate, Interval, Trouble
-from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState
+from app.common.states import CAMPAIGN_ACTIONS, CampaignState, JobState, TrialState, VehicleState
 from app.core.definition import aborted_by_gains
 from app.core.statistics.comparisons import Verdict
 from app.core.tuning.confirmation import ComparisonState
@@ -276,6 +276,8 @@ def _next_action(
         return _NEXT_ACTIONS[row.state]
     if (waiting := history.find_unreviewed(trials)) is not None:
         return f"Review flight {waiting.number}"
+    if row.vehicle.state is VehicleState.QUARANTINED:
+        return "Inspect and release the vehicle"
     if has_passed:
         return "Fly the campaign on the real vehicle"
     if not is_rehearsal_satisfied(rehearsal):

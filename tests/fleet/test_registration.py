@@ -174,6 +174,9 @@ def test_a_campaign_names_the_registered_vehicle_that_flies_it(client: TestClien
     assert (shown["id"], shown["name"], shown["registered"], shown["needs_staging"]) == (two["id"], "Two", True, True)
     assert shown["options"] == two["options"]
     assert campaign["next_action"] == "Fly the first flight"
+    put_into(VehicleState.QUARANTINED, database, two)
+    assert get(client, f"/api/campaigns/{campaign['id']}")["next_action"] == "Inspect and release the vehicle"
+    put_into(VehicleState.DISCONNECTED, database, two)
     clone = client.post(f"/api/campaigns/{campaign['id']}/clone").json()
     assert clone["vehicle"]["id"] == two["id"]
     moved = client.patch(

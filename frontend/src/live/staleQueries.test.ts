@@ -19,7 +19,7 @@ test("a changed job makes the jobs doubtful, and one without a campaign the repr
 
 test("a changed vehicle makes itself and the list of vehicles doubtful", () => {
   const keys = staleQueries([{ topic: "vehicle", entity_id: 2, campaign_id: null }]);
-  expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2], ["wear"]]);
+  expect(keys).toEqual([["flying"], ["vehicles"], ["vehicle", 2], ["campaigns"], ["wear"]]);
 });
 
 test("new gains and a flight make doubtful what is known of the vehicles' wear", () => {

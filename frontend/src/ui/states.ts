@@ -37,9 +37,8 @@ const REHEARSAL: Partial<Record<RehearsalState, StateLabel>> = {
 };
 
 interface Standing extends Pick<Campaign, "state" | "outcome" | "verdict"> {
+  vehicle: Pick<Campaign["vehicle"], "can_fly" | "state">;
   rehearsal?: RehearsalState;
-  /** Whether Gainline can fly the vehicle, rather than import its records. */
-  canFly?: boolean;
   /** Whether the campaign is a rehearsal that has passed. */
   hasPassed?: boolean;
 }
@@ -48,16 +47,17 @@ export function campaignStateLabel({
   state,
   outcome,
   verdict,
+  vehicle,
   rehearsal = "not needed",
-  canFly = true,
   hasPassed = false,
 }: Standing): StateLabel {
   if (state === "finished" && outcome === "converged" && verdict === null) return NOTHING_BETTER;
   if (state === "finished" && outcome !== null) return OUTCOME[outcome] ?? CAMPAIGN.finished;
   const mayFly = state === "ready" || state === "deciding";
+  if (mayFly && vehicle.state === "quarantined") return { word: "Vehicle quarantined", tone: "bad" };
   if (mayFly && hasPassed) return { word: "Rehearsal passed", tone: "good" };
   if (mayFly && REHEARSAL[rehearsal]) return REHEARSAL[rehearsal];
-  return state === "ready" && !canFly ? { word: "Ready", tone: "quiet" } : CAMPAIGN[state];
+  return state === "ready" && !vehicle.can_fly ? { word: "Ready", tone: "quiet" } : CAMPAIGN[state];
 }
 
 const TRIAL: Record<TrialState, StateLabel> = {

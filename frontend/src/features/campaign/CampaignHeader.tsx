@@ -7,6 +7,7 @@ import { useRename } from "../../api/mutations";
 import { problemOf } from "../../api/problems";
 import { useCatalogue } from "../../api/queries";
 import type { Campaign } from "../../api/types";
+import { useVehicle } from "../../api/vehicles";
 import { StateBadge } from "../../ui/Badges";
 import { count } from "../../ui/format";
 import { ErrorNotice } from "../../ui/Notices";
@@ -18,6 +19,7 @@ import { settingsOf } from "./definition";
 export function CampaignHeader({ campaign }: { campaign: Campaign }) {
   const [renaming, setRenaming] = useState(false);
   const catalogue = useCatalogue().data;
+  const vehicle = useVehicle(campaign.vehicle.id) ?? campaign.vehicle;
   return (
     <header className={classes["header"]}>
       <Group gap="0 16px" align="center" className={renaming ? undefined : (classes["heading"] ?? "")}>
@@ -39,8 +41,8 @@ export function CampaignHeader({ campaign }: { campaign: Campaign }) {
         <StateBadge
           words={campaignStateLabel({
             ...campaign,
+            vehicle: { ...campaign.vehicle, state: vehicle.state },
             rehearsal: campaign.rehearsal.state,
-            canFly: campaign.vehicle.can_fly,
           })}
         />
         <span>{count(campaign.trials.flown, "flight")}</span>

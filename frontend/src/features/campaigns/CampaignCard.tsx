@@ -22,7 +22,7 @@ export function CampaignCard({ campaign }: { campaign: CampaignSummary }) {
     <li className={classes["card"]}>
       <div className={classes["top"]}>
         <VehicleBadge isReal={vehicle.is_real} />
-        <StateBadge words={campaignStateLabel({ ...campaign, canFly: vehicle.can_fly, hasPassed })} />
+        <StateBadge words={campaignStateLabel({ ...campaign, hasPassed })} />
       </div>
       <h2 className={classes["name"]}>
         <Link to={`/campaigns/${id}`}>{name}</Link>
