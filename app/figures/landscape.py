@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, floor, log10
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -11,19 +10,13 @@ from app.core.policy import Gain, Gains
 from app.core.tuning.landscape import Landscape, Slice
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
+from app.figures.contours import LEGEND, Scale, contour_traces, scale_of
 from app.figures.data import FlightData, History
-from app.figures.landscape_layout import holds, number_position, numbers, padded, to_edge
+from app.figures.landscape_layout import Box, holds, mark_box, number_box, number_position, numbers, padded, to_edge
 from app.figures.theme import PALETTES, Palette, ThemeName
 
 LONGEST_PATH: Final = 60
 """Largest number of latest flights in the path; the first and the best are always included."""
-LEVELS: Final = 9
-"""Approximate number of contours."""
-SHOWN_SHARE: Final = 0.8
-"""Share of all points covered by the scale; the rest is shaded as off the scale."""
-_TINTS: Final = ((0.0, 0.5), (0.3, 0.26), (1.0, 0.0))
-"""Strength of the colour from the bottom to the top of the scale: the lower the error, the stronger the colour."""
-_GROUND: Final = "ground"
 _GAP: Final = 0.09
 _STAR_PX: Final = 17
 """Size of the star, and of the best flight's own invisible mark under it, which keeps its number clear of the star."""
@@ -45,15 +38,6 @@ class Search:
     gradient: Gains
     direction: Gains
     tried: tuple[Tried, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Scale:
-    """Contours from `low` to `high` every `step`, in the error's unit; higher values are off the scale."""
-
-    low: float
-    high: float
-    step: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +65,7 @@ class LandscapeFigure:
         traces: list[Trace] = []
         axes: dict[str, object] = {}
         for index, one in enumerate(slices, start=1):
-            named = {_GROUND, *(trace["legendgroup"] for trace in traces)}
+            named = {LEGEND, *(trace["legendgroup"] for trace in traces)}
             own = self._slice(palette, index, one, scale)
             traces += [trace | {"showlegend": trace["legendgroup"] not in named} for trace in own]
             axes |= self._axes(palette, index, one)
@@ -96,12 +80,28 @@ class LandscapeFigure:
 
     def _slice(self, palette: Palette, index: int, one: Slice, scale: Scale) -> list[Trace]:
         return [
-            *_ground(palette, index, one, scale, self.history.error_unit),
+            *contour_traces(palette, index, one, scale, self.history.error_unit, self._taken(one)),
             *self._line(palette, index, one),
             *self._tried(palette, index, one),
             *self._path(palette, index, one),
             *self._proposed(palette, index, one),
         ]
+
+    def _taken(self, one: Slice) -> list[Box]:
+        """The room of all marks and numbers in a slice."""
+        shown, proposal = self._shown(), self.history.proposal
+        marked = [*(flight.gains for flight in shown), *(step.gains for step in self.search.tried)]
+        marked += [] if proposal is None else [proposal.gains]
+        texts = zip(shown, self._texts(one), strict=True)
+        return [
+            *(mark_box(one, gains) for gains in marked),
+            *(number_box(one, flight.gains, text) for flight, text in texts if text),
+        ]
+
+    def _texts(self, one: Slice) -> list[str]:
+        """The numbers beside the flights that are shown."""
+        proposal = self.history.proposal
+        return numbers(self._shown(), self.history.best, one, aside=None if proposal is None else proposal.gains)
 
     def _shown(self) -> list[FlightData]:
         """All flights, or if there are many, the latest together with the first and the best before them."""
@@ -113,9 +113,8 @@ class LandscapeFigure:
         flights, best = self._shown(), self.history.best
         if not flights:
             return []
-        unit, proposal = self.history.error_unit, self.history.proposal
+        unit, texts = self.history.error_unit, self._texts(one)
         stars = [flight is best for flight in flights]
-        texts = numbers(flights, best, one, aside=None if proposal is None else proposal.gains)
         path = _marks(
             index,
             one,
@@ -134,7 +133,6 @@ class LandscapeFigure:
             textposition=[
                 number_position(one, flight.gains, text) for flight, text in zip(flights, texts, strict=True)
             ],
-            # The outline keeps a number readable over the label of a contour.
             textfont={"size": 12, "color": palette.ink, "weight": 700, "shadow": "auto"},
             hovertext=[_hover_text(flight, unit) for flight in flights],
         )
@@ -296,63 +294,11 @@ class LandscapeFigure:
         return (what, *(gains[gain.name] for gain in self.history.gains), predicted, measured)
 
 
-def scale_of(slices: Sequence[Slice]) -> Scale:
-    """Common scale of all slices: from the lowest error to the 80 % quantile of their points, in steps of 1, 2 or 5."""
-    errors = np.array([error for one in slices for row in one.errors for error in row if error is not None])
-    low, high = float(errors.min()), float(np.quantile(errors, SHOWN_SHARE))
-    step = _nice(max(high - low, 1e-3 * max(abs(high), 1e-9)) / LEVELS)
-    return Scale(low=floor(low / step) * step, high=ceil(high / step) * step, step=step)
-
-
 def lowest(one: Slice, centre: Gains) -> tuple[dict[str, float], float]:
     """The gains with the lowest error in a slice, and that error."""
     errors = np.array([[np.inf if error is None else error for error in row] for row in one.errors])
     row, column = divmod(int(np.argmin(errors)), errors.shape[1])
     return {**centre, one.x: one.x_values[column], one.y: one.y_values[row]}, float(errors[row, column])
-
-
-def _ground(palette: Palette, index: int, one: Slice, scale: Scale, unit: str) -> list[Trace]:
-    """The contours, and a shade over errors above the scale."""
-    suffix = theme.suffix(index)
-    common: dict[str, object] = {
-        "type": "contour",
-        "x": list(one.x_values),
-        "y": list(one.y_values),
-        "z": [list(row) for row in one.errors],
-        "xaxis": f"x{suffix}",
-        "yaxis": f"y{suffix}",
-        "showscale": False,
-        # Straight segments: placing labels along smooth contours takes Plotly most of a second.
-        "line": {"width": 0.9, "color": theme.with_opacity(palette.dim, 0.75), "smoothing": 0},
-    }
-    ground = common | {
-        "name": "Predicted error",
-        "legendgroup": _GROUND,
-        "contours": {
-            "start": scale.low,
-            "end": scale.high,
-            "size": scale.step,
-            "coloring": "fill",
-            "showlabels": True,
-            "labelfont": {"size": 11, "color": palette.ink},
-        },
-        "zmin": scale.low,
-        "zmax": scale.high,
-        "colorscale": [[place, theme.mixed(palette.best, palette.surface, share)] for place, share in _TINTS],
-        "meta": {"role": "model", "slice": index},
-        "hovertemplate": f"{one.x} %{{x:.4~g}}, {one.y} %{{y:.4~g}}<br>"
-        f"<b>%{{z:.4f}} {unit}</b> predicted<extra></extra>",
-    }
-    beyond = common | {
-        "name": f"Above {scale.high:g} {unit}",
-        "legendgroup": "beyond",
-        "contours": {"type": "constraint", "operation": "<", "value": scale.high},  # Plotly shades where it fails
-        "fillcolor": theme.mixed(palette.earlier, palette.surface, 0.4),
-        "line": {"width": 0.9, "color": palette.earlier, "smoothing": 0},
-        "hoverinfo": "skip",
-        "meta": {"role": "beyond", "slice": index},
-    }
-    return [ground, beyond]
 
 
 def _marks(index: int, one: Slice, gains: Sequence[Gains], role: str, name: str, mode: str, **more: Any) -> Trace:
@@ -387,12 +333,6 @@ def _place(index: int, count: int, *, stacked: bool) -> tuple[list[float], list[
     if stacked:
         return [0.0, 1.0], [max(0.0, 1.0 - first - size), 1.0 - first]
     return [first, min(1.0, first + size)], [0.0, 1.0]
-
-
-def _nice(width: float) -> float:
-    """1, 2 or 5 times a power of ten, at least `width`."""
-    decade = 10.0 ** floor(log10(width))
-    return next(round(factor * decade, 12) for factor in (1, 2, 5, 10) if factor * decade >= width)
 
 
 def _title(gain: Gain) -> str:

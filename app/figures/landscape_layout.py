@@ -1,6 +1,7 @@
 """Positions in a slice of the landscape, and placement of the flight numbers."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from app.core.policy import Gains
@@ -10,8 +11,34 @@ from app.figures.data import FlightData
 NUMBER_ROOM: Final = (0.07, 0.075)
 """Size of a flight's number, as shares of a slice's width and height."""
 _EDGE: Final = 0.03
+_MARK: Final = (0.06, 0.07)
+"""Size of the largest mark, the star, likewise."""
 
 PlotPosition = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Room of something in a slice: its centre, and its width and height, as shares of the slice's."""
+
+    centre: PlotPosition
+    size: tuple[float, float]
+
+    def clearance(self, others: Sequence["Box"]) -> float:
+        """Distance to the nearest of the others along the axis where it is larger; negative if they overlap."""
+        return min((self._gap(other) for other in others), default=1.0)
+
+    def overlaps(self, other: "Box") -> bool:
+        return self._gap(other) < 0.0
+
+    def _gap(self, other: "Box") -> float:
+        return max(
+            abs(self.centre[axis] - other.centre[axis]) - (self.size[axis] + other.size[axis]) / 2 for axis in (0, 1)
+        )
+
+    @property
+    def is_within_slice(self) -> bool:
+        return all(size / 2 <= centre <= 1.0 - size / 2 for centre, size in zip(self.centre, self.size, strict=True))
 
 
 def numbers(
@@ -22,18 +49,25 @@ def numbers(
     If those three overlap, or flights have the same position, one mark carries all their numbers. Numbers that would
     cover the mark at `aside` are omitted, except for those three.
     """
-    leading = {flights[0].number, flights[-1].number, *([best.number] if best else [])}
-    spots = {flight.number: spot(one, flight.gains) for flight in flights}
-    covered = [] if aside is None else [spot(one, aside)]
+    leading = {flight.number for flight in (*flights[:1], *flights[-1:], *([best] if best else []))}
+    gains = {flight.number: flight.gains for flight in flights}
+    covered = [] if aside is None else [mark_box(one, aside)]
     shared: dict[int, list[int]] = {}
-    for number in sorted(spots, key=lambda number: (number not in leading, number)):
-        near = next((other for other in shared if _collide(spots[number], spots[other], len(shared[other]))), None)
+    for number in sorted(gains, key=lambda number: (number not in leading, number)):
+        box = number_box(one, gains[number], str(number))
+        near = next(
+            (other for other in shared if box.overlaps(number_box(one, gains[other], _text(shared[other])))), None
+        )
         if near is not None:
-            if number in leading or spots[number] == spots[near]:
+            if number in leading or spot(one, gains[number]) == spot(one, gains[near]):
                 shared[near].append(number)
-        elif number in leading or not any(_collide(spots[number], other) for other in covered):
+        elif number in leading or not any(box.overlaps(mark) for mark in covered):
             shared[number] = [number]
-    return [", ".join(map(str, sorted(shared.pop(flight.number, [])))) for flight in flights]
+    return [_text(shared.pop(flight.number, [])) for flight in flights]
+
+
+def _text(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, sorted(numbers)))
 
 
 def spot(one: Slice, gains: Gains) -> PlotPosition:
@@ -48,15 +82,28 @@ def spot(one: Slice, gains: Gains) -> PlotPosition:
 def number_position(one: Slice, gains: Gains, text: str) -> str:
     """Where a text of some numbers stands beside the mark at these gains, so that it lies within the slice."""
     x, y = spot(one, gains)
-    width, height = (1 + text.count(",")) * NUMBER_ROOM[0], NUMBER_ROOM[1]
+    width, height = _number_size(text)
     across = "left" if x + width / 2 > 1.0 + _EDGE else "right" if x - width / 2 < -_EDGE else "center"
     return f"{'bottom' if y > 1.0 - height else 'top'} {across}"
 
 
-def _collide(one: PlotPosition, other: PlotPosition, count: int = 1) -> bool:
-    """Whether a number at `one` would overlap the `count` numbers at `other`."""
-    width, height = NUMBER_ROOM
-    return abs(one[0] - other[0]) < width * (1 + count) / 2 and abs(one[1] - other[1]) < height
+def number_box(one: Slice, gains: Gains, text: str) -> Box:
+    """Room of the text beside the mark at these gains."""
+    x, y = spot(one, gains)
+    width, height = _number_size(text)
+    vertical, horizontal = number_position(one, gains, text).split()
+    up = {"top": 0.5, "bottom": -0.5}[vertical]
+    across = {"left": -0.5, "center": 0.0, "right": 0.5}[horizontal]
+    return Box((x + across * width, y + up * height), (width, height))
+
+
+def mark_box(one: Slice, gains: Gains) -> Box:
+    """Room of the mark at these gains."""
+    return Box(spot(one, gains), _MARK)
+
+
+def _number_size(text: str) -> tuple[float, float]:
+    return (1 + text.count(",")) * NUMBER_ROOM[0], NUMBER_ROOM[1]
 
 
 def to_edge(one: Slice, centre: Gains, direction: Gains) -> list[Gains] | None:

@@ -5,8 +5,9 @@ from dataclasses import replace
 import pytest
 
 from app.core.tuning.landscape import Landscape, Slice
-from app.figures.landscape import LandscapeFigure, Search, Tried, lowest, scale_of
-from app.figures.landscape_layout import number_position
+from app.figures.contours import Label, Scale, place_labels, scale_of
+from app.figures.landscape import LandscapeFigure, Search, Tried, lowest
+from app.figures.landscape_layout import Box, mark_box, number_box, number_position
 from tests.figures.builders import flight, history, proposal, trace
 
 VALUES = tuple(float(value) for value in range(10))
@@ -65,6 +66,43 @@ def test_numbers_that_would_cover_each_other_are_left_out_but_never_the_first_be
     covering = history(*spread, proposal=replace(proposal(7), gains={"kp": 4.1, "ki": 5.2, "kd": 80.0}))
     card = LandscapeFigure(covering, land, Search(gradient={}, direction={})).compute()
     assert trace(card, "path")["text"] == ["1", "2", "3", "", "5", "6"]
+
+
+def test_a_number_below_its_mark_and_one_above_the_next_mark_do_not_overlap() -> None:
+    land = Landscape(centre={"kp": 4.0, "ki": 6.0, "kd": 80.0}, slices=(cliff(None),))
+    places = ((1.0, 1.0), (8.0, 9.0), (8.0, 7.9), (5.0, 5.0))
+    flights = [
+        replace(flight(number, 0.3 - 0.01 * number), gains={"kp": kp, "ki": ki, "kd": 80.0})
+        for number, (kp, ki) in enumerate(places, start=1)
+    ]
+    card = LandscapeFigure(history(*flights), land, Search(gradient={}, direction={})).compute()
+    assert trace(card, "path")["text"] == ["1", "2", "", "4"]
+
+
+def error_at(label: Label) -> float:
+    x, y = (9.0 * share for share in label.position)
+    return 0.1 + 0.01 * ((x - 4) ** 2 + (y - 6) ** 2)
+
+
+def test_each_contour_is_labelled_on_itself_where_no_flight_number_or_mark_is() -> None:
+    one, scale = Slice(x="kp", y="ki", x_values=VALUES, y_values=VALUES, errors=BOWL), Scale(0.1, 0.4, 0.05)
+    flown = [{"kp": float(kp), "ki": float(ki), "kd": 80.0} for kp, ki in ((6, 6), (4, 8), (2, 6), (4, 4), (7, 7))]
+    taken = [mark_box(one, gains) for gains in flown] + [number_box(one, gains, "1, 2") for gains in flown]
+    labels = list(place_labels(one, scale, taken))
+    assert [label.text for label in labels] == ["0.15", "0.2", "0.25", "0.3", "0.35", "0.4"]
+    for label in labels:
+        assert error_at(label) == pytest.approx(float(label.text), abs=0.0025)  # linear between points of a parabola
+        others = [other.box for other in labels if other is not label]
+        assert label.box.clearance([*taken, *others]) > 0.0
+
+
+def test_a_contour_without_a_free_point_has_no_label() -> None:
+    one, scale = Slice(x="kp", y="ki", x_values=VALUES, y_values=VALUES, errors=BOWL), Scale(0.1, 0.4, 0.05)
+    left_half = Box((0.25, 0.5), (0.5, 1.0))
+    labels = list(place_labels(one, scale, [left_half]))
+    assert labels != []
+    assert all(label.position[0] > 0.5 for label in labels)
+    assert list(place_labels(one, scale, [Box((0.5, 0.5), (1.0, 1.0))])) == []
 
 
 @pytest.mark.parametrize(
