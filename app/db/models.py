@@ -245,7 +245,8 @@ class TrajectoryRow(Base):
 class TrialRow(Base, Reported):
     """One flight of one policy.
 
-    `predicted_interval` is copied from the proposal. `repaired_error` is what the flight would score without its
+    `predicted_error` and `predicted_interval` are those with which it was planned; of a trial without a proposal,
+    `predicted` is the curve, else it is the proposal's. `repaired_error` is what the flight would score without its
     `glitches`. `curve` is the scored output in a few [time_s, value] pairs, for small plots. `ending` says how the
     record ends, whatever the trial's class; `abort_cause` why the flight was aborted.
     """
@@ -270,6 +271,7 @@ class TrialRow(Base, Reported):
     read_back: Mapped[GainsJson | None]
     proposal_id: Mapped[int | None] = mapped_column(ForeignKey("proposal.id", ondelete="SET NULL"), index=True)
     predicted_error: Mapped[float | None]
+    predicted_id: Mapped[int | None] = mapped_column(ForeignKey("trajectory.id"), index=True, unique=True)
     gate: Mapped[JsonObject]
     trajectory_id: Mapped[int | None] = mapped_column(ForeignKey("trajectory.id"), unique=True)
     error: Mapped[float | None]
@@ -292,7 +294,8 @@ class TrialRow(Base, Reported):
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     flown_at: Mapped[datetime | None]
 
-    trajectory: Mapped[TrajectoryRow | None] = relationship()
+    trajectory: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[trajectory_id])
+    predicted: Mapped[TrajectoryRow | None] = relationship(foreign_keys=[predicted_id])
 
 
 class TrialPhotoRow(Base, Reported):
