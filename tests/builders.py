@@ -124,8 +124,8 @@ def _copy(source: sqlite3.Connection, database: Database) -> None:
 
 
 def create_trial(client: httpx2.Client, campaign_id: int, **fields: object) -> Json:
-    """A trial of the proposal, unless gains are given."""
-    if "gains" not in fields and "proposal_id" not in fields:
+    """A trial of the proposal, unless gains or a variant are given."""
+    if not fields.keys() & {"gains", "proposal_id", "variant"}:
         fields["proposal_id"] = get(client, f"/api/campaigns/{campaign_id}/proposal")["proposal"]["id"]
     answer = client.post(f"/api/campaigns/{campaign_id}/trials", json=fields)
     assert answer.status_code == 201, answer.text

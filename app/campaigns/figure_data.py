@@ -1,8 +1,6 @@
 """Input data of the figures, loaded from the database as plain data."""
 
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -14,10 +12,7 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.campaigns.definitions import definition_of, experiment_of_campaign
 from app.campaigns.proposals import is_stale
-from app.campaigns.schemas import PredictedCurve
 from app.campaigns.trials import service as trials_service
-from app.campaigns.trials.service import Predict
-from app.common.errors import GainlineError
 from app.common.states import TrialState
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, Scatter
@@ -27,7 +22,7 @@ from app.core.statistics.comparisons import groups_of, pool_scatter, select_winn
 from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import band_channels
 from app.db import trajectories
-from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.db.models import CampaignRow, JsonObject, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats, curve_name
@@ -65,10 +60,6 @@ _CONFIDENCE: Final = 0.9
 _SPARSE_S: Final = 0.3
 """Interval of reports from which on the record's first samples after the command say nothing about it."""
 _UNFLOWN: Final = frozenset({TrialState.PLANNED, TrialState.STAGED, TrialState.FLYING})
-_PREDICTABLE: Final = _UNFLOWN | {TrialState.CAPTURED}
-"""States in which a trial has not changed what the flights predict."""
-_SAME: Final = 1e-6
-"""Relative difference of errors that are the same prediction, computed twice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +81,10 @@ def campaign_figure(
     name: Literal["takeoffs", "errors", "gains"],
     theme: ThemeName,
     view: FigureView = WHOLE_FLIGHT,
-    predict: Predict | None = None,
 ) -> Card:
     """One of the campaign's figures. Raises NotFoundError for an unknown campaign."""
     past = (
-        history_of(session, campaign_id, curves=True, view=view, predict=predict)
+        history_of(session, campaign_id, curves=True, view=view)
         if name == "takeoffs"
         else history_of(session, campaign_id, curves=False)
     )
@@ -109,19 +99,11 @@ def flight_figure(session: Session, trial_id: int, theme: ThemeName) -> Card:
     return card_of(FlightFigure(_flight_record(session, row, trials), theme))
 
 
-def history_of(
-    session: Session,
-    campaign_id: int,
-    *,
-    curves: bool,
-    view: FigureView = WHOLE_FLIGHT,
-    predict: Predict | None = None,
-) -> History:
+def history_of(session: Session, campaign_id: int, *, curves: bool, view: FigureView = WHOLE_FLIGHT) -> History:
     """Input data of the campaign's figures.
 
     Without `curves` no record is read. With them, full records are read only for the flights that are drawn
-    individually; the others have their coarse curves. Without `predict`, only the gains of a proposal have a predicted
-    curve.
+    individually; the others have their coarse curves.
     """
     campaign = repository.get_campaign(session, campaign_id)
     definition = definition_of(campaign)
@@ -137,7 +119,7 @@ def history_of(
         set_point=set_point,
         reference=reference,
         flights=tuple(_flight(row, corrected=history.is_corrected(rows, row.number)) for row in flown),
-        proposal=_predicted_flight(session, campaign, rows, experiment.output, view.predicted, predict),
+        proposal=_predicted_flight(session, campaign, rows, experiment.output, view.predicted),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
         curves_title=_CURVES.get(experiment.output, "Flight curves"),
@@ -236,12 +218,7 @@ def _goal(experiment: Experiment) -> tuple[Curve, Curve | None]:
 
 
 def _predicted_flight(
-    session: Session,
-    campaign: CampaignRow,
-    rows: Sequence[TrialRow],
-    output: str,
-    number: int | None,
-    predict: Predict | None,
+    session: Session, campaign: CampaignRow, rows: Sequence[TrialRow], output: str, number: int | None
 ) -> NextFlight | None:
     """The trial with that number; without one, the trial that is planned or flying, else the fresh proposal for the
     trial after the last one. None if there is none."""
@@ -254,7 +231,7 @@ def _predicted_flight(
                 gains=trial.gains,
                 predicted_error=trial.predicted_error,
                 interval=_interval(trial.predicted_interval),
-                **_predicted_trial(session, campaign, trial, output, predict),
+                **_predicted(session, _curve_id(session, trial), output),
             ),
             corrected=history.is_corrected(rows, trial.number),
         )
@@ -267,7 +244,7 @@ def _predicted_flight(
             gains=proposal.gains,
             predicted_error=proposal.predicted_error,
             interval=_interval(proposal.interval),
-            **_predicted(session, proposal, output),
+            **_predicted(session, proposal.predicted_id, output),
         ),
         corrected=history.is_corrected(rows),
     )
@@ -288,43 +265,17 @@ class _Predicted(TypedDict):
 _NOT_PREDICTED: Final[_Predicted] = {"curve": None, "band": None}
 
 
-def _predicted_trial(
-    session: Session, campaign: CampaignRow, row: TrialRow, output: str, predict: Predict | None
-) -> _Predicted:
-    """Predicted curve of a trial and its band: its proposal's, which is stored, else those predicted again, as long as
-    the flights still predict the error with which it was planned."""
-    if row.proposal_id is not None:
-        return _predicted(session, _proposal_of(session, row), output)
-    if predict is None or row.state not in _PREDICTABLE:
+def _curve_id(session: Session, row: TrialRow) -> int | None:
+    """The stored curve with which a trial was planned: its proposal's, else its own."""
+    proposal = None if row.proposal_id is None else repository.get_proposal_or_none(session, row.proposal_id)
+    return row.predicted_id if proposal is None else proposal.predicted_id
+
+
+def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicted:
+    """A stored predicted curve and its band, where there are any."""
+    if curve_id is None:
         return _NOT_PREDICTED
-    with suppress(GainlineError):
-        found = predict(session, campaign, row.gains)
-        if _is_same(found.predicted_error, row.predicted_error):
-            lower, upper = _points(found.lower), _points(found.upper)
-            band = None if lower is None or upper is None else Band(lower=lower, upper=upper)
-            return {"curve": _points(found.curve), "band": band}
-    return _NOT_PREDICTED
-
-
-def _is_same(found: float | None, planned: float | None) -> bool:
-    if found is None or planned is None:
-        return found is planned
-    return math.isclose(found, planned, rel_tol=_SAME)
-
-
-def _points(curve: PredictedCurve | None) -> Curve | None:
-    return None if curve is None else Curve(np.array(curve.time_s), np.array(curve.values))
-
-
-def _proposal_of(session: Session, row: TrialRow) -> ProposalRow | None:
-    return None if row.proposal_id is None else repository.get_proposal_or_none(session, row.proposal_id)
-
-
-def _predicted(session: Session, proposal: ProposalRow | None, output: str) -> _Predicted:
-    """Predicted curve of a proposal and its band, where there are any."""
-    if proposal is None or proposal.predicted_id is None:
-        return _NOT_PREDICTED
-    predicted = trajectories.readable_of(session, [proposal.predicted_id]).get(proposal.predicted_id)
+    predicted = trajectories.readable_of(session, [curve_id]).get(curve_id)
     if predicted is None:
         return _NOT_PREDICTED
     lower, upper = band_channels(output)
@@ -342,7 +293,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     glitches = _glitches(row)
     glitches_s = [glitch.low for glitch in glitches]
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
-    predicted = _predicted(session, _proposal_of(session, row), experiment.output)
+    predicted = _predicted(session, _curve_id(session, row), experiment.output)
     predicts = _flight(row, corrected=history.is_corrected(trials, row.number)).predicted_error is not None
     return FlightRecordData(
         number=row.number,

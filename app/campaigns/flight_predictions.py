@@ -3,7 +3,7 @@
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Final
 
@@ -18,7 +18,7 @@ from app.common.states import TrialState
 from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.policy import Gains
-from app.core.records.trajectory import Trajectory
+from app.core.records.trajectory import Trajectory, select_samples
 from app.core.tuning.flight_predictor import FlightPredictor, flight_predictor, modelled_flights, predict_repeat
 from app.core.tuning.gate import space_of
 from app.core.tuning.strategy import Proposal, band_channels
@@ -27,6 +27,8 @@ from app.db.session import Database
 from app.figures.scale import thin_by_bends, thinned
 
 CURVE_POINTS: Final = 500
+STORED_POINTS: Final = 1000
+"""Samples of a curve that is stored with its trial; a model's has up to 17,000."""
 KEPT: Final = 4
 
 
@@ -67,38 +69,37 @@ def predict_gains(database: Database, cache: PredictorCache, campaign_id: int, a
     """
     with database.read() as session:
         read = _read(session, cache, campaign_id, asked)
-    return _predict(cache, read)
+    return _view(read.question, _predict(cache, read))
 
 
 @dataclass(frozen=True, slots=True)
 class DatedPrediction:
-    """A prediction, and the digest of the history that it is made of."""
+    """A prediction to be stored with a trial, None if there is none; its gains, and the digest of the history that it
+    is made of."""
 
     digest: str
-    prediction: GainsPrediction
+    gains: Gains
+    prediction: Proposal | None
 
 
 def predict_ahead(session: Session, cache: PredictorCache, campaign_id: int, asked: Gains) -> DatedPrediction:
     """The same before a transaction that plans a trial with these gains. Raises as `predict_gains` does."""
     read = _read(session, cache, campaign_id, asked)
-    return DatedPrediction(read.question.digest, _predict(cache, read))
-
-
-def predict_again(cache: PredictorCache) -> Callable[[Session, CampaignRow, Gains], GainsPrediction]:
-    """The same for trials that are planned already, as a function of session, campaign and gains."""
-    return lambda session, campaign, gains: predict_ahead(session, cache, campaign.id, gains).prediction
+    question = read.question
+    return DatedPrediction(question.digest, question.gains, _stored(question, _predict(cache, read)))
 
 
 def predict_planned(
     session: Session, campaign: CampaignRow, gains: Gains, ahead: DatedPrediction | None
-) -> GainsPrediction:
+) -> Proposal | None:
     """The prediction of a trial within the transaction that plans it, which is short: that made ahead if the history
     is still the same, else that of a repeat, else none."""
     question = _question(session, campaign, gains)
-    if ahead is not None and (ahead.digest, ahead.prediction.gains) == (question.digest, question.gains):
+    if ahead is not None and (ahead.digest, ahead.gains) == (question.digest, question.gains):
         return ahead.prediction
     flights = history.flights_of(session, campaign.id, recorded=question.flown) if question.flown else ()
-    return _view(question, predict_repeat(question.definition, flights, question.gains))
+    repeat = predict_repeat(question.definition, flights, question.gains)
+    return _stored(question, _checked(question, repeat))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +111,11 @@ class _Question:
     gains: Gains
     digest: str
     flown: set[int]
+
+    @property
+    def output(self) -> str:
+        """The scored channel."""
+        return experiment_of(self.definition).output
 
 
 def _question(session: Session, campaign: CampaignRow, asked: Gains) -> _Question:
@@ -144,7 +150,7 @@ def _read(session: Session, cache: PredictorCache, campaign_id: int, asked: Gain
     )
 
 
-def _predict(cache: PredictorCache, read: _Read) -> GainsPrediction:
+def _predict(cache: PredictorCache, read: _Read) -> Proposal | None:
     question, kept = read.question, read.kept
     predicted = predict_repeat(question.definition, read.flights, question.gains)
     if predicted is None:
@@ -153,27 +159,47 @@ def _predict(cache: PredictorCache, read: _Read) -> GainsPrediction:
             lambda: flight_predictor(question.definition, read.flights, read.donor) if kept is None else kept.predictor,
         )
         predicted = None if fitted.predictor is None else fitted.predictor.predict(question.gains)
-    return _view(question, predicted)
+    return _checked(question, predicted)
+
+
+def _checked(question: _Question, predicted: Proposal | None) -> Proposal | None:
+    """The prediction, or only its curve where error, interval and band say nothing; None where the model diverges."""
+    if predicted is None or predicted.predicted_error is None or not math.isfinite(predicted.predicted_error):
+        return None
+    lower = None if predicted.interval is None else predicted.interval.lower
+    if history.is_prediction_informative(lower, question.trials):
+        return predicted
+    curve = None if predicted.predicted is None else _only(predicted.predicted, question.output)
+    return replace(predicted, predicted=curve, predicted_error=None, interval=None)
+
+
+def _stored(question: _Question, predicted: Proposal | None) -> Proposal | None:
+    """The prediction with as much of its curve and band as is drawn."""
+    if predicted is None or predicted.predicted is None:
+        return predicted
+    curve = _only(predicted.predicted, question.output, *band_channels(question.output))
+    chosen = select_samples(curve.time_s, curve[question.output], STORED_POINTS)
+    thin = {name: values[chosen] for name, values in curve.channels.items()}
+    return replace(predicted, predicted=replace(curve, time_s=curve.time_s[chosen], channels=thin))
 
 
 def _view(question: _Question, predicted: Proposal | None) -> GainsPrediction:
-    gains, output = question.gains, experiment_of(question.definition).output
-    error = None if predicted is None else predicted.predicted_error
-    if predicted is None or error is None or not math.isfinite(error):  # a model may diverge
-        return GainsPrediction(
-            gains=dict(gains), predicted_error=None, interval=None, curve=None, lower=None, upper=None
-        )
-    interval = predicted.interval
-    predicts = history.is_prediction_informative(None if interval is None else interval.lower, question.trials)
-    lower, upper = (_edge(predicted.predicted, channel) for channel in band_channels(output))
+    curve = None if predicted is None else predicted.predicted
+    interval = None if predicted is None else predicted.interval
+    lower, upper = (_edge(curve, channel) for channel in band_channels(question.output))
     return GainsPrediction(
-        gains=dict(gains),
-        predicted_error=error if predicts else None,
-        interval=Interval.model_validate(interval, from_attributes=True) if predicts and interval else None,
-        curve=_curve(predicted.predicted, output),
+        gains=dict(question.gains),
+        predicted_error=None if predicted is None else predicted.predicted_error,
+        interval=None if interval is None else Interval.model_validate(interval, from_attributes=True),
+        curve=_curve(curve, question.output),
         lower=lower,
         upper=upper,
     )
+
+
+def _only(trajectory: Trajectory, *names: str) -> Trajectory:
+    """The trajectory with no other channels than these."""
+    return replace(trajectory, channels={name: trajectory[name] for name in names if name in trajectory.channels})
 
 
 def _curve(trajectory: Trajectory | None, channel: str) -> PredictedCurve | None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
 
-from sqlalchemy import ColumnElement, delete, func, literal, or_, select, tuple_
+from sqlalchemy import ColumnElement, delete, func, literal, or_, select, tuple_, union_all
 from sqlalchemy.orm import Session, defer, joinedload
 
 from app.campaigns.schemas import Sort
@@ -275,6 +275,15 @@ def proposals_by_id(session: Session, proposal_ids: Collection[int]) -> Mapping[
 
 def proposals(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
     return session.scalars(select(ProposalRow).where(ProposalRow.campaign_id == campaign_id)).all()
+
+
+def predicted_curves(session: Session, campaign_id: int) -> Sequence[TrajectoryRow]:
+    """The predicted curves of the campaign's proposals, and of its trials that have none."""
+    ids = [
+        select(table.predicted_id).where(table.campaign_id == campaign_id, table.predicted_id.is_not(None))
+        for table in (ProposalRow, TrialRow)
+    ]
+    return session.scalars(select(TrajectoryRow).where(TrajectoryRow.id.in_(union_all(*ids)))).all()
 
 
 def latest_proposal(session: Session, campaign_id: int) -> ProposalRow | None:

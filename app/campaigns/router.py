@@ -166,7 +166,6 @@ FigureName = Literal["takeoffs", "errors", "gains"]
 @figures_router.get("/campaigns/{campaign_id}/figures/{name}")
 def get_campaign_figure(
     session: Reader,
-    predictors: Predictors,
     campaign_id: Id,
     name: FigureName,
     theme: Theme = "light",
@@ -186,8 +185,7 @@ def get_campaign_figure(
     are drawn individually. Between `from_s` and `to_s` the curves are drawn with more points.
     """
     view = figure_data.FigureView(window=_window(from_s, to_s), chosen=flight, predicted=predicted)
-    predict = flight_predictions.predict_again(predictors)
-    return figure_card(figure_data.campaign_figure(session, campaign_id, name, theme, view, predict))
+    return figure_card(figure_data.campaign_figure(session, campaign_id, name, theme, view))
 
 
 def _window(from_s: float | None, to_s: float | None) -> Range | None:

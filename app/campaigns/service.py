@@ -223,11 +223,11 @@ def delete_campaign(session: Session, campaign_id: int, version: int, context: R
             hint="It cannot be deleted: the gain history keeps every gain set that was written to a vehicle.",
         )
     repository.delete_unclaimed_flights(session, row.id)
-    predicted = [proposal.predicted for proposal in repository.proposals(session, row.id) if proposal.predicted]
+    curves = repository.predicted_curves(session, row.id)
     session.delete(row)
     session.flush()
-    for trajectory in predicted:
-        session.delete(trajectory)
+    for curve in curves:
+        session.delete(curve)
 
 
 def finish_campaign(session: Session, campaign_id: int, reason: str, context: RequestContext) -> Campaign:

@@ -172,6 +172,7 @@ def test_what_is_asked_for_cannot_change_while_a_flight_is_asked_for(client: Tes
 def test_a_campaign_is_deleted_with_everything_that_it_made(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     create_trial(client, campaign["id"])
+    create_trial(client, campaign["id"], gains={"kp": 350, "ki": 30, "kd": 90})
     assert client.delete(f"/api/campaigns/{campaign['id']}?version=1").status_code == 204
     assert client.get(f"/api/campaigns/{campaign['id']}").status_code == 404
     with database.read() as session:

@@ -15,10 +15,21 @@ from sqlalchemy import CheckConstraint
 from app.common.errors import SchemaError, StorageError
 from app.common.settings import Settings
 from app.db.migrate import migrate, require_current, revision_of
-from app.db.models import Base
+from app.db.models import Base, TrajectoryRow, TrialRow
 from app.db.revision import REVISION, is_current
-from app.db.session import open_engine
+from app.db.session import Database, open_engine
 from app.main import create_app
+from tests.builders import (
+    Json,
+    create_flown_trial,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    get,
+    land,
+    lift_off,
+    run_jobs,
+)
 
 
 def test_the_newest_migration_is_the_one_that_the_program_works_with() -> None:
@@ -112,6 +123,43 @@ def test_what_was_asked_of_a_vehicle_survives_new_kinds_of_commands(migrated_fil
         connection.commit()
     assert kept == [(1, "land", "Ada")]
     assert after == [(1, "land"), (3, "take-off")]
+
+
+def test_flights_survive_the_migration_to_stored_predicted_curves_and_back(
+    client: TestClient, database: Database, settings: Settings
+) -> None:
+    """A campaign with one flight of its proposal and one of custom gains, taken back to 0008 and up again."""
+    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 9}})
+    create_flown_trial(client, database, campaign["id"])
+    custom = create_trial(client, campaign["id"], gains={"kp": 350, "ki": 30, "kd": 90}, fly={"speed": None})
+    land(database, lift_off(database), create_record(0.9))
+    run_jobs(database)
+    shown = f"/api/trials/{custom['id']}/figure"
+    path = f"/api/campaigns/{campaign['id']}/trials"
+    trials = get(client, path)["items"]
+    assert "prediction" in roles_of(get(client, shown))
+    with database.read() as session:
+        curve_id = session.get_one(TrialRow, custom["id"]).predicted_id
+        kept = {row.id for row in session.query(TrajectoryRow)} - {curve_id}
+    database.close()
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parents[2] / "migrations"))
+    with open_engine(settings.database_file, foreign_keys=False).connect() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0008")
+        columns = {row[1] for row in connection.exec_driver_sql("PRAGMA table_info(trial)")}
+        assert {row[0] for row in connection.exec_driver_sql("SELECT id FROM trajectory")} == kept
+        connection.commit()
+    assert "predicted_id" not in columns
+    migrate(settings.database_file)
+    assert get(client, path)["items"] == trials
+    assert "prediction" not in roles_of(get(client, shown))
+    with database.read() as session:
+        assert {row.id for row in session.query(TrajectoryRow)} == kept
+
+
+def roles_of(card: Json) -> set[str]:
+    return {trace["meta"]["role"] for trace in card["figure"]["data"]}
 
 
 def test_a_database_of_a_newer_program_is_refused_and_left_alone(settings: Settings) -> None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from sqlalchemy.orm import Session
 
 from app.campaigns.flight_predictions import DatedPrediction, PredictorCache, predict_ahead, predict_planned
-from app.campaigns.schemas import GainsPrediction
 from app.campaigns.trials.schemas import TrialPlan
 from app.campaigns.trials.service import find_gains
 from app.common.errors import GainlineError
 from app.core.policy import Gains
+from app.core.tuning.strategy import Proposal
 from app.db.models import CampaignRow
 
 
@@ -29,6 +29,6 @@ class TrialPredictor:
             if new.proposal_id is None:
                 self._ahead = predict_ahead(session, self.cache, campaign_id, gains)
 
-    def predict(self, session: Session, campaign: CampaignRow, gains: Gains) -> GainsPrediction:
-        """What is predicted for a trial with these gains."""
+    def predict(self, session: Session, campaign: CampaignRow, gains: Gains) -> Proposal | None:
+        """What is predicted for a trial with these gains, as it is stored with it."""
         return predict_planned(session, campaign, gains, self._ahead)

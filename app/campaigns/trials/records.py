@@ -82,6 +82,9 @@ def settle_gains(session: Session, campaign: CampaignRow, row: TrialRow, flown: 
     judged = check_flown_gains(session, campaign, flown.gains)
     row.gains, row.gate, row.kind = judged.gains, judged.gate, "manual"
     row.predicted_error = row.predicted_interval = None
+    if (curve := row.predicted) is not None:
+        row.predicted = None
+        session.delete(curve)
 
 
 def _same(planned: Gains, flown: Gains) -> bool:

@@ -4,7 +4,8 @@ Every gain set passes the gate before it becomes a trial; an operator may overru
 """
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from sqlalchemy.orm import Session
@@ -14,7 +15,7 @@ from app.campaigns import history, proposals, repository
 from app.campaigns import service as campaigns
 from app.campaigns.definitions import definition_of
 from app.campaigns.history import set_flight_state, set_trial_state
-from app.campaigns.schemas import Campaign, GainsPrediction, Variant
+from app.campaigns.schemas import Campaign, Variant
 from app.campaigns.trials.schemas import Reopening, Trial, TrialEdit, TrialPlan
 from app.campaigns.trials.views import trial_view, trial_views
 from app.campaigns.variants import gains_of
@@ -23,11 +24,14 @@ from app.common.errors import ConflictError, InputError, Problem
 from app.common.schemas import Gate, Page, decode_cursor, encode_cursor
 from app.common.states import BUDGETED_TRIAL_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialKind, TrialState
 from app.core.definition import flight_seed
+from app.core.errors import TrajectoryError
 from app.core.experiments import experiment_of
 from app.core.policy import Gains
 from app.core.tuning.gate import GateResult, check_policy, require_flyable, space_of
 from app.core.tuning.stop_rules import describe_budget
+from app.core.tuning.strategy import Proposal
 from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
+from app.db.trajectories import pack
 from app.fleet import service as fleet
 from app.fleet.control import require_may
 from app.vehicles.registry import get_kind
@@ -153,8 +157,8 @@ def get_trial(session: Session, trial_id: int) -> Trial:
     return _seen(session, repository.get_trial(session, trial_id))
 
 
-Predict = Callable[[Session, CampaignRow, Gains], GainsPrediction]
-"""What is predicted for gains that no proposal contains."""
+Predict = Callable[[Session, CampaignRow, Gains], Proposal | None]
+"""What is predicted for gains that no proposal contains, with its curve in as many samples as are stored."""
 
 
 def create_trial(
@@ -176,7 +180,6 @@ def create_trial(
     require_open(session, campaign, BUDGETED_TRIAL_STATES)
     judged, proposal = _chosen(session, campaign, new)
     gains = judged.gains
-    predicted_error, interval = _predicted(session, campaign, gains, proposal, predict)
     number = repository.next_number(session, campaign_id)
     row = TrialRow(
         campaign_id=campaign_id,
@@ -184,29 +187,30 @@ def create_trial(
         state=TrialState.PLANNED,
         gains=gains,
         kind=_kind(session, campaign, gains, proposal) if new.variant is None else KINDS[new.variant],
-        proposal_id=None if proposal is None else proposal.id,
-        predicted_error=predicted_error,
-        predicted_interval=interval,
         gate=judged.gate,
         overrule_reason=judged.overrule_reason,
         note=new.note,
         seed=flight_seed(definition_of(campaign).seed, number),
     )
+    if proposal is not None:
+        row.proposal_id = proposal.id
+        row.predicted_error, row.predicted_interval = proposal.predicted_error, proposal.interval
+    elif predict is not None:
+        _keep_prediction(row, predict(session, campaign, gains))
     session.add(row)
     session.flush()
     return trial_view(session, campaign, row)
 
 
-def _predicted(
-    session: Session, campaign: CampaignRow, gains: Gains, proposal: ProposalRow | None, predict: Predict | None
-) -> tuple[float | None, JsonObject | None]:
-    """Predicted error and interval, as stored."""
-    if proposal is not None:
-        return proposal.predicted_error, proposal.interval
-    if predict is None:
-        return None, None
-    found = predict(session, campaign, gains)
-    return found.predicted_error, None if found.interval is None else found.interval.model_dump(mode="json")
+def _keep_prediction(row: TrialRow, found: Proposal | None) -> None:
+    """Store what is predicted for a trial with it."""
+    if found is None:
+        return
+    row.predicted_error = found.predicted_error
+    row.predicted_interval = None if found.interval is None else asdict(found.interval)
+    if found.predicted is not None:
+        with suppress(TrajectoryError):  # a curve that single precision cannot hold is not drawn
+            row.predicted = pack(found.predicted)
 
 
 def reopen_campaign(

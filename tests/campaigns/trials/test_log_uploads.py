@@ -5,6 +5,7 @@ import json
 import pytest
 from fastapi.testclient import TestClient
 
+from app.db.models import TrajectoryRow, TrialRow
 from app.db.session import Database
 from tests.builders import Json, create_ready_campaign, create_trial, get, problems_of, run_jobs
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
@@ -131,6 +132,25 @@ def test_confirmed_gains_become_the_trial_s_and_what_was_predicted_for_others_go
     assert (answer.status_code, flown["state"], flown["kind"]) == (201, "valid", "manual")
     assert flown["gains"] == flown["read_back"] == {"kp": 290, "ki": 40, "kd": 80}
     assert (flown["predicted_error"], flown["predicted_interval"]) == (None, None)
+
+
+def test_the_curve_predicted_for_other_custom_gains_is_deleted(
+    client: TestClient, database: Database, campaign: Json
+) -> None:
+    trial = create_trial(client, campaign["id"], gains={"kp": 300, "ki": 20, "kd": 80})
+    with database.read() as session:
+        assert session.query(TrajectoryRow).count() == 2, "the proposal's and the trial's"
+    flight = data_of(Flight({"kp": 290, "ki": 40, "kd": 80})).encode()
+    flown = client.post(f"{path_of(trial)}?confirm=true", content=flight, headers=ANY).json()
+    assert not is_prediction_drawn(client, flown)
+    with database.read() as session:
+        assert session.query(TrajectoryRow).count() == 2, "the proposal's and the record"
+        assert session.get_one(TrialRow, trial["id"]).predicted_id is None
+
+
+def is_prediction_drawn(client: TestClient, trial: Json) -> bool:
+    drawn = get(client, f"/api/trials/{trial['id']}/figure")["figure"]["data"]
+    return any(trace["meta"]["role"] in {"prediction", "band"} for trace in drawn)
 
 
 EXPERIMENTS = {
