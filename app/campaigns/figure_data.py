@@ -266,9 +266,12 @@ _NOT_PREDICTED: Final[_Predicted] = {"curve": None, "band": None}
 
 
 def _curve_id(session: Session, row: TrialRow) -> int | None:
-    """The stored curve with which a trial was planned: its proposal's, else its own."""
+    """The stored curve with which a trial was planned: its proposal's, else its own. None where its record has shown
+    that it was flown with other gains."""
     proposal = None if row.proposal_id is None else repository.get_proposal_or_none(session, row.proposal_id)
-    return row.predicted_id if proposal is None else proposal.predicted_id
+    if proposal is None:
+        return row.predicted_id
+    return proposal.predicted_id if proposal.gains == row.gains else None
 
 
 def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicted:

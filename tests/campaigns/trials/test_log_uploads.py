@@ -132,6 +132,7 @@ def test_confirmed_gains_become_the_trial_s_and_what_was_predicted_for_others_go
     assert (answer.status_code, flown["state"], flown["kind"]) == (201, "valid", "manual")
     assert flown["gains"] == flown["read_back"] == {"kp": 290, "ki": 40, "kd": 80}
     assert (flown["predicted_error"], flown["predicted_interval"]) == (None, None)
+    assert not is_prediction_drawn(client, flown)
 
 
 def test_the_curve_predicted_for_other_custom_gains_is_deleted(
