@@ -1,9 +1,9 @@
-"""Schema of a bundle, version 4, with the validation of its contents.
+"""Schema of a bundle, version 5, with the validation of its contents.
 
 A zip of `manifest.json` (the program that wrote it, and the SHA-256 of every other part), `contents.json` (the
 campaign, after those that it starts from), and one part for each record, photo and telemetry log. A record is stored as
 in the database (`app.db.trajectories`), with its own checksum. Version 1 lacks `abort_cause`;
-versions below 4 lack rise time, settling time and steady-state error.
+versions below 4 lack rise time, settling time and steady-state error, below 5 the predicted curves of trials.
 """
 
 from functools import cache
@@ -22,7 +22,7 @@ from app.core.tuning.strategy import Explanation
 from app.core.tuning.strategy import Kind as ProposalKind
 
 FORMAT: Final = "gainline-campaign"
-VERSION: Final = 4
+VERSION: Final = 5
 MANIFEST: Final = "manifest.json"
 CONTENTS: Final = "contents.json"
 
@@ -71,7 +71,7 @@ class Manifest(_Strict):
     """Manifest of a bundle. `parts`: the SHA-256 of every other file in the zip, by its name."""
 
     format: Literal["gainline-campaign"]
-    version: Literal[1, 2, 3, 4]
+    version: Literal[1, 2, 3, 4, 5]
     program: ShortText
     made_at: AwareDatetime
     parts: Annotated[dict[Annotated[str, Field(max_length=100)], Digest], Field(max_length=20_000)]
@@ -98,7 +98,8 @@ class Photo(_Strict):
 
 
 class Trial(_Strict):
-    """A trial as in the database. `proposal` is an index into the campaign's proposals, from 0."""
+    """A trial as in the database. `proposal` is an index into the campaign's proposals, from 0; without one,
+    `predicted` is the trial's own predicted curve."""
 
     number: Annotated[int, Field(ge=1, le=2**31)]
     state: TrialState
@@ -108,6 +109,7 @@ class Trial(_Strict):
     proposal: Annotated[int, Field(ge=0)] | None
     predicted_error: Finite | None
     predicted_interval: Annotated[JsonObject, _fits(Interval)] | None
+    predicted: Record | None = None
     gate: Annotated[JsonObject, _fits(Gate)]
     record: Record | None
     error: Finite | None
@@ -201,8 +203,9 @@ class Campaign(_Strict):
     def records(self) -> list[tuple[str, Record]]:
         """Every record with the name of its field."""
         flown = [(f"trials.{i}.record", trial.record) for i, trial in enumerate(self.trials)]
-        predicted = [(f"proposals.{i}.predicted", proposal.predicted) for i, proposal in enumerate(self.proposals)]
-        return [(field, record) for field, record in (*flown, *predicted) if record is not None]
+        planned = [(f"trials.{i}.predicted", trial.predicted) for i, trial in enumerate(self.trials)]
+        proposed = [(f"proposals.{i}.predicted", proposal.predicted) for i, proposal in enumerate(self.proposals)]
+        return [(field, record) for field, record in (*flown, *planned, *proposed) if record is not None]
 
 
 class Contents(_Strict):

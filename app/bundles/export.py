@@ -149,19 +149,22 @@ class Packer:
             **kept,
             proposal=proposal,
             record=self._flown(row),
+            predicted=self._predicted(row.predicted, f"flight {row.number}", row.campaign_id),
             photos=[self._photo(row, photo) for photo in photos],
             telemetry=self._telemetry(row, flight),
         )
 
     def _proposal(self, row: ProposalRow) -> Proposal:
         kept = {name: getattr(row, name) for name in Proposal.model_fields.keys() & row.__mapper__.columns.keys()}
-        if row.predicted is not None and not is_intact(row.predicted):
+        return Proposal(**kept, predicted=self._predicted(row.predicted, f"proposal {row.id}", row.campaign_id))
+
+    def _predicted(self, row: TrajectoryRow | None, whose: str, campaign_id: int) -> Record | None:
+        if row is not None and not is_intact(row):
             raise StorageError(
-                f"The bundle was not created: the predicted flight of proposal {row.id} of campaign "
-                f"{row.campaign_id} is damaged.",
+                f"The bundle was not created: the predicted curve of {whose} of campaign {campaign_id} is damaged.",
                 hint="Restore the database from an earlier backup.",
             )
-        return Proposal(**kept, predicted=self._record(row.predicted))
+        return self._record(row)
 
     def _flown(self, row: TrialRow) -> Record | None:
         if row.trajectory is not None and not is_intact(row.trajectory):

@@ -147,7 +147,7 @@ def _trials(
         ]
         session.add_all((row, *photos))
         made.append(row)
-        held: list[TrajectoryRow | TrialPhotoRow] = [*photos, *filter(None, (row.trajectory,))]
+        held: list[TrajectoryRow | TrialPhotoRow] = [*photos, *filter(None, (row.trajectory, row.predicted))]
         waiting += held
         size += sum(len(one.data) for one in held)
         if size > _AT_ONCE_BYTES:
@@ -166,11 +166,12 @@ def _settle(session: Session, waiting: list[TrajectoryRow | TrialPhotoRow]) -> N
 
 
 def _trial(bundle: Bundle, campaign: CampaignRow, source: Trial, proposals: Sequence[ProposalRow]) -> TrialRow:
-    kept = _fields(source, {"proposal", "record", "photos", "telemetry", "curve"})
+    kept = _fields(source, {"proposal", "record", "predicted", "photos", "telemetry", "curve"})
     return TrialRow(
         campaign_id=campaign.id,
         proposal_id=None if source.proposal is None else proposals[source.proposal].id,
         trajectory=_record(bundle, source.record),
+        predicted=_record(bundle, source.predicted),
         curve=None if source.curve is None else [list(point) for point in source.curve],
         **kept,
     )

@@ -272,6 +272,30 @@ def test_nothing_is_left_of_a_bundle_whose_storing_fails(
         assert session.query(TrialRow).count() == 3
 
 
+def test_the_curve_with_which_custom_gains_were_planned_goes_along(
+    client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
+) -> None:
+    there, _ = elsewhere
+    trial = create_trial(client, campaign["id"], gains={"kp": 350, "ki": 30, "kd": 90}, fly={"speed": None})
+    land(database, lift_off(database), modelled(trial["gains"]))
+    run_jobs(database)
+    bundle = download_bundle(client, campaign["id"])
+
+    def drawn(client: TestClient, campaign_id: int) -> list[Json]:
+        path = f"/api/campaigns/{campaign_id}/figures/takeoffs?predicted={trial['number']}"
+        traces = get(client, path)["figure"]["data"]
+        return [one for one in traces if one["meta"]["role"] in {"prediction", "band", "predicted deviation"}]
+
+    assert len(drawn(client, campaign["id"])) == 4
+    assert drawn(there, brought(there, bundle)["id"]) == drawn(client, campaign["id"])
+    parts = parts_of(bundle)
+    contents, manifest = json.loads(parts["contents.json"]), {**json.loads(parts["manifest.json"]), "version": 4}
+    curves = [each.pop("predicted") for each in contents["campaigns"][0]["trials"]]
+    old = {name: data for name, data in parts.items() if name not in {one["part"] for one in curves if one}}
+    old |= {"contents.json": json.dumps(contents).encode(), "manifest.json": json.dumps(manifest).encode()}
+    assert drawn(there, brought(there, sealed(old))["id"]) == []
+
+
 def test_why_a_flight_was_broken_off_goes_along_and_bundles_from_before_it_was_recorded_are_still_read(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
