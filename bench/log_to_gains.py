@@ -1,4 +1,4 @@
-"""From the log of one flight with ArduCopter's default gains to the second flight, on random vehicles.
+"""From the log of one flight with the autopilot's default gains to the second flight, on random vehicles.
 
     ./dev exec python -m bench.log_to_gains                    a few vehicles, against the limits
     ./dev exec python -m bench.log_to_gains --vehicles 200 --searches     the figures of docs/benchmarks.md
@@ -21,19 +21,19 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.analysis import Assessment, analyze
+from app.core.analysis.loop import AltitudeLoop
 from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, least_damping
-from app.core.analysis.proposal import BOUNDS, LARGEST_ACTIVITY, with_gains
-from app.core.control.ardupilot_parameters import STEP_S, Parameters
+from app.core.analysis.proposal import LARGEST_ACTIVITY
 from app.core.errors import TrajectoryError
 from app.core.records.trajectory import Samples
 from bench.copters.black_box import BUDGET, SEARCHES, best_of
-from bench.copters.simulation import FILTER_HZ, SimulatedCopter, fly_steps, sample
+from bench.copters.rigs import RIGS, Rig
+from bench.copters.simulation import SimulatedCopter
 
 SEED: Final = 20261125
 QUICK_VEHICLES: Final = 6
 FLIGHTS: Final = 6
 FLIGHTS_OF_THE_GRID: Final = 3
-GRID: Final = ((1.0, 1.7, 3.0), (5.0, 6.5, 8.0), (0.2, 0.3, 0.45, 0.65, 1.0, 1.5), (0.4, 0.7, 1.2, 1.7, 2.4, 3.0))
 PROPOSED: Final = "Proposed"
 SEARCHED_FLIGHTS: Final = (2, 5, 10, BUDGET)
 LIMITS: Final[Mapping[str, float]] = {"worse": 0.0, "unsafe": 0.0, "covered": 0.6, "near": 0.6}
@@ -63,28 +63,28 @@ class Searched:
     keeps_margin: bool
 
 
-def judge(number: int, *, searches: bool = False) -> Result:
+def judge(number: int, *, rig: Rig, searches: bool = False) -> Result:
     """Fly, analyse, and fly what is proposed, what people would set, and what `searches` find."""
     random = np.random.default_rng((SEED, number))
-    copter = sample(random)
-    flown = Parameters(hover_throttle=copter.assumed_hover_throttle)
+    copter = rig.sample(random)
+    loop = rig.first_loop(copter)
     seeds = random.integers(2**31, size=FLIGHTS + 1).tolist()
-    first = fly_steps(copter, flown, seed=seeds[0])
+    first = rig.fly(copter, loop, seeds[0])
     try:
         analysis = analyze(first.log)
     except TrajectoryError as error:
         return Result({}, np.nan, (), (), frozenset(), str(error), {})
-    best_m = least_error(copter, flown, seeds[1:])
-    searched = search(copter, flown, seeds[1:]) if searches else {}
+    best_m = least_error(rig, copter, seeds[1:])
+    searched = search(rig, copter, seeds[1:]) if searches else {}
     errors_m: dict[str, float] = {}
     covered: list[bool] = []
     predicted: list[tuple[float, float]] = []
     rang: set[str] = set()
     for each in sets(analysis.proposed, analysis.assessments):
-        flights = [fly_steps(copter, with_gains(flown, each.gains), seed=seed) for seed in seeds[1:]]
+        flights = [rig.fly(copter, loop.with_gains(each.gains), seed) for seed in seeds[1:]]
         errors_m[each.name] = float(np.mean([flight.error_m for flight in flights]))
         predicted.append((each.prediction.error_m, errors_m[each.name]))
-        if rings(copter, flown, each.gains):
+        if rings(copter, loop.with_gains(each.gains)):
             rang.add(each.name)
         if each.name == PROPOSED:
             within = (each.prediction.low_m, each.prediction.high_m)
@@ -92,33 +92,37 @@ def judge(number: int, *, searches: bool = False) -> Result:
     return Result(errors_m, best_m, covered, predicted, frozenset(rang), analysis.insufficient, searched)
 
 
-def rings(copter: SimulatedCopter, flown: Parameters, gains: Mapping[str, float]) -> bool:
-    """Whether the loop rings with these gains, by the vehicle's own linear model."""
-    parameters = with_gains(flown, gains)
-    return least_damping(parameters, copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S) < RINGING_DAMPING
+def rings(copter: SimulatedCopter, loop: AltitudeLoop) -> bool:
+    """Whether the loop rings, by the vehicle's own linear model."""
+    return least_damping(loop, copter.linear) < RINGING_DAMPING
 
 
-def search(copter: SimulatedCopter, flown: Parameters, seeds: Sequence[int]) -> dict[str, Searched]:
+def keeps_margin(copter: SimulatedCopter, loop: AltitudeLoop) -> bool:
+    """Whether the loop has the margin of a proposal, by the vehicle's own linear model."""
+    return damping_within_margin(loop, copter.linear) >= RINGING_DAMPING
+
+
+def search(rig: Rig, copter: SimulatedCopter, seeds: Sequence[int]) -> dict[str, Searched]:
     """What the black-box searches find from the gains of the first flight on, every flight in other weather."""
-    first = {name: value for name, value in flown.gains.items() if name in BOUNDS}
+    loop = rig.first_loop(copter)
     found = {}
     for name, run in SEARCHES.items():
         weather = iter(np.random.default_rng(seeds[0]).integers(2**31, size=BUDGET).tolist())
         trials = run(
-            first,
-            lambda gains, weather=weather: fly_steps(copter, with_gains(flown, gains), seed=next(weather)).error_m,
+            loop.space,
+            loop.gains,
+            lambda gains, weather=weather: rig.fly(copter, loop.with_gains(gains), next(weather)).error_m,
             seed=seeds[0],
         )
-        last = with_gains(flown, best_of(trials).gains)
-        best = {number: with_gains(flown, best_of(trials[:number]).gains) for number in SEARCHED_FLIGHTS}
+        last = loop.with_gains(best_of(trials).gains)
+        best = {number: loop.with_gains(best_of(trials[:number]).gains) for number in SEARCHED_FLIGHTS}
         found[name] = Searched(
             errors_m={
-                number: float(np.mean([fly_steps(copter, each, seed=seed).error_m for seed in seeds]))
+                number: float(np.mean([rig.fly(copter, each, seed).error_m for seed in seeds]))
                 for number, each in best.items()
             },
-            rang=sum(rings(copter, flown, trial.gains) for trial in trials),
-            keeps_margin=damping_within_margin(last, copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S)
-            >= RINGING_DAMPING,
+            rang=sum(rings(copter, loop.with_gains(trial.gains)) for trial in trials),
+            keeps_margin=keeps_margin(copter, last),
         )
     return found
 
@@ -128,19 +132,20 @@ def sets(proposed: Assessment | None, others: Sequence[Assessment]) -> list[Asse
     return [*([proposed] if proposed else []), *others[1:]]
 
 
-def least_error(copter: SimulatedCopter, flown: Parameters, seeds: Sequence[int]) -> float:
+def least_error(rig: Rig, copter: SimulatedCopter, seeds: Sequence[int]) -> float:
     """Least error, m, of the gains of the grid that keep the limits of a proposal."""
-    usual = np.mean([fly_steps(copter, flown, seed=seed).activity for seed in seeds])
+    first = rig.first_loop(copter)
+    usual = np.mean([rig.fly(copter, first, seed).activity for seed in seeds])
     candidates = []
-    for values in product(*GRID):
-        parameters = with_gains(flown, dict(zip(BOUNDS, values, strict=True)))
-        if damping_within_margin(parameters, copter.linear, filter_hz=FILTER_HZ, step_s=STEP_S) < RINGING_DAMPING:
+    for values in product(*rig.grid):
+        loop = first.with_gains(dict(zip(first.space.bounds, values, strict=True)))
+        if not keeps_margin(copter, loop):
             continue
-        flights = [fly_steps(copter, parameters, seed=seed) for seed in seeds[:FLIGHTS_OF_THE_GRID]]
+        flights = [rig.fly(copter, loop, seed) for seed in seeds[:FLIGHTS_OF_THE_GRID]]
         if np.mean([flight.activity for flight in flights]) <= LARGEST_ACTIVITY * usual:
-            candidates.append((float(np.mean([flight.error_m for flight in flights])), parameters))
+            candidates.append((float(np.mean([flight.error_m for flight in flights])), loop))
     best = min(candidates, key=lambda each: each[0])[1]
-    return float(np.mean([fly_steps(copter, best, seed=seed).error_m for seed in seeds]))
+    return float(np.mean([rig.fly(copter, best, seed).error_m for seed in seeds]))
 
 
 def print_sets(answered: Sequence[Result]) -> None:
@@ -179,9 +184,11 @@ def main() -> int:
     parser.add_argument("--vehicles", type=int, default=QUICK_VEHICLES)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--searches", action="store_true", help="tune by black-box searches too")
+    parser.add_argument("--autopilot", choices=RIGS, default="ArduCopter")
     options = parser.parse_args()
+    rig = RIGS[options.autopilot]
     with ProcessPoolExecutor(options.processes) as pool:
-        results = list(pool.map(partial(judge, searches=options.searches), range(options.vehicles)))
+        results = list(pool.map(partial(judge, rig=rig, searches=options.searches), range(options.vehicles)))
     refused = [each for each in results if each.refused]
     answered = [each for each in results if PROPOSED in each.errors_m]
     print(
@@ -192,7 +199,9 @@ def main() -> int:
     pairs = np.array([pair for each in answered for pair in each.predicted])
     shares = {
         "worse": float(
-            np.mean([each.errors_m[PROPOSED] > each.errors_m["ArduCopter's default gains"] for each in answered])
+            np.mean(
+                [each.errors_m[PROPOSED] > each.errors_m[f"{options.autopilot}'s default gains"] for each in answered]
+            )
         ),
         "unsafe": float(np.mean([PROPOSED in each.rang for each in answered])),
         "covered": float(np.mean([inside for each in answered for inside in each.covered])),

@@ -34,6 +34,6 @@ def analyze_content(content: bytes, companion: bytes | None, name: str) -> Analy
     """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
     if is_dataflash(content[:HEAD_BYTES]):
         flight = read_ardupilot_flight(io.BytesIO(content), name=name)
-        return AnalysedManoeuvres(analyze(flight), name, flight.parameters.hover_throttle)
+        return AnalysedManoeuvres(analyze(flight), name)
     found = read_content(content, companion, name, usable=ANALYSED)
     return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)

@@ -1,4 +1,4 @@
-"""The answer of an ArduCopter's log, for a person: its facts, table, notes, parameter file and figure."""
+"""The answer of an ArduCopter's or PX4's log, for a person: its facts, table, notes, parameter file and figure."""
 
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -28,21 +28,20 @@ _FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 
 @dataclass(frozen=True, slots=True)
 class AnalysedManoeuvres:
-    """An analysis, the log's file name, and the hover throttle that the autopilot assumed."""
+    """An analysis, and the log's file name."""
 
     analysis: Analysis
     file_name: str
-    assumed_hover_throttle: float
 
     @property
     def answer(self) -> LogAnswer:
         """The answer in facts and numbers."""
         analysis = self.analysis
         content = analysis.parameter_file(self.file_name)
-        name = f"{PurePath(self.file_name).stem}.param"
+        name = f"{PurePath(self.file_name).stem}{analysis.loop.texts.parameter_suffix}"
         return LogAnswer(
             file_name=self.file_name,
-            autopilot="ArduCopter",
+            autopilot=analysis.loop.texts.autopilot,
             answer=analysis.answer,
             proposes=analysis.proposed is not None,
             flight=_flight(analysis),
@@ -82,11 +81,12 @@ class AnalysedManoeuvres:
         )
 
     def _vehicle(self) -> list[str]:
-        estimate, assumed = self.analysis.estimate, self.assumed_hover_throttle
+        estimate, loop = self.analysis.estimate, self.analysis.loop
+        assumed, parameter = loop.assumed_hover_throttle, loop.texts.hover_parameter
         mean, deviation = estimate.mean, estimate.deviation
         is_off = abs(mean.hover_throttle / assumed - 1.0) > _HOVER_DIFFERENCE
         return [
-            f"hover throttle {mean.hover_throttle:.3f}" + (f", but MOT_THST_HOVER was {assumed:.3f}" if is_off else ""),
+            f"hover throttle {mean.hover_throttle:.3f}" + (f", but {parameter} was {assumed:.3f}" if is_off else ""),
             f"thrust slope {mean.thrust_slope:.2f} ± {max(deviation.thrust_slope, _LEAST_SPREAD):.2f}",
             f"motor lag {1e3 * mean.motor_lag_s:.0f} ± {1e3 * deviation.motor_lag_s:.0f} ms",
             f"drag {mean.drag_1_s:.2f} ± {max(deviation.drag_1_s, _LEAST_SPREAD):.2f} 1/s",
@@ -103,7 +103,7 @@ class AnalysedManoeuvres:
             behaviour=LoggedBehaviour.model_validate(analysis.behaviour, from_attributes=True),
             vehicle=EstimatedVehicle(
                 **values,
-                assumed_hover_throttle=self.assumed_hover_throttle,
+                assumed_hover_throttle=analysis.loop.assumed_hover_throttle,
                 residual_m_s2=analysis.estimate.residual_m_s2,
             ),
             assessments=[_assessed(each) for each in analysis.assessments],
@@ -129,7 +129,7 @@ def _flight(analysis: Analysis) -> list[str]:
 def _table(analysis: Analysis) -> GainsTable:
     flown, *others = analysis.assessments
     listed = [flown, *([analysis.proposed] if analysis.proposed else []), *others]
-    names = [name.removeprefix("PSC_") for name in flown.gains]
+    names = [name.removeprefix(analysis.loop.texts.prefix) for name in flown.gains]
     return GainsTable(
         columns=["Gains", *names, "Predicted error", "90 % interval", "Throttle activity", "Margin"],
         rows=[_row(each) for each in listed],
@@ -150,10 +150,12 @@ def _row(each: Assessment) -> list[str]:
 
 
 def _notes(analysis: Analysis) -> list[str]:
+    texts = analysis.loop.texts
+    late = f", with {1e3 * EXTRA_LAG_S:.0f} ms of extra {texts.lateness}; a proposal has at least {REQUIRED_MARGIN:g}."
     return [
         "Errors are predicted for the same manoeuvre in the same weather, with all other parameters as flown.",
         f"Throttle activity is relative to the gains flown; a proposal has at most {LARGEST_ACTIVITY:g}.",
-        _MARGIN,
+        f"The margin is the factor by which {texts.fast_gains} can be raised before the loop rings{late}",
         *(
             [f"At the limit of the search range, which is the documented range: {', '.join(analysis.at_limit)}."]
             if analysis.at_limit
@@ -163,10 +165,6 @@ def _notes(analysis: Analysis) -> list[str]:
     ]
 
 
-_MARGIN: Final = (
-    "The margin is the factor by which P and I of the acceleration controller can be raised before the loop rings, "
-    f"with {1e3 * EXTRA_LAG_S:.0f} ms of extra lag; a proposal has at least {REQUIRED_MARGIN:g}."
-)
 _LOAD: Final = "Load the gains on the ground. Fly them first at a safe height, ready to take over."
 
 

@@ -1,6 +1,5 @@
 """Reader of a whole flight's altitude control in ArduPilot's on-board log (.bin), in every mode that holds altitude."""
 
-from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -9,8 +8,9 @@ from typing import BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.analysis.flight import LoggedFlight, Segment
-from app.core.analysis.proposal import BOUNDS
+from app.core.analysis.ardupilot_loop import SPACE, ArduPilotLoop
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.segment import Segment
 from app.core.control.ardupilot_parameters import (
     FIRMWARE_NAMES,
     UNSUPPORTED,
@@ -22,7 +22,16 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.dataflash import parameters_in, read_tables
-from app.logs.flight_parts import LONGEST_INTERVAL_S, SHORTEST_PART_S, Manoeuvres, Part, Rows, find_parts, jumps
+from app.logs.flight_parts import (
+    LONGEST_INTERVAL_S,
+    SHORTEST_PART_S,
+    ParameterHistory,
+    Parameters,
+    Rows,
+    choose_parts,
+    jumps,
+    thinned,
+)
 
 _WANTED: Final = frozenset({"PSCD", "PSCZ", "CTUN", "ATT", "MODE", "EV", "ERR", "PARM"})
 _LOOP: Final = ("PD", "VD", "AD", "DVD", "DAD", "TVD")
@@ -41,7 +50,6 @@ _JUMP_M: Final = 0.1
 _JUMP_M_S: Final = 1.0
 _LARGEST_ACCELERATION_M_S2: Final = 50.0
 _RESTART_S: Final = 1.0
-_INTERVAL_S: Final = 0.1
 _RATE_HZ: Final = 400.0
 _RATES_HZ: Final = (50.0, 2000.0)
 _FILTER_HZ: Final = 20.0
@@ -50,8 +58,6 @@ _THRUST_CURVE: Final = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_BA
 _USED: Final = frozenset(
     {*FIRMWARE_NAMES, *UNSUPPORTED, *_THRUST_CURVE, "SCHED_LOOP_RATE", "INS_ACCEL_FILTER"} - {_LEARNED}
 )
-
-Parameters = Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,21 +104,8 @@ class _Logged:
             v_t_m_s=self.up["TVD"][rows],
             throttle=self.throttle["ThI"][rows],
             throttle_filtered=self.throttle["ThO"][rows] * self.lean[rows],
+            assumed_hover=self.throttle["ThH"][rows],
         )
-
-
-@dataclass(frozen=True, slots=True)
-class _ParameterHistory:
-    """The values in force from each time on, s; `has_newer_names` of release 4.7."""
-
-    times_s: list[float]
-    values: list[Parameters]
-    has_newer_names: bool
-
-    def at(self, time_s: float) -> Parameters:
-        """The values at a time."""
-        place = bisect_right(self.times_s, time_s) - 1
-        return self.values[place] if place >= 0 else {}
 
 
 def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
@@ -136,36 +129,28 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         usable &= condition
         if not usable.any():
             raise _refused(name, field, reason)
-    parts = find_parts(time_s, usable, logged.is_reset, history.times_s)
-    if not parts:
+    given, chosen = choose_parts(time_s, usable, logged.is_reset, history, logged.up["DAD"])
+    if not chosen:
         raise _refused(
             name,
             "PSCD",
             f"has no {SHORTEST_PART_S:g} s flown in an altitude-holding mode without a gap of {LONGEST_INTERVAL_S:g} "
             "s, a jump in altitude or a parameter change",
         )
-    manoeuvres = Manoeuvres(time_s, logged.up["DAD"])
-    given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
-    chosen = manoeuvres.choose([part for part in parts if history.at(float(time_s[part[0]])) == given])
     hover = float(np.median(np.concatenate([logged.throttle["ThH"][slice(*part)] for part in chosen])))
     _require_gains(given, name)
     rate_hz = given.get("SCHED_LOOP_RATE", _RATE_HZ)
     if not _RATES_HZ[0] <= rate_hz <= _RATES_HZ[1]:
         raise _refused(name, "SCHED_LOOP_RATE", f"must be {_RATES_HZ[0]:g} to {_RATES_HZ[1]:g} Hz, got {rate_hz:g}")
     return LoggedFlight(
-        parameters=parameters_from({**given, _LEARNED: hover}),
-        filter_hz=given.get("INS_ACCEL_FILTER", _FILTER_HZ),
-        step_s=1.0 / rate_hz,
-        segments=[logged.segment(_thinned(time_s, part)) for part in chosen],
-        has_newer_names=history.has_newer_names,
+        loop=ArduPilotLoop(
+            parameters=parameters_from({**given, _LEARNED: hover}),
+            filter_hz=given.get("INS_ACCEL_FILTER", _FILTER_HZ),
+            step_s=1.0 / rate_hz,
+            has_newer_names=_has_newer_names(tables),
+        ),
+        segments=[logged.segment(thinned(time_s, part)) for part in chosen],
     )
-
-
-def _thinned(time_s: Samples, part: Part) -> NDArray[np.int64]:
-    """Rows of a part at ten a second or fewer, as the vehicle logs them by default."""
-    first, end = part
-    tenths = np.floor((time_s[first:end] - time_s[first]) / _INTERVAL_S + 0.5)
-    return first + np.flatnonzero(np.diff(tenths, prepend=-1.0) > 0.0)
 
 
 def _logged(tables: Mapping[str, Table], name: str) -> _Logged:
@@ -245,22 +230,19 @@ def _compensating_vibration(tables: Mapping[str, Table], time_s: Samples) -> Row
     return compensating
 
 
-def _parameter_history(tables: Mapping[str, Table]) -> _ParameterHistory:
-    """Times at which parameters that the analysis uses took new values, with all values from then on."""
-    newer = in_newer_names(dict.fromkeys(BOUNDS, 0.0)).keys()
-    history = _ParameterHistory([], [], has_newer_names=any(name in newer for _, name, _ in parameters_in(tables)))
-    values: Parameters = {}
-    for time_s, name, logged in parameters_in(tables):
-        parameter, value = in_older_names(name, logged)
-        if parameter in _USED and np.isfinite(value) and values.get(parameter) != value:
-            values = {**values, parameter: value}
-            history.times_s.append(time_s)
-            history.values.append(values)
-    return history
+def _parameter_history(tables: Mapping[str, Table]) -> ParameterHistory:
+    """The parameters that the analysis uses, by their older names."""
+    logged = ((time_s, *in_older_names(name, value)) for time_s, name, value in parameters_in(tables))
+    return ParameterHistory.of(each for each in logged if each[1] in _USED)
+
+
+def _has_newer_names(tables: Mapping[str, Table]) -> bool:
+    newer = in_newer_names(dict.fromkeys(SPACE.bounds, 0.0)).keys()
+    return any(name in newer for _, name, _ in parameters_in(tables))
 
 
 def _require_gains(given: Parameters, name: str) -> None:
-    for each in BOUNDS:
+    for each in SPACE.bounds:
         if each not in given:
             (newer,) = in_newer_names({each: 0.0})
             raise _refused(name, each, f"is missing, and {newer} of release 4.7 too")

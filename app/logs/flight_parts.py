@@ -1,7 +1,9 @@
 """Parts of a logged flight that can be analysed: rows that follow each other without a gap, a jump or a change."""
 
-from collections.abc import Sequence
-from typing import Final
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +13,39 @@ from app.core.records.trajectory import Samples
 LONGEST_INTERVAL_S: Final = 0.25
 SHORTEST_PART_S: Final = 4.0
 LONGEST_FLIGHT_S: Final = 120.0
+_INTERVAL_S: Final = 0.1
 
 Part = tuple[int, int]
 """First row, and the row after the last."""
 
 Rows = NDArray[np.bool_]
+
+Parameters = Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterHistory:
+    """The values in force from each time on, s, increasing."""
+
+    times_s: Sequence[float]
+    values: Sequence[Parameters]
+
+    @classmethod
+    def of(cls, logged: Iterable[tuple[float, str, float]]) -> Self:
+        """The history of logged values (time, name, value), in order of time."""
+        times_s, history = [], []
+        values: Parameters = {}
+        for time_s, name, value in logged:
+            if np.isfinite(value) and values.get(name) != value:
+                values = {**values, name: value}
+                times_s.append(time_s)
+                history.append(values)
+        return cls(times_s, history)
+
+    def at(self, time_s: float) -> Parameters:
+        """The values at a time."""
+        place = bisect_right(self.times_s, time_s) - 1
+        return self.values[place] if place >= 0 else {}
 
 
 def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> Rows:
@@ -74,3 +104,23 @@ class Manoeuvres:
                 chosen.append((first, end))
                 left_s -= duration_s
         return sorted(chosen)
+
+
+def choose_parts(
+    time_s: Samples, usable: Rows, begins: Rows, history: ParameterHistory, acceleration_m_s2: Samples
+) -> tuple[Parameters, list[Part]]:
+    """The parts to analyse, under the parameters of the one with most manoeuvres, and these parameters; no parts if
+    none is long enough. Signals have shape (n,), `acceleration_m_s2` is that of the reference."""
+    parts = find_parts(time_s, usable, begins, history.times_s)
+    if not parts:
+        return {}, []
+    manoeuvres = Manoeuvres(time_s, acceleration_m_s2)
+    given = history.at(float(time_s[max(parts, key=manoeuvres.within)[0]]))
+    return given, manoeuvres.choose([part for part in parts if history.at(float(time_s[part[0]])) == given])
+
+
+def thinned(time_s: Samples, part: Part) -> NDArray[np.int64]:
+    """Rows of a part at ten a second or fewer, as vehicles log them by default."""
+    first, end = part
+    tenths = np.floor((time_s[first:end] - time_s[first]) / _INTERVAL_S + 0.5)
+    return first + np.flatnonzero(np.diff(tenths, prepend=-1.0) > 0.0)

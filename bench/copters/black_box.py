@@ -1,7 +1,7 @@
 """Black-box searches for gains on a vehicle, flight by flight, without a model.
 
-Each begins with the gains of the first flight, knows the error of single flights alone, and searches the bounds of a
-proposal as a unit cube of the gains' logarithms.
+Each begins with the gains of the first flight, knows the error of single flights alone, and searches the space of
+a proposal as a unit cube.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from app.core.analysis.proposal import BOUNDS
+from app.core.analysis.loop import GainSpace
 from app.core.records.trajectory import Samples
 from bench.targets.flying import BudgetSpentError
 
@@ -21,7 +21,6 @@ BUDGET: Final = 20
 _FIRST_STEP: Final = 0.25
 
 Gains = Mapping[str, float]
-_LOW, _HIGH = np.log(np.array(list(BOUNDS.values()))).T
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +36,10 @@ def best_of(trials: Sequence[Trial]) -> Trial:
     return min(trials, key=lambda trial: trial.error_m)
 
 
-def nelder_mead(first: Gains, fly: Callable[[Gains], float], *, seed: int) -> list[Trial]:  # noqa: ARG001
+def nelder_mead(space: GainSpace, first: Gains, fly: Callable[[Gains], float], *, seed: int) -> list[Trial]:  # noqa: ARG001
     """The simplex of Nelder and Mead, with first steps of a quarter of each range."""
-    flown = _Flown(fly)
-    start = _point(first)
+    flown = _Flown(space, fly)
+    start = flown.point(first)
     simplex = np.vstack((start, start + np.diag(np.where(start > 0.5, -_FIRST_STEP, _FIRST_STEP))))
     with suppress(BudgetSpentError):
         minimize(
@@ -53,10 +52,10 @@ def nelder_mead(first: Gains, fly: Callable[[Gains], float], *, seed: int) -> li
     return flown.trials
 
 
-def quadratic_models(first: Gains, fly: Callable[[Gains], float], *, seed: int) -> list[Trial]:  # noqa: ARG001
+def quadratic_models(space: GainSpace, first: Gains, fly: Callable[[Gains], float], *, seed: int) -> list[Trial]:  # noqa: ARG001
     """COBYQA: a quadratic model of the error within a trust region."""
-    flown = _Flown(fly)
-    start = _point(first)
+    flown = _Flown(space, fly)
+    start = flown.point(first)
     with suppress(BudgetSpentError):
         minimize(
             flown.error,
@@ -68,12 +67,12 @@ def quadratic_models(first: Gains, fly: Callable[[Gains], float], *, seed: int) 
     return flown.trials
 
 
-def random_search(first: Gains, fly: Callable[[Gains], float], *, seed: int) -> list[Trial]:
+def random_search(space: GainSpace, first: Gains, fly: Callable[[Gains], float], *, seed: int) -> list[Trial]:
     """Points that fill the bounds evenly (Sobol), in random order."""
-    flown = _Flown(fly)
-    points = qmc.Sobol(len(BOUNDS), rng=np.random.default_rng(seed)).random_base2(5)
+    flown = _Flown(space, fly)
+    points = qmc.Sobol(len(space.bounds), rng=np.random.default_rng(seed)).random_base2(5)
     with suppress(BudgetSpentError):
-        for point in (_point(first), *points):
+        for point in (flown.point(first), *points):
             flown.error(point)
     return flown.trials
 
@@ -88,18 +87,19 @@ SEARCHES: Final[Mapping[str, Callable[..., list[Trial]]]] = {
 class _Flown:
     """The flights of a search; raises BudgetSpentError instead of flying one too many."""
 
-    def __init__(self, fly: Callable[[Gains], float]) -> None:
-        self._fly = fly
+    def __init__(self, space: GainSpace, fly: Callable[[Gains], float]) -> None:
+        self._space, self._fly = space, fly
+        ends = [{name: ends[place] for name, ends in space.bounds.items()} for place in (0, 1)]
+        self._low, self._high = map(space.coordinates, ends)
         self.trials: list[Trial] = []
 
     def error(self, point: Samples) -> float:
         if len(self.trials) == BUDGET:
             raise BudgetSpentError
-        values = np.exp(_LOW + np.clip(point, 0.0, 1.0) * (_HIGH - _LOW)).tolist()
-        gains = dict(zip(BOUNDS, values, strict=True))
+        gains = self._space.gains_at(self._low + np.clip(point, 0.0, 1.0) * (self._high - self._low))
         self.trials.append(Trial(gains, self._fly(gains)))
         return self.trials[-1].error_m
 
-
-def _point(gains: Gains) -> Samples:
-    return np.asarray((np.log([gains[name] for name in BOUNDS]) - _LOW) / (_HIGH - _LOW))
+    def point(self, gains: Gains) -> Samples:
+        """The gains in the unit cube, shape (k,)."""
+        return np.asarray((self._space.coordinates(gains) - self._low) / (self._high - self._low))

@@ -10,7 +10,9 @@ from typing import Final
 import numpy as np
 from scipy.signal import lfilter
 
-from app.core.analysis.flight import LoggedFlight, Segment
+from app.core.analysis.ardupilot_loop import ArduPilotLoop
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.segment import Segment
 from app.core.control import ardupilot as loop
 from app.core.control.ardupilot_parameters import DT, STEP_S, THROTTLE_GAIN, Packed, Parameters
 from app.core.kernels import kernel
@@ -31,8 +33,7 @@ _GUST_S, _CLIMB_RATE_WANDER_S, _ALTITUDE_WANDER_S = 0.5, 3.0, 5.0
 # Indices of a packed vehicle.
 _HOVER, _QUADRATIC, _LAG_GAIN, _DRAG, _DRAG_QUADRATIC, _SAG, _DEAD_STEPS = range(7)
 
-# Columns of the weather, and of the flown steps.
-_GUST, _NOISE, _CLIMB_RATE_ERROR, _ALTITUDE_ERROR = range(4)
+# Columns of the flown steps.
 _Z, _V, _A, _Z_D, _V_D, _A_D, _V_T, _THROTTLE, _FILTERED = range(9)
 
 
@@ -108,7 +109,15 @@ def fly_steps(copter: SimulatedCopter, parameters: Parameters, *, seed: int) -> 
     targets = np.full(_STEPS, HEIGHT_M)
     targets[_SCORED_FROM : _SCORED_FROM + round(STEP_LASTS_S / STEP_S)] += CLIMB_M
     numerator, denominator = accelerometer_filter(FILTER_HZ, STEP_S)
-    _fly(state, p, _packed(copter), _weather(copter, seed), targets, np.concatenate([numerator, denominator]), flown)
+    _fly(
+        state,
+        p,
+        packed(copter, STEP_S),
+        weather_of(copter, seed, _STEPS, STEP_S),
+        targets,
+        np.concatenate([numerator, denominator]),
+        flown,
+    )
     scored = flown[_SCORED_FROM:]
     rows = flown[::_ROW_EVERY]
     segment = Segment(
@@ -122,45 +131,73 @@ def fly_steps(copter: SimulatedCopter, parameters: Parameters, *, seed: int) -> 
         v_t_m_s=rows[:, _V_T],
         throttle=rows[:, _THROTTLE],
         throttle_filtered=rows[:, _FILTERED],
+        assumed_hover=np.full(len(rows), parameters.hover_throttle),
     )
     return StepFlight(
         error_m=float(np.abs(scored[:, _Z_D] - scored[:, _Z]).mean()),
         activity=float(np.std(scored[:, _THROTTLE] - scored[:, _FILTERED])),
-        log=LoggedFlight(parameters=parameters, filter_hz=FILTER_HZ, step_s=STEP_S, segments=[segment]),
+        log=LoggedFlight(loop=loop_of(parameters), segments=[segment]),
     )
 
 
-def _packed(copter: SimulatedCopter) -> Samples:
+def loop_of(parameters: Parameters) -> ArduPilotLoop:
+    """The loop of every flight, with these parameters."""
+    return ArduPilotLoop(parameters=parameters, filter_hz=FILTER_HZ, step_s=STEP_S)
+
+
+def packed(copter: SimulatedCopter, step_s: float) -> Samples:
+    """Constants of `move` for steps of this duration."""
     return np.array([
         copter.hover_throttle,
         copter.quadratic,
-        STEP_S / (STEP_S + copter.motor_lag_s),
+        step_s / (step_s + copter.motor_lag_s),
         copter.drag_1_s,
         copter.drag_1_m,
         copter.sag / 33.0,
-        round(copter.dead_time_s / STEP_S),
+        round(copter.dead_time_s / step_s),
     ])  # fmt: skip
 
 
-def _weather(copter: SimulatedCopter, seed: int) -> Samples:
+def weather_of(
+    copter: SimulatedCopter,
+    seed: int,
+    steps: int,
+    step_s: float,
+    *,
+    climb_rate_wander_s: float = _CLIMB_RATE_WANDER_S,
+) -> Samples:
     """Gust, noise of the accelerometer, errors of the estimated climb rate and altitude at each step, shape (n, 4)."""
     random = np.random.default_rng(seed)
     slow = (
         (copter.gust_m_s2, _GUST_S),
-        (copter.wander_m_s, _CLIMB_RATE_WANDER_S),
+        (copter.wander_m_s, climb_rate_wander_s),
         (copter.wander_m, _ALTITUDE_WANDER_S),
     )
-    gust, climb_rate, altitude = (deviation * _coloured(random, time_s) for deviation, time_s in slow)
-    noise, _ = lfilter(*accelerometer_filter(FILTER_HZ, STEP_S), random.standard_normal(_STEPS), zi=np.zeros(2))
+    gust, climb_rate, altitude = (deviation * _coloured(random, steps, step_s / time_s) for deviation, time_s in slow)
+    noise, _ = lfilter(*accelerometer_filter(FILTER_HZ, step_s), random.standard_normal(steps), zi=np.zeros(2))
     return np.column_stack([gust, copter.noise_m_s2 * noise / noise.std(), climb_rate, altitude])
 
 
-def _coloured(random: np.random.Generator, time_s: float) -> Samples:
-    """Noise of standard deviation 1 that is correlated over `time_s`."""
-    kept = float(np.exp(-STEP_S / time_s))
-    drive = np.sqrt(1.0 - kept**2) * random.standard_normal(_STEPS)
+def _coloured(random: np.random.Generator, steps: int, step: float) -> Samples:
+    """Noise of standard deviation 1, correlated over the time of which a step is the share `step`."""
+    kept = float(np.exp(-step))
+    drive = np.sqrt(1.0 - kept**2) * random.standard_normal(steps)
     values, _ = lfilter([1.0], [1.0, -kept], drive, zi=[kept * random.standard_normal()])
     return np.asarray(values)
+
+
+@kernel
+def move(moving: Samples, copter: Samples, command: float, time_s: float, gust: float, dt: float) -> float:
+    """Move the vehicle by a step of `dt` with this throttle, `time_s` into the flight; returns its acceleration."""
+    hover, quadratic = copter[0], copter[1]
+    weight = (1.0 - quadratic) * hover + quadratic * hover * hover
+    moving[0] += copter[2] * (command - moving[0])
+    lagged, v = moving[0], moving[2]
+    thrust = ((1.0 - quadratic) * lagged + quadratic * lagged * lagged) / weight * (1.0 - copter[5] * time_s)
+    a: float = GRAVITY_M_S2 * (thrust - 1.0) - copter[3] * v - copter[4] * v * abs(v) + gust
+    moving[2] += dt * a
+    moving[1] += dt * moving[2]
+    return a
 
 
 @kernel
@@ -173,14 +210,14 @@ def _fly(
     accelerometer: Samples,
     flown: Samples,
 ) -> None:
-    hover, quadratic = copter[0], copter[1]
-    weight = (1.0 - quadratic) * hover + quadratic * hover * hover
-    lagged, z, v, sensed, memory_1, memory_2 = hover, targets[0], 0.0, 0.0, 0.0, 0.0
+    hover = copter[0]
+    moving = np.array([hover, targets[0], 0.0])
+    sensed, memory_1, memory_2 = 0.0, 0.0, 0.0
     b, a_filter = accelerometer[:3], accelerometer[3:]
     for row in range(len(targets)):
         filtered = state[loop.THROTTLE_FILTERED]
         filtered += p[THROTTLE_GAIN] * (state[loop.THROTTLE] - filtered)
-        measured_z, measured_v = z + weather[row, 3], v + weather[row, 2]
+        measured_z, measured_v = moving[1] + weather[row, 3], moving[2] + weather[row, 2]
         measured_a = sensed + weather[row, 1]
         loop.shape(state, p, targets[row])
         loop.control(state, p, measured_z, measured_v, measured_a, filtered <= 0.0, filtered >= 1.0)
@@ -190,11 +227,7 @@ def _fly(
         flown[row, 7], flown[row, 8] = state[loop.THROTTLE], state[loop.THROTTLE_FILTERED]
         late = row - int(copter[6])
         command = flown[late, 8] if late >= 0 else hover
-        lagged += copter[2] * (command - lagged)
-        thrust = ((1.0 - quadratic) * lagged + quadratic * lagged * lagged) / weight * (1.0 - copter[5] * row * p[DT])
-        a = GRAVITY_M_S2 * (thrust - 1.0) - copter[3] * v - copter[4] * v * abs(v) + weather[row, 0]
-        v += p[DT] * a
-        z += p[DT] * v
+        a = move(moving, copter, command, row * p[DT], weather[row, 0], p[DT])
         sensed = b[0] * a + memory_1
         memory_1 = b[1] * a - a_filter[1] * sensed + memory_2
         memory_2 = b[2] * a - a_filter[2] * sensed

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
 from app.core.control.ardupilot_parameters import Parameters
 from app.core.errors import InputError, TrajectoryError
@@ -34,6 +35,11 @@ def read(content: bytes) -> LoggedFlight:
     return read_ardupilot_flight(io.BytesIO(content), name="flight.bin")
 
 
+def loop_of(flight: LoggedFlight) -> ArduPilotLoop:
+    assert isinstance(flight.loop, ArduPilotLoop)
+    return flight.loop
+
+
 def refusal(content: bytes) -> tuple[str, str]:
     with pytest.raises(TrajectoryError) as refused:
         read(content)
@@ -51,9 +57,11 @@ def test_the_recorded_flight_is_read_from_takeoff_to_landing() -> None:
     flight = read(recorded("arducopter_steps.bin"))
     (segment,) = flight.segments
     assert (segment.time_s[0], segment.time_s[-1]) == pytest.approx((46.95, 68.65), abs=0.06)
-    assert (flight.parameters.hover_throttle, flight.parameters.takeoff_throttle) == pytest.approx((0.39, 0.9))
-    assert replace(flight.parameters, hover_throttle=0.35, takeoff_throttle=0.9) == Parameters()
-    assert (flight.filter_hz, flight.step_s) == (20.0, 1 / 400)
+    assert (loop_of(flight).parameters.hover_throttle, loop_of(flight).parameters.takeoff_throttle) == pytest.approx(
+        (0.39, 0.9)
+    )
+    assert replace(loop_of(flight).parameters, hover_throttle=0.35, takeoff_throttle=0.9) == Parameters()
+    assert (loop_of(flight).filter_hz, flight.loop.step_s) == (20.0, 1 / 400)
     assert flight.throttle_mean == pytest.approx(0.363, abs=0.002)
 
 
@@ -62,15 +70,15 @@ def test_a_simulated_flight_is_read_as_it_was_flown() -> None:
     (segment,), (flown,) = flight.segments, FLIGHT.segments
     for name in ("z_m", "v_m_s", "a_m_s2", "z_d_m", "v_d_m_s", "a_d_m_s2", "v_t_m_s", "throttle", "throttle_filtered"):
         assert np.asarray(getattr(segment, name)) == pytest.approx(getattr(flown, name), rel=1e-6, abs=1e-6), name
-    assert flight.parameters.hover_throttle == pytest.approx(0.35)
-    assert replace(flight.parameters, hover_throttle=0.35) == Parameters()
+    assert loop_of(flight).parameters.hover_throttle == pytest.approx(0.35)
+    assert replace(loop_of(flight).parameters, hover_throttle=0.35) == Parameters()
 
 
 def test_parameters_of_release_4_7_are_read_by_their_new_names_and_units() -> None:
     older, newer = (read(ardupilot_log(FLIGHT, parameters=each)) for each in (PARAMETERS, NEWER_PARAMETERS))
-    assert (older.has_newer_names, newer.has_newer_names) == (False, True)
-    assert newer.parameters == older.parameters
-    assert newer.named({"PSC_ACCZ_P": 0.5}) == {"PSC_D_ACC_P": 0.05}
+    assert (loop_of(older).has_newer_names, loop_of(newer).has_newer_names) == (False, True)
+    assert loop_of(newer).parameters == loop_of(older).parameters
+    assert newer.loop.named({"PSC_ACCZ_P": 0.5}) == {"PSC_D_ACC_P": 0.05}
 
 
 def test_every_mode_that_holds_altitude_counts_and_landing_does_not() -> None:
@@ -99,14 +107,14 @@ def test_a_log_that_never_left_the_ground_is_refused() -> None:
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:
     """The step up is at 14 s, the one down at 20.5 s; other gains from 12 s on are those of the flight."""
     flight = read(ardupilot_log(FLIGHT, changes=((12.0, "PSC_ACCZ_P", 0.8),)))
-    assert flight.parameters.acceleration_p == pytest.approx(0.8)
+    assert loop_of(flight).parameters.acceleration_p == pytest.approx(0.8)
     assert spans_s(flight) == [(12.0, 26.9)]
 
 
 def test_learned_hover_throttle_does_not_end_a_part() -> None:
     flight = read(ardupilot_log(FLIGHT, changes=((15.0, "MOT_THST_HOVER", 0.36),)))
     assert spans_s(flight) == [(10.0, 26.9)]
-    assert flight.parameters.hover_throttle == pytest.approx(0.35)
+    assert loop_of(flight).parameters.hover_throttle == pytest.approx(0.35)
 
 
 def test_parts_with_the_same_parameters_count_together() -> None:

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import AltitudeLoop
 from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
-from app.core.analysis.proposal import BOUNDS, propose, with_gains
+from app.core.analysis.proposal import propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
-from app.core.control.ardupilot_shaping import square_root
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.copter import FLOWN
 from app.core.records.trajectory import Samples
@@ -20,15 +20,10 @@ _SHORTEST_S: Final = 6.0
 _LEAST_CHANGE_M: Final = 0.3
 _LARGEST_SATURATION: Final = 0.05
 _LEAST_VARIATION: Final = 1e-6
-_OTHER_CONTROLLER_M_S: Final = 0.02
 _OTHER_CONTROLLER_SHARE: Final = 0.05
 _LARGEST_RESIDUAL_M_S2: Final = 1.5
 _LARGEST_MISFIT: Final = (0.005, 0.25)
 _LARGEST_SLOPE_DEVIATION: Final = 0.15
-_FLY: Final = (
-    "Fly at a height of 3 m or more in a mode that holds altitude (GUIDED, LOITER, ALT_HOLD, AUTO): hover for 5 s, "
-    "climb 2 m, hover for 5 s, descend 2 m, hover for 5 s; with NTUN and CTUN in LOG_BITMASK."
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,10 +68,11 @@ class Response:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
-    """Everything that a log answers. `assessments` begins with the gains of the flight; `proposed` is None if the log
-    does not suffice, no gains do, or none are better, which `insufficient` then says. `at_limit` names proposed gains
-    at an end of the range that was searched."""
+    """Everything that a log answers. `loop` is that of the flight. `assessments` begins with the gains of the flight;
+    `proposed` is None if the log does not suffice, no gains do, or none are better, which `insufficient` then says.
+    `at_limit` names proposed gains at an end of the range that was searched."""
 
+    loop: AltitudeLoop
     behaviour: Behaviour
     estimate: CopterEstimate
     assessments: Sequence[Assessment]
@@ -110,8 +106,7 @@ class Analysis:
         flown = self.assessments[0].gains
         lines = [
             f"# Gainline, from {file_name}. Load on the ground; fly first at a safe height, ready to take over.",
-            *(f"# {name} was {value:g}" for name, value in flown.items()),
-            *(f"{name},{value:g}" for name, value in self.proposed.gains.items()),
+            *self.loop.parameter_lines(flown, self.proposed.gains),
         ]
         return "\n".join((*lines, ""))
 
@@ -125,33 +120,32 @@ def analyze(flight: LoggedFlight) -> Analysis:
 
     Raises TrajectoryError if the flight contains nothing to learn from, or something that no copter of the model does.
     """
-    behaviour = _behaviour(flight)
-    _require_altitude_changes(behaviour)
+    loop, behaviour = flight.loop, _behaviour(flight)
+    _require_altitude_changes(loop, behaviour)
     _require_signals(flight)
     _require_own_controller(flight)
     estimate = fit_copter(flight)
     model = FlightModel(flight, estimate.draws)
-    present = _assess("As flown", _gains_of(flight), flight, model, estimate)
-    _require_likeness(behaviour, estimate, present)
-    usual = rules(flight)
-    compared = [present, *(_assess(name, gains, flight, model, estimate) for name, gains in usual.items())]
-    insufficient = _insufficient(estimate)
-    gains = None if insufficient else propose(flight, estimate.few, [_gains_of(flight), *usual.values()])
-    proposed = _assess("Proposed", gains, flight, model, estimate) if gains else None
+    present = _assess("As flown", loop.gains, loop, model, estimate)
+    _require_likeness(loop, behaviour, estimate, present)
+    usual = loop.rules(flight.throttle_mean)
+    compared = [present, *(_assess(name, gains, loop, model, estimate) for name, gains in usual.items())]
+    insufficient = _insufficient(loop, estimate)
+    gains = None if insufficient else propose(flight, estimate.few, [loop.gains, *usual.values()])
+    proposed = _assess("Proposed", gains, loop, model, estimate) if gains else None
     if proposed is None:
-        insufficient = insufficient or _NONE_ALLOWED
+        insufficient = insufficient or f"{_NONE_ALLOWED} {loop.texts.lags}."
     elif not _is_better(proposed, present):
         gains, proposed, insufficient = None, None, _NONE_BETTER
     return Analysis(
+        loop=loop,
         behaviour=behaviour,
         estimate=estimate,
         assessments=tuple(compared),
         proposed=proposed,
         insufficient=insufficient,
-        at_limit=[*flight.named({name: gains[name] for name in BOUNDS if gains[name] in BOUNDS[name]})]
-        if gains
-        else [],
-        response=_response(flight, estimate, gains or _gains_of(flight)),
+        at_limit=[*loop.named({name: gains[name] for name in loop.space.at_limit(gains)})] if gains else [],
+        response=_response(flight, estimate, gains or loop.gains),
     )
 
 
@@ -167,15 +161,14 @@ _NONE_BETTER: Final = (
     "than 5 %."
 )
 _NONE_ALLOWED: Final = (
-    "No gains within the documented ranges reach the required margin on this vehicle. Reduce its lags first: motors, "
-    "accelerometer filter, acceleration controller filters."
+    "No gains within the documented ranges reach the required margin on this vehicle. Reduce its lags first:"
 )
 
 
 def _response(flight: LoggedFlight, estimate: CopterEstimate, gains: Mapping[str, float]) -> Response:
     segment = max(flight.segments, key=lambda each: float(np.ptp(each.z_d_m)))
     alone = replace(flight, segments=[segment])
-    rows = FlightModel(alone, [estimate.mean]).rows(with_gains(flight.parameters, gains))
+    rows = FlightModel(alone, [estimate.mean]).rows(flight.loop.with_gains(gains))
     return Response(
         time_s=segment.time_s - flight.segments[0].time_s[0],
         reference_m=segment.z_d_m,
@@ -186,55 +179,32 @@ def _response(flight: LoggedFlight, estimate: CopterEstimate, gains: Mapping[str
     )
 
 
-def rules(flight: LoggedFlight) -> dict[str, dict[str, float]]:
-    """Gains that are set without a model, by name: the firmware's defaults, the rule of its documentation, two fixed
-    sets."""
-    hover = flight.throttle_mean
-    by_hover = _with_names((1.0, 5.0, float(f"{hover:.2g}"), float(f"{2.0 * hover:.2g}")))
-    fixed = [_with_names(values) for values in ((2.0, 7.0, 1.0, 2.0), (3.0, 8.0, 0.5, 3.0))]
-    return {
-        "ArduCopter's default gains": _with_names((1.0, 5.0, 0.5, 1.0)),
-        f"P = {'0.1 ' if flight.has_newer_names else ''}hover throttle, I = 2 P": by_hover,
-        **{f"For comparison: {_in_order(flight.named(gains))}": gains for gains in fixed},
-    }
-
-
-def _in_order(gains: Mapping[str, float]) -> str:
-    return ", ".join(f"{value:g}" for value in gains.values())
-
-
-def _with_names(values: Sequence[float]) -> dict[str, float]:
-    return dict(zip(BOUNDS, values, strict=True))
-
-
-def _gains_of(flight: LoggedFlight) -> dict[str, float]:
-    return {name: value for name, value in flight.parameters.gains.items() if name in BOUNDS}
-
-
 def _behaviour(flight: LoggedFlight) -> Behaviour:
     deviation = np.concatenate([np.abs(each.z_d_m - each.z_m)[each.scored] for each in flight.segments])
     reference = [each.z_d_m[each.scored] for each in flight.segments]
     throttle = np.concatenate([each.throttle[each.scored] for each in flight.segments])
+    least, most = flight.loop.throttle_limits
     return Behaviour(
         duration_s=sum(each.duration_s for each in flight.segments),
         error_m=flight.error_m,
         largest_deviation_m=float(deviation.max()),
         reference_range_m=max(float(np.ptp(each)) for each in reference),
         throttle_mean=flight.throttle_mean,
-        saturated_share=float(np.mean((throttle <= 0.0) | (throttle >= 1.0))),
+        saturated_share=float(np.mean((throttle <= least) | (throttle >= most))),
     )
 
 
-def _require_altitude_changes(behaviour: Behaviour) -> None:
+def _require_altitude_changes(loop: AltitudeLoop, behaviour: Behaviour) -> None:
     if behaviour.duration_s < _SHORTEST_S:
-        raise _unanswered(f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed")
+        raise _unanswered(loop, f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed")
     if behaviour.reference_range_m < _LEAST_CHANGE_M:
         raise _unanswered(
+            loop,
             f"has no altitude changes: the reference moves by {behaviour.reference_range_m:.2f} m, and "
-            f"{_LEAST_CHANGE_M:g} m are needed"
+            f"{_LEAST_CHANGE_M:g} m are needed",
         )
     if behaviour.saturated_share > _LARGEST_SATURATION:
-        raise _unanswered(f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows")
+        raise _unanswered(loop, f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows")
 
 
 def _require_signals(flight: LoggedFlight) -> None:
@@ -246,64 +216,66 @@ def _require_signals(flight: LoggedFlight) -> None:
             if np.ptp(values) < _LEAST_VARIATION
         ]
         if constant:
-            raise _unanswered(f"has a constant {' and '.join(constant)}: nothing can be learned from it")
+            raise _unanswered(flight.loop, f"has a constant {' and '.join(constant)}: nothing can be learned from it")
 
 
 def _require_own_controller(flight: LoggedFlight) -> None:
     """Require that the climb rate target is what the replica's position controller computes."""
-    p, acceleration = flight.parameters.position_p_1_s, flight.parameters.acceleration_m_s2
-    differing, rows = 0, 0
-    for each in flight.segments:
-        targets = [square_root(error, p, acceleration, 0.0) for error in (each.z_d_m - each.z_m).tolist()]
-        differing += int(np.sum(np.abs(np.array(targets) + each.v_d_m_s - each.v_t_m_s) > _OTHER_CONTROLLER_M_S))
-        rows += len(targets)
-    if differing > _OTHER_CONTROLLER_SHARE * rows:
+    loop = flight.loop
+    apart = np.concatenate([np.abs(loop.climb_rate_targets(each) - each.v_t_m_s) for each in flight.segments])
+    differing = int(np.sum(apart > loop.target_tolerance_m_s))
+    if differing > _OTHER_CONTROLLER_SHARE * len(apart):
         raise _unanswered(
-            f"has a climb rate target that does not follow from the logged parameters, in {differing} of {rows} rows: "
-            "terrain following, or a release with another position controller"
+            loop,
+            f"has a climb rate target that does not follow from the logged parameters, in {differing} of {len(apart)} "
+            f"rows: {loop.texts.other_controller}",
         )
 
 
-def _require_likeness(behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> None:
+def _require_likeness(loop: AltitudeLoop, behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> None:
     if estimate.residual_m_s2 > _LARGEST_RESIDUAL_M_S2:
         raise _unanswered(
+            loop,
             f"has accelerations that throttle and climb rate do not explain, {estimate.residual_m_s2:.1f} m/s² rms: "
-            "gusts too strong, oscillating rate controllers, or vibration compensation"
+            "gusts too strong, oscillating rate controllers, or vibration compensation",
         )
     least, share = _LARGEST_MISFIT
     misfit_m = abs(present.prediction.error_m - behaviour.error_m)
     if misfit_m > max(least, share * behaviour.error_m):
         raise _unanswered(
+            loop,
             f"has a deviation of {1e3 * behaviour.error_m:.1f} mm, where the gains in the log make the fitted vehicle "
             f"deviate by {1e3 * present.prediction.error_m:.1f} mm: it flew with other gains, for instance set by a "
-            "tuning knob, or something else replaced the controller"
+            "tuning knob, or something else replaced the controller",
         )
 
 
-def _insufficient(estimate: CopterEstimate) -> str | None:
+def _insufficient(loop: AltitudeLoop, estimate: CopterEstimate) -> str | None:
     known_to = estimate.deviation.thrust_slope
     if known_to <= _LARGEST_SLOPE_DEVIATION:
         return None
     return (
         f"The log is not sufficient to propose gains: the thrust slope is known only to ±{known_to:.2f}; "
-        f"±{_LARGEST_SLOPE_DEVIATION} is needed. {_FLY}"
+        f"±{_LARGEST_SLOPE_DEVIATION} is needed. {loop.texts.what_to_fly}"
     )
 
 
 def _assess(
-    name: str, gains: Mapping[str, float], flight: LoggedFlight, model: FlightModel, estimate: CopterEstimate
+    name: str, gains: Mapping[str, float], flown: AltitudeLoop, model: FlightModel, estimate: CopterEstimate
 ) -> Assessment:
-    parameters = with_gains(flight.parameters, gains)
-    prediction = model.predict(parameters)
-    margins = [gain_margin(parameters, each, filter_hz=flight.filter_hz, step_s=flight.step_s) for each in estimate.few]
+    loop = flown.with_gains(gains)
+    prediction = model.predict(loop)
+    margins = [gain_margin(loop, each) for each in estimate.few]
     return Assessment(
         name=name,
-        gains=flight.named(gains),
+        gains=flown.named(gains),
         prediction=prediction,
-        activity=prediction.activity / model.fly(flight.parameters)[1],
+        activity=prediction.activity / model.fly(flown)[1],
         margin=min(margins),
     )
 
 
-def _unanswered(reason: str) -> TrajectoryError:
-    return TrajectoryError("The log cannot be analysed.", hint=_FLY, problems=(Problem("file", reason),))
+def _unanswered(loop: AltitudeLoop, reason: str) -> TrajectoryError:
+    return TrajectoryError(
+        "The log cannot be analysed.", hint=loop.texts.what_to_fly, problems=(Problem("file", reason),)
+    )

@@ -5,8 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from app.core.analysis.flight import LoggedFlight, Segment, Steps
-from app.core.models.copter import DISTURBANCES, GRAVITY_M_S2, Copter, accelerometer_filter, filtered, motor_filter
+from app.core.analysis.loop import AltitudeLoop
+from app.core.analysis.segment import Segment, Steps
+from app.core.models.copter import DISTURBANCES, GRAVITY_M_S2, Copter, filtered, motor_filter
 from app.core.records.trajectory import Samples
 
 _SEED: Final = 1
@@ -18,10 +19,10 @@ from what lasts for seconds, of which a flight has few. With this value nine of 
 within a 90 % interval."""
 
 
-def disturbances_of(flight: LoggedFlight, segment: Segment, steps: Steps, copter: Copter) -> Samples:
+def disturbances_of(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: Copter) -> Samples:
     """Disturbances at every step, shape (m, 4) as `DISTURBANCES`, with which the copter flies what was flown."""
-    accelerometer = accelerometer_filter(flight.filter_hz, flight.step_s)
-    modelled = modelled_acceleration(steps, copter, flight.step_s)
+    accelerometer = loop.accelerometer
+    modelled = modelled_acceleration(steps, copter, loop.step_s)
     sensed = np.interp(segment.time_s, steps.time_s, filtered(modelled, accelerometer))
     unmodelled = segment.a_m_s2 - sensed
     gust_at_rows, noise_m_s2 = _separated(unmodelled)
@@ -30,8 +31,8 @@ def disturbances_of(flight: LoggedFlight, segment: Segment, steps: Steps, copter
 
     def beyond(values: Samples, rates: Samples) -> Samples:
         """Rate at which `values`, at the rows, changed beyond the integral of `rates`, constant between two rows."""
-        integral = np.append(0.0, np.cumsum(rates) * flight.step_s)
-        at_rows = np.interp(segment.time_s, np.append(steps.time_s, steps.time_s[-1] + flight.step_s), integral)
+        integral = np.append(0.0, np.cumsum(rates) * loop.step_s)
+        at_rows = np.interp(segment.time_s, np.append(steps.time_s, steps.time_s[-1] + loop.step_s), integral)
         row = np.searchsorted(segment.time_s, steps.time_s, side="right") - 1
         rate: Samples = ((np.diff(values) - np.diff(at_rows)) / np.diff(segment.time_s))[row]
         return rate

@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.disturbances import disturbances_of, in_other_weather
-from app.core.analysis.flight import LEAD_S, LoggedFlight, Segment, Steps, interpolated
-from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import Parameters
-from app.core.models.copter import FLOWN, GRAVITY_M_S2, Copter, fly, start_body
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import AltitudeLoop, Run
+from app.core.analysis.segment import LEAD_S, Segment, Steps, interpolated
+from app.core.models.copter import FLOWN, GRAVITY_M_S2, Copter
 from app.core.records.trajectory import Samples
 
 _SEED: Final = 1
@@ -26,7 +26,7 @@ _QUANTILES: Final = (0.05, 0.95)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
     """Predicted error, m, with its 90 % interval for a single flight, and the throttle activity: the standard
-    deviation of the demanded throttle about its own 2 Hz low-pass, which the motors follow, share of full."""
+    deviation of the demanded throttle about its own 2 Hz low-pass, share of full."""
 
     error_m: float
     low_m: float
@@ -34,25 +34,14 @@ class Prediction:
     activity: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """A segment for one copter, as the kernel takes it, and the start: the altitude of the flight, and the reference's
-    climb rate and acceleration, with the throttle for them."""
-
-    copter: Samples
-    reference: Samples
-    disturbances: Samples
-    start: tuple[float, float, float, float]
-
-
 class FlightModel:
     """A flight and the copters that it allows; predicts it with other gains."""
 
     def __init__(self, flight: LoggedFlight, copters: Sequence[Copter]) -> None:
         self._flight = flight
-        steps = [interpolated(each, flight.step_s) for each in flight.segments]
+        steps = [interpolated(each, flight.loop.step_s) for each in flight.segments]
         self._runs = [
-            [_run(flight, segment, each, copter) for segment, each in zip(flight.segments, steps, strict=True)]
+            [_run(flight.loop, segment, each, copter) for segment, each in zip(flight.segments, steps, strict=True)]
             for copter in copters
         ]
         random = np.random.default_rng(_SEED)
@@ -61,55 +50,47 @@ class FlightModel:
             for runs in self._runs
         ]
 
-    def fly(self, parameters: Parameters) -> tuple[float, float]:
+    def fly(self, loop: AltitudeLoop) -> tuple[float, float]:
         """Error, m, and throttle activity in the weather of the flight, means of the copters."""
-        error_m, activity = np.mean([self._flown(runs, parameters) for runs in self._runs], axis=0).tolist()
+        error_m, activity = np.mean([self._flown(runs, loop) for runs in self._runs], axis=0).tolist()
         return error_m, activity
 
-    def predict(self, parameters: Parameters) -> Prediction:
+    def predict(self, loop: AltitudeLoop) -> Prediction:
         """Prediction for a single flight: the disturbances of the interval meet the reference at other times."""
-        error_m, activity = self.fly(parameters)
-        elsewhen = np.array([self._flown(runs, parameters)[0] for runs in self._elsewhen])
+        error_m, activity = self.fly(loop)
+        elsewhen = np.array([self._flown(runs, loop)[0] for runs in self._elsewhen])
         low_m, high_m = np.quantile(elsewhen + (error_m - elsewhen.mean()), _QUANTILES).tolist()
         return Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity)
 
-    def rows(self, parameters: Parameters) -> Samples:
-        """What the first copter flies in the weather of the flight, at the rows of the first segment, shape (n, 5) as
+    def rows(self, loop: AltitudeLoop) -> Samples:
+        """What the first copter flies in the weather of the flight, at the rows of the first segment, shape (n, 6) as
         `FLOWN`."""
         time_s = self._flight.segments[0].time_s
-        flown = self._trajectory(self._runs[0][0], parameters)
-        place = np.round((time_s - time_s[0]) / self._flight.step_s).astype(np.int64)
+        flown = loop.fly(self._runs[0][0])
+        place = np.round((time_s - time_s[0]) / self._flight.loop.step_s).astype(np.int64)
         return np.asarray(flown[np.minimum(place, len(flown) - 1)])
 
-    def _flown(self, runs: Sequence[_Run], parameters: Parameters) -> tuple[float, float]:
+    def _flown(self, runs: Sequence[Run], loop: AltitudeLoop) -> tuple[float, float]:
         """Error, m, and throttle activity over all segments."""
-        lead = round(LEAD_S / self._flight.step_s)
+        lead = round(LEAD_S / self._flight.loop.step_s)
         deviations, fast = [], []
         for run in runs:
-            flown = self._trajectory(run, parameters)[lead:]
+            flown = loop.fly(run)[lead:]
             deviations.append(np.abs(run.reference[lead:, 0] - flown[:, 0]))
-            fast.append(flown[:, 3] - flown[:, 4])
+            fast.append(flown[:, FLOWN.index("throttle")] - flown[:, FLOWN.index("throttle_slow")])
         return float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std())
 
-    def _trajectory(self, run: _Run, parameters: Parameters) -> Samples:
-        """The segment flown with these gains, shape (m, 5) as `FLOWN`."""
-        packed = parameters.packed(self._flight.step_s)
-        throttle, z_m, v_m_s, a_m_s2 = run.start
-        state, flown = np.empty(loop.STATE_SIZE), np.empty((len(run.reference), len(FLOWN)))
-        loop.start_hover(state, packed, throttle, z_m, v_m_s, a_m_s2)
-        body = start_body(throttle, z_m, v_m_s, a_m_s2, run.copter)
-        fly(state, body, packed, run.copter, run.reference, run.disturbances, flown)
-        return flown
 
-
-def _run(flight: LoggedFlight, segment: Segment, steps: Steps, copter: Copter) -> _Run:
-    disturbances = disturbances_of(flight, segment, steps, copter)
-    _, v_d, a_d = steps.reference[0].tolist()
-    gust = float(disturbances[: round(LEAD_S / flight.step_s), 0].mean())
-    lift = max(1.0 + (a_d + copter.drag_1_s * v_d - gust) / GRAVITY_M_S2, 0.0)
-    return _Run(
-        copter=copter.packed(filter_hz=flight.filter_hz, dt_s=flight.step_s),
+def _run(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: Copter) -> Run:
+    """The start is the altitude of the flight, and the loop's own climb rate and acceleration, with the throttle for
+    them in the wind of the first seconds."""
+    disturbances = disturbances_of(loop, segment, steps, copter)
+    v, a = loop.start(steps)
+    gust = float(disturbances[: round(LEAD_S / loop.step_s), 0].mean())
+    lift = max(1.0 + (a + copter.drag_1_s * v - gust) / GRAVITY_M_S2, 0.0)
+    return Run(
+        copter=loop.packed(copter),
         reference=steps.reference,
         disturbances=disturbances,
-        start=(copter.hover_throttle * lift ** (1.0 / copter.thrust_slope), float(segment.z_m[0]), v_d, a_d),
+        start=(copter.hover_throttle * lift ** (1.0 / copter.thrust_slope), float(segment.z_m[0]), v, a),
     )

@@ -2,33 +2,17 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cache
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import AltitudeLoop, GainSpace
 from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, gain_margin
 from app.core.analysis.prediction import FlightModel
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, Parameters
 from app.core.models.copter import Copter
 from app.core.records.trajectory import Samples
-
-BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
-    {
-        "PSC_POSZ_P": (1.0, 3.0),
-        "PSC_VELZ_P": (1.0, 8.0),
-        "PSC_ACCZ_P": (0.2, 1.5),
-        "PSC_ACCZ_I": (0.2, 3.0),
-    }
-)
-"""Gains that are proposed, and their documented ranges; an integral gain below 0.2 fails the arming check."""
-
-_GENTLE: Final[Mapping[str, float]] = MappingProxyType(
-    {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.2, "PSC_ACCZ_I": 0.2}
-)
 
 LARGEST_ACTIVITY: Final = 1.5
 """Throttle activity allowed, relative to that with the gains of the flight."""
@@ -41,39 +25,37 @@ _AS_GOOD: Final = math.log(1.05)
 _ACTIVITY_SOUGHT: Final = 0.97 * LARGEST_ACTIVITY
 """The few copters of a search differ from all of them by up to 3 %."""
 _DIGITS: Final = 3
+_DECIMALS: Final = 2
 _ROUNDING: Final = 0.005
 
 _Point = tuple[float, ...]
-"""Logarithms of the gains, in the order of `BOUNDS`."""
-
-
-def with_gains(parameters: Parameters, gains: Mapping[str, float]) -> Parameters:
-    """The parameters with other values of these gains, by the firmware's names."""
-    return replace(parameters, **{FIRMWARE_NAMES[name][0]: value for name, value in gains.items()})
+"""Coordinates of the gains in the loop's space."""
 
 
 def propose(
     flight: LoggedFlight, copters: Sequence[Copter], starts: Sequence[Mapping[str, float]]
 ) -> dict[str, float] | None:
-    """Gains of `BOUNDS` with three digits, searched for from the best allowed one of `starts` and a gentle set; None if
-    none is allowed. Of what is found and the starts, those within 5 % of the best error, the one with the largest
-    margin.
+    """Gains of the loop's space with three digits, searched for from the best allowed one of `starts` and its gentle
+    set; None if none is allowed. Of what is found and the starts, those within 5 % of the best error, the one with the
+    largest margin.
 
-    Allowed are gains within `BOUNDS` with an acceleration controller's I of at least its P, that ring with none of the
-    copters within the margin, and move the throttle at most `LARGEST_ACTIVITY` times as much as those of the flight.
+    Allowed are gains within the space that ring with none of the copters within the margin, and move the throttle at
+    most `LARGEST_ACTIVITY` times as much as those of the flight.
     """
     from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
+    space = flight.loop.space
     model = FlightModel(flight, copters)
-    _, usual_activity = model.fly(flight.parameters)
+    _, usual_activity = model.fly(flight.loop)
 
-    def parameters(point: _Point) -> Parameters:
-        return with_gains(flight.parameters, dict(zip(BOUNDS, np.exp(point).tolist(), strict=True)))
+    @cache
+    def loop_at(point: _Point) -> AltitudeLoop:
+        return flight.loop.with_gains(space.gains_at(np.array(point)))
 
     @cache
     def flown(point: _Point) -> tuple[float, float]:
         """Logarithms of the predicted error, and of the throttle activity relative to that of the flight."""
-        error_m, activity = model.fly(parameters(point))
+        error_m, activity = model.fly(loop_at(point))
         return math.log(error_m), math.log(activity / usual_activity)
 
     def cost(point: _Point) -> float:
@@ -81,29 +63,21 @@ def propose(
         return error + _PRICE_OF_ACTIVITY * activity
 
     @cache
-    def excess(point: _Point) -> tuple[float, float, float]:
-        """How far the point is beyond what is allowed: in damping, activity, and P over I; allowed if none is
+    def excess(point: _Point) -> tuple[float, ...]:
+        """How far the point is beyond what is allowed: in damping, activity, and the order of gains; allowed if none is
         positive."""
-        damping = min(
-            damping_within_margin(parameters(point), each, filter_hz=flight.filter_hz, step_s=flight.step_s)
-            for each in copters
-        )
-        gains = dict(zip(BOUNDS, point, strict=True))
+        damping = min(damping_within_margin(loop_at(point), each) for each in copters)
         return (
             RINGING_DAMPING - damping,
             flown(point)[1] - math.log(_ACTIVITY_SOUGHT),
-            gains["PSC_ACCZ_P"] - gains["PSC_ACCZ_I"],
+            *space.disorder(np.array(point)),
         )
 
     def margin(point: _Point) -> float:
-        return min(
-            gain_margin(parameters(point), each, filter_hz=flight.filter_hz, step_s=flight.step_s) for each in copters
-        )
+        return min(gain_margin(loop_at(point), each) for each in copters)
 
-    low, high = np.log(np.array(list(BOUNDS.values()))).T
-    points = [
-        tuple(np.clip(np.log([start[name] for name in BOUNDS]), low, high).tolist()) for start in (*starts, _GENTLE)
-    ]
+    low, high = (space.coordinates({name: ends[end] for name, ends in space.bounds.items()}) for end in (0, 1))
+    points = [tuple(space.coordinates(start).tolist()) for start in (*starts, space.gentle)]
     allowed = [point for point in points if max(excess(point)) <= 0.0]
     if not allowed:
         return None
@@ -122,8 +96,16 @@ def propose(
         constraints=NonlinearConstraint(excess_at, -np.inf, -_ROUNDING),
         options={"maxfev": _MOST_FLIGHTS, "initial_tr_radius": _FIRST_STEP, "final_tr_radius": _LAST_STEP},
     )
-    rounded = tuple(math.log(float(f"{value:.{_DIGITS}g}")) for value in np.exp(found.x).tolist())
+    rounded = tuple(space.coordinates(_rounded(space, space.gains_at(found.x))).tolist())
     candidates = [point for point in (rounded, *allowed) if max(excess(point)) <= 0.0]
     least = min(map(cost, candidates))
     best = max((point for point in candidates if cost(point) <= least + _AS_GOOD), key=margin)
-    return {name: float(f"{math.exp(value):.{_DIGITS}g}") for name, value in zip(BOUNDS, best, strict=True)}
+    return _rounded(space, space.gains_at(np.array(best)))
+
+
+def _rounded(space: GainSpace, gains: Mapping[str, float]) -> dict[str, float]:
+    """Gains with three digits; those that may be 0, with two decimals."""
+    return {
+        name: round(value, _DECIMALS) if space.zero(name) else float(f"{value:.{_DIGITS}g}")
+        for name, value in gains.items()
+    }

@@ -3,29 +3,29 @@
     log(1 + a/g) = s·log u − s·log h − (drag/g)·v + disturbance
 
 The throttle also answers to disturbances, which would bias an ordinary regression: a gust raises the vehicle, and the
-loop lowers the throttle. The reference does not answer to them, so throttle and climb rate are first projected on its
-climb rate and acceleration (two-stage least squares). Gusts last from row to row, which makes the result less certain
-than as many independent rows would: gusts that decay exponentially beside noise that does not last are an
-autoregressive moving average, found by its likelihood. The motors' lag is not linear in this equation: each value of a
-grid is weighed by what it leaves that follows the reference, and by what is usual.
+loop lowers the throttle. The reference does not answer to them, so throttle and climb rate are first projected on the
+climb rate and acceleration that follow from it (two-stage least squares). Gusts last from row to row, which makes the
+result less certain than as many independent rows would: gusts that decay exponentially beside noise that does not last
+are an autoregressive moving average, found by its likelihood. The motors' lag is not linear in this equation: each
+value of a grid is weighed by what it leaves that follows the reference, and by what is usual.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
 
-from app.core.analysis.flight import LoggedFlight, Segment, interpolated
-from app.core.models.copter import GRAVITY_M_S2, Copter, accelerometer_filter, filtered, motor_filter
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import AltitudeLoop
+from app.core.analysis.segment import Segment, interpolated
+from app.core.models.copter import GRAVITY_M_S2, Copter, filtered, motor_filter
 from app.core.records.trajectory import Samples
 
-USUAL_SLOPE: Final = (1.0, 0.25)
 USUAL_DRAG_1_S: Final = (0.3, 0.3)
 USUAL_LAG_S: Final = (0.05, 0.05)
-"""Mean and standard deviation over vehicles."""
+"""Mean and standard deviation over vehicles; that of the slope depends on the autopilot."""
 
 _LAGS_S: Final = np.linspace(0.0, 0.25, 26)
 _ROUNDING: Final = np.array([0.0, 0.0, 0.0, 0.01 / math.sqrt(12.0)])
@@ -143,10 +143,12 @@ def fit_copter(flight: LoggedFlight) -> CopterEstimate:
     """Estimate the copter from all scored rows of the flight; deterministic."""
     from scipy.stats import norm
 
-    candidates = [_rows(flight, lag_s) for lag_s in _LAGS_S.tolist()]
+    throttle = flight.throttle_mean
+    excitations = [flight.loop.excitation(each, throttle) for each in flight.segments]
+    candidates = [_rows(flight, excitations, lag_s) for lag_s in _LAGS_S.tolist()]
     best = min(candidates, key=lambda each: each.variance)
     variance = best.independent_variance(max(_NOISES, key=best.log_likelihood))
-    regressions = [_regress(each, variance) for each in candidates]
+    regressions = [_regress(each, variance, flight.loop) for each in candidates]
     log_weight = np.array([each.log_likelihood + norm.logpdf(each.lag_s, *USUAL_LAG_S) for each in regressions])
     weight = np.exp(log_weight - log_weight.max())
     values = _draws(regressions, weight / weight.sum())
@@ -158,7 +160,9 @@ def fit_copter(flight: LoggedFlight) -> CopterEstimate:
     )
 
 
-def _rows(flight: LoggedFlight, lag_s: float) -> _Rows:
+def _rows(flight: LoggedFlight, excitations: Sequence[tuple[Samples, Samples]], lag_s: float) -> _Rows:
+    """`excitations` are climb rate and acceleration that follow from the reference, for each segment."""
+
     def rows(signal: Callable[[Segment], Samples]) -> Samples:
         return np.concatenate([signal(each)[each.scored] for each in flight.segments])
 
@@ -166,34 +170,38 @@ def _rows(flight: LoggedFlight, lag_s: float) -> _Rows:
     ones = np.ones(len(sought))
     throttle = np.log(rows(lambda each: _sensed_throttle(each, flight, lag_s)))
     causes = np.column_stack([throttle, rows(lambda each: each.v_m_s), ones])
-    accelerations = [rows(partial(_accelerations_before, rows=back)) for back in range(_INSTRUMENT_ROWS)]
-    instruments = np.column_stack([rows(lambda each: each.v_d_m_s), *accelerations, ones])
+    excited = [
+        np.column_stack([v, *(_before(a, rows=back) for back in range(_INSTRUMENT_ROWS))])[each.scored]
+        for each, (v, a) in zip(flight.segments, excitations, strict=True)
+    ]
+    instruments = np.column_stack([np.concatenate(excited), ones])
     return _with_instruments(lag_s, sought, causes, instruments)
 
 
-def _accelerations_before(segment: Segment, *, rows: int) -> Samples:
-    """Acceleration of the reference some rows before each, shape (n,); that of the first row before the first."""
-    before = np.maximum(np.arange(len(segment.time_s)) - rows, 0)
-    return np.asarray(segment.a_d_m_s2[before])
+def _before(values: Samples, *, rows: int) -> Samples:
+    """Values some rows before each, shape (n,); that of the first row before the first."""
+    return np.asarray(values[np.maximum(np.arange(len(values)) - rows, 0)])
 
 
-def _regress(rows: _Rows, variance: float) -> _Regression:
+def _regress(rows: _Rows, variance: float, loop: AltitudeLoop) -> _Regression:
     """Two-stage least squares with the usual slope and drag as further observations; `variance` is that of independent
     rows."""
-    usual = np.array([USUAL_SLOPE[0], -USUAL_DRAG_1_S[0] / GRAVITY_M_S2, 0.0])
-    certainty = np.diag([USUAL_SLOPE[1] ** -2, (USUAL_DRAG_1_S[1] / GRAVITY_M_S2) ** -2, 0.0])
+    usual = np.array([loop.usual_slope[0], -USUAL_DRAG_1_S[0] / GRAVITY_M_S2, 0.0])
+    certainty = np.diag([loop.usual_slope[1] ** -2, (USUAL_DRAG_1_S[1] / GRAVITY_M_S2) ** -2, 0.0])
     information = rows.projected.T / variance
     covariance = np.asarray(np.linalg.inv(information @ rows.projected + certainty), dtype=np.float64)
     mean = covariance @ (information @ rows.sought + certainty @ usual)
     explained = np.sum((rows.instruments.T @ (rows.sought - rows.causes @ mean)) ** 2)
+    with_hover = np.array([1.0, 0.0, mean[2] / mean[0]])
+    covariance += loop.slope_error**2 * np.outer(with_hover, with_hover)
     return _Regression(rows.lag_s, mean, covariance, -0.5 * float(explained) / variance)
 
 
 def _sensed_throttle(segment: Segment, flight: LoggedFlight, lag_s: float) -> Samples:
     """Throttle after the motors' lag and the accelerometer's filter at each row, shape (n,)."""
-    steps = interpolated(segment, flight.step_s)
-    accelerometer = accelerometer_filter(flight.filter_hz, flight.step_s)
-    sensed = filtered(steps.throttle_filtered, motor_filter(lag_s, flight.step_s), accelerometer)
+    step_s = flight.loop.step_s
+    steps = interpolated(segment, step_s)
+    sensed = filtered(steps.throttle_filtered, motor_filter(lag_s, step_s), flight.loop.accelerometer)
     return np.maximum(np.interp(segment.time_s, steps.time_s, sensed), _LEAST_THROTTLE)
 
 

@@ -1,10 +1,10 @@
-"""A multicopter's altitude under ArduCopter's vertical loop, along a given reference.
+"""A multicopter's altitude, whatever loop commands its throttle.
 
     u̇ = (u_f − u)/lag,   a = g·((u/h)^s − 1) − drag·v + disturbance,
 
-where u_f is the loop's filtered throttle, u that after the motors' lag, h the throttle in hover and s the slope of
-log thrust over log throttle: a polynomial of the throttle would turn negative at a low hover throttle. The loop senses
-the acceleration through the accelerometer's filter. The climb rate and the altitude are those that the vehicle's
+where u_f is the throttle that the loop gives the motors, u that after their lag, h the throttle in hover and s the
+slope of log thrust over log throttle: a polynomial of the throttle would turn negative at a low hover throttle. The
+acceleration is sensed through the accelerometer's filter. The climb rate and the altitude are those that the vehicle's
 estimator reports, which need not be the integral of its acceleration: the difference is a disturbance, too. Altitude
 up, SI, explicit Euler at the rate of the loop.
 """
@@ -15,16 +15,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.ardupilot import (
-    A_D,
-    THROTTLE,
-    THROTTLE_FILTERED,
-    V_D,
-    Z_D,
-    State,
-    control,
-)
-from app.core.control.ardupilot_parameters import DT, STEP_S, THROTTLE_GAIN, Packed
 from app.core.kernels import kernel
 from app.core.records.trajectory import Samples
 
@@ -53,10 +43,13 @@ BODY_SIZE: Final = 6
 """Throttle after the motors' lag, altitude and climb rate as estimated, acceleration as sensed, and the memory of the
 accelerometer's filter."""
 
-REFERENCE: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2")
+REFERENCE: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2", "assumed_hover")
+"""What a loop is given: the desired motion, and the throttle that it assumes to hover with."""
 DISTURBANCES: Final = ("acceleration_m_s2", "climb_rate_m_s2", "altitude_m_s", "sensed_m_s2")
 """Of the acceleration, of the estimated climb rate and altitude beyond it, and of the sensed acceleration alone."""
-FLOWN: Final = ("z_m", "v_m_s", "a_m_s2", "throttle", "throttle_filtered")
+FLOWN: Final = ("z_m", "v_m_s", "a_m_s2", "throttle", "throttle_filtered", "throttle_slow")
+"""The estimates that a loop used, the throttle that it demanded with them, what of it the motors get, and its 2 Hz
+low-pass."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +62,7 @@ class Copter:
     motor_lag_s: float = 0.0
     drag_1_s: float = 0.0
 
-    def packed(self, *, filter_hz: float, dt_s: float = STEP_S) -> Samples:
+    def packed(self, *, filter_hz: float, dt_s: float) -> Samples:
         """Constants of a step for the kernels; `filter_hz` is the cut-off of the accelerometer's filter."""
         numerator, denominator = accelerometer_filter(filter_hz, dt_s)
         packed = np.empty(_PACKED_SIZE)
@@ -114,51 +107,18 @@ def filtered(values: Samples, *filters: Filter) -> Samples:
 
 
 @kernel
-def step(
-    state: State,
-    body: Samples,
-    p: Packed,
-    copter: Samples,
-    reference: Samples,
-    disturbance: Samples,
+def advance(
+    body: Samples, copter: Samples, dt: float, throttle: float, gust: float, beyond_v: float, beyond_z: float
 ) -> None:
-    """One step of loop and body. `reference` has shape (3,) as `REFERENCE`, `disturbance` (4,) as `DISTURBANCES`."""
-    state[Z_D], state[V_D], state[A_D] = reference[0], reference[1], reference[2]
-    filtered = state[THROTTLE_FILTERED]
-    filtered += p[THROTTLE_GAIN] * (state[THROTTLE] - filtered)
-    sensed = body[SENSED] + disturbance[3]
-    control(state, p, body[ALTITUDE], body[CLIMB_RATE], sensed, filtered <= 0.0, filtered >= 1.0)
-    body[LAGGED] += copter[_LAG_GAIN] * (state[THROTTLE_FILTERED] - body[LAGGED])
+    """One step of `dt` with the `throttle` that the motors get, and with the first three of `DISTURBANCES`."""
+    body[LAGGED] += copter[_LAG_GAIN] * (throttle - body[LAGGED])
     thrust = (body[LAGGED] / copter[HOVER_THROTTLE]) ** copter[_SLOPE]
-    a = GRAVITY_M_S2 * (thrust - 1.0) - copter[_DRAG] * body[CLIMB_RATE] + disturbance[0]
-    body[CLIMB_RATE] += p[DT] * (a + disturbance[1])
-    body[ALTITUDE] += p[DT] * (body[CLIMB_RATE] + disturbance[2])
+    a = GRAVITY_M_S2 * (thrust - 1.0) - copter[_DRAG] * body[CLIMB_RATE] + gust
+    body[CLIMB_RATE] += dt * (a + beyond_v)
+    body[ALTITUDE] += dt * (body[CLIMB_RATE] + beyond_z)
     body[SENSED] = copter[_B0] * a + body[_MEMORY_1]
     body[_MEMORY_1] = copter[_B1] * a - copter[_A1] * body[SENSED] + body[_MEMORY_2]
     body[_MEMORY_2] = copter[_B2] * a - copter[_A2] * body[SENSED]
-
-
-@kernel
-def fly(
-    state: State,
-    body: Samples,
-    p: Packed,
-    copter: Samples,
-    references: Samples,
-    disturbances: Samples,
-    flown: Samples,
-) -> None:
-    """A step per row of `references`, shape (n, 3), and `disturbances`, (n, 4); fills `flown`, (n, 5) as `FLOWN`.
-
-    A row of `flown` holds the estimates that the loop used, and the throttle that it demanded with them.
-    """
-    for row in range(len(references)):
-        flown[row, 0] = body[ALTITUDE]
-        flown[row, 1] = body[CLIMB_RATE]
-        flown[row, 2] = body[SENSED] + disturbances[row, 3]
-        step(state, body, p, copter, references[row], disturbances[row])
-        flown[row, 3] = state[THROTTLE]
-        flown[row, 4] = state[THROTTLE_FILTERED]
 
 
 def start_body(throttle: float, z_m: float, v_m_s: float, a_m_s2: float, copter: Samples) -> NDArray[np.float64]:

@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.core.analysis.flight import LEAD_S, LoggedFlight
+from app.core.analysis.ardupilot_loop import ArduPilotLoop
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.segment import LEAD_S
 from app.core.control.ardupilot_parameters import Parameters
 from app.logs.ardupilot_flight import read_ardupilot_flight
 from bench.copters.simulation import SimulatedCopter, fly_steps
@@ -45,6 +47,12 @@ def simulated_flight(copter: SimulatedCopter = QUIET, *, seed: int = 1, **gains:
     """Log of the steps with the vehicle, default gains but for those given."""
     parameters = replace(Parameters(hover_throttle=copter.assumed_hover_throttle), **gains)
     return fly_steps(copter, parameters, seed=seed).log
+
+
+def parameters_of(flight: LoggedFlight) -> Parameters:
+    """Those of the loop, which is ArduCopter's."""
+    assert isinstance(flight.loop, ArduPilotLoop)
+    return flight.loop.parameters
 
 
 def with_gains_of(parameters: Parameters, position: float, velocity: float, p: float, i: float) -> Parameters:

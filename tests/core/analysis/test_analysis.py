@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.analysis.analysis import analyze, rules
-from app.core.analysis.flight import LoggedFlight, Segment
+from app.core.analysis.analysis import analyze
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.segment import Segment
 from app.core.errors import TrajectoryError
 from app.core.records.trajectory import Samples
-from tests.core.analysis.flights import GUSTY, QUIET, recorded_steps, simulated_flight
+from tests.core.analysis.flights import GUSTY, QUIET, parameters_of, recorded_steps, simulated_flight
 from tests.core.tuning.flying import compiled_only
 
 pytestmark = compiled_only
@@ -48,11 +49,12 @@ def test_the_log_of_the_real_binary_gives_gains_six_times_better() -> None:
     assert found.behaviour.error_m == pytest.approx(0.0275, abs=2e-4)
     assert found.behaviour.reference_range_m == pytest.approx(2.0, abs=0.05)
     assert found.behaviour.saturated_share == 0.0
-    assert {each.name for each in found.assessments[1:]} == set(rules(recorded_steps()))
+    assert {each.name for each in found.assessments[1:]} == set(found.loop.rules(0.363))
 
 
 def test_the_documented_rule_follows_the_hover_throttle() -> None:
-    rule = rules(simulated_flight(QUIET))["P = hover throttle, I = 2 P"]
+    flight = simulated_flight(QUIET)
+    rule = flight.loop.rules(flight.throttle_mean)["P = hover throttle, I = 2 P"]
     assert rule == {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.4, "PSC_ACCZ_I": 0.8}
 
 
@@ -121,7 +123,7 @@ def test_a_flight_that_the_model_does_not_repeat_is_refused() -> None:
     flight = simulated_flight()
     (segment,) = flight.segments
     off = segment.z_d_m + 0.1
-    moved = changed(flight, z_d_m=off, v_t_m_s=segment.v_t_m_s + 0.1 * flight.parameters.position_p_1_s)
+    moved = changed(flight, z_d_m=off, v_t_m_s=segment.v_t_m_s + 0.1 * parameters_of(flight).position_p_1_s)
     assert "it flew with other gains" in refusal(moved)
 
 

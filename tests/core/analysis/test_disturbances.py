@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.core.analysis.disturbances import disturbances_of, in_other_weather
-from app.core.analysis.flight import interpolated
+from app.core.analysis.segment import interpolated
 from app.core.records.trajectory import Samples
 from bench.copters.simulation import SimulatedCopter
 from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
@@ -18,7 +18,7 @@ pytestmark = compiled_only
 def found(copter: SimulatedCopter) -> Samples:
     flight = simulated_flight(copter)
     (segment,) = flight.segments
-    return disturbances_of(flight, segment, interpolated(segment, flight.step_s), copter.linear)
+    return disturbances_of(flight.loop, segment, interpolated(segment, flight.loop.step_s), copter.linear)
 
 
 def test_a_vehicle_of_the_models_own_kind_in_still_air_has_hardly_any() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.margin import (
     EXTRA_LAG_S,
     LARGEST_MARGIN,
@@ -15,14 +16,14 @@ from app.core.analysis.margin import (
     least_damping,
 )
 from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import STEP_S, Parameters
-from app.core.models.copter import DISTURBANCES, FLOWN, REFERENCE, Copter, fly, start_body
+from app.core.control.ardupilot_parameters import Parameters
+from app.core.models.ardupilot_copter import fly
+from app.core.models.copter import DISTURBANCES, FLOWN, REFERENCE, Copter, start_body
+from bench.copters.simulation import loop_of
 from tests.core.analysis.flights import with_gains_of
 from tests.core.tuning.flying import compiled_only
 
 pytestmark = compiled_only
-
-FILTER_HZ = 20.0
 
 RACER = Copter(hover_throttle=0.118, motor_lag_s=0.0, drag_1_s=0.18)
 STOCK = Copter(hover_throttle=0.365, motor_lag_s=0.0, drag_1_s=0.3)
@@ -31,12 +32,12 @@ OVERPOWERED = Copter(hover_throttle=0.14, motor_lag_s=0.04, drag_1_s=0.3)
 SLOW = Copter(hover_throttle=0.28, motor_lag_s=0.13, drag_1_s=0.3)
 
 
-def parameters(copter: Copter, gains: tuple[float, float, float, float]) -> Parameters:
-    return with_gains_of(Parameters(hover_throttle=copter.hover_throttle), *gains)
+def flown_with(copter: Copter, gains: tuple[float, float, float, float]) -> ArduPilotLoop:
+    return loop_of(with_gains_of(Parameters(hover_throttle=copter.hover_throttle), *gains))
 
 
 def damping(copter: Copter, gains: tuple[float, float, float, float]) -> float:
-    return least_damping(parameters(copter, gains), copter, filter_hz=FILTER_HZ, step_s=STEP_S)
+    return least_damping(flown_with(copter, gains), copter)
 
 
 @pytest.mark.parametrize(
@@ -75,9 +76,9 @@ def test_what_flew_well_does_not(copter: Copter, gains: tuple[float, float, floa
 
 def test_the_damping_is_that_of_an_oscillation_as_it_dies_away() -> None:
     """The racer with 1.3 times the default gains of the acceleration, pushed: peaks of its acceleration above 5 Hz."""
-    gains = parameters(RACER, (1.0, 5.0, 0.65, 1.3))
-    packed = gains.packed()
-    copter = RACER.packed(filter_hz=FILTER_HZ)
+    gains = flown_with(RACER, (1.0, 5.0, 0.65, 1.3))
+    packed = gains.parameters.packed()
+    copter = gains.packed(RACER)
     state, flown = np.empty(loop.STATE_SIZE), np.empty((800, len(FLOWN)))
     loop.start_hover(state, packed, RACER.hover_throttle, 0.0, 0.0, 0.0)
     body = start_body(RACER.hover_throttle, 0.0, 0.0, 0.0, copter)
@@ -89,32 +90,32 @@ def test_the_damping_is_that_of_an_oscillation_as_it_dies_away() -> None:
     heights = fast[peaks][:6]
     decrement = np.log(heights[:-1] / heights[1:]).mean()
     seen = decrement / np.hypot(2.0 * np.pi, decrement)
-    assert least_damping(gains, RACER, filter_hz=FILTER_HZ, step_s=STEP_S) == pytest.approx(seen, rel=0.1)
+    assert least_damping(gains, RACER) == pytest.approx(seen, rel=0.1)
 
 
 def test_at_the_margin_the_loop_with_more_lag_just_begins_to_ring() -> None:
-    gains = parameters(STOCK, (2.0, 7.0, 1.0, 2.0))
-    margin = gain_margin(gains, STOCK, filter_hz=FILTER_HZ, step_s=STEP_S)
+    gains = flown_with(STOCK, (2.0, 7.0, 1.0, 2.0))
+    margin = gain_margin(gains, STOCK)
     assert 1.0 < margin < REQUIRED_MARGIN
     late = replace(STOCK, motor_lag_s=EXTRA_LAG_S)
-    scaled = replace(gains, acceleration_p=margin * 1.0, acceleration_i_1_s=margin * 2.0)
-    assert least_damping(scaled, late, filter_hz=FILTER_HZ, step_s=STEP_S) == pytest.approx(RINGING_DAMPING, abs=0.005)
+    scaled = gains.with_gains({"PSC_ACCZ_P": margin * 1.0, "PSC_ACCZ_I": margin * 2.0})
+    assert least_damping(scaled, late) == pytest.approx(RINGING_DAMPING, abs=0.005)
 
 
 def test_a_loop_that_rings_with_more_lag_has_no_margin() -> None:
-    gains = parameters(RACER, (2.0, 7.0, 1.0, 2.0))
-    assert gain_margin(gains, RACER, filter_hz=FILTER_HZ, step_s=STEP_S) == 0.0
+    gains = flown_with(RACER, (2.0, 7.0, 1.0, 2.0))
+    assert gain_margin(gains, RACER) == 0.0
 
 
 def test_a_margin_ends_at_the_largest() -> None:
-    gains = parameters(STOCK, (1.0, 5.0, 0.15, 0.2))
-    assert gain_margin(gains, STOCK, filter_hz=FILTER_HZ, step_s=STEP_S) == LARGEST_MARGIN
+    gains = flown_with(STOCK, (1.0, 5.0, 0.15, 0.2))
+    assert gain_margin(gains, STOCK) == LARGEST_MARGIN
 
 
 def test_less_gain_counts_too() -> None:
     """A slow heavy vehicle with six times as much integral as proportional gain: it swings more when the gain falls."""
     heavy = Copter(hover_throttle=0.58, motor_lag_s=0.05, drag_1_s=0.3)
-    gains = parameters(heavy, (3.0, 8.0, 0.5, 3.0))
-    within = damping_within_margin(gains, heavy, filter_hz=FILTER_HZ, step_s=STEP_S)
+    gains = flown_with(heavy, (3.0, 8.0, 0.5, 3.0))
+    within = damping_within_margin(gains, heavy)
     late = replace(heavy, motor_lag_s=heavy.motor_lag_s + EXTRA_LAG_S)
-    assert within < least_damping(gains, late, filter_hz=FILTER_HZ, step_s=STEP_S)
+    assert within < least_damping(gains, late)

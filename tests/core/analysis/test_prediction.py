@@ -7,8 +7,8 @@ import pytest
 
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.vehicle_fit import fit_copter
-from bench.copters.simulation import fly_steps
-from tests.core.analysis.flights import GUSTY, recorded_steps, simulated_flight, with_gains_of
+from bench.copters.simulation import fly_steps, loop_of
+from tests.core.analysis.flights import GUSTY, parameters_of, recorded_steps, simulated_flight, with_gains_of
 from tests.core.tuning.flying import compiled_only
 
 pytestmark = compiled_only
@@ -39,22 +39,23 @@ def test_the_binary_flew_other_gains_as_its_default_flight_predicts(
 ) -> None:
     """Errors of the 13 s of steps as measured with the same binary and vehicle, one flight scatters by 2 %: predicted
     to 12 %, and inside the interval."""
-    prediction = model.predict(with_gains_of(FLIGHT.parameters, *gains))
+    prediction = model.predict(loop_of(with_gains_of(parameters_of(FLIGHT), *gains)))
     assert 1e3 * prediction.error_m == pytest.approx(flown_mm, rel=0.12)
     assert prediction.low_m < 1e-3 * flown_mm < prediction.high_m
 
 
 def test_the_gains_of_the_flight_give_its_error(model: FlightModel) -> None:
-    assert model.fly(FLIGHT.parameters)[0] == pytest.approx(FLIGHT.error_m, rel=0.05)
+    assert model.fly(FLIGHT.loop)[0] == pytest.approx(FLIGHT.error_m, rel=0.05)
 
 
 def test_activity_rises_with_the_acceleration_gain() -> None:
     """In noise the fast part of the throttle is in proportion to it; flown and predicted agree to a fifth."""
     flight = simulated_flight(GUSTY)
     model = FlightModel(flight, [GUSTY.linear])
-    twice = replace(flight.parameters, acceleration_p=1.0)
-    ratio = model.fly(twice)[1] / model.fly(flight.parameters)[1]
-    flown = fly_steps(GUSTY, twice, seed=2).activity / fly_steps(GUSTY, flight.parameters, seed=2).activity
+    once = parameters_of(flight)
+    twice = replace(once, acceleration_p=1.0)
+    ratio = model.fly(loop_of(twice))[1] / model.fly(flight.loop)[1]
+    flown = fly_steps(GUSTY, twice, seed=2).activity / fly_steps(GUSTY, once, seed=2).activity
     assert ratio == pytest.approx(flown, rel=0.2)
 
 
@@ -64,16 +65,16 @@ def test_most_flights_in_other_weather_lie_within_the_interval() -> None:
     inside = 0
     for seed in range(10):
         flight = simulated_flight(GUSTY, seed=seed)
-        prediction = FlightModel(flight, fit_copter(flight).draws).predict(flight.parameters)
-        others = [fly_steps(GUSTY, flight.parameters, seed=1000 + 10 * seed + other) for other in range(3)]
+        prediction = FlightModel(flight, fit_copter(flight).draws).predict(flight.loop)
+        others = [fly_steps(GUSTY, parameters_of(flight), seed=1000 + 10 * seed + other) for other in range(3)]
         inside += sum(prediction.low_m <= each.log.error_m <= prediction.high_m for each in others)
     assert inside >= 22
 
 
 def test_an_interval_is_wider_in_gusts() -> None:
     gusty = simulated_flight(GUSTY)
-    wide = FlightModel(gusty, fit_copter(gusty).draws).predict(gusty.parameters)
+    wide = FlightModel(gusty, fit_copter(gusty).draws).predict(gusty.loop)
     quiet = simulated_flight()
-    narrow = FlightModel(quiet, fit_copter(quiet).draws).predict(quiet.parameters)
+    narrow = FlightModel(quiet, fit_copter(quiet).draws).predict(quiet.loop)
     assert wide.high_m - wide.low_m > 3 * (narrow.high_m - narrow.low_m)
     assert np.isfinite([wide.low_m, narrow.low_m]).all()

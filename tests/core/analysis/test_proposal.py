@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
+from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin
 from app.core.analysis.prediction import FlightModel
-from app.core.analysis.proposal import BOUNDS, LARGEST_ACTIVITY, propose, with_gains
+from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
 from app.core.analysis.vehicle_fit import fit_copter
 from bench.copters.simulation import SimulatedCopter
 from tests.core.analysis.flights import GUSTY, QUIET, recorded_steps, simulated_flight
@@ -31,16 +32,16 @@ def test_a_proposal_is_allowed_and_better_than_what_it_began_with(copter: Simula
     estimate = fit_copter(flight)
     gains = propose(flight, estimate.few, [DEFAULTS, STIFF])
     assert gains is not None
-    assert all(low <= gains[name] <= high for name, (low, high) in BOUNDS.items())
+    assert all(low <= gains[name] <= high for name, (low, high) in flight.loop.space.bounds.items())
     assert gains["PSC_ACCZ_I"] >= gains["PSC_ACCZ_P"]
     model = FlightModel(flight, estimate.few)
-    parameters = with_gains(flight.parameters, gains)
-    error_m, activity = model.fly(parameters)
-    usual_m, usual_activity = model.fly(flight.parameters)
+    loop = flight.loop.with_gains(gains)
+    error_m, activity = model.fly(loop)
+    usual_m, usual_activity = model.fly(flight.loop)
     assert error_m < 0.6 * usual_m
     assert activity <= LARGEST_ACTIVITY * usual_activity * 1.001
     for each in estimate.few:
-        found = damping_within_margin(parameters, each, filter_hz=flight.filter_hz, step_s=flight.step_s)
+        found = damping_within_margin(loop, each)
         assert found >= RINGING_DAMPING - 1e-9
 
 
@@ -70,6 +71,7 @@ def test_nothing_is_proposed_where_every_start_rings() -> None:
 
 
 def test_other_gains_replace_those_of_the_same_name_only() -> None:
-    parameters = simulated_flight(QUIET).parameters
-    changed = with_gains(parameters, {"PSC_ACCZ_P": 0.7})
-    assert changed == replace(parameters, acceleration_p=0.7)
+    loop = simulated_flight(QUIET).loop
+    assert isinstance(loop, ArduPilotLoop)
+    changed = loop.with_gains({"PSC_ACCZ_P": 0.7})
+    assert changed.parameters == replace(loop.parameters, acceleration_p=0.7)

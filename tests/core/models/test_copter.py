@@ -7,6 +7,7 @@ import pytest
 
 from app.core.control import ardupilot as loop
 from app.core.control.ardupilot_parameters import STEP_S, Parameters
+from app.core.models.ardupilot_copter import fly, step
 from app.core.models.copter import (
     ALTITUDE,
     CLIMB_RATE,
@@ -19,10 +20,8 @@ from app.core.models.copter import (
     Copter,
     accelerometer_filter,
     filtered,
-    fly,
     motor_filter,
     start_body,
-    step,
 )
 from app.core.records.trajectory import Samples
 
@@ -31,8 +30,8 @@ PARAMETERS = Parameters(hover_throttle=0.4)
 
 
 def flown(disturbances: Samples, *, parameters: Parameters = PARAMETERS, z_m: float = 0.0) -> Samples:
-    """Flight about the altitude 0, shape (n, 5), from hover."""
-    packed, copter = parameters.packed(), COPTER.packed(filter_hz=20.0)
+    """Flight about the altitude 0, shape (n, 6), from hover."""
+    packed, copter = parameters.packed(), COPTER.packed(filter_hz=20.0, dt_s=STEP_S)
     state, found = np.empty(loop.STATE_SIZE), np.empty((len(disturbances), len(FLOWN)))
     loop.start_hover(state, packed, COPTER.hover_throttle, z_m, 0.0, 0.0)
     body = start_body(COPTER.hover_throttle, z_m, 0.0, 0.0, copter)
@@ -71,7 +70,7 @@ def test_a_step_without_control_obeys_the_equation_of_motion() -> None:
     idle = Parameters(
         position_p_1_s=1e-9, velocity_p_1_s=0.0, acceleration_p=0.0, acceleration_i_1_s=0.0, hover_throttle=0.44
     )
-    copter = COPTER.packed(filter_hz=20.0)
+    copter = COPTER.packed(filter_hz=20.0, dt_s=STEP_S)
     packed, state = idle.packed(), np.empty(loop.STATE_SIZE)
     loop.start_hover(state, packed, 0.44, 0.0, 2.0, 0.0)
     body = start_body(0.44, 0.0, 2.0, 0.0, copter)
@@ -108,7 +107,7 @@ def test_filters_begin_at_rest() -> None:
 
 
 def test_a_body_begins_at_rest_behind_its_filter() -> None:
-    copter = COPTER.packed(filter_hz=20.0)
+    copter = COPTER.packed(filter_hz=20.0, dt_s=STEP_S)
     body = start_body(0.4, 1.0, 0.0, 0.5, copter)
     state, packed = np.empty(loop.STATE_SIZE), PARAMETERS.packed()
     loop.start_hover(state, packed, 0.4, 1.0, 0.0, 0.5)

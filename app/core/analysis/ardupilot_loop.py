@@ -1,0 +1,182 @@
+"""ArduCopter's altitude loop as an analysis takes it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final, Self
+
+import numpy as np
+
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, transition_of
+from app.core.analysis.segment import Segment, Steps
+from app.core.control import ardupilot as loop
+from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, HOVER, Packed, Parameters, in_newer_names
+from app.core.control.ardupilot_shaping import square_root
+from app.core.models.ardupilot_copter import fly, step
+from app.core.models.copter import (
+    DISTURBANCES,
+    FLOWN,
+    HOVER_THROTTLE,
+    REFERENCE,
+    Copter,
+    Filter,
+    accelerometer_filter,
+    start_body,
+)
+from app.core.records.trajectory import Samples
+
+SPACE: Final = GainSpace(
+    bounds=MappingProxyType(
+        {
+            "PSC_POSZ_P": (1.0, 3.0),
+            "PSC_VELZ_P": (1.0, 8.0),
+            "PSC_ACCZ_P": (0.2, 1.5),
+            "PSC_ACCZ_I": (0.2, 3.0),
+        }
+    ),
+    gentle=MappingProxyType({"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.2, "PSC_ACCZ_I": 0.2}),
+    ordered=("PSC_ACCZ_P", "PSC_ACCZ_I"),
+)
+"""An integral gain below 0.2 fails the arming check."""
+
+_TEXTS: Final = LoopTexts(
+    autopilot="ArduCopter",
+    prefix="PSC_",
+    hover_parameter="MOT_THST_HOVER",
+    fast_gains="P and I of the acceleration controller",
+    lateness="lag",
+    what_to_fly=(
+        "Fly at a height of 3 m or more in a mode that holds altitude (GUIDED, LOITER, ALT_HOLD, AUTO): hover for 5 s, "
+        "climb 2 m, hover for 5 s, descend 2 m, hover for 5 s; with NTUN and CTUN in LOG_BITMASK."
+    ),
+    lags="motors, accelerometer filter, acceleration controller filters",
+    other_controller="terrain following, or a release with another position controller",
+    parameter_suffix=".param",
+)
+
+_DYNAMIC: Final = [
+    loop.THROTTLE,
+    loop.THROTTLE_FILTERED,
+    loop.VELOCITY_ERROR,
+    loop.VELOCITY_DERIVATIVE,
+    loop.VELOCITY_SUM,
+    loop.FILTERED_TARGET,
+    loop.ACCELERATION_ERROR,
+    loop.ACCELERATION_DERIVATIVE,
+    loop.ACCELERATION_SUM,
+]
+"""What the loop remembers from one step to the next, on a reference at rest."""
+
+_NUDGE: Final = 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArduPilotLoop:
+    """The loop (`AltitudeLoop`). `filter_hz` is the cut-off of the accelerometer's filter. `has_newer_names` if the
+    vehicle's parameters have the names and units of release 4.7."""
+
+    parameters: Parameters
+    filter_hz: float
+    step_s: float
+    has_newer_names: bool = False
+
+    texts = _TEXTS
+    space = SPACE
+    throttle_limits = (0.0, 1.0)
+    usual_slope = (1.0, 0.25)
+    slope_error = 0.0
+    target_tolerance_m_s = 0.02
+
+    @property
+    def gains(self) -> dict[str, float]:
+        return {name: value for name, value in self.parameters.gains.items() if name in SPACE.bounds}
+
+    @property
+    def assumed_hover_throttle(self) -> float:
+        return self.parameters.hover_throttle
+
+    @property
+    def accelerometer(self) -> Filter:
+        return accelerometer_filter(self.filter_hz, self.step_s)
+
+    def named(self, gains: Mapping[str, float]) -> dict[str, float]:
+        return in_newer_names(gains) if self.has_newer_names else dict(gains)
+
+    def rules(self, hover_throttle: float) -> dict[str, dict[str, float]]:
+        """The firmware's defaults, the rule of its documentation, two fixed sets."""
+        by_hover = _with_names((1.0, 5.0, float(f"{hover_throttle:.2g}"), float(f"{2.0 * hover_throttle:.2g}")))
+        fixed = [_with_names(values) for values in ((2.0, 7.0, 1.0, 2.0), (3.0, 8.0, 0.5, 3.0))]
+        return {
+            "ArduCopter's default gains": _with_names((1.0, 5.0, 0.5, 1.0)),
+            f"P = {'0.1 ' if self.has_newer_names else ''}hover throttle, I = 2 P": by_hover,
+            **{f"For comparison: {in_order(self.named(gains))}": gains for gains in fixed},
+        }
+
+    def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
+        """As Mission Planner and MAVProxy load them."""
+        return [
+            *(f"# {name} was {value:g}" for name, value in flown.items()),
+            *(f"{name},{value:g}" for name, value in proposed.items()),
+        ]
+
+    def with_gains(self, gains: Mapping[str, float]) -> Self:
+        return self._with(**{FIRMWARE_NAMES[name][0]: value for name, value in gains.items()})
+
+    def with_fast_gains(self, factor: float) -> Self:
+        """All feedback passes through the acceleration controller."""
+        p = self.parameters
+        return self._with(
+            acceleration_p=factor * p.acceleration_p,
+            acceleration_i_1_s=factor * p.acceleration_i_1_s,
+            acceleration_d_s=factor * p.acceleration_d_s,
+            acceleration_ff=factor * p.acceleration_ff,
+        )
+
+    def _with(self, **values: float) -> Self:
+        return replace(self, parameters=replace(self.parameters, **values))
+
+    def climb_rate_targets(self, segment: Segment) -> Samples:
+        p, acceleration = self.parameters.position_p_1_s, self.parameters.acceleration_m_s2
+        targets = [square_root(error, p, acceleration, 0.0) for error in (segment.z_d_m - segment.z_m).tolist()]
+        return np.array(targets) + segment.v_d_m_s
+
+    def excitation(self, segment: Segment, throttle: float) -> tuple[Samples, Samples]:  # noqa: ARG002
+        """Those of the reference, which the loop shapes itself."""
+        return segment.v_d_m_s, segment.a_d_m_s2
+
+    def start(self, steps: Steps) -> tuple[float, float]:
+        _, v_d, a_d, _ = steps.reference[0].tolist()
+        return v_d, a_d
+
+    def packed(self, copter: Copter) -> Samples:
+        return copter.packed(filter_hz=self.filter_hz, dt_s=self.step_s)
+
+    def fly(self, run: Run) -> Samples:
+        packed = self.parameters.packed(self.step_s)
+        state, flown = np.empty(loop.STATE_SIZE), np.empty((len(run.reference), len(FLOWN)))
+        loop.start_hover(state, packed, *run.start)
+        body = start_body(*run.start, run.copter)
+        fly(state, body, packed, run.copter, run.reference, run.disturbances, flown)
+        return flown
+
+    def transition(self, copter: Copter, *, late_s: float = 0.0) -> Samples:
+        """The copter is late by more lag of its motors."""
+        late = replace(copter, motor_lag_s=copter.motor_lag_s + late_s)
+        p, packed = self.parameters.packed(self.step_s), self.packed(late)
+        return transition_of(lambda nudge: _after_step(p, packed, nudge), len(_DYNAMIC), _NUDGE)
+
+
+def _with_names(values: Sequence[float]) -> dict[str, float]:
+    return dict(zip(SPACE.bounds, values, strict=True))
+
+
+def _after_step(p: Packed, copter: Samples, nudge: Samples) -> Samples:
+    hover = float(copter[HOVER_THROTTLE])
+    state = np.empty(loop.STATE_SIZE)
+    loop.start_hover(state, p, hover, 0.0, 0.0, 0.0)
+    state[loop.RESET] = 0.0
+    state[loop.ACCELERATION_SUM] = 1000.0 * (hover - p[HOVER])
+    state[_DYNAMIC] += nudge[: len(_DYNAMIC)]
+    body = start_body(hover, 0.0, 0.0, 0.0, copter) + nudge[len(_DYNAMIC) :]
+    step(state, body, p, copter, np.zeros(len(REFERENCE)), np.zeros(len(DISTURBANCES)))
+    return np.concatenate([state[_DYNAMIC], body])
