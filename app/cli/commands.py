@@ -352,7 +352,8 @@ def analyze(
         typer.Argument(
             metavar="LOG",
             show_default=False,
-            help="ArduCopter's .bin log, or Paparazzi's .data (a .log next to it is read too) or .tlog of takeoffs.",
+            help="ArduCopter's .bin log, PX4's .ulg log, or Paparazzi's .data (a .log next to it is read too) or .tlog "
+            "of takeoffs.",
         ),
     ],
     params: Annotated[
@@ -360,7 +361,8 @@ def analyze(
         typer.Option(
             metavar="FILE",
             show_default=False,
-            help="Write the proposed gains: a .param file for ArduCopter, a section of an airframe file for Paparazzi.",
+            help="Write the proposed gains: a .param file for ArduCopter, a .params file for PX4, a section of an "
+            "airframe file for Paparazzi.",
             callback=_spare_other_parameters,
         ),
     ] = None,

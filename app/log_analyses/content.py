@@ -11,12 +11,14 @@ from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
 from app.logs.ardupilot_flight import read_ardupilot_flight
 from app.logs.dataflash import is_dataflash
 from app.logs.paparazzi import is_paparazzi
+from app.logs.px4_flight import read_px4_flight
 from app.logs.readers import HEAD_BYTES, READERS, read_takeoffs
 from app.logs.takeoffs import Takeoff
 from app.logs.tlog import is_tlog
+from app.logs.ulog_tables import is_ulog
 
 TAKEOFFS: Final = "Paparazzi's .data or .tlog log of a takeoff"
-ANALYSED: Final = f"ArduCopter's .bin log, or {TAKEOFFS}; logs of PX4 are not analysed yet"
+ANALYSED: Final = f"ArduCopter's .bin log, PX4's .ulg log, or {TAKEOFFS}"
 
 
 def read_content(content: bytes, companion: bytes | None, name: str, *, usable: str) -> list[Takeoff]:
@@ -32,8 +34,9 @@ def read_content(content: bytes, companion: bytes | None, name: str, *, usable: 
 
 def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
     """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
-    if is_dataflash(content[:HEAD_BYTES]):
-        flight = read_ardupilot_flight(io.BytesIO(content), name=name)
-        return AnalysedManoeuvres(analyze(flight), name)
+    head = content[:HEAD_BYTES]
+    for recognises, read in ((is_dataflash, read_ardupilot_flight), (is_ulog, read_px4_flight)):
+        if recognises(head):
+            return AnalysedManoeuvres(analyze(read(io.BytesIO(content), name=name)), name)
     found = read_content(content, companion, name, usable=ANALYSED)
     return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)

@@ -28,10 +28,10 @@ class EstimatedValue(Schema):
 
 
 class EstimatedVehicle(Schema):
-    """The ArduCopter that the log fits."""
+    """The copter that the log fits."""
 
     hover_throttle: EstimatedValue
-    assumed_hover_throttle: Annotated[float, Field(description="MOT_THST_HOVER in flight")]
+    assumed_hover_throttle: Annotated[float, Field(description="MOT_THST_HOVER in flight, or MPC_THR_HOVER")]
     thrust_slope: EstimatedValue
     motor_lag_s: EstimatedValue
     drag_1_s: EstimatedValue
@@ -55,8 +55,9 @@ class GainsInManoeuvre(AssessedGains):
     margin: Annotated[
         float,
         Field(
-            description="factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most "
-            "critical of the vehicles consistent with the log; 0: less than 1, 8: at least 8"
+            description="factor on the gains of the acceleration controller, PX4: of the velocity controller, at which "
+            "the loop rings with 30 ms more lag, PX4: dead time, on the most critical of the vehicles consistent with "
+            "the log; 0: less than 1, 8: at least 8"
         ),
     ]
 
@@ -69,7 +70,7 @@ class GainsInTakeoff(AssessedGains):
 
 
 class ManoeuvreNumbers(Schema):
-    """The analysis of an ArduCopter's log. `assessments` begins with the gains flown."""
+    """The analysis of an ArduCopter's or PX4's log. `assessments` begins with the gains flown."""
 
     behaviour: LoggedBehaviour
     vehicle: EstimatedVehicle
@@ -123,7 +124,7 @@ class LogAnswer(Schema):
     """The result of a log analysis without its figure."""
 
     file_name: str
-    autopilot: Literal["ArduCopter", "Paparazzi"]
+    autopilot: Literal["ArduCopter", "PX4", "Paparazzi"]
     answer: str
     proposes: Annotated[bool, Field(description="whether gains are proposed; if not, `answer` says why")]
     flight: Annotated[Sequence[str], Field(description="how the altitude was controlled")]

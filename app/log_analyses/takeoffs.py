@@ -36,7 +36,7 @@ def logged_takeoffs(found: Sequence[Takeoff], *, name: str) -> list[LoggedTakeof
     if other := next((each for each in found if each.gain_names and set(each.gain_names) != names), None):
         raise TrajectoryError(
             f"{name} cannot be analysed.",
-            hint="Use the vehicle's own log: the .bin file of an ArduCopter.",
+            hint="Use the vehicle's own log: the .bin file of an ArduCopter, the .ulg file of a PX4.",
             problems=(
                 Problem("file", f"is a telemetry log of an autopilot with the gains {', '.join(other.gain_names)}"),
             ),

@@ -1,6 +1,6 @@
 """Reader of the vertical loop in PX4's log (.ulg): positions, set-points, hover thrust and the parameters."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import BinaryIO, Final
 
 import numpy as np
@@ -13,7 +13,7 @@ from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
 from app.logs.takeoffs import Setting
-from app.logs.ulog_tables import read_ulog_tables, seconds
+from app.logs.ulog_tables import has_rows, latest, read_ulog_tables, seconds
 
 _POSITION, _TARGET, _SET_POINT = "vehicle_local_position", "vehicle_local_position_setpoint", "trajectory_setpoint"
 _TAKEOFF, _HOVER = "takeoff_status", "hover_thrust_estimate"
@@ -40,13 +40,16 @@ def read_px4_log(stream: BinaryIO, *, name: str) -> LoopLog:
     )
     topics = tables.topics
     for topic, columns in _NEEDED.items():
-        if not _has_rows(topics.get(topic, {}), *columns):
+        if not has_rows(topics.get(topic, {}), *columns):
             raise _refused(name, topic, "is missing")
     position, target = topics[_POSITION], topics[_TARGET]
     position_s, time_s = seconds(position), seconds(target)
     kept = np.flatnonzero(np.diff(np.maximum.accumulate(position_s), prepend=-np.inf) > 0.0)
     position_s = position_s[kept]
-    column = _columns(topics, time_s)
+
+    def column(topic: str, name: str) -> Samples:
+        return latest(topics.get(topic, {}), name, time_s)
+
     takeoff = column(_TAKEOFF, "takeoff_state")
     place = np.searchsorted(position_s, time_s, side="right") - 1
     fresh = (place >= 0) & (time_s - position_s[place] <= _SAME_RUN_S)
@@ -88,24 +91,6 @@ def read_px4_log(stream: BinaryIO, *, name: str) -> LoopLog:
     )
 
 
-def _has_rows(table: Table, *names: str) -> bool:
-    """Whether a topic was logged, with these columns."""
-    return {"timestamp", *names} <= table.keys() and len(table["timestamp"]) > 0
-
-
-def _columns(topics: Mapping[str, Table], time_s: Samples) -> Callable[[str, str], Samples]:
-    """A function that gives a column of a topic as it was last published at each time; NaN before, and if missing."""
-
-    def column(topic: str, name: str) -> Samples:
-        table = topics.get(topic, {})
-        if not _has_rows(table, name):
-            return np.full(len(time_s), np.nan)
-        last = np.searchsorted(seconds(table), time_s, side="right") - 1
-        return np.where(last >= 0, numbers(table[name])[last], np.nan)
-
-    return column
-
-
 def _first_change_s(settings: Sequence[Setting], begin_s: float) -> float:
     """When a parameter first has another value than at the beginning; infinite if none has."""
     values: dict[str, float] = {}
@@ -123,7 +108,7 @@ def _set_points(table: Table, time_s: Samples, set_z: Samples) -> tuple[Samples,
     are not logged.
     """
     names = ("position[2]", "velocity[2]", "acceleration[2]")
-    if not _has_rows(table, *names):
+    if not has_rows(table, *names):
         unknown = np.full(len(time_s), np.nan)
         return unknown, unknown, np.zeros(len(time_s), dtype=np.bool_)
     at_s = seconds(table)
@@ -146,7 +131,7 @@ def _hover(table: Table, time_s: Samples, takeoff: Samples, parameters: Paramete
     In flight it is between two valid estimates that were logged around it, or before the first valid one the parameter.
     """
     on_ground = np.where(takeoff < FLIGHT, parameters.hover_thrust, np.nan)
-    if not _has_rows(table, "hover_thrust", "valid"):
+    if not has_rows(table, "hover_thrust", "valid"):
         return on_ground
     at_s, valid = seconds(table), numbers(table["valid"]) > 0.0
     estimates = np.clip(numbers(table["hover_thrust"]), HOVER_MIN, HOVER_MAX)

@@ -26,6 +26,7 @@ _LARGEST_ARRAY: Final = 64
 _MAX_FIELDS: Final = 300
 _FIELD: Final = re.compile(r"(u?int(?:8|16|32|64)_t|float|double|bool|char)(?:\[(\d{1,3})\])? (\w+)")
 _APPENDED: Final = 0x01
+_PARAMETERS: Final = frozenset({"float", "int32_t"})
 
 HINT: Final = "Use PX4's .ulg log of the flight, with vehicle_local_position in it."
 
@@ -62,6 +63,7 @@ def read_ulog_tables(stream: BinaryIO, *, topics: Collection[str], parameters: C
     changes = ((time_us / 1e6, name, value) for time_us, name, value in log.changed_parameters)
     values = [*((-np.inf, name, value) for name, value in log.initial_parameters.items()), *changes]
     notes = [f"{count(sieve.damages, 'damaged section')} skipped"] if sieve.damages else []
+    notes += ["the file ends in the middle of a message"] if sieve.is_cut_off else []
     if log.dropouts:
         lost_s = sum(each.duration for each in log.dropouts) / 1000
         notes.append(f"the logger dropped data {times(len(log.dropouts))}, {lost_s:.2f} s in total")
@@ -77,14 +79,29 @@ def seconds(table: Table) -> Samples:
     return numbers(table["timestamp"]) / 1e6
 
 
+def has_rows(table: Table, *names: str) -> bool:
+    """Whether a topic was logged, with these columns."""
+    return {"timestamp", *names} <= table.keys() and len(table["timestamp"]) > 0
+
+
+def latest(table: Table, name: str, time_s: Samples) -> Samples:
+    """A column as it was last published at each time, shape (n,); NaN before, and if it is missing."""
+    if not has_rows(table, name):
+        return np.full(len(time_s), np.nan)
+    last = np.searchsorted(seconds(table), time_s, side="right") - 1
+    return np.where(last >= 0, numbers(table[name])[last], np.nan)
+
+
 @dataclass(slots=True)
 class _LogFilter:
-    """Filters the messages of a log. `damages` counts the sections that were skipped."""
+    """Filters the messages of a log. `damages` counts the sections that were skipped; `is_cut_off` tells that the last
+    message is not complete."""
 
     topics: Collection[str]
     parameters: Collection[str]
     kept: bytearray = field(default_factory=bytearray)
     damages: int = 0
+    is_cut_off: bool = False
     _formats: set[str] = field(default_factory=set)
     _subscribed: set[int] = field(default_factory=set)
     _appended: list[int] = field(default_factory=list)
@@ -99,6 +116,7 @@ class _LogFilter:
             if self._appended and end > self._appended[0]:
                 position = max(self._appended.pop(0), position)
             elif end > size:
+                self.is_cut_off = True
                 break
             elif kind not in _TYPES or not 0 < length <= _LARGEST_MESSAGE:
                 self.damages += 1
@@ -162,7 +180,7 @@ class _LogFilter:
         self._appended = sorted(offset for offset in offsets if offset)
 
     def _is_parameter(self, body: bytes) -> bool:
-        """Whether this is one of the parameters, in PX4's form: "float NAME" and its value."""
+        """Whether this is one of the parameters, in PX4's form: "float NAME" or "int32_t NAME", and its value."""
         key = body[1 : 1 + body[0]].decode("ascii", "replace")
         kind, _, name = key.partition(" ")
-        return kind == "float" and name in self.parameters and len(body) == 1 + body[0] + 4
+        return kind in _PARAMETERS and name in self.parameters and len(body) == 1 + body[0] + 4

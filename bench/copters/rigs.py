@@ -7,7 +7,11 @@ from typing import Any, Final
 import numpy as np
 
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
+from app.core.analysis.px4_loop import Px4Loop
+from app.core.control import px4_parameters
 from app.core.control.ardupilot_parameters import Parameters
+from bench.copters.px4_simulation import fly_changes, sample_px4
+from bench.copters.px4_simulation import loop_of as px4_loop_of
 from bench.copters.simulation import SimulatedCopter, StepFlight, fly_steps, loop_of, sample
 
 
@@ -30,11 +34,25 @@ def _fly_ardupilot(copter: SimulatedCopter, loop: ArduPilotLoop, seed: int) -> S
     return fly_steps(copter, loop.parameters, seed=seed)
 
 
+def _first_loop_of_px4(copter: SimulatedCopter) -> Px4Loop:
+    return px4_loop_of(px4_parameters.Parameters(hover_thrust=copter.assumed_hover_throttle))
+
+
+def _fly_px4(copter: SimulatedCopter, loop: Px4Loop, seed: int) -> StepFlight:
+    return fly_changes(copter, loop.parameters, seed=seed)
+
+
 RIGS: Final[Mapping[str, Rig]] = {
     "ArduCopter": Rig(
         sample=sample,
         first_loop=_first_loop_of_ardupilot,
         fly=_fly_ardupilot,
         grid=((1.0, 1.7, 3.0), (5.0, 6.5, 8.0), (0.2, 0.3, 0.45, 0.65, 1.0, 1.5), (0.4, 0.7, 1.2, 1.7, 2.4, 3.0)),
+    ),
+    "PX4": Rig(
+        sample=sample_px4,
+        first_loop=_first_loop_of_px4,
+        fly=_fly_px4,
+        grid=((0.5, 1.0, 1.5), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 11.0), (0.5, 1.0, 2.0, 3.0), (0.0, 0.2, 0.5)),
     ),
 }

@@ -9,9 +9,11 @@ from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
 from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
+from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS, PARAMETERS, ardupilot_log
+from tests.logs.written_px4 import px4_log
 
 
 def analyze(*arguments: str | Path) -> Result:
@@ -63,6 +65,19 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
     names = [line.split(",")[0] for line in lines_of(files[1])]
     assert names == ["PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I"]
     assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3]])
+
+
+def test_the_log_of_px4_gives_a_file_for_its_ground_station(tmp_path: Path) -> None:
+    log, parameters = tmp_path / "flight.ulg", tmp_path / "gains.params"
+    log.write_bytes(px4_log(simulated_px4()))
+    result = analyze(log, "--params", parameters)
+    assert result.exit_code == 0, result.output
+    assert "hover throttle 0.4" in result.output
+    assert "PX4's default gains" in result.output
+    assert "# MPC_Z_VEL_P_ACC was 4\n" in parameters.read_text()
+    rows = [line.split("\t") for line in lines_of(parameters)]
+    assert [row[2] for row in rows] == ["MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC"]
+    assert {len(row) for row in rows} == {5}
 
 
 def test_the_document_alone_can_be_printed(steps: Path) -> None:
@@ -121,7 +136,7 @@ def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> No
     ("name", "reason"),
     [
         ("arducopter_takeoff.bin", "holds altitude for 4.8 s only"),
-        ("px4_takeoff.ulg", "another kind of log (PX4's log)"),
+        ("px4_takeoff.ulg", "has no 4 s with an altitude to follow between takeoff and landing"),
     ],
 )
 def test_the_other_recorded_logs_are_refused_with_the_reason(name: str, reason: str, tmp_path: Path) -> None:

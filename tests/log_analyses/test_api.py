@@ -9,8 +9,10 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from app.figures.theme import PALETTES
 from tests.builders import Json, problems_of
+from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import Telemetry, recorded
+from tests.logs.written_px4 import px4_log
 
 PATH = "/api/log-analyses"
 
@@ -60,13 +62,54 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
     ("name", "reason"),
     [
         ("arducopter_takeoff.bin", "holds altitude for 4.8 s only; 6 s are needed"),
-        ("px4_takeoff.ulg", "is another kind of log (PX4's log)"),
+        (
+            "px4_takeoff.ulg",
+            (
+                "has no 4 s with an altitude to follow between takeoff and landing, without a gap of 0.25 s, a reset "
+                "of the estimator or a parameter change"
+            ),
+        ),
     ],
 )
 def test_a_log_that_cannot_be_analysed_is_refused_with_the_reason(client: TestClient, name: str, reason: str) -> None:
     answer = send(client, name, recorded(name))
     assert answer.status_code == 422
-    assert problems_of(answer) == {"file": reason}
+    assert list(problems_of(answer).values()) == [reason]
+
+
+def test_the_log_of_px4_gives_gains_for_its_ground_station(client: TestClient) -> None:
+    """The vehicle hovers at 0.40, and was told 0.35; P falls short of the hand rule's 8 because of the activity."""
+    found = send(client, "flight.ulg", px4_log(simulated_px4())).json()
+    assert (found["autopilot"], found["proposes"]) == ("PX4", True)
+    vehicle = found["numbers"]["vehicle"]
+    assert vehicle["hover_throttle"]["mean"] == pytest.approx(0.40, abs=0.01)
+    assert vehicle["assumed_hover_throttle"] == pytest.approx(0.35)
+    assert any("but MPC_THR_HOVER was 0.350" in fact for fact in found["vehicle"])
+    assert found["gains"]["columns"][:5] == ["Gains", "Z_P", "Z_VEL_P_ACC", "Z_VEL_I_ACC", "Z_VEL_D_ACC"]
+    assert [row[0] for row in found["gains"]["rows"]] == [
+        "As flown",
+        "Proposed",
+        "PX4's default gains",
+        "For comparison: 1.5, 8, 3, 0",
+        "For comparison: 1.5, 6, 3, 0.3",
+    ]
+    flown, proposed = found["numbers"]["assessments"][0], found["numbers"]["proposed"]
+    assert proposed["error_m"] < 0.8 * flown["error_m"]
+    assert (proposed["activity"] <= 1.5, proposed["margin"] >= 2.0) == (True, True)
+    assert proposed["gains"]["MPC_Z_VEL_P_ACC"] < 8.0
+    assert any("30 ms of extra dead time" in note for note in found["notes"])
+    assert found["parameter_file"]["name"] == "flight.params"
+    lines = [line.split("\t") for line in found["parameter_file"]["content"].splitlines() if not line.startswith("#")]
+    assert [(vehicle, component, kind) for vehicle, component, _, _, kind in lines] == [("7", "1", "9")] * 4
+    assert {name: float(value) for _, _, name, value, _ in lines} == pytest.approx(proposed["gains"])
+    drawn = found["figures"]["light"]["figure"]["data"]
+    assert [(one["meta"]["panel"], one["meta"]["line"]) for one in drawn][:3] == [
+        (1, "Reference"),
+        (1, "Flown"),
+        (1, "Predicted with the proposed gains"),
+    ]
+    flown_mm, predicted_mm = (sum(map(abs, drawn[place]["y"])) / len(drawn[place]["y"]) for place in (3, 4))
+    assert predicted_mm < 0.9 * flown_mm
 
 
 def test_a_file_that_is_no_log_is_refused(client: TestClient) -> None:
@@ -74,7 +117,7 @@ def test_a_file_that_is_no_log_is_refused(client: TestClient) -> None:
     assert problems_of(answer) == {"file": "is not a log"}
     assert problems_of(send(client, "empty.bin", b"")) == {"file": "is empty"}
     assert answer.json()["hint"].startswith(
-        "Use ArduCopter's .bin log, or Paparazzi's .data or .tlog log of a takeoff; logs of PX4 are not analysed yet."
+        "Use ArduCopter's .bin log, PX4's .ulg log, or Paparazzi's .data or .tlog log of a takeoff."
     )
 
 

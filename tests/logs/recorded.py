@@ -41,6 +41,53 @@ class OnBoardLog:
         self.content += b"\xa3\x95" + bytes([kind]) + struct.pack(layout, *fields)
 
 
+ULOG_HEADER = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 1)
+
+
+def ulog_message(kind: str, body: bytes) -> bytes:
+    """One message of a ULog."""
+    return struct.pack("<HB", len(body), ord(kind)) + body
+
+
+class ULogFile:
+    """PX4's log put together by hand: topics and parameters first, then rows in order of their time."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, tuple[int, str]] = {}
+        self._formats = self._subscriptions = self._parameters = b""
+        self._rows: list[tuple[int, bytes]] = []
+
+    @property
+    def content(self) -> bytes:
+        """The whole file."""
+        rows = (body for _, body in sorted(self._rows, key=lambda row: row[0]))
+        return b"".join((ULOG_HEADER, self._formats, self._parameters, self._subscriptions, *rows))
+
+    def define(self, topic: str, fields: str, layout: str) -> None:
+        """A topic with these fields ("float z;float vz;") beside its time, packed by `layout`."""
+        number = len(self._topics)
+        self._topics[topic] = (number, layout)
+        self._formats += ulog_message("F", f"{topic}:uint64_t timestamp;{fields}".encode())
+        self._subscriptions += ulog_message("A", b"\0" + struct.pack("<H", number) + topic.encode())
+
+    def parameter(self, name: str, value: float, *, at_s: float | None = None) -> None:
+        """A parameter from before the log, or changed at a time; whole numbers are integers."""
+        kind, layout = ("int32_t", "<i") if isinstance(value, int) else ("float", "<f")
+        key = f"{kind} {name}".encode()
+        body = ulog_message("P", bytes([len(key)]) + key + struct.pack(layout, value))
+        if at_s is None:
+            self._parameters += body
+        else:
+            self._rows.append((round(at_s * 1e6), body))
+
+    def add(self, topic: str, at_s: float, *values: float) -> None:
+        """A row of a topic, if it was defined."""
+        if topic in self._topics:
+            number, layout = self._topics[topic]
+            at_us = round(at_s * 1e6)
+            self._rows.append((at_us, ulog_message("D", struct.pack("<HQ" + layout, number, at_us, *values))))
+
+
 class Telemetry:
     """A telemetry log under construction: messages of a vehicle and of a ground station, in one time."""
 

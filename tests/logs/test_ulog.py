@@ -11,10 +11,11 @@ from pyulog import ULog
 from app.core.errors import TrajectoryError
 from app.logs.readers import read_takeoff, read_takeoffs
 from app.logs.ulog import read_ulog
+from tests.logs.recorded import ULOG_HEADER as HEADER
 from tests.logs.recorded import recorded
+from tests.logs.recorded import ulog_message as message
 
 LOG = "px4_takeoff.ulg"
-HEADER = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 1)
 
 
 def test_the_recorded_takeoff_is_found_with_its_gains() -> None:
@@ -35,10 +36,6 @@ def test_the_sieved_log_holds_the_same_altitude_as_the_whole_one() -> None:
     ours = read_ulog(io.BytesIO(recorded(LOG)))
     np.testing.assert_array_equal(ours.time_s, whole["timestamp"] / 1e6)
     np.testing.assert_array_equal(ours.channels["altitude_m"], -whole["z"].astype(np.float64))
-
-
-def message(kind: str, body: bytes) -> bytes:
-    return struct.pack("<HB", len(body), ord(kind)) + body
 
 
 def small_log(*, after: bytes = b"") -> bytes:

@@ -59,7 +59,7 @@ class LoopTexts:
     suffice, `lags` say what to reduce if no gains do, `other_controller` what may have flown instead of this loop.
     """
 
-    autopilot: Literal["ArduCopter"]
+    autopilot: Literal["ArduCopter", "PX4"]
     prefix: str
     hover_parameter: str
     fast_gains: str

@@ -43,6 +43,23 @@ class Segment:
         """Rows after the lead, shape (n,)."""
         return np.asarray(self.time_s >= self.time_s[0] + LEAD_S)
 
+    def motor_throttle(self, time_s: Samples) -> Samples:
+        """What the motors get at these times within the segment, shape (m,), between its rows."""
+        return _smooth(self.time_s, self.throttle_filtered, time_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FinerSegment(Segment):
+    """A segment of a log that has the throttle of the motors more often than the rest: at `motor_time_s`, shape (k,),
+    which increases and begins and ends with the rows."""
+
+    motor_time_s: Samples
+    motor_values: Samples
+
+    def motor_throttle(self, time_s: Samples) -> Samples:
+        """What the motors get at these times within the segment, shape (m,)."""
+        return _smooth(self.motor_time_s, self.motor_values, time_s)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Steps:
@@ -58,7 +75,7 @@ class Steps:
 
 def interpolated(segment: Segment, step_s: float) -> Steps:
     """The segment at every step: each signal with its derivative, where that was logged too."""
-    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+    from scipy.interpolate import CubicHermiteSpline
 
     time_s = np.arange(segment.time_s[0], segment.time_s[-1], step_s)
 
@@ -76,5 +93,11 @@ def interpolated(segment: Segment, step_s: float) -> Steps:
         reference=np.column_stack(reference),
         z_m=between(segment.z_m, segment.v_m_s),
         v_m_s=between(segment.v_m_s, segment.a_m_s2),
-        throttle_filtered=np.asarray(PchipInterpolator(segment.time_s, segment.throttle_filtered)(time_s)),
+        throttle_filtered=segment.motor_throttle(time_s),
     )
+
+
+def _smooth(time_s: Samples, values: Samples, wanted_s: Samples) -> Samples:
+    from scipy.interpolate import PchipInterpolator
+
+    return np.asarray(PchipInterpolator(time_s, values)(wanted_s))

@@ -48,8 +48,8 @@ REFERENCE: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2", "assumed_hover")
 DISTURBANCES: Final = ("acceleration_m_s2", "climb_rate_m_s2", "altitude_m_s", "sensed_m_s2")
 """Of the acceleration, of the estimated climb rate and altitude beyond it, and of the sensed acceleration alone."""
 FLOWN: Final = ("z_m", "v_m_s", "a_m_s2", "throttle", "throttle_filtered", "throttle_slow")
-"""The estimates that a loop used, the throttle that it demanded with them, what of it the motors get, and its 2 Hz
-low-pass."""
+"""The estimates that a loop used, the throttle that it demanded with them, what of it the motors get, and the slow part
+of it: throttle activity is the rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

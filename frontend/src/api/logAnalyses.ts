@@ -8,7 +8,7 @@ import type { RecordFiles } from "./records";
 export type { LogAnalysis } from "./generated";
 
 /** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
-export const ANALYSED_FILES = ".bin,.tlog,.data,.log";
+export const ANALYSED_FILES = ".bin,.ulg,.tlog,.data,.log";
 
 /** Create a campaign with the takeoffs of a Paparazzi log. */
 export function useStartCampaign() {

@@ -1154,14 +1154,14 @@ export type EstimatedValue = {
 /**
  * EstimatedVehicle
  *
- * The ArduCopter that the log fits.
+ * The copter that the log fits.
  */
 export type EstimatedVehicle = {
     hover_throttle: EstimatedValue;
     /**
      * Assumed Hover Throttle
      *
-     * MOT_THST_HOVER in flight
+     * MOT_THST_HOVER in flight, or MPC_THR_HOVER
      */
     assumed_hover_throttle: number;
     thrust_slope: EstimatedValue;
@@ -1848,7 +1848,7 @@ export type GainsInManoeuvre = {
     /**
      * Margin
      *
-     * factor on the acceleration gains at which the loop rings with 30 ms more lag, on the most critical of the vehicles consistent with the log; 0: less than 1, 8: at least 8
+     * factor on the gains of the acceleration controller, PX4: of the velocity controller, at which the loop rings with 30 ms more lag, PX4: dead time, on the most critical of the vehicles consistent with the log; 0: less than 1, 8: at least 8
      */
     margin: number;
 };
@@ -2359,7 +2359,7 @@ export type LogAnalysis = {
     /**
      * Autopilot
      */
-    autopilot: 'ArduCopter' | 'Paparazzi';
+    autopilot: 'ArduCopter' | 'PX4' | 'Paparazzi';
     /**
      * Answer
      */
@@ -2445,7 +2445,7 @@ export type LoggedBehaviour = {
 /**
  * ManoeuvreNumbers
  *
- * The analysis of an ArduCopter's log. `assessments` begins with the gains flown.
+ * The analysis of an ArduCopter's or PX4's log. `assessments` begins with the gains flown.
  */
 export type ManoeuvreNumbers = {
     behaviour: LoggedBehaviour;

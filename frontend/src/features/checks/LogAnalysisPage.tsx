@@ -59,9 +59,9 @@ export function LogAnalysisPage() {
         className={over ? classes["over"] : ""}
       >
         <Text maw="90ch" lh={1.45} mb={10}>
-          Drop or choose a log. ArduCopter: the .bin log of a flight in GUIDED, LOITER, ALT_HOLD or AUTO that climbs and
-          descends by about 2 m, with a few seconds of hover in between. Paparazzi: the .data and .log files, or the
-          .tlog, of takeoffs to 3 m. Nothing is stored.
+          Drop or choose a log. ArduCopter's .bin or PX4's .ulg: a flight in a mode that holds altitude, with climbs and
+          descents of about 2 m and 5 s of hover in between. Paparazzi: the .data and .log files, or the .tlog, of
+          takeoffs to 3 m. Nothing is stored.
         </Text>
         <Group gap={10} mt={12} mb={10}>
           <FileButton multiple accept={ANALYSED_FILES} onChange={analyze} resetRef={resetFile}>

@@ -1,0 +1,246 @@
+"""PX4's altitude loop as an analysis takes it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, transition_of
+from app.core.analysis.segment import Segment, Steps, interpolated
+from app.core.control import px4 as loop
+from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, Parameters, low_pass_gain
+from app.core.models.copter import (
+    DISTURBANCES,
+    FLOWN,
+    HOVER_THROTTLE,
+    REFERENCE,
+    Copter,
+    Filter,
+    advance,
+    start_body,
+)
+from app.core.models.px4_copter import fly
+from app.core.records.trajectory import Samples
+
+SPACE: Final = GainSpace(
+    bounds=MappingProxyType(
+        {
+            "MPC_Z_P": (0.1, 1.5),
+            "MPC_Z_VEL_P_ACC": (2.0, 15.0),
+            "MPC_Z_VEL_I_ACC": (0.2, 3.0),
+            "MPC_Z_VEL_D_ACC": (0.0, 2.0),
+        }
+    ),
+    gentle=MappingProxyType({"MPC_Z_P": 0.5, "MPC_Z_VEL_P_ACC": 2.0, "MPC_Z_VEL_I_ACC": 0.5, "MPC_Z_VEL_D_ACC": 0.0}),
+    zeros=MappingProxyType({"MPC_Z_VEL_D_ACC": 0.25}),
+)
+
+_TEXTS: Final = LoopTexts(
+    autopilot="PX4",
+    prefix="MPC_",
+    hover_parameter="MPC_THR_HOVER",
+    fast_gains="P, I and D of the velocity controller",
+    lateness="dead time",
+    what_to_fly=(
+        "Fly at a height of 3 m or more in a mode that follows an altitude (Hold with a changed altitude, Mission, "
+        "Offboard): hover for 5 s, climb 2 m, hover for 5 s, descend 2 m, hover for 5 s, twice; with bit 0 of "
+        "SDLOG_PROFILE set, its default. In a takeoff the ramp decides, not the gains."
+    ),
+    lags="motors, filters of the velocity (MPC_VEL_LP, MPC_VELD_LP)",
+    other_controller="a release with another position controller, or set-points that were not logged",
+    parameter_suffix=".params",
+)
+
+_DYNAMIC: Final = [loop.THRUST, loop.DERIVATIVE, loop.VELOCITY, loop.INTEGRAL, loop.ACCELERATION_TARGET]
+"""What the loop remembers from one step to the next, on a reference at rest."""
+
+_NUDGE: Final = 2e-3
+"""Large, because the loop has single precision, and between its limits it is linear."""
+
+SLOW_HZ: Final = 2.0
+"""Cut-off of the low-pass about which throttle activity is counted."""
+
+_USUAL: Final = Copter(hover_throttle=0.5, thrust_slope=1.25, motor_lag_s=0.05, drag_1_s=0.3)
+_THROTTLE, _SLOW = FLOWN.index("throttle"), FLOWN.index("throttle_slow")
+_REAL32: Final = 9
+_AT_LIMIT: Final = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Px4Loop:
+    """The loop (`AltitudeLoop`), with the limits of its mode.
+
+    The acceleration in the log is the change of the climb rate over `row_s`, a whole number of steps. `vehicle` is the
+    number of the vehicle in MAVLink.
+    """
+
+    parameters: Parameters
+    step_s: float
+    row_s: float
+    descent_m_s: float
+    vehicle: int = 1
+
+    texts = _TEXTS
+    space = SPACE
+    usual_slope = (1.25, 0.35)
+    slope_error = 0.06
+    target_tolerance_m_s = 0.1
+
+    @property
+    def gains(self) -> dict[str, float]:
+        return self.parameters.gains
+
+    @property
+    def assumed_hover_throttle(self) -> float:
+        return self.parameters.hover_thrust
+
+    @property
+    def throttle_limits(self) -> tuple[float, float]:
+        return self.parameters.thrust_min + _AT_LIMIT, self.parameters.thrust_max - _AT_LIMIT
+
+    @property
+    def accelerometer(self) -> Filter:
+        """The mean over a row, of the steps before."""
+        steps = max(round(self.row_s / self.step_s), 1)
+        return np.append(0.0, np.full(steps, 1.0 / steps)), np.array([1.0])
+
+    def named(self, gains: Mapping[str, float]) -> dict[str, float]:
+        return dict(gains)
+
+    def rules(self, hover_throttle: float) -> dict[str, dict[str, float]]:  # noqa: ARG002
+        """The firmware's defaults, two fixed sets."""
+        fixed = [_with_names(values) for values in ((1.5, 8.0, 3.0, 0.0), (1.5, 6.0, 3.0, 0.3))]
+        return {
+            "PX4's default gains": _with_names((1.0, 4.0, 2.0, 0.0)),
+            **{f"For comparison: {in_order(gains)}": gains for gains in fixed},
+        }
+
+    def parameter_lines(self, flown: Mapping[str, float], proposed: Mapping[str, float]) -> list[str]:
+        """As QGroundControl loads them: vehicle, component, name, value and MAVLink type, separated by tabs."""
+        return [
+            *(f"# {name} was {value:g}" for name, value in flown.items()),
+            "# Vehicle-Id Component-Id Name Value Type",
+            *(f"{self.vehicle}\t1\t{name}\t{value:g}\t{_REAL32}" for name, value in proposed.items()),
+        ]
+
+    def with_gains(self, gains: Mapping[str, float]) -> Self:
+        return self._with(**{FIRMWARE_NAMES[name]: value for name, value in gains.items()})
+
+    def with_fast_gains(self, factor: float) -> Self:
+        """All feedback passes through the velocity controller."""
+        p = self.parameters
+        return self._with(
+            velocity_p_1_s=factor * p.velocity_p_1_s,
+            velocity_i_1_s2=factor * p.velocity_i_1_s2,
+            velocity_d=factor * p.velocity_d,
+        )
+
+    def _with(self, **values: float) -> Self:
+        return replace(self, parameters=replace(self.parameters, **values))
+
+    def climb_rate_targets(self, segment: Segment) -> Samples:
+        p = self.parameters
+        wanted = segment.v_d_m_s + p.position_p_1_s * (segment.z_d_m - segment.z_m)
+        return np.clip(wanted, -self.descent_m_s, p.climb_m_s)
+
+    def excitation(self, segment: Segment, throttle: float) -> tuple[Samples, Samples]:
+        """What a usual vehicle does along the reference in still air: a step of the reference has no rates."""
+        usual = replace(_USUAL, hover_throttle=throttle)
+        steps = interpolated(segment, self.step_s)
+        reference = steps.reference.copy()
+        reference[:, REFERENCE.index("assumed_hover")] = throttle
+        run = Run(
+            copter=self.packed(usual),
+            reference=reference,
+            disturbances=np.zeros((len(reference), len(DISTURBANCES))),
+            start=(throttle, float(reference[0, 0]), float(reference[0, 1]), 0.0),
+        )
+        v_m_s = np.interp(segment.time_s, steps.time_s, self._flown(run)[:, FLOWN.index("v_m_s")])
+        rates = np.diff(v_m_s) / np.diff(segment.time_s)
+        return v_m_s, np.append(rates[0], rates)
+
+    def start(self, steps: Steps) -> tuple[float, float]:
+        return float(steps.v_m_s[0]), float(steps.reference[0, 2])
+
+    def packed(self, copter: Copter) -> Samples:
+        return copter.packed(filter_hz=0.0, dt_s=self.step_s)
+
+    def fly(self, run: Run) -> Samples:
+        """Activity is counted about what the reference alone commands, too: its part of the throttle is fast, and as
+        large as the gains are."""
+        still = self._flown(replace(run, disturbances=np.zeros_like(run.disturbances)))
+        flown = self._flown(run)
+        flown[:, _SLOW] += still[:, _THROTTLE] - still[:, _SLOW]
+        return flown
+
+    def _flown(self, run: Run) -> Samples:
+        packed, inputs = self.parameters.packed(self.step_s), self._inputs()
+        state, outputs = np.empty(loop.STATE_SIZE, dtype=np.float32), np.empty((1, len(loop.OUTPUTS)), dtype=np.float32)
+        throttle, _, v_m_s, _ = run.start
+        loop.start_hover(state, packed, float(run.reference[0, 3]), throttle, -v_m_s)
+        body, flown = start_body(*run.start, run.copter), np.empty((len(run.reference), len(FLOWN)))
+        slow_gain = low_pass_gain(SLOW_HZ, self.step_s)
+        fly(
+            state, body, packed, run.copter, self.step_s, slow_gain, inputs, outputs, run.reference, run.disturbances,
+            flown,
+        )  # fmt: skip
+        return flown
+
+    def transition(self, copter: Copter, *, late_s: float = 0.0) -> Samples:
+        """With the hover throttle of the vehicle, which PX4 estimates in flight. The copter is late by dead time, in
+        whole steps: with more lag alone, a loop without a filter of its throttle hardly ever rings."""
+        packed, p = self.packed(copter), self.parameters.packed(self.step_s)
+        hover = float(packed[HOVER_THROTTLE])
+        reference, still = np.array([[0.0, 0.0, 0.0, hover]]), np.zeros((1, len(DISTURBANCES)))
+        inputs, outputs = self._inputs(), np.empty((1, len(loop.OUTPUTS)), dtype=np.float32)
+
+        def after_step(nudge: Samples) -> Samples:
+            state, flown = np.empty(loop.STATE_SIZE, dtype=np.float32), np.empty((1, len(FLOWN)))
+            loop.start_hover(state, p, hover, hover, 0.0)
+            state[_DYNAMIC] += nudge[: len(_DYNAMIC)].astype(np.float32)
+            body = start_body(hover, 0.0, 0.0, 0.0, packed) + nudge[len(_DYNAMIC) :]
+            fly(state, body, p, packed, self.step_s, 1.0, inputs, outputs, reference, still, flown)
+            return np.concatenate([state[_DYNAMIC].astype(np.float64), body])
+
+        def body_after_step(nudge: Samples) -> Samples:
+            body = start_body(hover, 0.0, 0.0, 0.0, packed) + nudge[1:]
+            advance(body, packed, self.step_s, hover + float(nudge[0]), 0.0, 0.0, 0.0)
+            return np.append(0.0, body)
+
+        together = transition_of(after_step, len(_DYNAMIC), _NUDGE)
+        steps = round(late_s / self.step_s)
+        return _late(together, transition_of(body_after_step, 1, _NUDGE), steps) if steps else together
+
+    def _inputs(self) -> NDArray[np.float32]:
+        """Inputs of the loop in flight, shape (1, 15), without estimates and set-points."""
+        inputs = np.zeros((1, len(loop.INPUTS)), dtype=np.float32)
+        given = {
+            "dt_s": self.step_s,
+            "set_new": 1.0,
+            "armed": 1.0,
+            "limit_up_m_s": self.parameters.climb_m_s,
+            "limit_down_m_s": self.descent_m_s,
+        }
+        for name, value in given.items():
+            inputs[0, loop.INPUTS.index(name)] = value
+        return inputs
+
+
+def _with_names(values: Sequence[float]) -> dict[str, float]:
+    return dict(zip(GAINS, values, strict=True))
+
+
+def _late(together: Samples, body: Samples, steps: int) -> Samples:
+    """The transition of loop and body, shape (k, k), with a throttle that arrives `steps` later; `body` is that of
+    the throttle and the body alone. The throttles on their way are appended to the state."""
+    size, first = len(together), len(_DYNAMIC)
+    late = np.zeros((size + steps, size + steps))
+    late[:first, :size] = together[:first]
+    late[first:size, first:size] = body[1:, 1:]
+    late[first:size, -1] = body[1:, 0]
+    late[size, :size] = together[_DYNAMIC.index(loop.THRUST)]
+    late[size + 1 :, size:-1] = np.eye(steps - 1)
+    return late
