@@ -51,6 +51,8 @@ _LARGEST_LEAN: Final = 0.866
 _JUMP_M: Final = 0.5
 _JUMP_M_S: Final = 2.0
 _LONGEST_STEP_S: Final = 0.02
+_EVERY_POSITION_S: Final = 0.0125
+"""Rows of the position that are not further apart than this are all that there were."""
 _SET_POINT_LASTS_S: Final = 1.0
 _NEAR_LIMIT: Final = 1e-3
 _LEAST_SHARE: Final = 0.2
@@ -194,14 +196,15 @@ def read_px4_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
 
 def _manoeuvres(logged: _Logged) -> Samples:
     """Acceleration that the reference alone asks for, shape (n,): steps of the altitude count too."""
-    return np.asarray(np.gradient(logged.up["v_d"] + logged.up["z_d"], logged.time_s) + logged.up["a_d"])
+    target, time_s = logged.up["v_d"] + logged.up["z_d"], logged.time_s
+    return np.diff(target, prepend=target[0]) / np.diff(time_s, prepend=time_s[0] - 1.0) + logged.up["a_d"]
 
 
 def _step_s(position: Table, given: Parameters) -> float:
     """Interval of the estimates, s: as logged, or where not all were, as the estimator's parameters say, in whole
     intervals of the IMU."""
     logged_s = float(np.median(np.diff(seconds(position))))
-    if 0.0 < logged_s <= _LONGEST_STEP_S:
+    if 0.0 < logged_s <= _EVERY_POSITION_S:
         return logged_s
     imu_s = 1.0 / max(given.get(_IMU_RATE, _IMU_HZ), 1.0 / _LONGEST_STEP_S)
     period_s = given.get(_PERIOD, _PERIOD_US) / 1e6

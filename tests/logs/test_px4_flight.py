@@ -118,6 +118,13 @@ def test_a_log_that_cannot_be_used_is_refused_by_what_is_missing(
     assert (found[0], found[1][: len(reason)]) == (field, reason)
 
 
+def test_a_log_with_a_single_row_is_refused() -> None:
+    first = replace(LOGGED, **{name: getattr(LOGGED, name)[:1] for name in Segment.__slots__})
+    assert refusal(px4_log(replace(FLIGHT, segments=[first])))[0] in {
+        "vehicle_local_position_setpoint", "vehicle_local_position_setpoint.z"
+    }  # fmt: skip
+
+
 def test_thrust_without_numbers_is_refused() -> None:
     unknown = replace(LOGGED, throttle=np.full_like(LOGGED.throttle, np.nan))
     assert refusal(px4_log(replace(FLIGHT, segments=[unknown]))) == (
@@ -160,12 +167,12 @@ def test_the_loop_runs_in_whole_intervals_of_the_imu(parameters: dict[str, float
 
 
 def test_where_every_position_was_logged_their_interval_is_the_step() -> None:
-    """Rows of 16 ms, of which the analysis takes ten a second."""
-    time_s = np.arange(0.0, LOGGED.duration_s, 0.016)
+    """Rows of 10 ms, of which the analysis takes ten a second."""
+    time_s = np.arange(0.0, LOGGED.duration_s, 0.01)
     names = [name for name in Segment.__slots__ if name != "time_s"]
     often = Segment(time_s=time_s, **{name: np.interp(time_s, LOGGED.time_s, getattr(LOGGED, name)) for name in names})
     flight = read(px4_log(replace(FLIGHT, segments=[often])))
-    assert flight.loop.step_s == pytest.approx(0.016)
+    assert flight.loop.step_s == pytest.approx(0.01)
     assert loop_of(flight).row_s == pytest.approx(0.1, abs=0.015)
 
 

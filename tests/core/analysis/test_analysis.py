@@ -49,6 +49,7 @@ def test_the_log_of_the_real_binary_gives_gains_six_times_better() -> None:
     assert found.behaviour.error_m == pytest.approx(0.0275, abs=2e-4)
     assert found.behaviour.reference_range_m == pytest.approx(2.0, abs=0.05)
     assert found.behaviour.saturated_share == 0.0
+    assert found.loop.assumed_hover_throttle == pytest.approx(0.39)
     assert {each.name for each in found.assessments[1:]} == set(found.loop.rules(0.363))
 
 

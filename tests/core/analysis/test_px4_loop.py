@@ -93,6 +93,7 @@ def test_soft_gains_are_answered_by_better_ones_than_the_defaults_within_the_lim
     assert sum(within) >= 7
 
 
+@pytest.mark.complete
 def test_gains_without_a_margin_are_answered_by_gains_that_have_one() -> None:
     """P of 15 on motors of 0.2 s: with 30 ms more it rings. The error hardly rises."""
     found = analyze(simulated_px4(SLOW, position_p_1_s=1.5, velocity_p_1_s=15.0, velocity_i_1_s2=3.0))
@@ -104,6 +105,18 @@ def test_gains_without_a_margin_are_answered_by_gains_that_have_one() -> None:
         loop_of(Parameters()).with_gains(dict(each.gains)) for each in (found.assessments[0], found.proposed)
     )
     assert least_damping(proposed, SLOW.linear) > 1.3 * least_damping(flown, SLOW.linear)
+
+
+def test_the_parameter_file_has_the_fields_of_the_ground_station_between_tabs() -> None:
+    loop = replace(loop_of(Parameters(hover_thrust=0.45)), vehicle=7)
+    proposed = {"MPC_Z_P": 1.5, "MPC_Z_VEL_D_ACC": 0.25}
+    assert loop.parameter_lines({"MPC_Z_P": 1.0}, loop.named(proposed)) == [
+        "# MPC_Z_P was 1",
+        "# Vehicle-Id Component-Id Name Value Type",
+        "7\t1\tMPC_Z_P\t1.5\t9",
+        "7\t1\tMPC_Z_VEL_D_ACC\t0.25\t9",
+    ]
+    assert loop.assumed_hover_throttle == 0.45
 
 
 def test_the_rules_are_the_defaults_and_two_fixed_sets() -> None:
@@ -145,6 +158,22 @@ def test_set_points_that_were_not_logged_are_refused() -> None:
     with pytest.raises(TrajectoryError, match="set-points that were not logged") as refused:
         analyze(unknown)
     assert "In a takeoff the ramp decides" in refused.value.hint
+
+
+@pytest.mark.parametrize(
+    ("signals", "reason"),
+    [
+        ({"z_d_m": 5.0, "v_d_m_s": 0.0, "a_d_m_s2": 0.0}, "has no altitude changes: the reference moves by 0.00 m"),
+        ({"throttle": 0.12}, "has the throttle at a limit in 100% of its rows"),
+    ],
+)
+def test_a_flight_to_learn_nothing_from_is_refused(signals: dict[str, float], reason: str) -> None:
+    flight = simulated_px4()
+    (segment,) = flight.segments
+    constant = {name: np.full(len(segment.time_s), value) for name, value in signals.items()}
+    with pytest.raises(TrajectoryError, match=reason) as refused:
+        analyze(replace(flight, segments=[replace(segment, **constant)]))
+    assert "hover for 5 s, climb 2 m" in refused.value.hint
 
 
 def test_coordinates_of_a_gain_space_are_logarithms_that_a_zero_does_not_end() -> None:
