@@ -99,18 +99,24 @@ def motors_off_requested(reason: str) -> str:
     return requested("Motors off", reason)
 
 
+LANDED: Final = "landed"
+"""Key in the settings of a record: false if the vehicle fell, or was not seen to stop its motors on the ground."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightRecord:
     """Result of a flight: its trajectory at full rate, how it ended, and the reason if it ended early.
 
     If `should_stop` ended the flight before any limit did, `reason` begins with the reason of the stop request, or with
     `motors_off_requested` of it. The caller that requested the stop then sets `on_request` of the aborted flight.
+    Without `has_flown` nothing was flown, because the vehicle has certainly never left the ground.
     """
 
     trajectory: Trajectory
     ending: Ending
     reason: str = ""
     on_request: bool = False
+    has_flown: bool = True
     settings: Mapping[str, OptionValue] = field(default_factory=dict)
 
 
@@ -142,7 +148,8 @@ class Vehicle(Protocol):
 
         `on_sample` receives live telemetry at 50 Hz of vehicle time; `should_stop` is called at least as often and
         returns a request once the flight must end early. Raises VehicleError if the flight could not be carried out,
-        with `not_flown` set if the vehicle was never commanded to take off.
+        with `not_flown` set if the vehicle was never commanded to take off. A flight that a request ended before the
+        lift-off has a record without `has_flown`.
         """
         ...
 

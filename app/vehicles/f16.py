@@ -80,6 +80,7 @@ class LinearAircraft(GainHolder):
             trajectory=_trajectory(detail),
             ending="completed" if stop is None else "aborted",
             reason="" if stop is None else stop.reason,
+            has_flown=flown_steps > 0,
             settings=self._settings,
         )
 

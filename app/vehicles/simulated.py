@@ -204,8 +204,8 @@ class SimulatedVehicle(GainHolder):
 
         `should_stop` is called every 20 ms, of vehicle time or of wall time, whichever comes first. A stop ends the
         flight there: the safe gains are set and the vehicle descends at 0.5 m/s. The record includes the descent, whose
-        set point is the ground. Afterwards the vehicle holds its safe gains. Raises VehicleError if no gains were
-        staged or the simulation diverged.
+        set point is the ground; one that never rose above `_LANDED_M` has not flown. Afterwards the vehicle holds its
+        safe gains. Raises VehicleError if no gains were staged or the simulation diverged.
         """
         self._require_staged()
         try:
@@ -217,10 +217,12 @@ class SimulatedVehicle(GainHolder):
                 rows.extend(self._land(simulation, rows[-1]) if rows else [self._stay(simulation)])
         finally:
             self._restore()
+        flown = np.concatenate(rows)
         return FlightRecord(
-            trajectory=trajectory_of(np.concatenate(rows), self.kind),
+            trajectory=trajectory_of(flown, self.kind),
             ending="completed" if stop is None else "aborted",
             reason="" if stop is None else stop.reason,
+            has_flown=stop is None or bool(flown[:, ALTITUDE].max() > _LANDED_M),
             settings=self._settings,
         )
 

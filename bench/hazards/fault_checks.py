@@ -92,6 +92,9 @@ class _Checker:
         causes = [*self._on_ground(), *self._while_arming(), *self._in_the_air(), *self._coming_down()]
         outcome = self.result.outcome
         allowed = {cause.outcome for cause in causes}
+        had_its_time = any(cause.failure == "F4/F6" and cause.is_certain for cause in causes)
+        if allowed and self._has_stayed_down() and not had_its_time:
+            allowed.add("refused")
         if not any(cause.is_certain for cause in causes):
             allowed.add("completed")
         if outcome not in allowed:
@@ -99,8 +102,10 @@ class _Checker:
             yield f"the trial is {outcome}, but {known} was expected ({self.result.reason})"
         if outcome == "completed" and self.states.first_s(State.LAND) is None:
             yield "a completed trial has no complete record"
-        if outcome == "refused" and self.took_off_s is not None:
+        if not self.result.has_record and self.took_off_s is not None:
             yield "a trial that took off left no record"
+        if outcome == "refused" and self.took_off_s is not None and self.result.rose_m > RESTING_M:
+            yield f"the vehicle rose to {self.result.rose_m:.3f} m, but nothing is said to have been flown"
         if self.result.flew_on is not None and not _same(self.result.flew_on, self.case.gains):
             yield f"the vehicle lifted off with {dict(self.result.flew_on)}"
 
@@ -123,7 +128,7 @@ class _Checker:
         if self.within(self.beatless, *GROUND) > 2.5 * self.heartbeat_s - 0.1:
             yield Cause("preflight", "refused")
         if self.began_in(ABORT, State.CONNECT, *GROUND) or self.began_in(MOTORS_OFF, State.CONNECT, *GROUND):
-            yield Cause("F8", "aborted", is_certain=self.armed_s is not None)
+            yield Cause("F8", "refused", is_certain=self.armed_s is not None)
         for kind in (*SILENT, "frozen-position", "jumping-position", "low-battery"):
             stale_s = STANDSTILL_S + (BATTERY_S[self.case.autopilot] if kind == "low-battery" else 0.0)
             if self.armed_s is not None and covers(self.of(kind), (self.armed_s - stale_s, self.armed_s)):
@@ -140,7 +145,7 @@ class _Checker:
         if any(self.began_in(kind, *arming) for kind in ("reboot", OTHER_MODE)):
             yield Cause("F10", "refused")
         if self.began_in(ABORT, *arming) or self.began_in(MOTORS_OFF, *arming):
-            yield Cause("F8", "aborted", is_certain=True)
+            yield Cause("F8", "refused", is_certain=True)
         refused = [covers(self.of("arm-refused"), (at_s, at_s)) for at_s in self.states.times_of(Command.ARM)]
         if any(refused):
             yield Cause("F3", "refused", is_certain=all(refused))
@@ -194,6 +199,10 @@ class _Checker:
             yield Cause("F10", "invalid")
         if self.of(WILD_GAINS) and self.took_off_s is not None:
             yield Cause("F6", "aborted", is_certain=True)
+
+    def _has_stayed_down(self) -> bool:
+        """Whether the vehicle truly never left the ground after the takeoff command."""
+        return self.took_off_s is not None and self.result.rose_m <= RESTING_M
 
     def _may_have_stayed_down(self) -> bool:
         """Whether the takeoff command may not have arrived, or another command may have followed before the climb."""
@@ -306,7 +315,8 @@ class _Checker:
         may_be_suspect |= self.states.first_s(State.RECORD) is None and self._may_have_stayed_down()
         if first is Command.GAIN and not may_be_suspect:
             yield "the safe gains were sent before Land, though the gains were not suspect"
-        is_aborted = self.result.outcome == "aborted" and not self.of(MOTORS_OFF)
+        is_refused = self.result.outcome == "refused" and self.began_in(ABORT, *AIR)
+        is_aborted = (self.result.outcome == "aborted" or is_refused) and not self.of(MOTORS_OFF)
         if is_aborted and first is Command.LAND and self.states.at(max(left)) is State.ABORT_LAND:
             yield "Land was sent before the safe gains, though the gains were suspect"
         lands = [at_s for at_s, command in following if command is Command.LAND]

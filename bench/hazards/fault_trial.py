@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from app.vehicles.base import FlightOptions, SafeGainsError, Sample, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import Case
@@ -15,13 +15,15 @@ from bench.hazards.trial_states import TrialStates
 class TrialResult:
     """Result of a case.
 
-    `outcome` is completed, aborted, invalid (these three with a record) or refused (without a flight). `vehicle` is
-    what the program reports afterwards: safe, quarantined, or unopened (never connected). The rest is the drone's true
-    state: `flew_on` are the gains that it held at lift-off, `impact_m_s` its fastest descent within half a metre of the
-    ground, `touched_down_s` when it was last off the ground.
+    `outcome` is completed, aborted, invalid, or refused: nothing was flown. `has_record`: the vehicle returned a
+    record, of a flight or of one that ended before the lift-off. `vehicle` is what the program reports afterwards:
+    safe, quarantined, or unopened (never connected). The rest is the drone's true state: `flew_on` are the gains that
+    it held at lift-off, `rose_m` how far it has risen from where it stood, `impact_m_s` its fastest descent within half
+    a metre of the ground, `touched_down_s` when it was last off the ground.
     """
 
     outcome: str
+    has_record: bool
     vehicle: str
     reason: str
     holds_safe: bool
@@ -29,6 +31,7 @@ class TrialResult:
     flew_on: Mapping[str, float] | None
     armed: bool
     height_m: float
+    rose_m: float
     impact_m_s: float
     touched_down_s: float
     packets: int
@@ -51,7 +54,7 @@ def _connect_and_fly(rig: Rig) -> TrialResult:
         vehicle = MavlinkVehicle(rig.options(), rig.case.safe, is_real=False, clock=rig, source=source, transport=rig)
     except VehicleError as error:
         rig.states.ended_s = rig.drone.time_s
-        return _end(rig, "refused", "unopened", str(error))
+        return _end(rig, None, "unopened", str(error))
     try:
         return _fly(rig, vehicle)
     finally:
@@ -60,22 +63,23 @@ def _connect_and_fly(rig: Rig) -> TrialResult:
 
 def _fly(rig: Rig, vehicle: MavlinkVehicle) -> TrialResult:
     try:
-        outcome, reason = _stage_and_fly(rig, vehicle)
+        record, reason = _stage_and_fly(rig, vehicle)
     except VehicleError as error:
-        outcome, reason = "refused", str(error)
+        record, reason = None, str(error)
     rig.states.ended_s = rig.drone.time_s
-    left = _end(rig, outcome, "safe", reason)
+    left = _end(rig, record, "safe", reason)
     failure = _restore_safe_gains(vehicle, rig.case.safe)
-    if outcome == "refused":
-        return _end(rig, outcome, "safe" if failure is None else "quarantined", reason)
+    if record is None:
+        return _end(rig, record, "safe" if failure is None else "quarantined", reason)
     return replace(left, vehicle="quarantined") if isinstance(failure, SafeGainsError) else left
 
 
-def _end(rig: Rig, outcome: str, vehicle: str, reason: str) -> TrialResult:
+def _end(rig: Rig, record: FlightRecord | None, vehicle: str, reason: str) -> TrialResult:
     """Return the result with the present state of the drone."""
     drone = rig.drone
     return TrialResult(
-        outcome=outcome,
+        outcome=outcome_of(record),
+        has_record=record is not None,
         vehicle=vehicle,
         reason=reason,
         holds_safe=rig.holds(rig.case.safe),
@@ -83,6 +87,7 @@ def _end(rig: Rig, outcome: str, vehicle: str, reason: str) -> TrialResult:
         flew_on=rig.flew_on,
         armed=drone.autopilot.armed,
         height_m=drone.body.altitude_m,
+        rose_m=rig.rose_m,
         impact_m_s=rig.impact_m_s,
         touched_down_s=rig.touched_down_s,
         packets=rig.packets,
@@ -104,13 +109,18 @@ def _restore_safe_gains(vehicle: MavlinkVehicle, safe: Mapping[str, float]) -> V
     return None if held == safe else SafeGainsError(f"it holds {held}", hint="")
 
 
-def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[str, str]:
+def outcome_of(record: FlightRecord | None) -> str:
+    """Return the outcome of a trial, which has no record if it raised an error."""
+    return record.ending if record is not None and record.has_flown else "refused"
+
+
+def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[FlightRecord | None, str]:
     held = vehicle.stage(rig.case.gains)
     if held != rig.case.gains:
-        return "refused", f"it holds {held}"
+        return None, f"it holds {held}"
     rig.wait_s(rig.case.staged_s)
     record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
-    return record.ending, record.reason
+    return record, record.reason
 
 
 def _ignore_sample(_sample: Sample) -> None:

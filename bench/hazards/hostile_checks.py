@@ -15,7 +15,7 @@ from bench.hazards.cases import ABORT, FOR_GOOD_S, Case
 from bench.hazards.hostile_expectations import EXPECTED, HARMLESS, LEADS
 from bench.hazards.hostile_links import PILOTS
 from bench.hazards.rig import InjectedFault, MotorStop
-from bench.hazards.trial_states import LIFTED_M, RECORDED_S, TrialStates
+from bench.hazards.trial_states import LIFTED_M, RECORDED_S, RESTING_M, TrialStates
 from bench.hazards.wire import Command
 
 CEILING_M: Final = 5.5
@@ -75,6 +75,8 @@ class GroundTruth:
     true_states: Sequence[TrueState]
     armed: bool
     holds_safe: bool
+    rose_m: float = 0.0
+    """How far it has risen from where it stood."""
     pilot_seen_s: Sequence[float] = ()
     """Times of heartbeats that showed a pilot's mode, after the takeoff."""
     overruled_s: float = FOR_GOOD_S
@@ -170,7 +172,7 @@ def _verdict(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
     expected = HARMLESS if hazard is None else EXPECTED[hazard.kind]
     led = {each.kind for each in truth.injected if each.kind in LEADS}
     known = (*expected.reasons, *(LEADS[kind] for kind in led))
-    if reported.outcome == "refused" and truth.rose:
+    if reported.outcome == "refused" and (truth.rose or truth.rose_m > RESTING_M):
         yield f"reported as not flown, but it flew ({reported.reason})"
     if reported.outcome == "completed":
         if ABORT in led:

@@ -10,6 +10,7 @@ from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sampl
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, PlannedFault, tuned_gains
+from bench.hazards.fault_trial import outcome_of
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, TrueState, find_violations
 from bench.hazards.hostile_links import (
     COMMAND_DELAYS_S,
@@ -141,6 +142,7 @@ class HostileRig(Rig):
             overruled_s=self._overruled_s,
             armed=self.drone.autopilot.armed,
             holds_safe=self.holds(self.case.safe),
+            rose_m=self.rose_m,
         )
 
     def _inject(self, planned: PlannedFault, now_s: float) -> None:
@@ -186,7 +188,7 @@ def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
         if held != rig.case.gains:
             raise VehicleError(f"it holds {held}", hint="")
         record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
-        outcome, reason = str(record.ending), record.reason
+        outcome, reason = outcome_of(record), record.reason
     except VehicleError as error:
         reason = str(error)
     rig.states.ended_s, concern = rig.drone.time_s, vehicle.concern

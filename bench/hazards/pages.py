@@ -123,6 +123,7 @@ drone receives it, together with the drone's true height. The states in the tabl
 The checks are:
 
 - Is the outcome of the trial the one that the table requires for the fault, its beginning and its duration?
+- Did the drone truly never rise, by more than 2 mm, in a trial in which nothing is reported as flown (*refused*)?
 - Is the drone truly disarmed on the ground with its safe gains, or quarantined for a reason that the table names? A
   vehicle reported as safe must be safe, and an unnecessary quarantine is a violation too.
 - Was no packet that stops motors sent while the drone was more than 0.15 m above the ground, except by the operator?

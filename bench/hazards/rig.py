@@ -65,6 +65,8 @@ class Rig(Lockstep):
         self.stops: list[MotorStop] = []
         self.packets: int = 0
         self.flew_on: Mapping[str, float] | None = None
+        self.rose_m = 0.0
+        self._stood_m: float | None = None
         self.impact_m_s = 0.0
         self.touched_down_s = 0.0
         self.stop_request: StopRequest | None = None
@@ -79,6 +81,7 @@ class Rig(Lockstep):
     def tick(self) -> None:
         """Advance by one tick. Raises TimeoutError if the trial takes too long."""
         super().tick()
+        self._update_rise()
         if self.drone.body.altitude_m > RESTING_M:
             self.touched_down_s = self.drone.time_s
         if 0.0 < self.drone.body.altitude_m < _NEAR_GROUND_M:
@@ -86,6 +89,15 @@ class Rig(Lockstep):
         self._update()
         if self.drone.time_s > _LONGEST_S:
             raise TimeoutError(f"the trial was not over after {_LONGEST_S:g} s")
+
+    def _update_rise(self) -> None:
+        """Note how far the drone has risen since its motors began to turn: where it stands is not exactly at zero."""
+        body = self.drone.body
+        if body.is_resting:
+            self._stood_m = None
+            return
+        self._stood_m = body.altitude_m if self._stood_m is None else self._stood_m
+        self.rose_m = max(self.rose_m, body.altitude_m - self._stood_m)
 
     def write(self, data: bytes) -> bool:
         for message in self._codec.parse(data):

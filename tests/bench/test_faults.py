@@ -107,6 +107,7 @@ def flown(*injected: InjectedFault, **changes: object) -> TrialResult:
     states.ended_s = 51.6
     whole = TrialResult(
         outcome="completed",
+        has_record=True,
         vehicle="safe",
         reason="",
         holds_safe=True,
@@ -114,6 +115,7 @@ def flown(*injected: InjectedFault, **changes: object) -> TrialResult:
         flew_on=TUNED["paparazzi"],
         armed=False,
         height_m=0.0,
+        rose_m=3.0,
         impact_m_s=0.8,
         touched_down_s=47.0,
         packets=100,
@@ -143,6 +145,11 @@ LINK_LOST: Final = InjectedFault("link-lost", State.RECORD, 20.0, 23.0)
 ABORT: Final = InjectedFault("abort", State.RECORD, 20.0, float("inf"))
 
 
+ARM_ABORT: Final = InjectedFault("abort", State.ARM, 10.0, float("inf"))
+TAKE_OFF_ABORT: Final = InjectedFault("abort", State.TAKEOFF, 11.1, float("inf"))
+MOTORLESS: Final = InjectedFault("no-lift-off", State.ARM, 10.0, float("inf"))
+
+
 def stop_requested(at_s: float) -> InjectedFault:
     """Return the operator's motors off at that time."""
     return InjectedFault("motors-off", State.RECORD, at_s, float("inf"))
@@ -170,6 +177,11 @@ WRONG: Final[list[tuple[TrialResult, str]]] = [
     (flown(InjectedFault("jumping-position", State.RECORD, 20.0, 30.0)), "F9b invalid was expected"),
     (flown(InjectedFault("low-battery", State.ARM, 9.2, 99.0)), "F7 invalid"),
     (flown(flew_on=SAFE["paparazzi"]), "the vehicle lifted off with"),
+    (flown(outcome="refused", has_record=False), "a trial that took off left no record"),
+    (flown(TAKE_OFF_ABORT, outcome="refused", rose_m=0.003), "the vehicle rose to 0.003 m, but nothing"),
+    (flown(TAKE_OFF_ABORT, outcome="refused", rose_m=0.003), "but F8 aborted was expected"),
+    (flown(ARM_ABORT, outcome="aborted", rose_m=0.0), "the trial is aborted, but F8 refused was expected"),
+    (flown(MOTORLESS, outcome="refused", rose_m=0.0), "the trial is refused, but F4/F6 aborted"),
 ]
 
 
@@ -185,7 +197,7 @@ FOUND: Final = [
     # seed 20261148: each lone sample restarted the two seconds of rest on the ground, until quarantine
     (case(PlannedFault("jumping-position", State.LAND, 4.4)), "completed", "safe"),
     # seed 20261209: a stop before arming left the gains of the trial on the vehicle
-    (case(PlannedFault("abort", State.SET_GAINS, 2.0)), "aborted", "safe"),
+    (case(PlannedFault("abort", State.SET_GAINS, 2.0)), "refused", "safe"),
     # a restart while the gains were staged: the trial flew on the autopilot's own; Paparazzi forgets what was set
     (case(PlannedFault("reboot", State.SET_GAINS, 3.0), staged_s=8.0), "refused", "safe"),
     # PX4 keeps it, but is no longer staged either
@@ -204,6 +216,9 @@ FOUND: Final = [
     (case(PlannedFault("no-lift-off", State.SET_GAINS, 0.1), autopilot="px4"), "aborted", "safe"),
     # seed 20261320: switched back to its previous mode before a heartbeat could tell, it did not lift off
     (case(PlannedFault("other-mode", State.TAKEOFF, 0.27), autopilot="px4"), "aborted", "safe"),
+    # an abort before the lift-off passed for an aborted flight
+    (case(PlannedFault("abort", State.ARM, 0.6)), "refused", "safe"),
+    (case(PlannedFault("motors-off", State.ARM, 0.6), autopilot="px4"), "refused", "safe"),
     # a vehicle whose motors were stopped at 3 m passed for safe
     (case(PlannedFault("motors-off", State.RECORD, 5.0), autopilot="ardupilot"), "aborted", "quarantined"),
 ]

@@ -57,7 +57,7 @@ def test_gains_are_staged_anew_for_every_flight(kind: str, vehicle: Vehicle) -> 
 def test_a_flight_leaves_known_channels_at_one_rate_past_the_scored_window(kind: str, vehicle: Vehicle) -> None:
     record = fly(vehicle)
     flight = record.trajectory
-    assert (record.ending, record.reason) == ("completed", "")
+    assert (record.ending, record.reason, record.has_flown) == ("completed", "", True)
     assert record.settings.keys() == {option.name for option in VEHICLE_KINDS[kind].options}
     assert (flight.source, flight.clock) == (kind, "simulation")
     assert PROFILES[kind].experiment.output in flight.channels
@@ -94,7 +94,7 @@ def test_an_abort_ends_the_manoeuvre_on_the_safe_gains_and_keeps_the_record(kind
     whole = fly(vehicle).trajectory
     flight, output = record.trajectory, PROFILES[kind].experiment.output
     asked = int(np.searchsorted(flight.time_s, watcher.samples[-1].time_s))
-    assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
+    assert (record.ending, record.reason, record.has_flown) == ("aborted", "the operator pressed Abort", True)
     assert watcher.samples[-1].time_s == pytest.approx(2.0, abs=0.02)
     np.testing.assert_array_equal(flight[output][: asked + 1], whole[output][: asked + 1])
     assert (np.diff(flight.time_s) > 0.0).all()
@@ -163,7 +163,7 @@ def test_an_impossible_pace_is_refused_and_the_safe_gains_are_back(kind: str, ve
 
 def test_a_flight_aborted_before_it_starts_leaves_one_instant(kind: str, vehicle: Vehicle) -> None:
     record = fly(vehicle, should_stop=lambda: StopRequest("changed my mind"))
-    assert (record.ending, record.reason) == ("aborted", "changed my mind")
+    assert (record.ending, record.reason, record.has_flown) == ("aborted", "changed my mind", False)
     assert record.trajectory.time_s.tolist() == [0.0]
 
 

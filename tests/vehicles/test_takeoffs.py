@@ -125,3 +125,13 @@ def test_an_aborted_flight_lands_on_its_safe_gains_and_keeps_its_record(kind: st
     assert flight["altitude_m"][-1] < 0.05
     assert (np.diff(flight.time_s) > 0.0).all()
     assert vehicle.read_gains() == SAFE
+
+
+@pytest.mark.parametrize(("abort_at_s", "has_flown"), [(0.02, False), (1.0, True)])
+def test_a_flight_aborted_before_the_vehicle_has_risen_is_none(
+    kind: str, vehicle: Vehicle, abort_at_s: float, has_flown: bool
+) -> None:
+    watcher = Watcher(abort_at_s=abort_at_s)
+    record = fly(vehicle, on_sample=watcher.see, should_stop=watcher.decide)
+    assert (record.ending, record.has_flown) == ("aborted", has_flown)
+    assert (record.trajectory["altitude_m"].max() > 0.02) == has_flown

@@ -24,7 +24,8 @@ class Failure(StrEnum):
     NO_HEARTBEAT = "F1"
     PARAMETER = "F2"
     NOT_ARMED = "F3"
-    NO_LIFT_OFF = "F4"
+    NO_LIFT_OFF = "F4a"
+    TAKE_OFF_REFUSED = "F4b"
     LINK = "F5"
     ENVELOPE = "F6"
     BATTERY = "F7"
@@ -68,11 +69,12 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "arming refused, or not armed within 2 s", "disarm", "refused", "The vehicle did not arm."
         ),
         Failure.NO_LIFT_OFF: Response(
-            "takeoff refused, or still less than 0.15 m above the ground when the lift-off time limit ends",
+            "still less than 0.15 m above the ground when the lift-off time limit ends",
             "disarm",
             "aborted",
             "The vehicle did not lift off.",
         ),
+        Failure.TAKE_OFF_REFUSED: Response("takeoff refused", "disarm", "refused", "The vehicle did not lift off."),
         Failure.LINK: Response(
             "no packet for 1 s, or three heartbeats missed",
             "repeat land",

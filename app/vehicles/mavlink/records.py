@@ -13,7 +13,7 @@ from app.core.formatting import count
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.base import Ending, OptionValue
+from app.vehicles.base import LANDED, Ending, OptionValue
 from app.vehicles.mavlink.events import RecordSample
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.trial_machine import Trial
@@ -153,6 +153,16 @@ def trajectory_of(samples: Sequence[RecordSample], start_s: float, datum_m: floa
     time_s = np.array([round(sample.position.time_boot_s - start_s, 6) for sample in samples])
     channels = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
     return Trajectory(time_s, channels, SOURCE, "vehicle")
+
+
+def has_flown(trial: Trial) -> bool:
+    """Whether something was flown, or may have been."""
+    return trial.contact != "stayed"
+
+
+def contact_of(trial: Trial) -> Mapping[str, OptionValue]:
+    """Return what a record states of the landing: nothing after a normal one, otherwise that it was not observed."""
+    return {} if trial.contact in {"stayed", "landed"} else {LANDED: False}
 
 
 def ending_of(trial: Trial) -> Ending:

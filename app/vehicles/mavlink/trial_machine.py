@@ -40,6 +40,7 @@ from app.vehicles.mavlink.trial_reactions import (
     disarm,
     enter,
     fail,
+    find_contact,
     find_doubt_of_descent,
     find_doubt_of_ground,
     land,
@@ -130,7 +131,7 @@ def _with_fall(trial: Trial) -> Trial:
     if trial.stopped or trial.commanded_s is None or trial.doubt:
         return trial
     fall = limit_checks.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
-    return trial if fall is None else note(trial, fall)
+    return trial if fall is None else replace(note(trial, fall), contact="fell")
 
 
 def _with_jump(trial: Trial) -> Trial:
@@ -196,7 +197,7 @@ def _take_off(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     if isinstance(event, ActionRefused):
         refused = replace(trial, confirmed_boot_s=trial.commanded_boot_s)
-        return fail(refused, Finding(failure=Failure.NO_LIFT_OFF, why=event.why), now_s)
+        return fail(refused, Finding(failure=Failure.TAKE_OFF_REFUSED, why=event.why), now_s)
     if _waited_s(trial) > trial.plan.lift_off_s and watching.is_fresh(trial.watch, now_s):
         why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
         return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why), now_s)
@@ -333,7 +334,8 @@ def _disarming(trial: Trial, event: Event) -> Step:
     trial = _answered(_doubting(trial), event)
     if _is_stopped(trial, event):
         confirmed = " The vehicle confirmed that its motors have stopped." if trial.stopped else ""
-        return enter(replace(trial, why=trial.why + confirmed), State.RESTORE, now_s), (RestoreGains(),)
+        trial = replace(trial, why=trial.why + confirmed, contact=find_contact(trial, now_s))
+        return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
     airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     if airborne and not trial.stopped:
         why = "It was in the air when its motors were to be stopped."

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
-from typing import Final
+from typing import Final, Literal
 
 from app.core.experiments.takeoff import WINDOW_S
 from app.vehicles.base import RECORDED_BEYOND_S, motors_off_requested
@@ -103,6 +103,8 @@ GAINS_S: Final = 0.3
 _IN_PLACE_M: Final = 0.3
 _SHIFT_M: Final = 0.3
 """Greatest shift of the altitude on the ground as the motors start, unless the autopilot resets it then."""
+_STANDS_S: Final = 0.1
+"""A vehicle that has stood on the ground since this long after the takeoff command had not left it before."""
 _CLIMBED_M: Final = 0.1
 """A vehicle that has climbed by less than this, by its climb rate, has not moved."""
 
@@ -143,6 +145,11 @@ class Plan:
         return replace(moved, limits=replace(self.limits, set_point_m=set_point_m))
 
 
+Contact = Literal["unknown", "stayed", "landed", "fell"]
+"""Contact with the ground once the motors have stopped. stayed: it has never left the ground. fell: its motors may have
+been stopped in the air, or it hit the ground hard. unknown: its motors were not seen to stop."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """State of a trial.
@@ -179,6 +186,7 @@ class Trial:
     stopped: bool = False
     answered: bool = False
     doubt: str = ""
+    contact: Contact = "unknown"
 
     @property
     def is_over(self) -> bool:
@@ -335,8 +343,10 @@ def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
     if trial.stopped:
         return trial, ()
     why, failure = joined(trial.why, motors_off_requested(reason)), trial.failure or Failure.OPERATOR
-    doubt = trial.doubt or _find_drop(trial, now_s)
-    trial = replace(trial, failure=failure, why=why, doubt=doubt, stopped=True, answered=False, awaited=None, unsent=())
+    drop = _find_drop(trial, now_s)
+    doubt, contact = trial.doubt or drop, "fell" if drop else trial.contact
+    trial = replace(trial, failure=failure, why=why, doubt=doubt, contact=contact, stopped=True, answered=False)
+    trial = replace(trial, awaited=None, unsent=())
     if trial.state not in (State.DISARM, State.RESTORE):
         trial = enter(trial, State.DISARM, now_s)
     return replace(trial, repeated_s=now_s), (PerformAction(Action.KILL),)
@@ -354,6 +364,26 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     if watching.is_grounded(watch, now_s, ground_m) and not watching.is_said_to_fly(watch, now_s, ground_m):
         return ""
     return "The vehicle was not known to be on the ground: inspect it before it flies again."
+
+
+def find_contact(trial: Trial, now_s: float) -> Contact:
+    """Return the contact with the ground of a vehicle whose motors have stopped now."""
+    if trial.contact == "fell":
+        return "fell"
+    return "stayed" if _has_stayed_down(trial, now_s) else "landed"
+
+
+def _has_stayed_down(trial: Trial, now_s: float) -> bool:
+    """Whether it has certainly not left the ground: it was not commanded to take off, or it refused to, and every
+    source has shown it at rest on the ground from then on, without a gap and without a sample in doubt. A vehicle that
+    took the command may rise before any message shows it, and its altitude may stand still."""
+    watch = trial.watch
+    if trial.commanded_s is None:
+        return not watch.lifted
+    if trial.failure is not Failure.TAKE_OFF_REFUSED:
+        return False
+    stood = watch.grounded_since_s is not None and watch.grounded_since_s <= trial.commanded_s + _STANDS_S
+    return stood and not (trial.doubt or watch.glitches or find_doubt_of_ground(trial, now_s))
 
 
 def quarantine(trial: Trial, why: str, now_s: float) -> Step:

@@ -176,7 +176,7 @@ class MavlinkVehicle:
             raise
         if stop is not None:
             self._restore_or_quarantine()
-            return self._not_begun(ground, stop.reason)
+            return self._not_begun(ground, stop.reason, has_flown=False)
         flown = self._fly(ground, order.record_s, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
@@ -613,7 +613,7 @@ class MavlinkVehicle:
         trial, start_s = flown.trial, flown.trial.commanded_boot_s
         reason = records.reason_of(trial)
         if start_s is None and trial.failure is Failure.OPERATOR:
-            return self._not_begun(ground, reason)
+            return self._not_begun(ground, reason, has_flown=trial.watch.lifted)
         if start_s is None:
             refusal = VehicleError(reason, hint="Inspect the vehicle, correct this, then fly again.")
             refusal.not_flown = True
@@ -632,14 +632,17 @@ class MavlinkVehicle:
                 for part in (reason, _LAND_WAS_REPEATED if self._requested == _LAND_REPEATED else "", both.remark)
                 if part
             ),
-            settings={**self._options, **both.settings},
+            has_flown=records.has_flown(trial),
+            settings={**self._options, **both.settings, **records.contact_of(trial)},
         )
 
-    def _not_begun(self, ground: Ground, reason: str) -> FlightRecord:
+    def _not_begun(self, ground: Ground, reason: str, *, has_flown: bool) -> FlightRecord:
         """Return the record of an abort before any command: a single instant on the ground."""
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
-        return FlightRecord(trajectory=trajectory, ending="aborted", reason=reason, settings=self._options)
+        return FlightRecord(
+            trajectory=trajectory, ending="aborted", reason=reason, has_flown=has_flown, settings=self._options
+        )
 
     # ---- states
 

@@ -181,7 +181,7 @@ def test_a_flight_aborted_before_it_starts_leaves_one_instant_and_arms_nothing()
         vehicle = rig.vehicle()
         vehicle.stage(TUNED)
         record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=lambda: StopRequest("changed my mind"))
-        assert (record.ending, record.reason) == ("aborted", "changed my mind")
+        assert (record.ending, record.reason, record.has_flown) == ("aborted", "changed my mind", False)
         assert record.trajectory.time_s.tolist() == [0.0]
         assert not rig.told("SCRIPT_ITEM")
         vehicle.close()
