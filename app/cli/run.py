@@ -204,9 +204,11 @@ class _Campaign:
             request = flight_rows.claim_flight(session, "gainline run")
             assert request is not None
         self._display.planned(planned.number, request.gains)
-        record = self._fly(request)
+        outcome = flight_rows.outcome_of(self._fly(request))
+        if outcome.record is None:
+            raise VehicleError(f"Flight {planned.number}: {outcome.problem}", hint="Correct this, then run it again.")
         with self._database.write() as session:
-            flight_rows.record_outcome(session, request.flight_id, flight_rows.FlightOutcome(record=record))
+            flight_rows.record_outcome(session, request.flight_id, outcome)
             trial = history.trial_row(session, request.trial_id)
             if trial.state == TrialState.CAPTURED:
                 reason = " ".join(glitch["sentence"] for glitch in trial.glitches or ())

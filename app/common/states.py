@@ -220,7 +220,7 @@ class TrialState(StrEnum):
             planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
                │  ↑───────┘ │        ├──→ aborted
                │            │        ├──→ lost ──→ captured (record recovered) | invalid
-               │            │        └──→ planned (no takeoff command was sent)
+               │            │        └──→ planned (it never left the ground)
                ├────────────┴──→ cancelled
                └──→ captured (flown elsewhere, imported)
 

@@ -181,7 +181,8 @@ class FlightLoop(ABC):
         monitor.phase("flying")
         record = vehicle.fly(request.options(self._clock), on_sample=monitor.sample, should_stop=should_stop)
         monitor.flush()
-        monitor.phase("landed")
+        if record.has_flown:
+            monitor.phase("landed")
         return mark_if_requested(record, asked)
 
     def _should_stop(self) -> StopRequest | None:

@@ -3,7 +3,8 @@
     claim_flight → record_staged → record_lift_off → record_outcome
 
 A flight of mode `stage` waits between record_staged and record_lift_off, for what `clearance_of` says. `record_outcome`
-and `give_up_flight` may be called at any stage: a flight whose takeoff was not commanded was not flown.
+and `give_up_flight` may be called at any stage: a flight whose takeoff was not commanded was not flown, nor one whose
+vehicle has certainly never left the ground.
 
 What is sent to the vehicle is stored in the flight row before it is sent; what the vehicle answers, as soon as it is
 known. Each function is for a transaction of its own, and reads the flight's rows in one statement.
@@ -22,6 +23,7 @@ from app.campaigns.history import set_flight_state, set_trial_state
 from app.campaigns.trials.records import capture
 from app.common.errors import ConflictError, NotFoundError
 from app.common.states import FlightState, TrialState, VehicleState
+from app.core.formatting import without_word
 from app.core.tuning.stop_rules import landing_battery_v, starting_battery_v
 from app.db.models import CampaignRow, FlightRow
 from app.db.types import utc_now
@@ -40,9 +42,10 @@ _WORKER_ENDED: Final = {True: "the worker stopped during the flight", False: "th
 class FlightOutcome:
     """Outcome of a flight, as far as the worker knows.
 
-    With a `record` the flight took place. Without one, `lifted_off` says whether a takeoff command was sent, and
-    `withdrawn` whether the flight was ended before that. `concern`: the safe gains could not be verified afterwards.
-    `unheard`: the flight's process ended without reporting whether they are restored. `restored`: they were read back.
+    With a `record` the flight took place. Without one, `lifted_off` says whether the vehicle may have left the ground,
+    and `withdrawn` whether the flight was ended on request before that. `concern`: the safe gains could not be verified
+    afterwards. `unheard`: the flight's process ended without reporting whether they are restored. `restored`: they were
+    read back.
     """
 
     record: FlightRecord | None = None
@@ -52,6 +55,22 @@ class FlightOutcome:
     concern: str = ""
     unheard: bool = False
     restored: Mapping[str, float] | None = None
+
+
+def outcome_of(record: FlightRecord) -> FlightOutcome:
+    """Outcome of a flight with this record, which is dropped if nothing was flown."""
+    if record.has_flown:
+        return FlightOutcome(record=record, lifted_off=True)
+    return FlightOutcome(withdrawn=record.on_request, problem=_reason_before_lift_off(record))
+
+
+def _reason_before_lift_off(record: FlightRecord) -> str:
+    """`aborted before lift-off by the operator`, `aborted before lift-off: too close`, `ended before lift-off: …`."""
+    if record.reason.startswith(PROGRAM_STOPPED):
+        return record.reason
+    word = "aborted" if record.on_request else "ended"
+    rest = without_word(record.reason, word)
+    return f"{word} before lift-off: {rest}" if rest == record.reason else f"{word} before lift-off {rest}".rstrip()
 
 
 _WITH_ALL: Final = (
@@ -269,8 +288,7 @@ def _with_stop_explained(flight: FlightRow, outcome: FlightOutcome) -> FlightOut
     if outcome.record is None:
         what = "It restored the safe gains before the takeoff. Request the flight again if it is still needed."
         return replace(outcome, problem=_completed(outcome.problem, what))
-    has_flown = len(outcome.record.trajectory.time_s) > 1  # otherwise it is a single instant on the ground
-    what = "It landed the vehicle and restored the safe gains." if has_flown else "The vehicle had not taken off."
+    what = "It landed the vehicle and restored the safe gains."
     return replace(outcome, record=replace(outcome.record, reason=_completed(outcome.record.reason, what)))
 
 

@@ -156,7 +156,7 @@ class FlightRunner:
                     case GainsStaged(read_back):
                         ended = self._staged(request, flag, backend, read_back)
                     case FlightLanded(record):
-                        ended = FlightOutcome(record=record, lifted_off=True)
+                        ended = flight_rows.outcome_of(record)
                     case SafeGainsRestored(held):
                         ended = replace(ended, restored=held)
                     case FlightFailure(what, unsafe, not_flown):

@@ -1,5 +1,7 @@
 """A flight's way through the database, and what it does to its trial, its campaign and its vehicle."""
 
+from dataclasses import replace
+
 import pytest
 from fastapi.testclient import TestClient
 
@@ -121,15 +123,47 @@ def test_an_aborted_flight_keeps_its_record_and_is_history_without_an_error(
     assert get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["kind"] == "start"
 
 
-def test_an_abort_before_the_first_sample_is_aborted_too(client: TestClient, database: Database) -> None:
+BEFORE_LIFT_OFF = [
+    ("aborted by the operator", True, "aborted before lift-off by the operator", "cancelled"),
+    ("somebody walked in", True, "aborted before lift-off: somebody walked in", "cancelled"),
+    ("aborted", True, "aborted before lift-off", "cancelled"),
+    (
+        "The battery voltage was low: 9.0 V.",
+        False,
+        "ended before lift-off: The battery voltage was low: 9.0 V.",
+        "failed",
+    ),
+    ("Gainline was stopped", True, "Gainline was stopped. It restored the safe gains before the takeoff.", "cancelled"),
+]
+
+
+@pytest.mark.parametrize(("reason", "on_request", "problem", "state"), BEFORE_LIFT_OFF)
+def test_a_trial_whose_vehicle_never_left_the_ground_is_planned_again(
+    client: TestClient, database: Database, reason: str, on_request: bool, problem: str, state: str
+) -> None:
     campaign = create_ready_campaign(client, database)
     trial = create_trial(client, campaign["id"], fly={"speed": None})
-    record = create_record()
-    empty = FlightRecord(trajectory=create_climb(until_s=0.0), ending="aborted", reason="at once")
-    assert len(empty.trajectory) == 1 < len(record.trajectory)
-    land(database, lift_off(database), empty)
-    assert get(client, f"/api/trials/{trial['id']}")["state"] == "aborted"
-    assert run_jobs(database) == 1
+    record = FlightRecord(
+        trajectory=create_climb(until_s=0.0), ending="aborted", reason=reason, on_request=on_request, has_flown=False
+    )
+    task = lift_off(database)
+    with database.write() as session:
+        outcome = replace(flight_rows.outcome_of(record), restored=DEFAULT_GAINS)
+        flight_rows.record_outcome(session, task.flight_id, outcome)
+    after = get(client, f"/api/trials/{trial['id']}")
+    assert (after["state"], after["flown_at"], after["record"], after["abort_cause"]) == ("planned", None, None, None)
+    assert after["reason"] == after["flight"]["problem"]
+    assert after["reason"].startswith(problem)
+    assert (after["flight"]["state"], after["flight"]["safe_gains_restored"]) == (state, True)
+    assert "fly" in after["actions"]
+    [summary] = get(client, "/api/campaigns")["items"]
+    assert summary["flights"] == 0
+    assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
+
+
+def test_a_record_of_a_flight_is_its_outcome() -> None:
+    record = create_record(ending="aborted", on_request=True, until_s=4.0)
+    assert flight_rows.outcome_of(record) == FlightOutcome(record=record, lifted_off=True)
 
 
 def test_a_worker_that_died_leaves_a_lost_flight_that_is_not_flown_again(

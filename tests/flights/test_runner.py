@@ -130,16 +130,22 @@ def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field
     assert vehicle_state(client) == "ready"
 
 
-def test_an_abort_while_the_lift_off_is_stored_is_an_abort_on_the_ground(
-    client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, trial_id: int
+def test_an_abort_while_the_lift_off_is_stored_is_no_flight(
+    client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, settings: Settings, trial_id: int
 ) -> None:
+    """Observed defect: it was an aborted flight, landed, whose cause had to be given."""
     when_changed_to(TrialState.FLYING, lambda: field.abort_registry.abort(trial_id, "somebody walked in"))
     field.fly_next()
     ended = get(client, f"/api/trials/{trial_id}")
-    assert (ended["state"], ended["reason"]) == ("aborted", "somebody walked in")
-    assert ended["abort_cause"] == "operator"
-    assert ended["record"]["samples"] == 1
+    assert (ended["state"], ended["flown_at"], ended["record"]) == ("planned", None, None)
+    assert ended["reason"] == ended["flight"]["problem"] == "aborted before lift-off: somebody walked in"
+    assert (ended["flight"]["state"], ended["abort_cause"]) == ("cancelled", None)
+    assert [said.phase for said in field.heard if isinstance(said, FlightPhase)] == ["staging", "flying", "ended"]
+    assert list((settings.data_dir / "spool").iterdir()) == []
     assert vehicle_state(client) == "ready"
+    assert client.post(f"/api/trials/{trial_id}/fly", json={}).is_success
+    field.fly_next()
+    assert get(client, f"/api/trials/{trial_id}")["state"] == "valid"
 
 
 def test_a_flight_can_be_aborted_from_the_moment_at_which_it_is_seen_to_run(

@@ -4013,7 +4013,7 @@ export type TrialReadiness = {
  * planned ──→ staged ──→ flying ──→ captured ──→ valid | aborted | invalid
  * │  ↑───────┘ │        ├──→ aborted
  * │            │        ├──→ lost ──→ captured (record recovered) | invalid
- * │            │        └──→ planned (no takeoff command was sent)
+ * │            │        └──→ planned (it never left the ground)
  * ├────────────┴──→ cancelled
  * └──→ captured (flown elsewhere, imported)
  *
