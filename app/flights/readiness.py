@@ -157,8 +157,9 @@ class Standing:
     control. `min_battery_v`: below it the vehicle does not take off. `take_off_requested`: by the operator of a staged
     flight. `standing_down`: its safe gains are being restored instead. `abort_cause_open`: nobody has stated yet why
     the flight was aborted. `failed_checks`: titles of the items that failed at the last preflight check.
-    `was_lost_in_flight`: the record ends before the landing, and nothing was heard of the vehicle since. `flown_for_s`:
-    time since a flying trial began.
+    `was_lost_in_flight`: the record ends before the landing, and nothing was heard of the vehicle since.
+    `has_not_landed`: its motors were stopped in the air, it fell, or its landing was not observed. `flown_for_s`: time
+    since a flying trial began.
     """
 
     trial: TrialState
@@ -173,6 +174,7 @@ class Standing:
     abort_cause_open: bool = False
     failed_checks: tuple[str, ...] = ()
     was_lost_in_flight: bool = False
+    has_not_landed: bool = False
     flown_for_s: float = 0.0
 
 
@@ -220,6 +222,8 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
     steps = () if reached is None else STEPS[: STEPS.index(reached) + 1]
     if standing.trial is TrialState.LOST or standing.was_lost_in_flight:  # whether it has landed is not known
         return Readiness(steps=STEPS[: _IN_FLIGHT + 1], lost=("landed",), losses=())
+    if standing.has_not_landed and "landed" in steps:
+        return Readiness(steps=tuple(step for step in steps if step != "landed"), lost=("landed",), losses=())
     if len(steps) > _IN_FLIGHT + 1 or not steps:
         return Readiness(steps=steps, lost=(), losses=())
     kinds = _losses(standing, report)

@@ -41,6 +41,7 @@ from app.flights.flight_commands import record_abort, record_flight_command
 from app.flights.readiness import Readiness, Standing, readiness_of, require_ready
 from app.flights.schemas import TrialReadiness
 from app.live.hub import VehicleReport
+from app.vehicles.base import LANDED
 
 ReportOf = Callable[[int], VehicleReport]
 """What is known of a vehicle at this moment, by its id."""
@@ -170,6 +171,7 @@ def _readiness(session: Session, row: TrialRow, context: RequestContext, report_
         abort_cause_open=row.abort_cause == "operator",
         failed_checks=tuple(str(check["title"]) for check in vehicle.checks or () if not check["passed"]),
         was_lost_in_flight=_was_lost_in_flight(row, flight),
+        has_not_landed=not row.settings.get(LANDED, True),
         flown_for_s=0.0 if row.flown_at is None else (utc_now() - row.flown_at).total_seconds(),
     )
     return readiness_of(standing, report_of(vehicle.id))

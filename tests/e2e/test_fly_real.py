@@ -215,6 +215,8 @@ def test_the_motors_stop_when_the_knob_is_slid_to_its_end_and_the_vehicle_is_to_
     in_state(dashboard, vehicle_id, "quarantined")
     expect(page.get_by_role("heading", name="Do not fly")).to_be_visible()
     expect(page.get_by_label("Next action")).to_contain_text("above the ground: inspect it before it flies again.")
+    stepper = page.get_by_role("list", name="Readiness").get_by_role("listitem")
+    expect(stepper.filter(has_text="Landed")).to_have_attribute("data-standing", "lost")
     page.get_by_role("link", name="Inspect and release").click()
     page.get_by_label("Inspected by, and findings").fill("Ada: nothing is broken")
     dashboard.button("Release vehicle").click()

@@ -40,6 +40,7 @@ class Flags(TypedDict, total=False):
     take_off_requested: bool
     standing_down: bool
     abort_cause_open: bool
+    has_not_landed: bool
 
 
 REACHED: dict[str, tuple[TrialState, Flags, ReadinessStep | None]] = {
@@ -54,6 +55,10 @@ REACHED: dict[str, tuple[TrialState, Flags, ReadinessStep | None]] = {
     "aborted": (TrialState.ABORTED, {}, "reviewed"),
     "aborted, cause open": (TrialState.ABORTED, {"abort_cause_open": True}, "landed"),
     "invalid": (TrialState.INVALID, {}, "reviewed"),
+    "fallen": (TrialState.CAPTURED, {"has_not_landed": True}, "landed"),
+    "fallen, cause open": (TrialState.ABORTED, {"abort_cause_open": True, "has_not_landed": True}, "landed"),
+    "fallen, aborted": (TrialState.ABORTED, {"has_not_landed": True}, "reviewed"),
+    "fallen, invalid": (TrialState.INVALID, {"has_not_landed": True}, "reviewed"),
     "cancelled": (TrialState.CANCELLED, {}, None),
 }
 
@@ -92,16 +97,22 @@ def standing(
     )
 
 
+def held_of(name: str) -> tuple[ReadinessStep, ...]:
+    """Steps that hold: all up to the reached one, without the landing of a vehicle that fell."""
+    _, flags, reached = REACHED[name]
+    return tuple(step for step in up_to(reached) if step != "landed" or "has_not_landed" not in flags)
+
+
 def up_to(step: ReadinessStep | None) -> tuple[ReadinessStep, ...]:
     return () if step is None else STEPS[: STEPS.index(step) + 1]
 
 
 @pytest.mark.parametrize("name", REACHED)
 def test_without_a_loss_every_step_up_to_the_reached_one_holds(name: str) -> None:
-    state, flags, reached = REACHED[name]
+    state, flags, _ = REACHED[name]
     found = readiness_of(standing(state, flags), GOOD)
-    assert (found.steps, found.losses) == (up_to(reached), ())
-    assert found.lost == (("landed",) if name == "lost" else ())
+    assert (found.steps, found.losses) == (held_of(name), ())
+    assert found.lost == (("landed",) if name == "lost" or name.startswith("fallen") else ())
     assert found.is_ready == (name == "staged")
 
 
@@ -161,9 +172,9 @@ def test_a_vehicle_on_the_ground_has_not_taken_off_yet_and_later_has_landed() ->
 @pytest.mark.parametrize("loss", REPORTS)
 @pytest.mark.parametrize("name", list(REACHED)[list(REACHED).index("lost") :])
 def test_once_the_flight_is_over_a_loss_changes_nothing(name: str, loss: str) -> None:
-    state, flags, reached = REACHED[name]
+    state, flags, _ = REACHED[name]
     report, vehicle, _ = REPORTS[loss]
-    assert readiness_of(standing(state, flags, vehicle), report).steps == up_to(reached)
+    assert readiness_of(standing(state, flags, vehicle), report).steps == held_of(name)
     assert readiness_of(standing(state, flags, vehicle), report).losses == ()
 
 
@@ -192,6 +203,14 @@ def test_a_vehicle_that_was_not_heard_again_after_its_flight_is_not_said_to_have
     """Observed defect: “Landed” and “Reviewed” were ticked for a drone last heard at 3.2 m."""
     found = readiness_of(replace(standing(TrialState.INVALID, {}), was_lost_in_flight=True), GOOD)
     assert (found.steps, found.lost) == (up_to("in flight"), ("landed",))
+
+
+@pytest.mark.parametrize("name", ["planned", "staged", "held", "unstaging", "in flight", "cancelled"])
+def test_a_landing_that_was_not_reached_cannot_be_lost(name: str) -> None:
+    """A trial that is planned again is flown by a vehicle that stands on the ground."""
+    state, flags, reached = REACHED[name]
+    found = readiness_of(replace(standing(state, flags), has_not_landed=True), GOOD)
+    assert (found.steps, found.lost) == (up_to(reached), ())
 
 
 @pytest.mark.parametrize("name", ["staged", "held"])

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from concurrent.futures import Future
+from dataclasses import replace
 from datetime import timedelta
 from typing import Any
 
@@ -45,6 +46,7 @@ from tests.fleet.vehicles import (
     take_control,
 )
 from tests.unlocking import HERE, unlock
+from tests.vehicles.mavlink.test_before_lift_off import stopped as stopped_drone
 
 
 @pytest.fixture(autouse=True)
@@ -634,3 +636,30 @@ def test_a_window_that_its_flight_plan_does_not_fit_is_refused_before_it_is_stag
     assert refused.status_code == 409
     assert "a scored window of at most 42.6 s; the campaign's is 60 s" in refused.json()["detail"]
     assert "“Paparazzi: time limit of the flight plan's takeoff”" in refused.json()["hint"]
+
+
+@pytest.mark.parametrize("motors_off", [False, True])
+def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_not_said_to_have_landed(
+    client: TestClient, database: Database, real: Json, staged: Json, motors_off: bool
+) -> None:
+    """Observed defect: “Landed” was ticked for a drone that fell from 3 m."""
+    report(client, staged)
+    take_off(client, staged, {**OUR_PAGE, **control_header(client, real)})
+    record, _, concern = stopped_drone("paparazzi", 4.0, motors_off=motors_off)
+    assert bool(concern) == motors_off
+    outcome = FlightOutcome(record=replace(record, on_request=True), concern=concern)
+    with database.write() as session:
+        flight_rows.record_lift_off(session, staged["flight"]["id"])
+        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
+    path, flew = f"/api/trials/{staged['id']}", ["staged", "held", "in flight"]
+
+    def readiness() -> tuple[list[str], list[str]]:
+        found = get(client, f"{path}/readiness")
+        return found["steps"], found["lost"]
+
+    assert (trial(client, staged)["state"], trial(client, staged)["abort_cause"]) == ("aborted", "operator")
+    assert readiness() == ((flew, ["landed"]) if motors_off else ([*flew, "landed"], []))
+    cause = {"version": trial(client, staged)["version"], "cause": "something else"}
+    given = client.post(f"{path}/judge-abort", json=cause, headers=OUR_PAGE)
+    assert given.is_success, given.text
+    assert readiness() == (([*flew, "reviewed"], ["landed"]) if motors_off else ([*flew, "landed", "reviewed"], []))
