@@ -22,11 +22,12 @@ from scipy.signal import find_peaks
 
 from app.core.control.paparazzi import RATE_HZ
 from app.core.experiments.base import Check, Envelope, Matrix, ParameterDistribution, prior_distribution
-from app.core.experiments.takeoff import Takeoff
-from app.core.experiments.takeoff_hazards import (
+from app.core.experiments.takeoff import SET_POINTS, Takeoff
+from app.core.experiments.vertical_loop_hazards import (
     LARGEST_TOUCH_DOWN_M_S,
     SMALLEST_SWING_M_S,
     UNDAMPED,
+    Manoeuvre,
     abort_steps,
     fly_runs,
 )
@@ -40,7 +41,7 @@ TAKEOFF_S: Final = 0.5e-3
 SEED: Final = 20260101
 CEILING_M: Final = 4.5
 SET_POINT_M: Final = 3.0
-TARGET: Final = 768
+MANOEUVRE: Final = Manoeuvre(SET_POINTS, 16_693)
 BATCH: Final = 100
 
 TAKEOFF: Final = Takeoff()
@@ -121,11 +122,11 @@ def _swinging(altitude: Vector) -> str:
 def _aborted(gains: Counts, models: Matrix, seed: int) -> str:
     instants = np.random.default_rng(seed).uniform(0.3, 32.0, (len(models), 1))
     at = np.asarray(np.rint(instants * RATE_HZ), dtype=np.int64)
-    aborts = fly_runs(gains, SAFE_COUNTS, models, at, TARGET, 16693).aborts[:, 0]
+    aborts = fly_runs(gains, SAFE_COUNTS, models, at, MANOEUVRE).aborts[:, 0]
     beyond = (aborts > (CEILING_M, LARGEST_TOUCH_DOWN_M_S)).any(axis=1)
     if not beyond.any():
         return ""
-    own = fly_runs(SAFE_COUNTS, SAFE_COUNTS, models[beyond], abort_steps(int(beyond.sum()), 16693), TARGET, 16693)
+    own = fly_runs(SAFE_COUNTS, SAFE_COUNTS, models[beyond], abort_steps(int(beyond.sum()), MANOEUVRE), MANOEUVRE)
     highest = np.maximum(own.aborts[:, :, HIGHEST_M].max(axis=1), own.reports[:, HIGHEST_M])
     fastest = own.aborts[:, :, TOUCH_DOWN_M_S].max(axis=1)
     harmful = (aborts[beyond, 0] > np.maximum(highest, CEILING_M)) | (

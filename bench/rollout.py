@@ -42,7 +42,8 @@ def in_c(library: ctypes.CDLL) -> tuple[Callable[[], int], "np.ndarray[tuple[int
 def in_python() -> tuple[Callable[[], int], "np.ndarray[tuple[int], np.dtype[np.float64]]"]:
     altitude = np.empty((1, SAMPLES))
     gains, model = np.array(GAINS, dtype=np.int64), np.array([HOVER, 0.0, LAG, DRAG, 0.0, 0.0, 0.0, 0.0])
-    return lambda: rollout(gains, model, TARGET, None, altitude), altitude[0]
+    targets = np.array([TARGET], dtype=np.int64)
+    return lambda: rollout(gains, model, targets, None, altitude), altitude[0]
 
 
 def main() -> int:

@@ -139,7 +139,7 @@ def fill_in_donor(session: Session, asked: DefinitionIn) -> DefinitionIn:
 
     The donor is the best flight with the best gains of its campaign unless a trial is named. Its record and gains are
     fixed from then on, whatever class the trial gets later. Raises InputError when there is no such flight, it belongs
-    to another experiment or has another window, or its record does not match the checksum in the definition.
+    to another experiment or was scored otherwise, or its record does not match the checksum in the definition.
     """
     named = asked.start.donor
     if named is None or asked.start.kind != "campaign":
@@ -161,7 +161,7 @@ def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
     if campaign.experiment != asked.experiment:
         reason = f"campaign {campaign.id} flies {campaign.experiment!r}, this one {asked.experiment!r}"
         raise _refused("campaign_id", reason)
-    if (difference := _other_window(campaign, asked)) is not None:
+    if (difference := _other_score(campaign, asked)) is not None:
         raise _refused("campaign_id", difference)
     trials = history.trials_of(session, campaign.id)
     if named.trial_number is None:
@@ -175,17 +175,19 @@ def _trial(session: Session, asked: DefinitionIn, named: Donor) -> TrialRow:
     return found
 
 
-def _other_window(campaign: CampaignRow, asked: DefinitionIn) -> str | None:
+def _other_score(campaign: CampaignRow, asked: DefinitionIn) -> str | None:
     """Why the campaign's flights cannot be compared with those of the definition, which has the same experiment; None
-    if their windows are equal, and for options that the definition's own check refuses."""
+    if both are scored alike, and for options that the definition's own check refuses."""
     experiment = get_experiment(campaign.experiment)
     chosen = asked.experiment_options
     if any(problems_of_options(chosen, experiment.options, field="experiment_options", owner=experiment.name)):
         return None
-    theirs_s, own_s = experiment_of_campaign(campaign).window_s, experiment.configured(chosen).window_s
-    if theirs_s == own_s:
-        return None
-    return f"campaign {campaign.id} has a scored window of {theirs_s:g} s, this one of {own_s:g} s"
+    theirs, own = experiment_of_campaign(campaign), experiment.configured(chosen)
+    if theirs.measure != own.measure:
+        return f"campaign {campaign.id} flies {theirs.measure}, this one {own.measure}"
+    if theirs.window_s != own.window_s:
+        return f"campaign {campaign.id} has a scored window of {theirs.window_s:g} s, this one of {own.window_s:g} s"
+    return None
 
 
 def _refused(field: str, reason: str) -> InputError:

@@ -183,6 +183,8 @@ def _refusal(
     own, wanted = experiments[row.campaign_id], experiments[first.campaign_id]
     if own.error_unit != wanted.error_unit:
         differ = f"is in {own.error_unit}", f"in {wanted.error_unit}"
+    elif own.measure != wanted.measure:
+        differ = f"is of {own.measure}", f"of {wanted.measure}"
     elif own.window_s != wanted.window_s:
         differ = f"covers a window of {own.window_s:g} s", f"one of {wanted.window_s:g} s"
     else:

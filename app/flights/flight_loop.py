@@ -306,6 +306,7 @@ class FlightMonitor:
         self._trial_id = request.trial_id
         self._experiment = request.configured_experiment
         self._columns: list[str] = []
+        self._scored_from_s = self._experiment.scored_from_s
         self._scored_until_s = float(self._experiment.grid_s[-1])
         self._publish = publish
         self._clock = clock
@@ -319,8 +320,7 @@ class FlightMonitor:
 
     def sample(self, sample: Sample) -> None:
         output = self._experiment.output
-        set_point = float(self._experiment.set_point(np.array([sample.time_s]))[0])
-        self._score(sample.time_s, abs(set_point - sample[output]))
+        self._score(sample.time_s, abs(self._target(sample) - sample[output]))
         others = [name for name in sample.channels if name != output]
         self._columns = ["time_s", output, *others]
         self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
@@ -346,12 +346,19 @@ class FlightMonitor:
 
     @property
     def error_so_far(self) -> float | None:
-        if self._last is None or self._last[0] <= 0.0:
+        if self._last is None or self._last[0] <= self._scored_from_s:
             return None
-        return self._integral if self._experiment.integrates else self._integral / self._last[0]
+        return self._integral if self._experiment.integrates else self._integral / (self._last[0] - self._scored_from_s)
+
+    def _target(self, sample: Sample) -> float:
+        """What the output is compared with: a channel of the sample, or the set point."""
+        channel = self._experiment.target_channel
+        if channel is not None:
+            return sample[channel]
+        return float(self._experiment.set_point(np.array([sample.time_s]))[0])
 
     def _score(self, time_s: float, deviation: float) -> None:
-        if 0.0 <= time_s <= self._scored_until_s:
-            before_s, before = self._last if self._last is not None else (0.0, deviation)
+        if self._scored_from_s <= time_s <= self._scored_until_s:
+            before_s, before = self._last if self._last is not None else (self._scored_from_s, deviation)
             self._integral += (time_s - before_s) * (before + deviation) / 2.0
             self._last = (time_s, deviation)

@@ -7,7 +7,7 @@
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from app.common.states import ActKind, FlightMode
@@ -46,9 +46,9 @@ class FlightRequest:
         return get_experiment(self.experiment, self.experiment_options)
 
     def options(self, clock: Clock) -> FlightOptions:
-        return FlightOptions(
-            seed=self.seed, speed=self.speed, clock=clock, window_s=self.configured_experiment.window_s
-        )
+        experiment = self.configured_experiment
+        options = FlightOptions(seed=self.seed, speed=self.speed, clock=clock, window_s=experiment.window_s)
+        return options if experiment.set_points is None else replace(options, set_points=experiment.set_points)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,8 @@ from typing import Final, Literal, Protocol
 
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
-from app.core.experiments.takeoff import WINDOW_S
+from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
+from app.core.models.set_points import SetPoints
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 
@@ -64,13 +65,15 @@ class FlightOptions:
 
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
     over the time of the `clock` (10.0: ten times real time); None runs as fast as possible. Real vehicles ignore both.
-    `window_s` is the scored time after the takeoff command; a vehicle with one manoeuvre of fixed length ignores it.
+    `window_s` is the end of the scored time after the takeoff command; a vehicle with one manoeuvre of fixed length
+    ignores it. Only simulated vehicles fly other `set_points` than the takeoff's.
     """
 
     seed: int
     speed: float | None = None
     clock: Clock = REAL_TIME
     window_s: float = WINDOW_S
+    set_points: SetPoints = SET_POINTS
 
     @property
     def record_s(self) -> float:

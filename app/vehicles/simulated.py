@@ -24,6 +24,7 @@ from app.core.control.paparazzi import (
 )
 from app.core.errors import GainsError, InputError, Problem
 from app.core.experiments.takeoff import WINDOW_S
+from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, shortened
 from app.core.records.trajectory import Trajectory
 from app.vehicles.base import (
@@ -200,7 +201,7 @@ class SimulatedVehicle(GainHolder):
     def fly(
         self, order: FlightOptions, *, on_sample: Callable[[Sample], None], should_stop: ShouldStop
     ) -> FlightRecord:
-        """Take off to 3 m with the staged gains, with simulated time limited to the order's speed.
+        """Fly to the order's set points with the staged gains, with simulated time limited to the order's speed.
 
         `should_stop` is called every 20 ms, of vehicle time or of wall time, whichever comes first. A stop ends the
         flight there: the safe gains are set and the vehicle descends at 0.5 m/s. The record includes the descent, whose
@@ -235,12 +236,13 @@ class SimulatedVehicle(GainHolder):
         should_stop: ShouldStop,
     ) -> StopRequest | None:
         """Fill `rows` until the manoeuvre is over; return the stop request that ended it early, if any."""
-        command = self._command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS))
-        pacer = Pacer(order.speed, order.clock)
-        for first, last in _slices(order.record_s):
+        pacer, targets = Pacer(order.speed, order.clock), order.set_points.targets
+        for first, last in _slices(order.record_s, order.set_points):
             if (stop := pacer.wait_until(first * STEP_S, should_stop)) is not None:
                 return stop
-            rows.append(_flown(simulation, last - first, command, TAKEOFF_ALTITUDE_M))
+            command = self._command(ALT, int(targets[min(first, len(targets) - 1)]))
+            set_point_m = float(order.set_points.at(np.array([first * STEP_S]))[0])
+            rows.append(_flown(simulation, last - first, command, set_point_m))
             on_sample(_sample(first, rows[-1][0]))
         return None
 
@@ -297,9 +299,11 @@ def _command(mode: int, target: int, gains: Gains) -> Integers:
     return command
 
 
-def _slices(record_s: float) -> Iterator[tuple[int, int]]:
-    """First and past-last step of each 20 ms; the last slice ends with the instant at which the record does."""
-    edges = [round(i * RATE_HZ / TELEMETRY_HZ) for i in range(int(record_s * TELEMETRY_HZ) + 1)]
+def _slices(record_s: float, set_points: SetPoints) -> Iterator[tuple[int, int]]:
+    """First and past-last step of each 20 ms, and of what lies before and after a set point within them; the last slice
+    ends with the instant at which the record does."""
+    every_20_ms = {round(i * RATE_HZ / TELEMETRY_HZ) for i in range(int(record_s * TELEMETRY_HZ) + 1)}
+    edges = sorted(every_20_ms | set(set_points.steps))
     return zip(edges, [*edges[1:], round(record_s * RATE_HZ) + 1], strict=True)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.core.control.paparazzi import RATE_HZ, STEP_S
 from app.core.errors import Problem
-from app.core.experiments.takeoff import MODEL_PARAMETERS
+from app.core.experiments.vertical_loop import MODEL_PARAMETERS
 from app.core.formatting import percent
 from app.vehicles.base import VehicleOption
 from app.vehicles.kernels import AUTOPILOT_SIZE, BATTERY, CHANNELS, PAST, Integers, Rows, fly_simple_model

@@ -6,7 +6,9 @@ from typing import Final
 import numpy as np
 import pytest
 
+from app.core.control.paparazzi import ALT, LEVEL, Z_REF, measured, new_state, step
 from app.core.errors import GainsError
+from app.core.models.set_points import SetPoints
 from app.vehicles.base import FlightOptions, Vehicle
 from app.vehicles.kernels import CHANNELS
 from app.vehicles.registry import VEHICLE_KINDS, open_vehicle
@@ -76,6 +78,22 @@ def test_a_flight_with_another_window_is_the_same_and_lasts_as_long_as_that_need
     chosen = vehicle.fly(order, on_sample=unwatched, should_stop=never).trajectory
     assert chosen.time_s[-1] == pytest.approx(window_s + 0.4, abs=1 / 512)
     assert np.array_equal(chosen["altitude_m"], whole["altitude_m"][: len(chosen)])
+
+
+def test_later_set_points_are_commanded_at_their_steps_even_between_telemetry(kind: str, vehicle: Vehicle) -> None:
+    """The reference of a loop of its own, fed with the same targets and entered with the flight's, is the same."""
+    vehicle.stage(TUNED)
+    order = FlightOptions(seed=1, window_s=12.0, set_points=SetPoints((0.0, 5.123046875, 9.0), (2.5, 1.75, 3.0)))
+    flight = vehicle.fly(order, on_sample=unwatched, should_stop=never).trajectory
+    changes = np.flatnonzero(np.diff(flight["set_point_m"])) + 1
+    assert changes.tolist() == [2623, 4608]
+    assert flight["set_point_m"][[0, 2622, 2623, 4607, 4608]].tolist() == [2.5, 2.5, 1.75, 1.75, 3.0]
+    entered, reference = int(np.argmax(flight["thrust"] > 0.0)), []
+    state = new_state(measured(-flight["altitude_m"][entered], 8), measured(-flight["climb_rate_m_s"][entered], 19))
+    for target in flight["set_point_m"][entered:]:
+        step(state, ALT, int(target * 256), 0, 0, 0, 0, 0, LEVEL, True)
+        reference.append(-state[Z_REF] / 256)
+    assert flight["reference_m"][entered:].tolist() == reference
 
 
 def test_altitude_points_up_from_the_ground_to_3_m(kind: str, vehicle: Vehicle) -> None:

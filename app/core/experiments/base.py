@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.definition import Option, OptionValue
+from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 
@@ -265,7 +266,27 @@ class Experiment(Protocol):
     def error_unit(self) -> str: ...
     @property
     def window_s(self) -> float:
-        """Scored time from the command on, s. Errors over different windows are different quantities."""
+        """End of the scored time, s since the command. Errors over different windows are different quantities."""
+        ...
+
+    @property
+    def scored_from_s(self) -> float:
+        """Beginning of the scored time, s since the command."""
+        ...
+
+    @property
+    def measure(self) -> str:
+        """What is scored, apart from the window: errors of different measures are different quantities."""
+        ...
+
+    @property
+    def target_channel(self) -> str | None:
+        """Recorded channel with which the output is compared; None: the set point."""
+        ...
+
+    @property
+    def set_points(self) -> SetPoints | None:
+        """Altitudes that the vehicle is told to fly to; None for a manoeuvre of its own."""
         ...
 
     @property

@@ -95,6 +95,10 @@ class PitchTracking:
     integrates: Final = True
     error_unit: Final = "rad·s"
     window_s: Final = WINDOW_S
+    scored_from_s: Final = 0.0
+    measure: Final = "pitch tracking"
+    target_channel: Final = None
+    set_points: Final = None
     scatter: Final = Scatter(sd=0.001, degrees_of_freedom=4.0)
     search: Final = SimplexSearch(of_scale=0.5, iterations=300, bounded=False)
     difference: Final = 0.001

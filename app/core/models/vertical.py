@@ -1,4 +1,4 @@
-"""The simple vertical model of a multicopter, and its takeoff under the autopilot's vertical loop.
+"""The simple vertical model of a multicopter, and its flights under the autopilot's vertical loop.
 
 Force, mass, gravity (the paper's eq. 7), with refinements that are zero in the nominal model:
 
@@ -8,10 +8,11 @@ where u is the commanded share of full thrust after a first-order lag, h the hov
 thrust, e the ground effect, s the battery sag; altitude z is up from the ground at 0; explicit Euler at 512 Hz. The
 loop senses altitude and climb rate with a measurement delay; the delayed values are also those recorded and scored. The
 loop starts a latency after the command, from rest on the ground; until then nothing moves, so the latency shifts the
-whole run in time. Both delays are interpolated to fractions of a step, so that the outputs depend on them continuously,
-as a fit requires.
+run in time, up to the first change of the set point: a vehicle that has settled by then follows each later one when it
+is commanded, whenever it started. Both delays are interpolated to fractions of a step, so that the outputs depend on
+them continuously, as a fit requires.
 
-The takeoff can also be run with the disturbances of a recorded flight added inside the control loop: the paper's step 4
+A flight can also be run with the disturbances of a recorded flight added inside the control loop: the paper's step 4
 (Abbeel et al. 2006): f(s, a) + s_{t+1} − f(s_t, a_t), indexed by time; s is altitude and climb rate, a the thrust
 command, whose lagged value follows from the commands. The loop is entered at the first thrust of the recorded flight.
 """
@@ -41,6 +42,7 @@ from app.core.control.paparazzi import (
     step,
 )
 from app.core.kernels import kernel
+from app.core.models.set_points import SetPoints
 from app.core.records.trajectory import Samples
 
 GRAVITY_M_S2: Final = 9.81
@@ -200,7 +202,7 @@ def fly_steps(
     past: Samples,
     model: Samples,
     mode: int,
-    target: int,
+    targets: Counts,
     gains: Counts,
     disturbances: Samples | None,
     records_sensed: bool,
@@ -208,9 +210,10 @@ def fly_steps(
     lands: bool,
     channels: Samples,
 ) -> int:
-    """Fly or continue a takeoff for up to n steps, and return the steps flown.
+    """Fly or continue a flight for up to n steps, and return the steps flown.
 
-    The loop runs in `mode` with `target` and `gains` (kp, ki, kd). With `disturbances`, shape (n, 3), it is entered
+    The loop runs in `mode` with `gains` (kp, ki, kd) and the target of each step since its entry, shape (t,), the last
+    of which holds. With `disturbances`, shape (n, 3), it is entered
     where they say so, otherwise the caller has entered it. Writes `channels` before each step: what the loop senses if
     `records_sensed`, shape (1, n) or (6, n), else the vehicle's own altitude and climb rate, shape (2, n). Stops early
     above `ceiling_m`, or when a vehicle that `lands` has touched down. `state`, `vehicle` and `past` then hold the
@@ -222,6 +225,7 @@ def fly_steps(
     delay, latency, size = model[MEASUREMENT_DELAY_S] * RATE_HZ, model[START_LATENCY_S], past.shape[1]
     altitude, climb, thrust = vehicle[ALTITUDE], vehicle[CLIMB_RATE], vehicle[THRUST]
     command, before, flown = int(vehicle[COMMAND]), int(vehicle[STEPS_FLOWN]), 0
+    last_target = len(targets) - 1
     entered = disturbances is None
     for i in range(channels.shape[1]):
         now = before + i
@@ -235,6 +239,7 @@ def fly_steps(
             entered = True
         if entered:
             in_flight = detect_flight(state, command)
+            target = targets[min(now, last_target)]
             command = step(state, mode, target, kp, ki, kd, z, zd, LEVEL, in_flight)
         if records_sensed:
             channels[ALTITUDE, i] = sensed_altitude
@@ -257,43 +262,61 @@ def fly_steps(
 
 
 @kernel
-def rollout(gains: Counts, model: Samples, target: int, disturbances: Samples | None, channels: Samples) -> int:
-    """Fly one takeoff to `target` (8 fractional bits) and return the largest |product| in the loop.
+def steps_of_climb(targets: Counts) -> int:
+    """Steps until the first change of the targets, shape (t,); t if there is none."""
+    for i in range(len(targets)):
+        if targets[i] != targets[0]:
+            return i
+    return len(targets)
+
+
+@kernel
+def delay_start(signal: Samples, targets: Counts, latency_s: float) -> None:
+    """Delay the part of a signal before the first change of the targets, all of it if there is none, in place."""
+    climb = steps_of_climb(targets)
+    delay_by(signal[:climb] if climb < len(targets) else signal, latency_s * RATE_HZ)
+
+
+@kernel
+def rollout(gains: Counts, model: Samples, targets: Counts, disturbances: Samples | None, channels: Samples) -> int:
+    """Fly one flight to its `targets` (8 fractional bits, see `SetPoints`); return the largest |product| in the loop.
 
     `gains` holds kp, ki, kd; `model` the eight parameters; `disturbances` have shape (n, 3). Writes `channels` every
     1/512 s from the command on, in the order of `CHANNELS`: shape (6, n), or (1, n) for the altitude alone.
     """
     state, vehicle = np.zeros(STATE_SIZE, dtype=np.int64), np.zeros(VEHICLE_SIZE)
     start(state, 0, 0)
-    fly_steps(state, vehicle, new_past(model), model, ALT, target, gains, disturbances, True, np.inf, False, channels)
+    fly_steps(state, vehicle, new_past(model), model, ALT, targets, gains, disturbances, True, np.inf, False, channels)
     if model[START_LATENCY_S] > 0.0:
         for channel in range(channels.shape[0]):
-            delay_by(channels[channel], model[START_LATENCY_S] * RATE_HZ)
+            delay_start(channels[channel], targets, model[START_LATENCY_S])
     return int(state[LARGEST_PRODUCT])
 
 
-def fly(gains: Counts, model: Samples, target: int, samples: int) -> tuple[Samples, int]:
-    """One takeoff with every channel: shape (6, samples) in the order of `CHANNELS`, and the largest |product|."""
+def fly(gains: Counts, model: Samples, set_points: SetPoints, samples: int) -> tuple[Samples, int]:
+    """One flight with every channel: shape (6, samples) in the order of `CHANNELS`, and the largest |product|."""
     channels = np.empty((len(CHANNELS), samples))
-    return channels, rollout(gains, model, target, None, channels)
+    return channels, rollout(gains, model, set_points.targets, None, channels)
 
 
-def fly_each(gains: Counts, models: Samples, target: int, samples: int, disturbances: Samples | None = None) -> Samples:
-    """Many takeoffs one after another: gains (k, 3), models (k, 8) → altitude (k, samples)."""
+def fly_each(
+    gains: Counts, models: Samples, set_points: SetPoints, samples: int, disturbances: Samples | None = None
+) -> Samples:
+    """Many flights one after another: gains (k, 3), models (k, 8) → altitude (k, samples)."""
     altitude = np.empty((len(gains), 1, samples))
     for run in range(len(gains)):
-        rollout(gains[run], models[run], target, disturbances, altitude[run])
+        rollout(gains[run], models[run], set_points.targets, disturbances, altitude[run])
     return altitude[:, 0]
 
 
-def fly_disturbed(gains: Counts, models: Samples, target: int, disturbances: Samples) -> Samples:
-    """Many disturbed takeoffs: gains (k, 3), models (k, 8), disturbances (n, 3) → altitude (k, n).
+def fly_disturbed(gains: Counts, models: Samples, set_points: SetPoints, disturbances: Samples) -> Samples:
+    """Many disturbed flights: gains (k, 3), models (k, 8), disturbances (n, 3) → altitude (k, n).
 
     As in `observe`, the model's latency and measurement delay are ignored.
     """
     prompt = models.copy()
     prompt[:, [START_LATENCY_S, MEASUREMENT_DELAY_S]] = 0.0
-    return fly_each(gains, prompt, target, len(disturbances), disturbances)
+    return fly_each(gains, prompt, set_points, len(disturbances), disturbances)
 
 
 @kernel

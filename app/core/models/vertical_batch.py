@@ -1,8 +1,8 @@
-"""Simultaneous takeoffs of the simple vertical model: bit for bit as `vertical.rollout`, in a third of the time.
+"""Simultaneous flights of the simple vertical model: bit for bit as `vertical.rollout`, in a third of the time.
 
 All runs take a step before the next step begins, so that the inner loops run over the lanes and can be vectorised. Two
-properties make this possible. The loop's reference and feed-forward depend on the target alone, and come from a table.
-And its integers are stored as doubles, whose arithmetic is exact for them as long as nothing wraps at 32 bits:
+properties make this possible. The loop's reference and feed-forward depend on the set points alone, and come from a
+table. And its integers are stored as doubles, whose arithmetic is exact for them as long as nothing wraps at 32 bits:
 `are_exact` selects the gains with which no product can wrap, and a run whose climb rate becomes too large for 32 bits
 is repeated with `rollout`.
 """
@@ -35,6 +35,7 @@ from app.core.control.paparazzi import (
     step,
 )
 from app.core.kernels import kernel
+from app.core.models.set_points import SetPoints
 from app.core.models.vertical import (
     BATTERY_SAG,
     DRAG_1_S,
@@ -48,7 +49,7 @@ from app.core.models.vertical import (
     START_LATENCY_S,
     Counts,
     advance,
-    delay_by,
+    delay_start,
     fly_each,
     force_at_hover,
     lift_of,
@@ -112,42 +113,46 @@ def are_exact(gains: Counts) -> NDArray[np.bool_]:
     return np.asarray((largest <= INT32_MAX).all(axis=1))
 
 
-def fly_batch(gains: Counts, models: Samples, target: int, samples: int) -> Samples:
-    """Many takeoffs in compiled calls: gains (k, 3), models (k, 8) → altitude (k, samples)."""
+def fly_batch(gains: Counts, models: Samples, set_points: SetPoints, samples: int) -> Samples:
+    """Many flights in compiled calls: gains (k, 3), models (k, 8) → altitude (k, samples)."""
     altitude = np.empty((len(gains), samples))
     exact = are_exact(gains) & (models[:, MEASUREMENT_DELAY_S] * RATE_HZ < PAST - 2)
     side_by_side = np.flatnonzero(exact) if len(gains) > 1 else np.zeros(0, dtype=np.int64)
     alone = np.setdiff1d(np.arange(len(gains)), side_by_side)
     if side_by_side.size:
-        guide = _guide(target, samples)
+        guide = _guide(set_points, samples)
         for runs in np.array_split(side_by_side, -(-side_by_side.size // BATCH_WIDTH)):
-            flown, fastest_m_s = _fly(gains[runs], models[runs], guide)
+            flown, fastest_m_s = _fly(gains[runs], models[runs], set_points.targets, guide)
             altitude[runs] = flown
             alone = np.concatenate((alone, runs[~(fastest_m_s < FASTEST_M_S)]))
     if alone.size:
-        altitude[alone] = fly_each(gains[alone], models[alone], target, samples)
+        altitude[alone] = fly_each(gains[alone], models[alone], set_points, samples)
     return altitude
 
 
-def _fly(gains: Counts, models: Samples, guide: Samples) -> tuple[Samples, Samples]:
+def _fly(gains: Counts, models: Samples, targets: Counts, guide: Samples) -> tuple[Samples, Samples]:
     """Altitudes (k, n) and highest speeds (k,) of up to `BATCH_WIDTH` runs, padded to a multiple of four."""
     k = len(gains)
     filled = np.minimum(np.arange(-(-k // 4) * 4), k - 1)
     altitude, fastest_m_s = np.empty((k, guide.shape[1])), np.empty(k)
-    _fly_lanes(gains[filled], models[filled], guide, altitude, fastest_m_s)
+    _fly_lanes(gains[filled], models[filled], targets, guide, altitude, fastest_m_s)
     return altitude, fastest_m_s
 
 
 @lru_cache(maxsize=16)
-@kernel
-def _guide(target: int, samples: int) -> Samples:
+def _guide(set_points: SetPoints, samples: int) -> Samples:
     """The part of the loop that does not depend on what is sensed, for every step, shape (4, n)."""
+    return _guide_to(set_points.targets, samples)
+
+
+@kernel
+def _guide_to(targets: Counts, samples: int) -> Samples:
     guide, state = np.empty((_GUIDE_SIZE, samples)), np.zeros(STATE_SIZE, dtype=np.int64)
     start(state, 0, 0)
     for i in range(samples):
         guide[_CHECK, i] = 1.0 if state[CHECK_PHASE] >= RATE_HZ else 0.0
         in_flight = detect_flight(state, 0)
-        step(state, ALT, target, 0, 0, 0, 0, 0, LEVEL, in_flight)
+        step(state, ALT, targets[min(i, len(targets) - 1)], 0, 0, 0, 0, 0, LEVEL, in_flight)
         guide[_POSITION, i], guide[_SPEED, i], guide[_FEED_FORWARD, i] = state[Z_REF], state[ZD_REF], state[FF_CMD]
     return guide
 
@@ -210,7 +215,9 @@ def _take_step(runs: Samples, lanes: int, heights: Samples, climbs: Samples, gui
 
 
 @kernel
-def _fly_lanes(gains: Counts, models: Samples, guide: Samples, altitude: Samples, fastest_m_s: Samples) -> None:
+def _fly_lanes(
+    gains: Counts, models: Samples, targets: Counts, guide: Samples, altitude: Samples, fastest_m_s: Samples
+) -> None:
     """Fly k runs, some of which may be padding: altitude out (j, n), fastest (j,), j ≤ k.
 
     Delayed values are written ahead to where they are due, so that all runs read at the same index.
@@ -234,4 +241,4 @@ def _fly_lanes(gains: Counts, models: Samples, guide: Samples, altitude: Samples
     for lane in range(wanted):
         fastest_m_s[lane] = runs[_FASTEST + lane]
         if runs[_LATENCY + lane] > 0.0:
-            delay_by(altitude[lane], runs[_LATENCY + lane] * RATE_HZ)
+            delay_start(altitude[lane], targets, runs[_LATENCY + lane])

@@ -1,4 +1,4 @@
-"""Compiled inner loops of the gate: takeoffs with aborts, and runs that drive products to where they wrap.
+"""Compiled inner loops of the gate: flights with aborts, and runs that drive products to where they wrap.
 
 They share one file because numba validates its cached machine code by this file.
 """
@@ -48,9 +48,9 @@ SWING_LAST_M_S: Final = 6
 REPORT_SIZE: Final = 7
 """Indices in the report of a flight.
 
-Fallen: the step at which it was back on the ground, or −1. Distances are from the set point, after the altitude first
-exceeded half of it; swings are of the climb rate. Both are the largest in the middle and in the last third of the
-flight.
+Fallen: the step at which it was back on the ground, or −1. Distances are from the last set point, after the altitude
+first exceeded half of the first; swings are of the climb rate. Both are the largest in the middle and in the last third
+of the time at the last set point, which is the whole of a takeoff.
 """
 
 TOUCH_DOWN_M_S: Final = 1
@@ -79,30 +79,29 @@ def _abort(
     report[HIGHEST_M], report[TOUCH_DOWN_M_S] = vehicle[ALTITUDE], 0.0
     if vehicle[ALTITUDE] <= _STANDING_M:
         return
-    flown = fly_steps(
-        state, vehicle, past, model, CLIMB, _DESCENT, safe_gains, None, False, LOST_M, True, curves[:, 0:]
-    )
+    descent = np.full(1, _DESCENT)
+    flown = fly_steps(state, vehicle, past, model, CLIMB, descent, safe_gains, None, False, LOST_M, True, curves[:, 0:])
     report[HIGHEST_M] = max(vehicle[ALTITUDE], curves[ALTITUDE, :flown].max())
     if vehicle[ALTITUDE] <= 0.0:
         report[TOUCH_DOWN_M_S] = -curves[CLIMB_RATE, flown - 1]
 
 
 @kernel
-def report_heights(heights: Samples, set_point: float, third: int, report: Samples) -> None:
-    """Report the highest altitude, the return to the ground, and the distances from the set point.
+def report_heights(heights: Samples, near_m: float, set_point: float, first: int, third: int, report: Samples) -> None:
+    """Report the highest altitude, the return to the ground after `near_m`, and the distances from the set point.
 
-    The flight may end before its three thirds are complete.
+    The thirds begin at step `first`; the flight may end before they are complete.
     """
     near = False
     for i in range(len(heights)):
         height = heights[i]
         if height > report[HIGHEST_M]:
             report[HIGHEST_M], report[HIGHEST_STEP] = height, i
-        near = near or height >= 0.5 * set_point
+        near = near or height >= near_m
         if near and height <= 0.0 and report[FALLEN_STEP] < 0.0:
             report[FALLEN_STEP] = i
-        if near and i >= third:
-            place = DISTANCE_MIDDLE_M if i < 2 * third else DISTANCE_LAST_M
+        if near and i >= first + third:
+            place = DISTANCE_MIDDLE_M if i < first + 2 * third else DISTANCE_LAST_M
             report[place] = max(report[place], abs(height - set_point))
 
 
@@ -125,17 +124,17 @@ def report_swings(climbs: Samples, third: int, report: Samples) -> None:
 def fly_with_aborts(
     gains: Counts,
     model: Samples,
-    target: int,
+    targets: Counts,
     safe_gains: Counts,
     abort_steps: Counts,
     curves: Samples,
     report: Samples,
     aborts: Samples,
 ) -> None:
-    """Simulate one takeoff, and the result of an abort at each of the increasing `abort_steps`, shape (a,).
+    """Simulate one flight, and the result of an abort at each of the increasing `abort_steps`, shape (a,).
 
     Writes `report`, shape (REPORT_SIZE,), and `aborts`, shape (a, 2). Steps count from the loop's entry. `curves` is
-    scratch of shape (2, 2, n) for altitude and climb rate of n steps, of the takeoff and of an abort.
+    scratch of shape (2, 2, n) for altitude and climb rate of n steps, of the flight and of an abort.
     """
     state, aborted = np.zeros(STATE_SIZE, dtype=np.int64), np.zeros(STATE_SIZE, dtype=np.int64)
     curve, steps = curves[0], curves.shape[2]
@@ -147,18 +146,21 @@ def fly_with_aborts(
         until = min(abort_steps[following], steps) if following < len(abort_steps) else steps
         if until > flown:
             leg = curve[:, flown:until]
-            flown += fly_steps(state, vehicle, past, model, ALT, target, gains, None, False, LOST_M, False, leg)
+            flown += fly_steps(state, vehicle, past, model, ALT, targets, gains, None, False, LOST_M, False, leg)
         if flown < until:
             break
         if following < len(abort_steps):
             aborted[:] = state
             _abort(aborted, vehicle.copy(), past.copy(), model, safe_gains, curves[1], aborts[following])
-    report_heights(curve[ALTITUDE, :flown], target / (1 << POSITION_BITS), steps // 3, report)
-    report_swings(curve[CLIMB_RATE, :flown], steps // 3, report)
+    last_change = len(targets) - 1
+    third = (steps - last_change) // 3
+    half, set_point = 0.5 * targets[0] / (1 << POSITION_BITS), targets[-1] / (1 << POSITION_BITS)
+    report_heights(curve[ALTITUDE, :flown], half, set_point, last_change, third, report)
+    report_swings(curve[CLIMB_RATE, last_change:flown], third, report)
 
 
 @kernel
-def find_wraps(gains: Counts, model: Samples, target: int, frozen_step: int, steps: int, found: Counts) -> None:
+def find_wraps(gains: Counts, model: Samples, targets: Counts, frozen_step: int, steps: int, found: Counts) -> None:
     """Take off, freeze altitude and climb rate at `frozen_step`, and find the products that wrap.
 
     The vehicle senses without delay here; `model` must say so. Writes step and product of the first wrap of each gain
@@ -169,7 +171,7 @@ def find_wraps(gains: Counts, model: Samples, target: int, frozen_step: int, ste
     found[:, 0], found[:, 1] = -1, 0
     start(state, 0, 0)
     for i in range(steps):
-        fly_steps(state, vehicle, past, model, ALT, target, gains, None, False, LOST_M, False, curve)
+        fly_steps(state, vehicle, past, model, ALT, targets, gains, None, False, LOST_M, False, curve)
         altitude, climb = curve[ALTITUDE, 0], curve[CLIMB_RATE, 0]
         z, zd = measured(-altitude, POSITION_BITS), measured(-climb, SPEED_BITS)
         if i >= frozen_step:

@@ -44,12 +44,13 @@ class StepResponse:
 def step_response(time_s: Samples, values: Samples, set_point: SetPoint, stop_s: float) -> StepResponse | None:
     """The step response over [0, stop_s] of an output with increasing time stamps, both of shape (n,).
 
-    Times between samples are interpolated. None without two samples in the window, and where the set point is zero.
+    Times between samples are interpolated. None without two samples in the window, and where the set point is zero or
+    changes within the window.
     """
     excess = overshoot(time_s, values, set_point)
     inside = (time_s >= 0.0) & (time_s <= stop_s)
     at, output = time_s[inside], values[inside]
-    if excess is None or len(at) < 2:
+    if excess is None or len(at) < 2 or np.ptp(set_point(at)) > 0.0:
         return None
     target = float(set_point(time_s[-1:])[0])
     low, high = (_first_reached(at, output, share * target) for share in RISE)

@@ -13,6 +13,8 @@ from app.core.tuning.strategies import STRATEGIES
 MAX_FLIGHTS: Final = 200
 MAX_IMPROVEMENT: Final = 0.5
 MIN_CEILING_M: Final = 3.2
+CEILING_MARGIN_M: Final = 0.2
+"""Least room between the highest set point and the ceiling."""
 MAX_CEILING_M: Final = 100.0
 MIN_CONFIDENCE: Final = 0.5
 MAX_SEED: Final = 2**53 - 1
@@ -37,6 +39,7 @@ def problems_of(definition: Definition) -> tuple[Problem, ...]:
         *_fit(definition),
         *_policy(definition),
         *_fractions(definition),
+        *_ceiling(definition),
         *_stop(definition.stop),
         *_seed(definition.seed),
     )
@@ -132,10 +135,23 @@ def _fractions(definition: Definition) -> Iterator[Problem]:
         value = getattr(definition, name)
         if not 0.0 < value <= 1.0:
             yield Problem(name, f"must be above 0 and at most 1, got {value:g}")
-    if not (math.isfinite(definition.ceiling_m) and MIN_CEILING_M <= definition.ceiling_m <= MAX_CEILING_M):
+
+
+def _ceiling(definition: Definition) -> Iterator[Problem]:
+    lowest_m = max(MIN_CEILING_M, _highest_set_point_m(definition) + CEILING_MARGIN_M)
+    if not (math.isfinite(definition.ceiling_m) and lowest_m <= definition.ceiling_m <= MAX_CEILING_M):
         yield Problem(
-            "ceiling_m", f"must be between {MIN_CEILING_M:g} and {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}"
+            "ceiling_m", f"must be between {lowest_m:g} and {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}"
         )
+
+
+def _highest_set_point_m(definition: Definition) -> float:
+    """Zero where the experiment is unknown, has options that are refused, or has no altitude."""
+    experiment, chosen = EXPERIMENTS.get(definition.experiment), definition.experiment_options
+    if experiment is None or any(problems_of_options(chosen, experiment.options, field="", owner=experiment.name)):
+        return 0.0
+    set_points = experiment.configured(chosen).set_points
+    return 0.0 if set_points is None else max(set_points.altitudes_m)
 
 
 def _stop(rule: StopRule) -> Iterator[Problem]:

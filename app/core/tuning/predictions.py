@@ -241,7 +241,7 @@ def _sample_outputs(experiment: ModelledExperiment, space: PolicySpace, gains: V
 
 def offset_sensitivity(experiment: Experiment) -> float:
     """Error caused by a constant offset of one unit of the output: 1 for a mean, the window for an integral."""
-    return float(experiment.errors(experiment.set_point(experiment.grid_s)[np.newaxis] + 1.0)[0])
+    return experiment.window_s if experiment.integrates else 1.0
 
 
 def _sentence(inside: int, of: int, agreeing: int, disagreeing: int, trustworthy: bool) -> str:

@@ -1,9 +1,10 @@
 """How far a step may go from the best flight, given how well earlier predictions held, and the best gains within those
 bounds on several plausible models at once.
 
-The merit of a policy is its mean error over the models, plus a penalty of one metre per metre by which it rises above
-3.6 m on any model or stays below 2.4 m after five seconds; both limits keep a margin from what is unsafe. A fixed set
-of points spread over the box is evaluated first, for 8 s only and on half the models; then Nelder–Mead on integer
+The merit of a policy is its mean error over the models, plus a penalty of one metre per metre by which it rises more
+than 0.6 m above the highest set point on any model, or stays that far below the lowest one after five seconds; both
+limits keep a margin from what is unsafe. A fixed set of points spread over the box is evaluated first, on shorter
+flights and on half the models; then Nelder–Mead on integer
 counts starts from the best two.
 """
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from app.core.definition import Flight
 from app.core.experiments.base import Matrix, halton
-from app.core.experiments.takeoff import Takeoff
+from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.policy import Vector
 
 SHRINK: Final = 0.5
@@ -76,12 +77,7 @@ def minimise_in_box(
     return np.asarray(found.x)
 
 
-HIGHEST_M: Final = 3.6
-LOWEST_M: Final = 2.4
-
 _POINTS: Final = 64
-_COARSE_S: Final = 8.0
-_FINE_S: Final = 12.0
 _EVALUATIONS: Final = (60, 40)
 _DIGITS: Final = 9
 """Merits are rounded to nanometres: smaller differences vary between machines."""
@@ -99,23 +95,27 @@ class Box:
         return np.clip(np.rint(gains), self.low, self.high)
 
 
-def merit(takeoff: Takeoff, gains: Matrix, models: Matrix, until_s: float = _FINE_S) -> Vector:
-    """Mean error, m, plus the penalty for unsafe flights: gains (c, 3), models (k, m) → (c,); lower is better."""
-    sketches = takeoff.sketches(gains, models, until_s)
-    beyond = np.maximum(sketches.highest_m - HIGHEST_M, 0.0) + np.maximum(LOWEST_M - sketches.lowest_m, 0.0)
+def merit(experiment: VerticalLoop, gains: Matrix, models: Matrix, until_s: float | None = None) -> Vector:
+    """Mean error, m, plus the penalty for unsafe flights: gains (c, 3), models (k, m) → (c,); lower is better.
+
+    `until_s` is the time up to which flights are simulated, by default the finer of the experiment's.
+    """
+    sketches = experiment.sketches(gains, models, experiment.sketches_s[1] if until_s is None else until_s)
+    lowest_m, highest_m = experiment.expected_m
+    beyond = np.maximum(sketches.highest_m - highest_m, 0.0) + np.maximum(lowest_m - sketches.lowest_m, 0.0)
     return np.asarray(np.round(sketches.errors.mean(axis=1) + beyond.max(axis=1), _DIGITS))
 
 
-def find_robust_optimum(takeoff: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
+def find_robust_optimum(experiment: VerticalLoop, box: Box, models: Matrix, known: Matrix) -> Vector:
     """The best gains found in the box, shape (n,); `known` (c, n) are included in the first points."""
     spread = box.low + halton(len(box.low), _POINTS + 1)[1:] * (box.high - box.low)
     points = box.nearest(np.vstack((known, spread)))
-    first = merit(takeoff, points, models[::2], _COARSE_S)
+    first = merit(experiment, points, models[::2], experiment.sketches_s[0])
     starts = points[np.argsort(first, kind="stable")[: len(_EVALUATIONS)]]
 
     @cache
     def flown(counts: tuple[float, ...]) -> float:
-        return float(merit(takeoff, np.array([counts]), models)[0])
+        return float(merit(experiment, np.array([counts]), models)[0])
 
     def fine(gains: Vector) -> float:
         return flown(tuple(box.nearest(gains).tolist()))

@@ -14,16 +14,16 @@ from app.core.control.paparazzi import (
     step,
     wrap32,
 )
-from app.core.experiments import takeoff_hazards
+from app.core.experiments import vertical_loop_hazards
 from app.core.experiments.base import Check
-from app.core.experiments.takeoff_hazards import PRODUCTS, check_wrapping
+from app.core.experiments.vertical_loop_hazards import PRODUCTS, check_wrapping
 from tests.core.tuning.flying import TAKEOFF, compiled_only
 
 TARGET = 768
 
 
 def checked(kp: int, ki: int, kd: int) -> tuple[Check, ...]:
-    return check_wrapping(np.array([kp, ki, kd]), TAKEOFF.nominal_model, TARGET)
+    return check_wrapping(np.array([kp, ki, kd]), TAKEOFF.nominal_model, TAKEOFF.set_points)
 
 
 def test_the_largest_safe_gains_are_those_whose_product_with_the_limiter_just_fits() -> None:
@@ -91,6 +91,6 @@ def test_each_gain_that_can_wrap_is_refused_with_the_nearest_that_cannot() -> No
 
 def test_uncompiled_a_short_start_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """kp of 20 000 000 wraps within the first second, stuck on the ground."""
-    monkeypatch.setattr(takeoff_hazards, "LONGEST_S", 0.6)
+    monkeypatch.setattr(vertical_loop_hazards, "LONGEST_S", 0.6)
     (refused,) = checked(20_000_000, 0, 0)
     assert refused.case.startswith("stuck on the ground, 0.36 s")

@@ -23,6 +23,10 @@ def respond(values: Samples, time_s: Samples = TIME_S) -> StepResponse:
     return found
 
 
+def test_several_steps_have_no_single_response() -> None:
+    assert step_response(TIME_S, three(TIME_S), lambda at: np.where(at < 10.0, three(at), 2.0), WINDOW_S) is None
+
+
 def test_a_first_order_lag_rises_in_ln_9_and_settles_in_ln_20_time_constants() -> None:
     lag_s = 0.8
     found = respond(np.where(TIME_S > 0.0, 3.0 * (1.0 - np.exp(-TIME_S / lag_s)), 0.0))

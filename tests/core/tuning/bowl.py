@@ -41,6 +41,10 @@ class QuadraticExperiment:
     search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
     difference: Final = 0.1
     window_s: Final = 1.0
+    scored_from_s: Final = 0.0
+    measure: Final = "a bowl"
+    target_channel: Final = None
+    set_points: Final = None
     grid_s: Final = np.linspace(0.0, 1.0, 11)
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.core.definition import Definition, Flight, aborted_by_gains, best_flight, was_flown
 from app.core.experiments.base import Matrix, ModelledExperiment
-from app.core.experiments.takeoff import Takeoff
+from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
 from app.core.policy import PolicySpace, Vector
 from app.core.tuning.calibration import Calibration, calibrate
@@ -48,10 +48,10 @@ def propose(
 ) -> Proposal:
     """Propose the robust optimum of the calibrated model, within the trust region. At least one flight must be valid.
 
-    Raises TypeError for experiments other than the takeoff.
+    Raises TypeError for experiments that are not under the vertical loop.
     """
-    if not isinstance(experiment, Takeoff):
-        raise TypeError(f"calibrated works only with takeoff, not with {experiment.name}")
+    if not isinstance(experiment, VerticalLoop):
+        raise TypeError(f"calibrated works only under the vertical loop, not with {experiment.name}")
     calibration, base = _calibrated(experiment, flights)
     models = calibration.plausible(runs=MODELS, width=ROBUSTNESS_SD)
     fraction = min(trust_fraction(flights), definition.step_fraction)
@@ -105,7 +105,7 @@ def _predict(calibration: Calibration, base: Flight, gains: Vector) -> ModelPred
 
 def _choose(
     definition: Definition,
-    takeoff: Takeoff,
+    experiment: VerticalLoop,
     space: PolicySpace,
     flights: Sequence[Flight],
     calibration: Calibration,
@@ -114,8 +114,8 @@ def _choose(
     box: Box,
 ) -> _ChosenGains:
     here = space.nearest(space.vector(base.gains))
-    optimum = find_robust_optimum(takeoff, box, models, here[np.newaxis])
-    now, then = merit(takeoff, np.stack((here, optimum)), models).tolist()
+    optimum = find_robust_optimum(experiment, box, models, here[np.newaxis])
+    now, then = merit(experiment, np.stack((here, optimum)), models).tolist()
     if then > (1.0 - MIN_IMPROVEMENT) * now and was_flown(space.mapping(here), flights):
         return _ChosenGains("none", here, optimum)
     for halvings in range(_HALVINGS):
@@ -124,7 +124,7 @@ def _choose(
             break
         if was_flown(space.mapping(gains), flights):
             continue
-        if allows(definition, takeoff, gains, calibration.spread()):
+        if allows(definition, experiment, gains, calibration.spread()):
             if halvings == 0:
                 return _ChosenGains("step", gains, optimum)
             note = (
@@ -136,11 +136,11 @@ def _choose(
     return _ChosenGains("none", here, optimum, (note,))
 
 
-def _gradient(takeoff: Takeoff, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
+def _gradient(experiment: VerticalLoop, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
     """∂merit/∂gain at the best flight by central differences; zero for a pinned gain."""
-    steps = np.diag(np.maximum(np.rint(_DIFFERENCE * takeoff.space.scale), 1.0))
+    steps = np.diag(np.maximum(np.rint(_DIFFERENCE * experiment.space.scale), 1.0))
     above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
-    errors = merit(takeoff, np.concatenate((above, below)), models)
+    errors = merit(experiment, np.concatenate((above, below)), models)
     run = np.diag(above - below)
     rise = errors[: len(base)] - errors[len(base) :]
     return space.by_name(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))

@@ -1,6 +1,6 @@
-"""Hazards of a takeoff with a gain set: simulated takeoffs, and products of the loop that can wrap at 32 bits.
+"""Hazards of a flight with a gain set: simulated flights, and products of the loop that can wrap at 32 bits.
 
-Takeoffs are simulated on the exact replica, over the vehicle's parameter distribution, with aborts. Mass has no
+Flights are simulated on the exact replica, over the vehicle's parameter distribution, with aborts. Mass has no
 parameter of its own: it changes the ratio of thrust to weight, as the hover throttle does, whose distribution covers
 both.
 
@@ -25,7 +25,6 @@ import numpy as np
 from app.core.control.paparazzi import (
     ERROR_SUM_MAX,
     INT32_MAX,
-    POSITION_BITS,
     POSITION_ERROR_MAX,
     RATE_HZ,
     SPEED_ERROR_MAX,
@@ -33,6 +32,7 @@ from app.core.control.paparazzi import (
 )
 from app.core.experiments.base import Check
 from app.core.formatting import grouped, percent
+from app.core.models.set_points import SetPoints
 from app.core.models.vertical import MEASUREMENT_DELAY_S, START_LATENCY_S, Counts
 from app.core.models.vertical_hazards import (
     DISTANCE_LAST_M,
@@ -59,8 +59,8 @@ MODELS: Final = 32
 """Number of simulated vehicles: the likely one, and quasi-random ones around it."""
 
 ABORTS_BETWEEN_S: Final = (0.3, 1.0, 1.7, 2.6, 4.0, 8.0)
-"""Every takeoff is aborted once in each interval between these times, and once between the last of them and the last
-whole second of the flight, at a different time on every vehicle."""
+"""Every flight is aborted once in each interval between these times and those of the later set points, and once between
+the last of them and the last whole second of the flight, at a different time on every vehicle."""
 
 LARGEST_TOUCH_DOWN_M_S: Final = 2.5
 SMALLEST_SWING_M_S: Final = 0.1
@@ -76,7 +76,7 @@ _GOLDEN: Final = 0.6180339887498949
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Takeoffs of one gain set: models (k, m), abort steps (k, a), and the kernels' reports (k, 7) and (k, a, 2)."""
+    """Flights of one gain set: models (k, m), abort steps (k, a), and the kernels' reports (k, 7) and (k, a, 2)."""
 
     models: "Matrix"
     abort_steps: Counts
@@ -84,21 +84,31 @@ class Runs:
     aborts: Samples
 
 
-def abort_steps(models: int, steps: int) -> Counts:
-    """Abort times of flights of so many steps, in steps, shape (models, 6), increasing in each row; they cover each
-    interval evenly."""
-    edges = np.array((*ABORTS_BETWEEN_S, (steps - 1) // RATE_HZ))
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """A flight to simulate: its set points, its length in steps of the loop, and what it is called."""
+
+    set_points: SetPoints
+    steps: int
+    noun: str = "takeoff"
+
+
+def abort_steps(models: int, manoeuvre: Manoeuvre) -> Counts:
+    """Abort times of flights, in steps, shape (models, a), increasing in each row; they cover each interval evenly."""
+    later = (time_s for time_s in manoeuvre.set_points.times_s if time_s > ABORTS_BETWEEN_S[-1])
+    edges = np.array((*ABORTS_BETWEEN_S, *later, (manoeuvre.steps - 1) // RATE_HZ))
     shares = (np.arange(models)[:, np.newaxis] + 1.0) * _GOLDEN % 1.0
     return np.asarray(np.rint((edges[:-1] + shares * np.diff(edges)) * RATE_HZ), dtype=np.int64)
 
 
-def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Counts, target: int, steps: int) -> Runs:
-    """Simulate a takeoff to `target` (8 fractional bits) on each model, and its aborts to `safe_gains`."""
+def fly_runs(gains: Counts, safe_gains: Counts, models: "Matrix", aborts_at: Counts, manoeuvre: Manoeuvre) -> Runs:
+    """Simulate the manoeuvre on each model, and its aborts to `safe_gains`."""
+    targets = manoeuvre.set_points.targets
     reports = np.empty((len(models), REPORT_SIZE))
     aborts = np.empty((*aborts_at.shape, 2))
-    curves = np.empty((2, 2, steps))
+    curves = np.empty((2, 2, manoeuvre.steps))
     for model, at, report, abort in zip(models, aborts_at, reports, aborts, strict=True):
-        fly_with_aborts(gains, model, target, safe_gains, at, curves, report, abort)
+        fly_with_aborts(gains, model, targets, safe_gains, at, curves, report, abort)
     return Runs(models, aborts_at, reports, aborts)
 
 
@@ -109,28 +119,27 @@ def check_flights(
     parameters: Sequence["ModelParameter"],
     models: "Matrix",
     ceiling_m: float,
-    target: int,
-    steps: int,
+    manoeuvre: Manoeuvre,
 ) -> tuple[Check, ...]:
     """Check altitude, divergence, oscillation and aborts of one gain set over `models`, shape (k, m).
 
     A `baseline` is never refused for its altitude. An abort switches to the safe gains: what these would do by
     themselves on the same vehicle is not held against the gains under test.
     """
-    aborts_at = abort_steps(len(models), steps)
-    runs = fly_runs(gains, safe_gains, models, aborts_at, target, steps)
+    aborts_at = abort_steps(len(models), manoeuvre)
+    runs = fly_runs(gains, safe_gains, models, aborts_at, manoeuvre)
     limits = np.array([ceiling_m, LARGEST_TOUCH_DOWN_M_S])
     allowed = np.tile(limits, (len(models), 1))
     beyond = (runs.aborts > limits).any(axis=(1, 2))
     if beyond.any():
-        own = fly_runs(safe_gains, safe_gains, models[beyond], aborts_at[beyond], target, steps)
+        own = fly_runs(safe_gains, safe_gains, models[beyond], aborts_at[beyond], manoeuvre)
         highest_m = np.maximum(own.aborts[:, :, HIGHEST_M].max(axis=1), own.reports[:, HIGHEST_M])
         fastest_m_s = own.aborts[:, :, TOUCH_DOWN_M_S].max(axis=1)
         allowed[beyond] = np.maximum(limits, np.column_stack([highest_m, fastest_m_s]))
     return (
-        _altitude(runs, parameters, ceiling_m, baseline),
-        _divergence(runs, parameters, target / (1 << POSITION_BITS)),
-        _oscillation(runs, parameters),
+        _altitude(runs, parameters, ceiling_m, manoeuvre.noun, baseline),
+        _divergence(runs, parameters, manoeuvre.set_points.altitudes_m[-1], manoeuvre.noun),
+        _oscillation(runs, parameters, manoeuvre.noun),
         _abort(HIGHEST_M, runs, allowed, limits, parameters),
         _abort(TOUCH_DOWN_M_S, runs, allowed, limits, parameters),
     )
@@ -155,13 +164,13 @@ def undamped_swing(reports: "Matrix") -> Vector:
     return np.where((middle > 0.0) & (last >= UNDAMPED * middle), last, 0.0)
 
 
-def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: float, baseline: bool) -> Check:
+def _altitude(runs: Runs, parameters: Sequence["ModelParameter"], ceiling_m: float, noun: str, baseline: bool) -> Check:
     worst = int(np.argmax(runs.reports[:, HIGHEST_M]))
     highest_m = float(runs.reports[worst, HIGHEST_M])
     event = "highest" if highest_m < _CUT_OFF_M else f"above {LOST_M:.0f} m"
     case = _case(parameters, runs.models[worst], float(runs.reports[worst, HIGHEST_STEP]), event)
     passed = baseline or highest_m <= ceiling_m
-    sentence = f"The highest of {len(runs.models)} simulated takeoffs {_rises(highest_m)}" + (
+    sentence = f"The highest of {len(runs.models)} simulated {noun}s {_rises(highest_m)}" + (
         f", with {case}; at most {ceiling_m:.2f} m is allowed."
         if not passed
         else f"; {ceiling_m:.2f} m is allowed."
@@ -179,31 +188,31 @@ def _rises(highest_m: float) -> str:
     return f"rises to {highest_m:.2f} m"
 
 
-def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m: float) -> Check:
+def _divergence(runs: Runs, parameters: Sequence["ModelParameter"], set_point_m: float, noun: str) -> Check:
     distances = divergence_distance(runs.reports, set_point_m)
     worst = int(np.argmax(distances))
     distance_m, fallen_step = float(distances[worst]), float(runs.reports[worst, FALLEN_STEP])
     if distance_m == 0.0:
-        sentence = "No simulated takeoff falls back to the ground or diverges from the set point."
+        sentence = f"No simulated {noun} falls back to the ground or diverges from the set point."
         return Check("divergence", True, sentence, worst=0.0, limit=0.0)
     fallen = fallen_step >= 0.0
     case = _case(parameters, runs.models[worst], fallen_step, "on the ground again") if fallen else ""
     case = case or _case(parameters, runs.models[worst])
     did = "falls back to the ground" if fallen else f"ends {distance_m:.2f} m from the set point and diverges"
-    return Check("divergence", False, f"A simulated takeoff {did}, with {case}.", distance_m, 0.0, case=case)
+    return Check("divergence", False, f"A simulated {noun} {did}, with {case}.", distance_m, 0.0, case=case)
 
 
-def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"]) -> Check:
+def _oscillation(runs: Runs, parameters: Sequence["ModelParameter"], noun: str) -> Check:
     swings = undamped_swing(runs.reports)
     worst = int(np.argmax(swings))
     swing_m_s = float(swings[worst])
     if swing_m_s <= SMALLEST_SWING_M_S:
-        sentence = "Every simulated takeoff settles, or its oscillation decays."
+        sentence = f"Every simulated {noun} settles, or its oscillation decays."
         return Check("oscillation", True, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S)
     case = _case(parameters, runs.models[worst])
     before_m_s = float(runs.reports[worst, SWING_MIDDLE_M_S])
     sentence = (
-        f"The climb rate oscillates by {swing_m_s:.2f} m/s in the last third of a simulated takeoff, after "
+        f"The climb rate oscillates by {swing_m_s:.2f} m/s in the last third of a simulated {noun}, after "
         f"{before_m_s:.2f} m/s in the middle third: it does not decay, with {case}."
     )
     return Check("oscillation", False, sentence, worst=swing_m_s, limit=SMALLEST_SWING_M_S, case=case)
@@ -283,16 +292,16 @@ PRODUCTS: Final = (
 """In the order of the loop's gains."""
 
 
-def check_wrapping(counts: Counts, model: Vector, target: int) -> tuple[Check, ...]:
+def check_wrapping(counts: Counts, model: Vector, set_points: SetPoints) -> tuple[Check, ...]:
     """Return a refusal for each gain that can wrap, or one passed check.
 
-    `counts` are kp, ki, kd; `model` is the likely vehicle, on which refused gains are simulated; `target` is the
-    altitude, 8 fractional bits.
+    `counts` are kp, ki, kd; `model` is the likely vehicle, on which refused gains are simulated to the
+    `set_points`.
     """
     gains = [int(count) for count in counts]
     refused = [place for place, product in enumerate(PRODUCTS) if abs(gains[place]) > product.largest_safe_gain]
     if refused:
-        return tuple(_refusals(refused, gains, _first_wraps(counts, model, target)))
+        return tuple(_refusals(refused, gains, _first_wraps(counts, model, set_points)))
     worst, place = max((abs(gains[place]) * product.largest_error, place) for place, product in enumerate(PRODUCTS))
     product = PRODUCTS[place]
     sentence = (
@@ -302,14 +311,14 @@ def check_wrapping(counts: Counts, model: Vector, target: int) -> tuple[Check, .
     return (Check("wrapping", True, sentence, worst=float(worst), limit=float(INT32_MAX)),)
 
 
-def _first_wraps(counts: Counts, model: Vector, target: int) -> Counts:
+def _first_wraps(counts: Counts, model: Vector, set_points: SetPoints) -> Counts:
     """Step and product at which each gain first wraps in each start, shape (starts, 3, 2); step −1 if it does not."""
     found = np.empty((len(_STARTS), len(PRODUCTS), 2), dtype=np.int64)
     instantly = model.copy()
     instantly[MEASUREMENT_DELAY_S] = 0.0
     steps = round(LONGEST_S * RATE_HZ)
     for start, (_, frozen_after_s) in enumerate(_STARTS):
-        find_wraps(counts, instantly, target, round(frozen_after_s * RATE_HZ), steps, found[start])
+        find_wraps(counts, instantly, set_points.targets, round(frozen_after_s * RATE_HZ), steps, found[start])
     return found
 
 

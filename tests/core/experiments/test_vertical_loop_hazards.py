@@ -8,8 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from app.core.experiments.base import Check, Envelope, ParameterDistribution, prior_distribution
-from app.core.experiments.takeoff_hazards import (
+from app.core.experiments.vertical_loop_hazards import (
     MODELS,
+    Manoeuvre,
     abort_steps,
     check_flights,
     divergence_distance,
@@ -33,7 +34,7 @@ from tests.core.tuning.flying import TAKEOFF, compiled_only
 
 SAFE: dict[str, float] = {"kp": 283, "ki": 13, "kd": 82}
 SAFE_COUNTS = np.array([283, 13, 82])
-TARGET = 768
+TAKEOFF_FLIGHT = Manoeuvre(TAKEOFF.set_points, 16_693)
 NO_ABORTS = np.zeros((1, 0), dtype=np.int64)
 GOOD = [
     (283, 13, 82),
@@ -168,18 +169,18 @@ def test_what_the_safe_gains_do_themselves_is_no_fault_of_the_gains_that_are_jud
 
 @pytest.mark.parametrize(("flight_s", "last_s"), [(10, 10), (60, 60)])
 def test_the_last_abort_falls_before_the_end_of_the_flight(flight_s: int, last_s: int) -> None:
-    steps = abort_steps(MODELS, flight_s * 512 + 1)
+    steps = abort_steps(MODELS, Manoeuvre(TAKEOFF.set_points, flight_s * 512 + 1))
     assert (np.diff(steps, axis=1) > 0).all()
     assert 8.0 * 512 <= steps[:, -1].min() <= steps[:, -1].max() <= last_s * 512
 
 
 def test_aborts_fall_everywhere_and_the_same_every_time() -> None:
-    steps = abort_steps(MODELS, 16_693)
+    steps = abort_steps(MODELS, TAKEOFF_FLIGHT)
     assert (np.diff(steps, axis=1) > 0).all()
     assert steps.min() >= 0.3 * 512
     assert steps.max() <= 32.0 * 512
     assert len(np.unique(steps[:, 2])) == MODELS
-    np.testing.assert_array_equal(steps, abort_steps(MODELS, 16_693))
+    np.testing.assert_array_equal(steps, abort_steps(MODELS, TAKEOFF_FLIGHT))
 
 
 @pytest.mark.parametrize(
@@ -205,7 +206,7 @@ def test_an_abort_is_what_the_simulated_vehicle_does(model_parameters: dict[str,
     aborted_at = int(np.argmax(record["set_point_m"] == 0.0))
     assert aborted_at == pytest.approx(abort_step, abs=1)
     runs = fly_runs(
-        np.array([1600, 1023, 127]), SAFE_COUNTS, model(**model_parameters), np.array([[aborted_at]]), TARGET, 16693
+        np.array([1600, 1023, 127]), SAFE_COUNTS, model(**model_parameters), np.array([[aborted_at]]), TAKEOFF_FLIGHT
     )
     highest_m, touch_down_m_s = runs.aborts[0, 0].tolist()
     assert highest_m == pytest.approx(record["altitude_m"].max(), abs=1e-6)  # a delayed sense may miss the top
@@ -217,7 +218,7 @@ def test_an_abort_is_what_the_simulated_vehicle_does(model_parameters: dict[str,
 @pytest.mark.parametrize("model_parameters", [{}, {"motor_lag_s": 0.07, "battery_sag": 0.03, "ground_effect": 0.2}])
 def test_a_takeoff_of_the_gate_is_the_experiments_own(model_parameters: dict[str, float]) -> None:
     models = model(hover_throttle=0.6, **model_parameters)
-    runs = fly_runs(np.array([301, 133, 65]), SAFE_COUNTS, models, abort_steps(1, 16_693), TARGET, 16_693)
+    runs = fly_runs(np.array([301, 133, 65]), SAFE_COUNTS, models, abort_steps(1, TAKEOFF_FLIGHT), TAKEOFF_FLIGHT)
     (curve,) = TAKEOFF.outputs(np.array([[301.0, 133.0, 65.0]]), models[0])
     assert runs.reports[0, HIGHEST_M] == curve.max()
     assert runs.reports[0, HIGHEST_STEP] == np.argmax(curve)
@@ -227,7 +228,7 @@ def report_of(altitude_m: NDArray[np.float64]) -> NDArray[np.float64]:
     report = np.zeros((1, 7))
     report[0, FALLEN_STEP] = -1.0
     third = len(altitude_m) // 3
-    report_heights(altitude_m, 3.0, third, report[0])
+    report_heights(altitude_m, 1.5, 3.0, 0, third, report[0])
     report_swings(np.gradient(altitude_m, 1.0 / 16.0), third, report[0])
     return report
 
@@ -266,8 +267,7 @@ def test_uncompiled_one_short_takeoff_is_judged() -> None:
         TAKEOFF.model_parameters,
         prior_distribution(TAKEOFF).sample(TAKEOFF, 2),
         1.0,
-        TARGET,
-        1600,
+        Manoeuvre(TAKEOFF.set_points, 1600),
     )
     assert [check.name for check in answers][:3] == ["altitude", "divergence", "oscillation"]
     assert not answers[0].passed
@@ -276,7 +276,9 @@ def test_uncompiled_one_short_takeoff_is_judged() -> None:
 
 def test_a_vehicle_that_stands_is_not_aborted() -> None:
     """A hundredth of a second after the start."""
-    runs = fly_runs(SAFE_COUNTS, SAFE_COUNTS, model(hover_throttle=0.9), np.array([[5]]), TARGET, 30)
+    runs = fly_runs(
+        SAFE_COUNTS, SAFE_COUNTS, model(hover_throttle=0.9), np.array([[5]]), Manoeuvre(TAKEOFF.set_points, 30)
+    )
     assert runs.aborts[0, 0, HIGHEST_M] == pytest.approx(0.0, abs=0.001)
     assert runs.aborts[0, 0, TOUCH_DOWN_M_S] == 0.0
 
@@ -284,7 +286,9 @@ def test_a_vehicle_that_stands_is_not_aborted() -> None:
 def test_a_flight_that_is_lost_is_not_followed_any_further() -> None:
     """A light vehicle without feedback is 200 m high in six seconds; of later aborts nothing is known."""
     light = model(hover_throttle=0.3)
-    runs = fly_runs(np.zeros(3, dtype=np.int64), SAFE_COUNTS, light, np.array([[4000]]), TARGET, 6000)
+    runs = fly_runs(
+        np.zeros(3, dtype=np.int64), SAFE_COUNTS, light, np.array([[4000]]), Manoeuvre(TAKEOFF.set_points, 6000)
+    )
     assert runs.reports[0, HIGHEST_M] == pytest.approx(LOST_M, abs=0.2)
     assert runs.reports[0, HIGHEST_STEP] < 3600
     assert runs.aborts[0, 0].tolist() == [0.0, 0.0]

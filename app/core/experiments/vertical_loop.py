@@ -1,0 +1,257 @@
+"""What the experiments under Paparazzi's vertical loop share: the gains, the simple model of the vehicle with its
+parameters, and the hazards. An experiment adds its set points and its performance measure.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar, Final, Self
+
+import numpy as np
+
+from app.core.control.paparazzi import RATE_HZ
+from app.core.definition import Option, OptionValue
+from app.core.experiments.base import (
+    Check,
+    Envelope,
+    Matrix,
+    ModelParameter,
+    ParameterDistribution,
+    Scatter,
+    SimplexSearch,
+    informed_parameters,
+)
+from app.core.experiments.vertical_loop_hazards import MODELS, Manoeuvre, check_flights, check_wrapping
+from app.core.models.set_points import SetPoints
+from app.core.models.vertical import CHANNELS, Counts, fly, fly_disturbed, observe
+from app.core.models.vertical_batch import fly_batch
+from app.core.policy import Gain, PolicySpace, Vector
+from app.core.records.trajectory import Samples, Trajectory
+
+SETTLED_S: Final = 5.0
+"""A vehicle should be near its first set point from this time on."""
+SKETCH_EVERY: Final = 4
+"""Only every fourth step of a sketch is evaluated."""
+_NEAR_M: Final = 0.6
+_STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
+
+
+def _gain(name: str, title: str, upper: int, default: int) -> Gain:
+    return Gain(name, title, "counts", lower=0, upper=upper, scale=upper / 10, default=default, integer=True)
+
+
+def _known(
+    name: str,
+    title: str,
+    unit: str,
+    upper: float,
+    prior_sd: float,
+    within: float,
+    *,
+    nominal: float = 0.0,
+    lower: float = 0.0,
+    expected: float | None = None,
+    flight_sd: float = 0.0,
+) -> ModelParameter:
+    return ModelParameter(name, title, unit, nominal, lower, upper, prior_sd, within, expected, flight_sd)
+
+
+MODEL_PARAMETERS: Final = (
+    _known("hover_throttle", "Hover throttle", "of full", 0.95, 0.09, 0.05, nominal=0.63, lower=0.3, flight_sd=0.002),
+    _known("start_latency_s", "Start latency", "s", 1.0, 0.15, 0.3, expected=0.2, flight_sd=0.06),
+    _known("motor_lag_s", "Motor lag", "s", 0.3, 0.04, 0.05, expected=0.05),
+    _known("drag_1_s", "Drag", "1/s", 1.0, 0.15, 0.2, expected=0.15),
+    _known("quadratic_share", "Quadratic share of thrust", "1", 1.0, 0.5, 0.3),
+    _known("ground_effect", "Ground effect", "of weight", 0.5, 0.12, 0.1),
+    _known("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
+    _known("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
+)
+"""The data sheet gives mass and thrust only: every other nominal value is zero. The expected values of the others are
+typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sketches:
+    """Shortened flights of c policies on k models; all of shape (c, k).
+
+    The errors are estimates of those of the whole flights; `lowest_m` is taken from 5 s after the command on.
+    """
+
+    errors: Matrix
+    highest_m: Matrix
+    lowest_m: Matrix
+
+
+class VerticalLoop(ABC):
+    """An experiment under Paparazzi's vertical loop, with its simple model; a run has n samples.
+
+    Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    options: ClassVar[tuple[Option, ...]]
+    scatter: Scatter
+    measure: str
+    scored_from_s: float
+    target_channel: str | None
+
+    output: Final = "altitude_m"
+    integrates: Final = False
+    error_unit: Final = "m"
+    space: Final = PolicySpace(
+        (
+            _gain("kp", "Proportional gain", 4000, 283),
+            _gain("ki", "Integral gain", 1073, 13),
+            _gain("kd", "Derivative gain", 409, 82),
+        )
+    )
+    search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
+    difference: Final = 0.1
+    simulated_as: ClassVar[str] = "flight"
+    """What the gate calls a simulated flight."""
+    held_s: ClassVar[float] = 0.0
+    """Time that the gate simulates beyond the window, at the last set point."""
+
+    def __init__(self, model_parameters: tuple[ModelParameter, ...], set_points: SetPoints, window_s: float) -> None:
+        self.model_parameters: Final = model_parameters
+        self.set_points: Final = set_points
+        self.window_s: Final = window_s
+        self._samples: Final = int(np.ceil(window_s * RATE_HZ)) + 1
+
+    @abstractmethod
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        """See `Experiment`, as for the next two."""
+
+    @abstractmethod
+    def errors(self, outputs: Matrix) -> Vector: ...
+
+    @abstractmethod
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float: ...
+
+    @abstractmethod
+    def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
+        """The same experiment on another model."""
+
+    @property
+    @abstractmethod
+    def sketches_s(self) -> tuple[float, float]:
+        """Times until which the robust optimum simulates: a coarse look, then a finer one; above `SETTLED_S`."""
+
+    @abstractmethod
+    def sketch_errors(self, altitude: Matrix, until_s: float) -> Vector:
+        """Estimated errors of flights known until `until_s`, at every `SKETCH_EVERY`-th step: (k, s) → (k,)."""
+
+    def informed(self, mean: Vector, sd: Vector) -> Self:
+        """The experiment with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
+        return self.with_parameters(informed_parameters(self.model_parameters, mean, sd))
+
+    @property
+    def modelled(self) -> Self:
+        """The experiment itself."""
+        return self
+
+    @property
+    def nominal_model(self) -> Vector:
+        """Parameters before the first flight. From the data sheet, only mass and thrust are known."""
+        return np.array([parameter.nominal for parameter in self.model_parameters])
+
+    @property
+    def grid_s(self) -> Samples:
+        """Every 1/512 s from the command to the first instant at or past the end of the window, shape (n,)."""
+        return np.arange(self._samples) / RATE_HZ
+
+    def set_point(self, time_s: Samples) -> Samples:
+        """The altitude asked for at each time, m."""
+        return self.set_points.at(time_s)
+
+    def simulate(self, gains: Vector, model: Vector) -> Trajectory:
+        """One run of the simple model, for any integer gains, inside the bounds or not."""
+        parameters = np.ascontiguousarray(np.broadcast_to(model, (len(self.model_parameters),)))
+        channels, _ = fly(_counts(gains), parameters, self.set_points, self._samples)
+        time_s = self.grid_s
+        named = dict(zip(CHANNELS, channels, strict=True)) | {"set_point_m": self.set_point(time_s)}
+        return Trajectory(time_s, named, "model", "simulation")
+
+    def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
+        """Altitude of many policies, each on its own model or all on one: gains (k, 3) → (k, n)."""
+        return fly_batch(_counts(gains), self._models(model, len(gains)), self.set_points, self._samples)
+
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
+        """Difference of altitude and climb rate from the model's in every step of a flight, shape (n, 3).
+
+        The third column marks when the loop is entered. None if the record lacks the climb rate or the thrust command.
+        """
+        if any(name not in trajectory.channels for name in _STATE_AND_COMMAND):
+            return None
+        altitude, climb_rate, thrust = (
+            np.interp(self.grid_s, trajectory.time_s, trajectory[name]) for name in _STATE_AND_COMMAND
+        )
+        return observe(altitude, climb_rate, thrust, self._models(model, 1)[0])
+
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
+        """`outputs` with `disturbances` added to the state after each step: gains (k, 3) → (k, n)."""
+        return fly_disturbed(_counts(gains), self._models(model, len(gains)), self.set_points, disturbances)
+
+    def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
+        """Check for products that can wrap, exactly, and simulate flights.
+
+        The flights are checked for altitude, divergence, oscillation and aborts. Takes a tenth of a second; repeated
+        questions are answered from a cache.
+        """
+        safe_gains = self.space.vector(envelope.safe_gains)
+        steps = self._samples + round(self.held_s * RATE_HZ)
+        return _hazards(
+            tuple(gains.tolist()),
+            tuple(safe_gains.tolist()),
+            envelope.ceiling_m,
+            tuple(map(tuple, spread.sample(self, MODELS).tolist())),
+            self.model_parameters,
+            Manoeuvre(self.set_points, steps, self.simulated_as),
+        )
+
+    def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
+        """Simulate every policy on every model until `until_s`, which must exceed 5 s, or to the end of the window:
+        gains (c, 3), models (k, m)."""
+        until_s = min(until_s, self.window_s)
+        runs = np.repeat(_counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
+        altitude = fly_batch(*runs, self.set_points, round(until_s * RATE_HZ))[:, ::SKETCH_EVERY]
+        return Sketches(
+            errors=_by_policy(self.sketch_errors(altitude, until_s), gains),
+            highest_m=_by_policy(altitude.max(axis=1), gains),
+            lowest_m=_by_policy(altitude[:, round(SETTLED_S * RATE_HZ / SKETCH_EVERY) :].min(axis=1), gains),
+        )
+
+    @property
+    def expected_m(self) -> tuple[float, float]:
+        """Altitudes between which a sketch should stay, m; they keep a margin from what is unsafe."""
+        return min(self.set_points.altitudes_m) - _NEAR_M, max(self.set_points.altitudes_m) + _NEAR_M
+
+    def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
+        return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
+
+
+def _by_policy(runs: Vector, gains: Matrix) -> Matrix:
+    return runs.reshape(len(gains), -1)
+
+
+def _counts(gains: Vector) -> Counts:
+    return np.ascontiguousarray(np.rint(gains), dtype=np.int64)
+
+
+@lru_cache(maxsize=64)
+def _hazards(
+    gains: tuple[float, ...],
+    safe_gains: tuple[float, ...],
+    ceiling_m: float,
+    models: tuple[tuple[float, ...], ...],
+    parameters: tuple[ModelParameter, ...],
+    manoeuvre: Manoeuvre,
+) -> tuple[Check, ...]:
+    counts, safe_counts, vehicles = _counts(np.array(gains)), _counts(np.array(safe_gains)), np.array(models)
+    baseline = gains == tuple(VerticalLoop.space.default.tolist())
+    return (
+        *check_wrapping(counts, vehicles[0], manoeuvre.set_points),
+        *check_flights(counts, safe_counts, baseline, parameters, vehicles, ceiling_m, manoeuvre),
+    )

@@ -1,0 +1,43 @@
+"""The altitude set points of a flight under the vertical loop: one, or several that follow each other."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.control.paparazzi import POSITION_BITS, RATE_HZ, fix
+from app.core.records.trajectory import Samples
+
+
+@dataclass(frozen=True, slots=True)
+class SetPoints:
+    """Set points `altitudes_m` (m, up), each from its time in `times_s` until the next; the last one holds.
+
+    Times are seconds since the command, increase, and are multiples of the loop's step; the first is 0.
+    """
+
+    times_s: tuple[float, ...]
+    altitudes_m: tuple[float, ...]
+
+    @property
+    def steps(self) -> tuple[int, ...]:
+        """The loop's steps at which each is commanded."""
+        return tuple(round(time_s * RATE_HZ) for time_s in self.times_s)
+
+    def at(self, time_s: Samples) -> Samples:
+        """Set point at each time, same shape; zero before the command."""
+        return np.array((0.0, *self.altitudes_m))[np.searchsorted(self.times_s, time_s, side="right")]
+
+    @property
+    def targets(self) -> NDArray[np.int64]:
+        """The loop's target in each step until the last change, shape (n,), 8 fractional bits; the last one holds."""
+        return _targets(self)
+
+
+@lru_cache(maxsize=64)
+def _targets(set_points: SetPoints) -> NDArray[np.int64]:
+    targets = np.empty(set_points.steps[-1] + 1, dtype=np.int64)
+    for step, altitude_m in zip(set_points.steps, set_points.altitudes_m, strict=True):
+        targets[step:] = fix(altitude_m, POSITION_BITS)
+    return targets
