@@ -32,7 +32,8 @@ from app.figures.theme import ThemeName
 from app.vehicles.registry import get_kind
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
-_CURVES: Final[Mapping[str, str]] = {"altitude_m": "Takeoff curves", "pitch_error_rad": "Pitch error curves"}
+_CURVES: Final[Mapping[str, str]] = {"altitude-steps": "Altitude steps", "pitch-tracking": "Pitch error curves"}
+_TAKEOFF_CURVES: Final = "Takeoff curves"
 _LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0), "throttle": Range(0.0, 1.0)}
 """Limits of commands."""
 _PANELS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
@@ -118,11 +119,12 @@ def history_of(session: Session, campaign_id: int, *, curves: bool, view: Figure
         gains=experiment.space.gains,
         set_point=set_point,
         reference=reference,
+        by_reference=experiment.target_channel is not None,
         flights=tuple(_flight(row, corrected=history.is_corrected(rows, row.number)) for row in flown),
         proposal=_predicted_flight(session, campaign, rows, experiment.output, view.predicted),
         stop_improvement=definition.stop.improvement if definition.stop.kind == "paper" else None,
         noise=_noise(rows, experiment.scatter),
-        curves_title=_CURVES.get(experiment.output, "Flight curves"),
+        curves_title=_CURVES.get(experiment.name, _TAKEOFF_CURVES),
         window=view.window,
         chosen=view.chosen,
         altitude_limit_m=_altitude_limit(campaign, experiment.output),
@@ -315,6 +317,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         events=() if record is None or experiment.output != "altitude_m" else flight_events(record, glitches_s),
         notes=pinned_notes(row.note),
         is_over=row.state in history.FLOWN,
+        by_reference=experiment.target_channel is not None,
     )
 
 

@@ -121,6 +121,7 @@ class Noise:
 class History:
     """A campaign's data for its figures.
 
+    `by_reference`: the output is scored against the reference, not against the set point.
     `stop_improvement` is the share of the best error by which a flight must be lower to count as an improvement, None
     if the stop rule has no such condition. `flights` are in the order of their numbers. `noise` is None while it is not
     known. `window` is the visible time range, s, which is drawn with more points; None for all. `chosen` is the number
@@ -138,10 +139,16 @@ class History:
     proposal: NextFlight | None = None
     stop_improvement: float | None = None
     noise: Noise | None = None
+    by_reference: bool = False
     curves_title: str = "Takeoff curves"
     window: Range | None = None
     chosen: int | None = None
     altitude_limit_m: float | None = None
+
+    @property
+    def target(self) -> Curve:
+        """What the output is scored against."""
+        return self.reference if self.by_reference and self.reference is not None else self.set_point
 
     @cached_property
     def valid(self) -> tuple[FlightData, ...]:

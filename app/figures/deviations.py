@@ -1,4 +1,4 @@
-"""The panel below a flight's output: its deviation from a set point that is a step."""
+"""The panel below a flight's output: its deviation from a set point that is not zero, or from the reference."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,8 +31,13 @@ def is_step(set_point: Curve) -> bool:
     return float(set_point.values.max()) > 0.0
 
 
+def changes_of(set_point: Curve) -> list[float]:
+    """Times at which the set point changes, s; empty for a single step."""
+    return [float(time_s) for time_s in set_point.time_s[1:][np.diff(set_point.values) != 0.0]]
+
+
 def deviation_of(curve: Curve, set_point: Curve) -> Curve:
-    """Output − set point, from the command on."""
+    """Output − set point (or what else the output is scored against), from the command on."""
     flown = curve.time_s >= 0.0
     time_s = curve.time_s[flown]
     return Curve(time_s, curve.values[flown] - np.interp(time_s, set_point.time_s, set_point.values))

@@ -67,6 +67,12 @@ class FlightRecordData:
     events: tuple[FlightEvent, ...] = ()
     notes: tuple[FlightEvent, ...] = ()
     is_over: bool = False
+    by_reference: bool = False
+
+    @property
+    def target(self) -> Curve:
+        """What the output is scored against."""
+        return self.reference if self.by_reference and self.reference is not None else self.set_point
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +120,7 @@ class FlightFigure:
         record = self.record
         if not self._has_deviation:
             return []
-        deviation = deviation_of(curve, record.set_point)
+        deviation = deviation_of(curve, record.target)
         drawn = _line("Deviation", deviation, palette.ink, 1.75, "deviation", record.output_unit)
         return [{**drawn, "yaxis": "y2", "showlegend": False}]
 

@@ -1,5 +1,5 @@
-"""All flights over set point and reference trajectory, and their deviation from the set point below: the best
-emphasised, the next one's prediction dashed.
+"""All flights over set point and reference trajectory, and their deviation from what they are scored against below: the
+best emphasised, the next one's prediction dashed.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,14 @@ from app.core.formatting import count
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, History, Range
-from app.figures.deviations import deviation_axis, deviation_limit, deviation_of, is_step, off_scale_deviations
+from app.figures.deviations import (
+    changes_of,
+    deviation_axis,
+    deviation_limit,
+    deviation_of,
+    is_step,
+    off_scale_deviations,
+)
 from app.figures.overlays import (
     PERCENTILES,
     Envelope,
@@ -30,7 +37,8 @@ ALL_POINTS: Final = 12_000
 HEADROOM: Final = 1.15
 """Room above the set point for the next flight, as a factor on the set point."""
 OPENING_S: Final = (-0.3, 8.0)
-"""Time range at first: the climb and the overshoot."""
+"""Time range at first: the climb and the overshoot; with later set points from the first of these to the end."""
+_BEFORE_S: Final = 1.0
 DEVIATION_SHARE: Final = 0.3
 """Height of the lower panel, as a share of the figure."""
 _PANEL_GAP: Final = 0.07
@@ -47,15 +55,16 @@ class TrajectoriesFigure:
     one) with `prediction_lower` and `prediction_upper` (if its band is known), at those `TABLE_TIMES_S` that lie within
     the experiment.
 
-    Every trace carries `meta`: `role` (set point, reference, envelope, flight, legend, prediction, deviation, predicted
-    deviation, band, glitch, limit, live, pointed, off scale, off scale deviation) and, for flights, `trial` and
-    `standing` (best, latest, baseline, earlier, invalid, unjudged). Every trace has its own `uid`: a flight's is
+    Every trace carries `meta`: `role` (target, set point, reference, envelope, flight, legend, prediction, deviation,
+    predicted deviation, band, glitch, limit, live, pointed, off scale, off scale deviation) and, for flights, `trial`
+    and `standing` (best, latest, baseline, earlier, invalid, unjudged). Every trace has its own `uid`: a flight's is
     `flight-` and its number, that of its deviation `deviation-` and its number. The traces `live`, `live deviation` and
     `pointed` are empty: a page fills the first two during a flight, the last with the flight under the pointer if that
-    one has no curve of its own. The altitude limit, `limit`, is hidden: the page on which a flight is observed shows
-    it. The axis shows the first 8 s; the layout's `meta` holds the time range of the whole flight, `whole_s`. Marks off
-    scale are those within the history's window, else within the first 8 s. A set point of zero has no deviations: they
-    would repeat the output.
+    one has no curve of its own. The set point or the reference, against which the output is scored, is the `target`:
+    deviations are counted from it. The altitude limit, `limit`, is hidden: the page on which a flight is observed shows
+    it. The axis shows the first 8 s, or with later set points the time from the first of them on; the layout's `meta`
+    holds the time range of the whole flight, `whole_s`. Marks off scale are those within the history's window, else
+    within that time. A set point of zero has no deviations: they would repeat the output.
     """
 
     history: History
@@ -101,7 +110,7 @@ class TrajectoriesFigure:
             leaving = off_scale_deviations(
                 palette,
                 drawn,
-                history.set_point,
+                history.target,
                 self._deviation_limit,
                 unit=history.output_unit,
                 window=self._visible,
@@ -123,6 +132,8 @@ class TrajectoriesFigure:
 
     @property
     def _opening_s(self) -> list[float]:
+        if changes_s := changes_of(self.history.set_point):
+            return [changes_s[0] - _BEFORE_S, self._lasts_s]
         return [OPENING_S[0], min(OPENING_S[1], self._lasts_s)]
 
     @property
@@ -166,7 +177,7 @@ class TrajectoriesFigure:
         ]
 
     def _deviations(self, palette: Palette, drawn: list[FlightData]) -> list[Trace]:
-        """Output − set point of each flight and of the prediction, in the lower panel."""
+        """Output − target of each flight and of the prediction, in the lower panel."""
         if not is_step(self.history.set_point):
             return []
         unit, proposal = self.history.output_unit, self.history.proposal
@@ -174,7 +185,7 @@ class TrajectoriesFigure:
         own = [
             self._trace(
                 f"Flight {flight.number}, deviation",
-                deviation_of(flight.curve, self.history.set_point),
+                deviation_of(flight.curve, self.history.target),
                 points,
                 role="deviation",
                 about={"trial": flight.number, "standing": standing},
@@ -193,7 +204,7 @@ class TrajectoriesFigure:
             return own
         predicted = self._trace(
             f"{proposal.curve_name}: deviation",
-            deviation_of(proposal.curve, self.history.set_point),
+            deviation_of(proposal.curve, self.history.target),
             points,
             role="predicted deviation",
             about={"trial": proposal.number},
@@ -213,7 +224,7 @@ class TrajectoriesFigure:
         history = self.history
         shown = [history.best, *history.valid[-1:], history.proposal]
         curves = [one.curve for one in shown if one is not None and one.curve is not None]
-        return deviation_limit(curves, history.set_point)
+        return deviation_limit(curves, history.target)
 
     def _span(self, drawn: list[FlightData]) -> tuple[float, float, tuple[int, ...]]:
         """From the ground to above the set point; if the set point is zero, the range of the first flight."""
@@ -293,7 +304,7 @@ class TrajectoriesFigure:
             scatter(
                 name,
                 thin_by_bends(curve.time_s, curve.values),
-                role=name.lower(),
+                role="target" if curve is self.history.target else name.lower(),
                 line=theme.line(palette.dim, 1.5, dash),
                 legendrank=900 + place,
             )
@@ -357,7 +368,7 @@ class TrajectoriesFigure:
     ) -> Trace:
         window = self.history.window
         drawn = (
-            thinned(curve.time_s, curve.values, points // 2, Range(*OPENING_S))
+            thinned(curve.time_s, curve.values, points // 2, Range(*self._opening_s))
             if window is None
             else thinned(curve.time_s, curve.values, points, window)
         )

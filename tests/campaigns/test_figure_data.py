@@ -49,7 +49,7 @@ def test_the_takeoff_curves_are_the_stored_records(client: TestClient, campaign_
         flown = create_climb(settling_s)
         np.testing.assert_allclose(curve["y"], np.interp(curve["x"], flown.time_s, flown["altitude_m"]), atol=2e-3)
     assert trace(drawn, "flight", trial=2)["meta"]["standing"] == "best"
-    assert set(trace(drawn, "set point")["y"]) == {3.0}
+    assert set(trace(drawn, "target")["y"]) == {3.0}
     assert trace(drawn, "reference")["y"][-1] == pytest.approx(3.0, abs=0.01)
 
 

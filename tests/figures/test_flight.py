@@ -41,6 +41,11 @@ def test_a_flight_is_drawn_over_prediction_best_and_goal_with_its_commands_below
     assert card.summary == "Altitude of flight 3: highest 3.40 m at 2.0 s."
 
 
+def test_a_flight_scored_against_the_reference_has_its_deviation_from_that() -> None:
+    card = FlightFigure(replace(RECORD, reference=RECORD.curve, by_reference=True)).compute()
+    assert set(trace(card, "deviation")["y"]) == {0.0}
+
+
 def test_an_imported_flight_without_commands_has_only_its_deviation_below() -> None:
     card = FlightFigure(replace(RECORD, panels=())).compute()
     assert [name for name in layout(card) if name.startswith("yaxis")] == ["yaxis", "yaxis2"]

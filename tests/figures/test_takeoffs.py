@@ -12,8 +12,8 @@ from tests.figures.builders import SET_POINT, TIME_S, climb, flight, history, la
 def test_before_the_first_flight_only_the_goal_and_the_prediction_are_drawn() -> None:
     card = TrajectoriesFigure(history(proposal=proposal(1))).compute()
     assert [one["meta"]["role"] for one in traces(card)] == [
-        "set point", "reference", "predicted deviation", "prediction", "live", "pointed", "live deviation"]  # fmt: skip
-    assert set(trace(card, "set point")["y"]) == {3.0}
+        "target", "reference", "predicted deviation", "prediction", "live", "pointed", "live deviation"]  # fmt: skip
+    assert set(trace(card, "target")["y"]) == {3.0}
     assert trace(card, "live")["x"] == []
 
 
@@ -65,7 +65,7 @@ def test_every_trace_has_its_own_uid_and_keeps_it_in_the_figure_after_another_fl
     before, after = uids(flights), uids(flights + 1)
     for uid in before.keys() & after.keys():
         assert before[uid]["role"] == after[uid]["role"]
-    assert {"set-point", "reference", "prediction", "band-lower", "live", "flight-1", "deviation-1"} <= before.keys()
+    assert {"target", "reference", "prediction", "band-lower", "live", "flight-1", "deviation-1"} <= before.keys()
 
 
 def test_flights_that_look_alike_share_an_entry_of_the_legend() -> None:
@@ -330,3 +330,19 @@ def test_both_themes_draw_the_same_values_in_different_colours() -> None:
     light, dark = (TrajectoriesFigure(history(flight(1, 0.3)), theme).compute() for theme in ("light", "dark"))
     assert trace(light, "flight", trial=1)["y"] == trace(dark, "flight", trial=1)["y"]
     assert trace(light, "flight", trial=1)["line"]["color"] != trace(dark, "flight", trial=1)["line"]["color"]
+
+
+def test_with_later_set_points_it_opens_at_them_and_deviations_are_from_the_reference() -> None:
+    steps = Curve(TIME_S, np.where(TIME_S < 10.0, 3.0, 2.0))
+    reference = Curve(TIME_S, 2.0 + np.exp(-np.maximum(TIME_S - 10.0, 0.0)))
+    flown = replace(flight(1, 0.3), curve=Curve(TIME_S, reference.values + 0.1))
+    stepped = replace(history(flown), set_point=steps, reference=reference, by_reference=True)
+    card = TrajectoriesFigure(stepped).compute()
+    assert [one["meta"]["role"] for one in traces(card)][:2] == ["set point", "target"]
+    assert layout(card)["xaxis"]["range"] == [pytest.approx(9.0, abs=0.1), TIME_S[-1]]
+    assert trace(card, "deviation", trial=1)["y"] == pytest.approx([0.1] * len(trace(card, "deviation", trial=1)["y"]))
+
+
+def test_without_a_reference_deviations_stay_those_from_the_set_point() -> None:
+    card = TrajectoriesFigure(replace(history(flight(1, 0.3)), reference=None, by_reference=True)).compute()
+    assert trace(card, "target")["name"] == "Set point"

@@ -16,7 +16,7 @@ import {
 } from "./traces";
 
 const traces: Trace[] = [
-  { meta: { role: "set point" }, x: [0, 32], y: [3, 3] },
+  { meta: { role: "target" }, x: [0, 32], y: [3, 3] },
   { meta: { role: "flight", trial: 1, standing: "earlier" }, line: { width: 1 }, x: [0, 1], y: [0, 2] },
   { meta: { role: "flight", trial: 2, standing: "best" }, line: { width: 3 }, x: [0, 1], y: [0, 3] },
   { meta: { role: "live" }, x: [], y: [], showlegend: false },
@@ -31,7 +31,7 @@ test("the live trace takes what has been measured, and only that trace", () => {
 });
 
 test("the live deviation is what has been measured less the set point, from the command on", () => {
-  const step: Trace = { meta: { role: "set point" }, x: [-0.3, 0, 0, 2, 4, 32], y: [0, 0, 3, 3, 5, 5] };
+  const step: Trace = { meta: { role: "target" }, x: [-0.3, 0, 0, 2, 4, 32], y: [0, 0, 3, 3, 5, 5] };
   const drawn = withLive([step, { meta: { role: "live deviation" }, x: [], y: [] }], {
     ...begun(1, 5),
     timeS: [-0.1, 0, 1, 3, 33],
@@ -131,7 +131,7 @@ test("a zoom says which seconds are looked at, and the way back that it is all o
 
 test("the predicted deviation belongs to the prediction that is drawn, from the command on", () => {
   const predicted: Trace[] = [
-    { meta: { role: "set point" }, x: [0, 2, 4, 32], y: [3, 3, 5, 5] },
+    { meta: { role: "target" }, x: [0, 2, 4, 32], y: [3, 3, 5, 5] },
     { meta: { role: "prediction", trial: 3 }, x: [0, 32], y: [0, 5] },
     { meta: { role: "predicted deviation", trial: 3 }, yaxis: "y2", x: [0, 32], y: [-3, 0] },
   ];

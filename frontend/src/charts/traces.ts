@@ -38,16 +38,16 @@ interface LiveCurve {
   showlegend: boolean;
 }
 
-/** What has been measured, by the place of the trace that shows it: the output, and its deviation from the set point. */
+/** What has been measured, by the place of the trace that shows it: the output, and its deviation from its target. */
 export function liveCurves(traces: readonly Trace[], { timeS, measured }: LiveFlight): Map<number, LiveCurve> {
   const curves = new Map<number, LiveCurve>();
   if (timeS.length === 0) return curves;
   const live = traceWithRole(traces, "live");
   const deviation = traceWithRole(traces, "live deviation");
-  const setPoint = traces[traceWithRole(traces, "set point")];
+  const target = traces[traceWithRole(traces, "target")];
   if (live >= 0) curves.set(live, { ...brokenAtGaps(timeS, measured), showlegend: true });
-  if (deviation >= 0 && setPoint !== undefined) {
-    const { x, y } = deviationFrom(setPoint, timeS, measured);
+  if (deviation >= 0 && target !== undefined) {
+    const { x, y } = deviationFrom(target, timeS, measured);
     curves.set(deviation, { ...brokenAtGaps(x, y), showlegend: false });
   }
   return curves;
@@ -64,15 +64,15 @@ function brokenAtGaps(x: number[], y: number[]): { x: number[]; y: number[] } {
   return { x: within(x, (place) => x[place - 1] as number), y: within(y, () => Number.NaN) };
 }
 
-/** Output − set point, from the command on. */
+/** Output − target, from the command on. */
 function deviationFrom(
-  setPoint: Trace,
+  target: Trace,
   timeS: readonly number[],
   output: readonly number[],
 ): { x: number[]; y: number[] } {
   const first = timeS.findIndex((time) => time >= 0);
   const x = first < 0 ? [] : timeS.slice(first);
-  const wanted = interpolated(x, setPoint.x as number[], setPoint.y as number[]);
+  const wanted = interpolated(x, target.x as number[], target.y as number[]);
   const y = wanted.map((value, place) => (output[first + place] ?? Number.NaN) - value);
   return { x, y };
 }
@@ -106,7 +106,7 @@ export interface DrawnPrediction {
 const PREDICTED = new Set(["prediction", "band", "predicted deviation"]);
 
 /**
- * The predicted curve, the edges of its band and its deviation from the set point, by the place of the trace that shows
+ * The predicted curve, the edges of its band and its deviation from its target, by the place of the trace that shows
  * each; the figure's for null.
  */
 export function predictedCurves(
@@ -114,7 +114,7 @@ export function predictedCurves(
   prediction: DrawnPrediction | null,
 ): Map<number, { x: unknown[]; y: unknown[] }> {
   const curves = new Map<number, { x: unknown[]; y: unknown[] }>();
-  const setPoint = traces[traceWithRole(traces, "set point")];
+  const target = traces[traceWithRole(traces, "target")];
   traces.forEach(({ meta, x = [], y = [] }, place) => {
     if (!PREDICTED.has(meta?.role ?? "")) return;
     if (prediction === null) {
@@ -122,8 +122,8 @@ export function predictedCurves(
       return;
     }
     const { time_s = [], values = [] } = prediction[meta?.edge ?? "curve"] ?? {};
-    const isDeviation = meta?.role === "predicted deviation" && setPoint !== undefined;
-    curves.set(place, isDeviation ? deviationFrom(setPoint, time_s, values) : { x: time_s, y: values });
+    const isDeviation = meta?.role === "predicted deviation" && target !== undefined;
+    curves.set(place, isDeviation ? deviationFrom(target, time_s, values) : { x: time_s, y: values });
   });
   return curves;
 }
