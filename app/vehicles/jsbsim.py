@@ -191,7 +191,7 @@ JSBSIM: Final = VehicleKind(
     line="Six degrees of freedom in JSBSim under the autopilot's own vertical loop, as flown for the paper's Table 1.",
     is_real=False,
     can_fly=True,
-    experiments=("takeoff",),
+    experiments=("takeoff", "altitude-steps"),
     options=(
         VehicleOption("thrust_scale", "Thrust, as a multiple of the data sheet's", "×", 1.0, 0.7, 1.5),
         VehicleOption("mass_kg", "Mass", "kg", MASS_KG, 0.3, 0.6),

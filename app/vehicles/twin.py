@@ -99,7 +99,7 @@ TWIN: Final = VehicleKind(
     line="A simple vertical model fitted to the paper's real flights, with their flight-to-flight scatter.",
     is_real=False,
     can_fly=True,
-    experiments=("takeoff",),
+    experiments=("takeoff", "altitude-steps"),
     options=(
         VehicleOption("scatter", "Flight-to-flight scatter, as a multiple of the real drone's", "×", 1.0, 0.0, 5.0),
         VehicleOption("hover_throttle", "Hover throttle", "of full throttle", 0.61, 0.3, 0.95),

@@ -25,8 +25,13 @@ def checked(file: CampaignFile) -> Definition:
 def test_every_preset_is_a_campaign_that_can_be_created(name: str) -> None:
     file = read_preset(name)
     definition = checked(file)
-    of_its_own = {"f16": "pitch-tracking", "ardupilot": "takeoff-ardupilot", "px4": "takeoff-px4"}
-    assert definition.experiment == of_its_own.get(name.split("-", maxsplit=1)[0], "takeoff")
+    of_its_own = {
+        "f16-pitch-tracking": "pitch-tracking",
+        "ardupilot-takeoff": "takeoff-ardupilot",
+        "px4-takeoff": "takeoff-px4",
+        "ardrone-altitude-steps": "altitude-steps",
+    }
+    assert definition.experiment == of_its_own.get(name, "takeoff")
     assert len(file.gains) == (definition.stop.max_flights if definition.strategy == "manual" else 0)
 
 

@@ -191,3 +191,29 @@ def test_another_experiment_has_its_own_vehicles_gains_and_units(dashboard: Dash
     record = dashboard.get(f"/trials/{trial['id']}/trajectory?points=20000")
     expected = np.interp(drawn["x"], record["time_s"], record["channels"][experiment["output"]])
     np.testing.assert_allclose(drawn["y"], expected, atol=2e-4)
+
+
+def test_altitude_steps_are_created_in_the_form_and_flown_twice_close_to_the_reference(
+    dashboard: Dashboard, states: States
+) -> None:
+    page = dashboard.page
+    dashboard.open("/new")
+    page.get_by_role("combobox", name="Experiment").select_option("Altitude steps")
+    expect(page.get_by_role("radio", name=re.compile("AR.Drone 2"))).to_have_count(2)
+    page.get_by_role("button", name=re.compile("^Advanced")).click()
+    page.get_by_label("Number of steps").fill("2")
+    page.get_by_role("textbox", name="Name", exact=True).fill("Steps")
+    dashboard.button("Create campaign").click()
+    expect(page.get_by_role("heading", name="Steps", exact=True)).to_be_visible()
+    campaign_id = dashboard.when_ready(dashboard.campaign_id)
+    states.fly(campaign_id)
+    dashboard.when_ready(campaign_id)
+    states.fly(campaign_id)
+    first, second = dashboard.trials(campaign_id)
+    assert second["error"] < 0.05 * first["error"]
+    expect(page.get_by_role("heading", name=re.compile("^Altitude steps"))).to_be_visible()
+    drawn = dashboard.until(lambda: dashboard.trace("Altitude steps", "flight", trial=2))
+    record = dashboard.get(f"/trials/{second['id']}/trajectory?points=20000")
+    reference = np.interp(drawn["x"], record["time_s"], record["channels"]["reference_m"])
+    shown = np.array(drawn["x"]) > 10.0
+    np.testing.assert_allclose(np.array(drawn["y"])[shown], reference[shown], atol=0.05)

@@ -41,3 +41,8 @@ def _targets(set_points: SetPoints) -> NDArray[np.int64]:
     for step, altitude_m in zip(set_points.steps, set_points.altitudes_m, strict=True):
         targets[step:] = fix(altitude_m, POSITION_BITS)
     return targets
+
+
+def on_step(time_s: float) -> float:
+    """The time of the loop's nearest step, s."""
+    return round(time_s * RATE_HZ) / RATE_HZ

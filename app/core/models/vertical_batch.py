@@ -139,6 +139,11 @@ def _fly(gains: Counts, models: Samples, targets: Counts, guide: Samples) -> tup
     return altitude, fastest_m_s
 
 
+def reference_altitude(set_points: SetPoints, samples: int) -> Samples:
+    """The loop's reference, m up, in every step of a flight that starts with the command, shape (samples,)."""
+    return np.asarray(-_guide(set_points, samples)[_POSITION] / _POSITION_UNIT)
+
+
 @lru_cache(maxsize=16)
 def _guide(set_points: SetPoints, samples: int) -> Samples:
     """The part of the loop that does not depend on what is sensed, for every step, shape (4, n)."""

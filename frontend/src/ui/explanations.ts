@@ -13,8 +13,8 @@ export const EXPLANATIONS = explained({
   error: {
     question: "What is the error?",
     answer: [
-      "How far the flight was from its set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. F-16: the integral of |reference − pitch|.",
-      "Lower is better. Zero is impossible because climbing takes time: the reference trajectory of Paparazzi scores 0.091 m over 32.6 s.",
+      "How far the flight was from its set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. Altitude steps: the mean of |reference − altitude| after the steps. F-16: the integral of |reference − pitch|.",
+      "Lower is better. A takeoff cannot reach zero: Paparazzi's reference scores 0.091 m over 32.6 s.",
     ],
   },
   altitude: {

@@ -197,5 +197,5 @@ CALIBRATED: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
-    experiments=("takeoff",),
+    experiments=("takeoff", "altitude-steps"),
 )

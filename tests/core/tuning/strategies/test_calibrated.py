@@ -251,5 +251,5 @@ def test_what_remains_reproduces_the_flight_and_fades_without_a_recorded_command
 
 
 @compiled_only
-def test_it_is_registered_for_the_takeoff_alone() -> None:
-    assert CALIBRATED.experiments == ("takeoff",)
+def test_it_is_registered_for_the_experiments_under_the_vertical_loop() -> None:
+    assert CALIBRATED.experiments == ("takeoff", "altitude-steps")
