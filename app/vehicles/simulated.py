@@ -23,7 +23,7 @@ from app.core.control.paparazzi import (
     fix,
 )
 from app.core.errors import GainsError, InputError, Problem
-from app.core.experiments.takeoff import WINDOW_S
+from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
 from app.core.models.set_points import SetPoints
 from app.core.policy import Gains, shortened
 from app.core.records.trajectory import Trajectory
@@ -116,7 +116,6 @@ class Pacer:
 
 
 GAIN_NAMES: Final = ("kp", "ki", "kd")
-TAKEOFF_ALTITUDE_M: Final = 3.0
 FLIGHT_S: Final = WINDOW_S + RECORDED_BEYOND_S
 """Time recorded after the command for the paper's window, 33 s."""
 TELEMETRY_HZ: Final = 50
@@ -281,9 +280,17 @@ def simulate_takeoff(simulation: Simulation, gains: Gains) -> Rows:
     For the twin this takes 1.5 ms instead of 30. Gains are 32-bit integers and are not checked. A flight that diverges
     numerically has non-finite altitudes.
     """
-    rows = simulation.advance(STEPS, _command(ALT, fix(TAKEOFF_ALTITUDE_M, POSITION_BITS), gains))
-    rows[:, SET_POINT] = TAKEOFF_ALTITUDE_M
-    return rows
+    return simulate_flight(simulation, gains, SET_POINTS, STEPS)
+
+
+def simulate_flight(simulation: Simulation, gains: Gains, set_points: SetPoints, steps: int) -> Rows:
+    """The same with other set points, for so many steps; shape (`steps`, 8)."""
+    rows = []
+    edges = [*set_points.steps, steps]
+    for first, last, altitude_m in zip(edges, edges[1:], set_points.altitudes_m, strict=False):
+        rows.append(simulation.advance(last - first, _command(ALT, fix(altitude_m, POSITION_BITS), gains)))
+        rows[-1][:, SET_POINT] = altitude_m
+    return np.concatenate(rows)
 
 
 def trajectory_of(rows: Rows, kind: str) -> Trajectory:
