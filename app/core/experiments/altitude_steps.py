@@ -4,6 +4,7 @@ A takeoff is scored from the ground, where the reference trajectory, which does 
 of the error. Here each step is scored against that reference, so that only what the gains can change remains.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,6 +12,7 @@ from typing import Final, Self
 
 import numpy as np
 
+from app.core.control.paparazzi import POSITION_BITS
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import Matrix, ModelParameter, Scatter
@@ -104,6 +106,8 @@ class AltitudeSteps(VerticalLoop):
     target_channel = REFERENCE
     scatter = Scatter(_SCATTER_M, degrees_of_freedom=1.0, measured=False)
     """That of the twin of the paper's drone, because no real vehicle has flown it yet."""
+    least_model_error = (1 / (1 << POSITION_BITS)) / math.sqrt(12.0)
+    """The loop rounds the altitude to 1/256 m, which is uniformly distributed; errors of tuned gains are as small."""
     held_s = 20.0
 
     def __init__(

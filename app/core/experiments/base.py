@@ -325,6 +325,12 @@ class ModelledExperiment(Experiment, Protocol):
         ...
 
     @property
+    def least_model_error(self) -> float:
+        """Standard deviation, in the error's unit, by which the prediction of even a fitted model is wrong, beside a
+        relative error."""
+        ...
+
+    @property
     def search(self) -> SimplexSearch: ...
     @property
     def difference(self) -> float:

@@ -111,6 +111,7 @@ class VerticalLoop(ABC):
     difference: Final = 0.1
     simulated_as: ClassVar[str] = "flight"
     """What the gate calls a simulated flight."""
+    least_model_error: ClassVar[float] = 0.0
     held_s: ClassVar[float] = 0.0
     """Time that the gate simulates beyond the window, at the last set point."""
 

@@ -226,6 +226,8 @@ def test_the_second_flight_of_the_calibrated_strategy_is_where_it_was_predicted(
     assert second.error is not None
     assert first.error is not None
     assert second.error in proposal.interval
+    assert proposal.predicted_error is not None
+    assert proposal.interval.upper - proposal.predicted_error > 1.64 * STEPS.least_model_error > 0.0018
     assert second.error < 0.006 < 0.02 * first.error
     assert proposal.predicted is not None
     assert {"altitude_m_lower", "altitude_m_upper"} <= proposal.predicted.channels.keys()

@@ -45,6 +45,7 @@ class QuadraticExperiment:
     measure: Final = "a bowl"
     target_channel: Final = None
     set_points: Final = None
+    least_model_error: Final = 0.0
     grid_s: Final = np.linspace(0.0, 1.0, 11)
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:
