@@ -63,8 +63,9 @@ class TrajectoriesFigure:
     one has no curve of its own. The set point or the reference, against which the output is scored, is the `target`:
     deviations are counted from it. The altitude limit, `limit`, is hidden: the page on which a flight is observed shows
     it. The axis shows the first 8 s, or with later set points the time from the first of them on; the layout's `meta`
-    holds the time range of the whole flight, `whole_s`. Marks off scale are those within the history's window, else
-    within that time. A set point of zero has no deviations: they would repeat the output.
+    holds the time range of the whole flight, `whole_s`, and the title of the first one, `opening`. Marks off scale are
+    those within the history's window, else within that time. A set point of zero has no deviations: they would repeat
+    the output.
     """
 
     history: History
@@ -120,7 +121,7 @@ class TrajectoriesFigure:
             palette,
             **self._axes(palette, low, high),
             margin=dict(theme.SIGNED_MARGIN_PX),
-            meta={"whole_s": self._whole_s},
+            meta={"whole_s": self._whole_s, "opening": self._opening_title},
             uirevision="takeoffs",
         )
         summary = self._summary(len(leaving_top), len(leaving))
@@ -140,6 +141,10 @@ class TrajectoriesFigure:
     def _visible(self) -> Range:
         """The visible time range: the one asked for, else the one at first."""
         return self.history.window or Range(*self._opening_s)
+
+    @property
+    def _opening_title(self) -> str:
+        return "Steps" if changes_of(self.history.set_point) else f"First {OPENING_S[1]:g} s"
 
     @property
     def _whole_s(self) -> list[float]:

@@ -146,7 +146,7 @@ def test_the_chart_opens_at_the_climb_with_the_deviation_below_and_knows_the_who
     card = TrajectoriesFigure(history(flight(1, 0.3), flight(2, 0.2, overshoot_m=0.5), proposal=proposal(3))).compute()
     drawn = layout(card)
     assert drawn["xaxis"]["range"] == [-0.3, 8.0]
-    assert drawn["meta"]["whole_s"] == [pytest.approx(-0.326), 32.6]
+    assert drawn["meta"] == {"whole_s": [pytest.approx(-0.326), 32.6], "opening": "First 8 s"}
     assert drawn["yaxis2"]["range"] == [pytest.approx(-0.55, abs=1e-3), pytest.approx(0.55, abs=1e-3)]
     deviation = trace(card, "deviation", trial=2)
     assert (deviation["yaxis"], deviation.get("xaxis", "x"), deviation["showlegend"]) == ("y2", "x", False)
@@ -340,6 +340,7 @@ def test_with_later_set_points_it_opens_at_them_and_deviations_are_from_the_refe
     card = TrajectoriesFigure(stepped).compute()
     assert [one["meta"]["role"] for one in traces(card)][:2] == ["set point", "target"]
     assert layout(card)["xaxis"]["range"] == [pytest.approx(9.0, abs=0.1), TIME_S[-1]]
+    assert layout(card)["meta"]["opening"] == "Steps"
     assert trace(card, "deviation", trial=1)["y"] == pytest.approx([0.1] * len(trace(card, "deviation", trial=1)["y"]))
 
 

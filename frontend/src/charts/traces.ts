@@ -257,6 +257,11 @@ export function wholeFlight({ layout }: PlotlyFigure): TimeRange | null {
   return meta?.whole_s ?? null;
 }
 
+/** Title of the time range that the axis shows at first. */
+export function openingTitle({ layout }: PlotlyFigure): string | undefined {
+  return (layout as { meta?: { opening?: string } }).meta?.opening;
+}
+
 /** The layout with its first x axis limited to `range`; unchanged for null. */
 export function withTimeRange(layout: Record<string, unknown>, range: readonly [number, number] | null) {
   if (range === null) return layout;

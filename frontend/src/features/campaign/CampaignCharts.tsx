@@ -7,7 +7,7 @@ import { type TimeRange, useCampaignFigure, useCurveOf, useLandscape } from "../
 import type { Campaign, FigureCard, Trial } from "../../api/types";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { type NextFlight, withNextError, withNextGains } from "../../charts/nextFlight";
-import { type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
+import { openingTitle, type PlotlyFigure, wholeFlight, withChosen, withTimeRange } from "../../charts/traces";
 import classes from "./CampaignPage.module.css";
 import type { Preview } from "./useNextFlight";
 
@@ -83,7 +83,7 @@ export const CurvesPanel = memo(function CurvesPanel({ campaign, trials, chosen,
           disabled={campaign.flying !== null}
           onChange={pick}
           data={[
-            { value: "first", label: "First 8 s" },
+            { value: "first", label: (figure && openingTitle(figure)) ?? "First 8 s" },
             { value: "whole", label: "Whole flight" },
           ]}
         />
