@@ -17,6 +17,7 @@ import httpx2
 
 T = TypeVar("T")
 PATIENCE_S = 40.0
+LIFTED_M = 0.1
 ENDED = {"valid", "aborted", "invalid", "cancelled"}
 
 
@@ -190,3 +191,13 @@ class Stream:
                 fields = {}
             else:
                 fields = {}
+
+
+def in_the_air(serving: Serving, campaign_id: int, *, speed: float) -> int:
+    """A trial that has lifted off."""
+    with stream(serving.url) as events:
+        trial_id = serving.fly(campaign_id, speed=speed)
+        for name, _, data in events:
+            if name == "telemetry" and data["samples"][-1][1] > LIFTED_M:
+                return trial_id
+    raise AssertionError("the stream ended")

@@ -12,7 +12,7 @@ import httpx2
 import pytest
 
 from app.runtime.http_connections import RESERVED_FOR_ABORTS, room_for_connections
-from tests.runtime.processes import Serving
+from tests.runtime.processes import Serving, in_the_air
 
 FILES: Final = 256
 """That the server may have open."""
@@ -53,8 +53,7 @@ def open_files(serving: Serving) -> int:
 
 @pytest.mark.parametrize("first", [b"", b"GET /api/he", b"POST /api/campaigns HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
 def test_an_abort_is_answered_while_idle_connections_fill_every_place(serving: Serving, first: bytes) -> None:
-    trial_id = serving.fly(serving.campaign(), speed=1.0)
-    serving.trial(trial_id, "flying")
+    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
     with ExitStack() as stack:
         idle = [stack.enter_context(connected(serving)) for _ in range(2 * FILES)]
         for connection in idle:

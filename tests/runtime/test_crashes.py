@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.runtime.processes import Serving, is_alive, stream, wait_for
+from tests.runtime.processes import Serving, in_the_air, is_alive, wait_for
 
 pytestmark = pytest.mark.real_time
 
@@ -35,16 +35,6 @@ def fork_server(pid: int) -> int:
 def children(pid: int) -> list[int]:
     """The processes that fly and compute for a worker."""
     return list(started_by(fork_server(pid)))
-
-
-def in_the_air(serving: Serving, campaign_id: int, *, speed: float) -> int:
-    """A trial that has lifted off."""
-    with stream(serving.url) as events:
-        trial_id = serving.fly(campaign_id, speed=speed)
-        for name, _, data in events:
-            if name == "telemetry" and data["time_s"] > 0.2:
-                return trial_id
-    raise AssertionError("the stream ended")
 
 
 def require_sound_database(data_dir: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.runtime.processes import Serving, stream, wait_for
+from tests.runtime.processes import Serving, in_the_air, stream, wait_for
 
 pytestmark = pytest.mark.real_time
 
@@ -47,15 +47,6 @@ def fill(disk: Path, *, leave_mb: int = 0) -> Path:
             pass
     os.truncate(filler, filler.stat().st_size - leave_mb * 2**20)
     return filler
-
-
-def in_the_air(serving: Serving, campaign_id: int) -> int:
-    with stream(serving.url) as events:
-        trial_id = serving.fly(campaign_id, speed=1.0)
-        for name, _, data in events:
-            if name == "telemetry" and data["time_s"] > 0.2:
-                return trial_id
-    raise AssertionError("the stream ended")
 
 
 @contextmanager
@@ -114,7 +105,7 @@ def test_a_flight_whose_record_would_not_fit_does_not_start(disk: Path, serving:
 
 @pytest.mark.complete
 def test_a_disk_that_fills_up_in_mid_flight_costs_no_record(disk: Path, serving: Serving) -> None:
-    trial_id = in_the_air(serving, serving.campaign())
+    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
     fill(disk)
     assert serving.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
     landed = serving.trial(trial_id, "aborted")
@@ -125,7 +116,7 @@ def test_a_disk_that_fills_up_in_mid_flight_costs_no_record(disk: Path, serving:
 @pytest.mark.complete
 def test_a_record_waits_in_the_spool_while_the_database_takes_nothing(tmp_path: Path) -> None:
     with Serving(tmp_path / "data") as serving:
-        trial_id = in_the_air(serving, serving.campaign())
+        trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
         with locked(serving):
             land_in_the_spool(serving, trial_id)
         landed = serving.trial(trial_id, "aborted")
@@ -137,7 +128,7 @@ def test_a_record_waits_in_the_spool_while_the_database_takes_nothing(tmp_path: 
 @pytest.mark.complete
 def test_a_record_in_the_spool_outlives_its_worker(tmp_path: Path) -> None:
     with Serving(tmp_path / "data") as serving:
-        trial_id = in_the_air(serving, serving.campaign())
+        trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
         with locked(serving):
             land_in_the_spool(serving, trial_id)
             os.kill(serving.worker_pid(), signal.SIGKILL)
