@@ -117,6 +117,11 @@ class Noise:
     best_numbers: tuple[int, ...] = ()
 
 
+def target_of(set_point: Curve, reference: Curve | None, *, by_reference: bool) -> Curve:
+    """What an output is scored against: the reference if the experiment asks for it and there is one."""
+    return reference if by_reference and reference is not None else set_point
+
+
 @dataclass(frozen=True, kw_only=True)
 class History:
     """A campaign's data for its figures.
@@ -148,7 +153,7 @@ class History:
     @property
     def target(self) -> Curve:
         """What the output is scored against."""
-        return self.reference if self.by_reference and self.reference is not None else self.set_point
+        return target_of(self.set_point, self.reference, by_reference=self.by_reference)
 
     @cached_property
     def valid(self) -> tuple[FlightData, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from app.core.records.flight_events import FlightEvent
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, literal, ready, scatter, table_of_curves
-from app.figures.data import Band, Curve, Range
+from app.figures.data import Band, Curve, Range, target_of
 from app.figures.deviations import deviation_axis, deviation_limit, deviation_of, is_step
 from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
@@ -72,7 +72,7 @@ class FlightRecordData:
     @property
     def target(self) -> Curve:
         """What the output is scored against."""
-        return self.reference if self.by_reference and self.reference is not None else self.set_point
+        return target_of(self.set_point, self.reference, by_reference=self.by_reference)
 
 
 @dataclass(frozen=True, slots=True)
