@@ -1,17 +1,21 @@
 """Simulated ArduCopter, up to 4.6 and from 4.7 on, in which the vertical gains have other names.
 
-Its altitude controller is a simplified cascade with ArduPilot's gains, not a replica; see copter_control.py.
+Its altitude is controlled by the replica of ArduCopter's vertical loop; see ardupilot_control.py. GUIDED has the
+takeoff and targets of position; the S-curves of GUID_OPTIONS bit 6 and targets of speed or acceleration are missing.
 """
 
+import contextlib
 import math
-from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import ClassVar, Final
 
-from app.simdrone.body import ACCEPTED, FAILED, Body
+from app.core.control import ardupilot_parameters as loop
+from app.core.errors import InputError
+from app.simdrone.ardupilot_control import LOOP_HZ, ArduPilotController
+from app.simdrone.body import ACCEPTED, FAILED, Body, OutgoingMessage
 from app.simdrone.copter import Copter
-from app.simdrone.copter_control import ThreeStage
+from app.simdrone.copter_control import SetPoint
 from app.simdrone.copter_parameters import (
     BY_VALUE,
     Behaviour,
@@ -28,34 +32,15 @@ _MANUAL: Final = 1 | 16 | 64
 _GUIDED: Final = 1 | 8 | 16
 _REPORT_ONLY: Final = 0
 _ALTITUDE_FENCE: Final = 1
+_SLOWEST_LANDING_CM_S: Final = 10.0
 
-NAMES_4_6: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "altitude_p": "PSC_POSZ_P",
-        "climb_p": "PSC_VELZ_P",
-        "acceleration_p": "PSC_ACCZ_P",
-        "acceleration_i": "PSC_ACCZ_I",
-        "acceleration_d": "PSC_ACCZ_D",
-    }
-)
-NAMES_4_7: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "altitude_p": "PSC_D_POS_P",
-        "climb_p": "PSC_D_VEL_P",
-        "acceleration_p": "PSC_D_ACC_P",
-        "acceleration_i": "PSC_D_ACC_I",
-        "acceleration_d": "PSC_D_ACC_D",
-    }
-)
-_DEFAULTS: Final = {
-    "altitude_p": 1.0,
-    "climb_p": 5.0,
-    "acceleration_p": 0.5,
-    "acceleration_i": 1.0,
-    "acceleration_d": 0.0,
-}
-SCALE_4_7: Final = 0.1
-"""Ratio of the newer acceleration gains to the older ones."""
+SCHED_LOOP_RATE: Final = "SCHED_LOOP_RATE"
+_HOVER: Final = "MOT_THST_HOVER"
+_POSITION_ONLY: Final = 0b000111111000
+_POSITION_BITS: Final = 0b000111111111
+"""The bits of POSITION_TARGET_TYPEMASK for position, velocity and acceleration."""
+_HOVER_THROTTLE: Final = 0.55
+"""MOT_THST_HOVER as set up, somewhat too low: these vehicles hover at 0.61 to 0.63, and learn it."""
 
 _COMMON: Final = (
     Parameter("ARMING_CHECK", Kind.INT32, 1),
@@ -68,8 +53,25 @@ _COMMON: Final = (
     Parameter("FENCE_ACTION", Kind.INT8, 1),
     real("FENCE_ALT_MAX", 100.0),
     Parameter("LAND_SPEED", Kind.INT16, 50),
-    Parameter("WPNAV_SPEED_UP", Kind.INT16, 250),
+    Parameter("GUID_OPTIONS", Kind.INT32, 0),
+    Parameter(SCHED_LOOP_RATE, Kind.INT16, LOOP_HZ),
+    Parameter("MOT_HOVER_LEARN", Kind.INT8, 2),
+    real("MOT_SPOOL_TIME", 0.5),
+    real("INS_ACCEL_FILTER", 20.0),
 )
+
+
+def _loop() -> tuple[Parameter, ...]:
+    """Parameters of the vertical loop, by their names until 4.6, with the firmware's defaults."""
+    defaults = asdict(loop.Parameters(hover_throttle=_HOVER_THROTTLE))
+    known = {name: defaults[field] / factor for name, (field, factor) in loop.FIRMWARE_NAMES.items()}
+    return tuple(real(name, value) for name, value in (known | dict.fromkeys(loop.UNSUPPORTED, 0.0)).items())
+
+
+def _renamed(parameter: Parameter) -> Parameter:
+    """Return the parameter by the name and in the unit that it has since 4.7."""
+    [(name, value)] = loop.in_newer_names({parameter.name: parameter.default}).items()
+    return replace(parameter, name=name, default=value)
 
 
 _GROUND_STATION: Final = "SYSID_MYGCS"
@@ -80,16 +82,11 @@ def _ids(own: str, ground_station: str) -> tuple[Parameter, ...]:
     return Parameter(own, Kind.INT16, 1), Parameter(ground_station, Kind.INT16, 255)
 
 
-def _gains(names: Mapping[str, str], scale: float) -> tuple[Parameter, ...]:
-    scales = {gain: scale if gain.startswith("acceleration") else 1.0 for gain in names}
-    return tuple(real(name, _DEFAULTS[gain] * scales[gain]) for gain, name in names.items())
-
-
 _FIRMWARE: Final = FirmwareProfile(
     dialect=ARDUPILOTMEGA,
     autopilot=3,
     version=0x040600FF,
-    parameters=_ids("SYSID_THISMAV", _GROUND_STATION) + _COMMON + _gains(NAMES_4_6, 1.0),
+    parameters=_ids("SYSID_THISMAV", _GROUND_STATION) + _COMMON + _loop(),
     coding=BY_VALUE,
     periods_s=MappingProxyType({"HEARTBEAT": 1.0}),
     streams=(
@@ -130,34 +127,45 @@ class ArduPilot(Copter):
     """ArduCopter up to 4.6. Return-to-launch only lands, because the vehicle does not move horizontally."""
 
     firmware: ClassVar[FirmwareProfile] = _FIRMWARE
-    names: ClassVar[Mapping[str, str]] = NAMES_4_6
-    scale: ClassVar[float] = 1.0
     ground_station: ClassVar[str] = _GROUND_STATION
 
+    controller: ArduPilotController
+
     def __init__(self, body: Body, *, system: int) -> None:
-        self._cascade = ThreeStage()
-        super().__init__(body, self._cascade, system=system)
+        super().__init__(body, ArduPilotController(body), system=system)
 
     def tune(self) -> None:
-        gains = {gain: self.parameters[name] for gain, name in self.names.items()}
-        cascade = self._cascade
-        cascade.altitude_p, cascade.climb_p = gains["altitude_p"], gains["climb_p"]
-        cascade.acceleration_p = gains["acceleration_p"] / self.scale
-        cascade.acceleration_i = gains["acceleration_i"] / self.scale
-        cascade.acceleration_d = gains["acceleration_d"] / self.scale
+        """Pass the parameters to the loop. With values for which it is not defined, it keeps those it had."""
+        values = dict(loop.in_older_names(name, value) for name, value in self.parameters.values().items())
+        with contextlib.suppress(InputError):
+            self.controller.tune(
+                loop.parameters_from(values),
+                accelerometer_hz=values["INS_ACCEL_FILTER"],
+                spool_s=values["MOT_SPOOL_TIME"],
+                land_m_s=max(values["LAND_SPEED"], _SLOWEST_LANDING_CM_S) / 100.0,
+            )
+
+    def tick(self) -> list[OutgoingMessage]:
+        messages = super().tick()
+        if self.parameters["MOT_HOVER_LEARN"] and (hover := self.controller.learned_hover()) is not None:
+            self.parameters[_HOVER] = hover
+        return messages
 
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:  # noqa: ARG002  one number suffices
         return next((mode for mode in self.firmware.modes if mode.custom_mode == main), None)
 
     def take_off(self, param7: float) -> int:
         """Take off to `param7` metres above the place of takeoff; only from the ground, armed and in GUIDED."""
-        if self.mode.name != "GUIDED" or not self.armed or self.flyer.flies or not math.isfinite(param7):
+        if self.mode.name != "GUIDED" or not self.armed or self.controller.flies or not math.isfinite(param7):
             return FAILED
-        self.climb(param7, self.parameters["WPNAV_SPEED_UP"] / 100.0)
+        self.climb(param7)
         return ACCEPTED
 
-    def landing_speed_m_s(self) -> float:
-        return self.parameters["LAND_SPEED"] / 100.0
+    def follow(self, target: SetPoint, type_mask: int) -> None:
+        """Fly to a target of position alone, in GUIDED; other targets are ignored."""
+        is_position = type_mask & _POSITION_BITS == _POSITION_ONLY and math.isfinite(target.altitude_m)
+        if self.mode.name == "GUIDED" and is_position:
+            self.controller.move_to(target.altitude_m)
 
     def link_loss(self) -> tuple[float, Reaction]:
         """Return timeout and reaction: Land for every action of FS_GCS_ENABLE except 0."""
@@ -186,8 +194,6 @@ class ArduPilot47(ArduPilot):
     firmware: ClassVar[FirmwareProfile] = replace(
         _FIRMWARE,
         version=0x040700FF,
-        parameters=_ids("MAV_SYSID", _GROUND_STATION_4_7) + _COMMON + _gains(NAMES_4_7, SCALE_4_7),
+        parameters=_ids("MAV_SYSID", _GROUND_STATION_4_7) + _COMMON + tuple(map(_renamed, _loop())),
     )
-    names: ClassVar[Mapping[str, str]] = NAMES_4_7
-    scale: ClassVar[float] = SCALE_4_7
     ground_station: ClassVar[str] = _GROUND_STATION_4_7

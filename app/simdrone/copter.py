@@ -16,7 +16,7 @@ from app.simdrone.body import (
     Timetable,
     whole_ticks,
 )
-from app.simdrone.copter_control import AltitudeGuidance, Cascade, Phase
+from app.simdrone.copter_control import LOCAL_NED, AltitudeController, Phase, SetPoint
 from app.simdrone.copter_parameters import Behaviour, FirmwareProfile, FlightMode, Parameters, Reaction
 from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number, text
 
@@ -27,6 +27,8 @@ FORCE: Final = 21196
 ESTIMATE_AFTER_S: Final = 3.0
 """Time from the start until the position is known well enough to arm and to be sent."""
 _ESTIMATED: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
+_CONTROLLED: Final = frozenset({"ATTITUDE_TARGET", "NAV_CONTROLLER_OUTPUT", "POSITION_TARGET_LOCAL_NED"})
+"""Sent only while the altitude controller runs."""
 _SIMULATED: Final = int.from_bytes(b"GAINLIN\0", "big")
 """Hardware id of a simulated drone, except its last byte."""
 _GROUND_STATION: Final = 6
@@ -56,7 +58,7 @@ class Copter(ABC):
 
     firmware: ClassVar[FirmwareProfile]
 
-    def __init__(self, body: Body, cascade: Cascade, *, system: int) -> None:
+    def __init__(self, body: Body, controller: AltitudeController, *, system: int) -> None:
         self.dialect = self.firmware.dialect
         self.system, self.component = system, COMPONENT
         self.uid = _SIMULATED | system
@@ -67,7 +69,7 @@ class Copter(ABC):
         self.armed = False
         self.mode = self.firmware.modes[0]
         self.parameters = Parameters(self.firmware.parameters)
-        self.flyer = AltitudeGuidance(body, cascade)
+        self.controller = controller
         self._body = body
         self._codec = self.dialect.codec(system=system, component=COMPONENT)
         self._ticks = 0
@@ -96,7 +98,11 @@ class Copter(ABC):
         """Execute command 22; return the result."""
 
     @abstractmethod
-    def landing_speed_m_s(self) -> float: ...
+    def follow(self, target: SetPoint, type_mask: int) -> None:
+        """Process a position target, whose altitude is above the ground, with its POSITION_TARGET_TYPEMASK."""
+
+    def follow_stream(self) -> None:  # noqa: B027  not every autopilot has such a mode
+        """Fly by streamed set points, in a mode of behaviour FOLLOW."""
 
     @abstractmethod
     def link_loss(self) -> tuple[float, Reaction]:
@@ -113,6 +119,10 @@ class Copter(ABC):
     def counts_heartbeat(self, _message: Message) -> bool:
         """Return whether the heartbeat of this ground station counts."""
         return True
+
+    def mode_refusal(self, _mode: FlightMode) -> str | None:
+        """Return why a commanded mode is not entered; None if it is."""
+        return None
 
     def prearm_failure(self) -> str | None:
         """Return why its arming checks do not pass, as reported regularly; None if they pass."""
@@ -136,9 +146,9 @@ class Copter(ABC):
 
     def tick(self) -> list[OutgoingMessage]:
         self._ticks += 1
-        was_flying = self.flyer.flies
-        self.flyer.tick()
-        if was_flying and not self.flyer.flies:
+        was_landing = self.controller.phase is Phase.LANDING
+        self.controller.tick()
+        if was_landing and not self.controller.flies:
             self._disarm()
         self._watch_idling()
         self._watch_link()
@@ -155,21 +165,23 @@ class Copter(ABC):
 
     # ------------------------------------------------------------ flying
 
-    def climb(self, height_m: float, speed_m_s: float) -> None:
-        """Take off, or continue to climb."""
+    def climb(self, height_m: float) -> None:
+        """Take off to this height."""
         self.took_off = True
-        self.flyer.take_off(height_m, speed_m_s)
+        self.controller.take_off(height_m)
 
     def enter(self, mode: FlightMode) -> None:
         self.mode = mode
         match mode.behaviour:
             case Behaviour.LAND:
-                self.flyer.land(self.landing_speed_m_s())
+                self.controller.land()
             case Behaviour.STAY:
-                self.flyer.hold()
+                self.controller.hold()
             case Behaviour.TAKE_OFF:
                 if self.armed:
                     self.take_off(float("nan"))
+            case Behaviour.FOLLOW:
+                self.follow_stream()
 
     @property
     def is_by_hand(self) -> bool:
@@ -194,6 +206,7 @@ class Copter(ABC):
             return self.firmware.refused
         if not self.armed:
             self.armed, self._armed_s = True, self.boot_s
+            self.controller.arm()
             if self.mode.behaviour is Behaviour.TAKE_OFF:
                 self.enter(self.mode)
         return ACCEPTED
@@ -205,30 +218,30 @@ class Copter(ABC):
 
     def _disarm(self) -> None:
         self.armed = False
-        self.flyer.stop()
+        self.controller.stop()
 
     def _watch_idling(self) -> None:
         limit_s = self.idle_limit_s()
-        if self.armed and not self.flyer.flies and limit_s > 0.0 and self.boot_s - self._armed_s > limit_s:
+        if self.armed and not self.controller.flies and limit_s > 0.0 and self.boot_s - self._armed_s > limit_s:
             self._disarm()
 
     def _watch_link(self) -> None:
         """React to a lost ground station, if there has been one."""
         limit_s, reaction = self.link_loss()
-        if reaction is Reaction.NONE or self._heartbeat_s is None or not self.flyer.flies:
+        if reaction is Reaction.NONE or self._heartbeat_s is None or not self.controller.flies:
             return
         if self.boot_s - self._heartbeat_s > limit_s:
             self._heartbeat_s = None
-            self._react(reaction, self.firmware.link_lost)
+            self.react(reaction, self.firmware.link_lost)
 
     def _watch_fence(self) -> None:
         limit_m, reaction = self.fence()
-        is_outside = reaction is not Reaction.NONE and self.flyer.flies and self._body.altitude_m > limit_m
+        is_outside = reaction is not Reaction.NONE and self.controller.flies and self._body.altitude_m > limit_m
         was_outside, self._is_breached = self._is_breached, is_outside
         if is_outside and not was_outside:
             self._breaches += 1
             self.send("FENCE_STATUS")
-            self._react(reaction, self.firmware.fence_breached)
+            self.react(reaction, self.firmware.fence_breached)
 
     def _report_readiness(self) -> None:
         if not self.armed and self._ticks % _REPORT_TICKS == 0:
@@ -239,7 +252,8 @@ class Copter(ABC):
         if (reason := self.prearm_failure()) is not None:
             self.send_text(self.firmware.unready + reason)
 
-    def _react(self, reaction: Reaction, reason: str) -> None:
+    def react(self, reaction: Reaction, reason: str) -> None:
+        """Send the reason, and change the mode as this reaction of a failsafe demands."""
         self.send_text(reason)
         if reaction is Reaction.LAND:
             self.enter(self.find_mode(self.firmware.land))
@@ -266,10 +280,15 @@ class Copter(ABC):
         if self._listing is not None and self._ticks % _LIST_EVERY_TICKS == 0:
             self._send_parameter(self._listing)
             self._listing = self._listing + 1 if self._listing + 1 < len(self.parameters) else None
-        due = [kind for kind in self._timetable.due(self._ticks) if self._has_estimate or kind not in _ESTIMATED]
+        due = [kind for kind in self._timetable.due(self._ticks) if self._can_send(kind)]
         if due:
             now = self._snapshot()
             self._out += [OutgoingMessage(kind, copter_telemetry.REPORTS[kind].fields(now)) for kind in due]
+
+    def _can_send(self, kind: str) -> bool:
+        if kind in _ESTIMATED:
+            return self._has_estimate
+        return kind not in _CONTROLLED or self.controller.flies
 
     def _snapshot(self) -> copter_telemetry.Snapshot:
         body, firmware = self._body, self.firmware
@@ -286,13 +305,16 @@ class Copter(ABC):
             autopilot=firmware.autopilot,
             base_mode=self.mode.base_mode,
             custom_mode=self.mode.custom_mode,
-            status=_ACTIVE if self.flyer.flies else _STANDBY,
-            landed_state=_LANDED_STATES[self.flyer.phase],
+            status=_ACTIVE if self.controller.flies else _STANDBY,
+            landed_state=_LANDED_STATES[self.controller.phase],
             version=firmware.version,
             uid=self.uid,
             breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
             breaches=self._breaches,
             ready=self.prearm_failure() is None,
+            set_point=self.controller.set_point.above(-firmware.ground_m),
+            altitude_error_m=self.controller.error_m,
+            throttle_demand=self.controller.demand,
         )
 
     def _send_parameter(self, place: int) -> None:
@@ -346,7 +368,12 @@ class Copter(ABC):
         custom = int(number(message, "custom_mode"))
         mode = next((mode for mode in self.firmware.modes if mode.custom_mode == custom), None)
         if mode is not None and int(number(message, "base_mode")) & _CUSTOM_MODE:
-            self.enter(mode)
+            self._enter_if_allowed(mode)
+
+    def _on_position_target(self, message: Message) -> None:
+        if int(number(message, "coordinate_frame")) == LOCAL_NED:
+            target = SetPoint.from_message(message).above(self.firmware.ground_m)
+            self.follow(target, int(number(message, "type_mask")))
 
     def _on_data_stream(self, message: Message) -> None:
         """Set the rate of all telemetry by the older message."""
@@ -364,7 +391,7 @@ class Copter(ABC):
         force = number(message, "param2") == FORCE
         if number(message, "param1") > 0.5:
             return self._arm(force=force)
-        if not (self.flyer.is_landed or force):
+        if not (self.controller.is_landed or force):
             self.send_text(self.firmware.not_landed)
             return self.firmware.refused
         self._disarm()
@@ -375,6 +402,12 @@ class Copter(ABC):
         mode = self.requested_mode(_whole(main), _whole(sub))
         if mode is None or not _whole(number(message, "param1")) & _CUSTOM_MODE:
             return FAILED
+        return self._enter_if_allowed(mode)
+
+    def _enter_if_allowed(self, mode: FlightMode) -> int:
+        if (reason := self.mode_refusal(mode)) is not None:
+            self.send_text(reason)
+            return self.firmware.refused
         self.enter(mode)
         return ACCEPTED
 
@@ -387,7 +420,7 @@ class Copter(ABC):
 
     def _handle_interval(self, message: Message) -> int:
         """Set the interval of a message in microseconds; 0 is the default, less than 0 never."""
-        kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
+        kind = self._requested(message)
         if kind is None:
             return FAILED
         interval_us = number(message, "param2")
@@ -396,11 +429,16 @@ class Copter(ABC):
         return ACCEPTED
 
     def _handle_request(self, message: Message) -> int:
-        kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
+        kind = self._requested(message)
         if kind is None:
             return UNSUPPORTED
         self.send(kind)
         return ACCEPTED
+
+    def _requested(self, message: Message) -> str | None:
+        """Return the message that a command is about, or None if this autopilot lacks it."""
+        kind = copter_telemetry.KINDS_BY_NUMBER.get(_whole(number(message, "param1")))
+        return None if kind in self.firmware.lacks else kind
 
     def _handle_checks(self, _message: Message) -> int:
         if self.armed:
@@ -436,6 +474,7 @@ _HANDLERS: Final[Mapping[str, Callable[[Copter, Message], None]]] = {
     "PARAM_SET": Copter._on_param_set,
     "REQUEST_DATA_STREAM": Copter._on_data_stream,
     "SET_MODE": Copter._on_set_mode,
+    "SET_POSITION_TARGET_LOCAL_NED": Copter._on_position_target,
     "COMMAND_LONG": Copter._on_command,
 }
 

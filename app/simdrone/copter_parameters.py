@@ -54,6 +54,10 @@ class Parameters:
         """Return the place of a parameter, by its case-sensitive name."""
         return self._places.get(name)
 
+    def values(self) -> dict[str, float]:
+        """Return all values by name."""
+        return {parameter.name: value for parameter, value in zip(self._known, self._values, strict=True)}
+
     def at(self, place: int) -> tuple[Parameter, float]:
         return self._known[place], self._values[place]
 
@@ -106,6 +110,7 @@ class Behaviour(Enum):
     STAY = "where it is"
     TAKE_OFF = "to the height of takeoff, once armed"
     LAND = "down"
+    FOLLOW = "to streamed set points"
 
 
 class Reaction(Enum):
@@ -160,3 +165,5 @@ class FirmwareProfile:
     fence_breached: str
     ground_m: float
     """Height of the place of takeoff in the local frame."""
+    lacks: frozenset[str] = frozenset()
+    """Messages of `copter_telemetry.REPORTS` that it does not know."""

@@ -1,11 +1,13 @@
 """Messages that both ArduPilot and PX4 send, from a snapshot of their state."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 from app.simdrone.body import ARMED, Fields
+from app.simdrone.copter_control import IGNORE_AZ, IGNORE_VZ, IGNORE_Z, LOCAL_NED, SetPoint
 
 LATITUDE_E7: Final = 473977420
 LONGITUDE_E7: Final = 85455940
@@ -18,6 +20,8 @@ TAKING_OFF: Final = 3
 LANDING: Final = 4
 """MAV_LANDED_STATE."""
 
+_IGNORE_HORIZONTAL: Final = 0b110011011000
+"""Horizontal speed and acceleration, yaw and its rate; x and y are those of the place, which it keeps."""
 _PREARM: Final = 1 << 28
 _SENSORS: Final = 1 | 2 | 4 | 8 | 32 | (1 << 10) | (1 << 11) | (1 << 15) | (1 << 25) | _PREARM
 """Gyroscope, accelerometer, magnetometer, pressure, GPS, attitude and yaw control, motors, battery, prearm check."""
@@ -47,6 +51,10 @@ class Snapshot:
     breaches: int
     ready: bool
     """Whether its arming checks pass."""
+    set_point: SetPoint
+    """Set point of the altitude controller; its altitude is in the local frame."""
+    altitude_error_m: float
+    throttle_demand: float
 
     @property
     def boot_ms(self) -> int:
@@ -89,6 +97,33 @@ def global_position(now: Snapshot) -> Fields:
 
 def attitude(now: Snapshot) -> Fields:
     return {"time_boot_ms": now.boot_ms, **dict.fromkeys(_ATTITUDE, 0.0)}
+
+
+def position_target(now: Snapshot) -> Fields:
+    """Return POSITION_TARGET_LOCAL_NED: the set point in force, not the shaped one."""
+    given = now.set_point
+    up = {"z": given.altitude_m, "vz": given.climb_m_s, "afz": given.acceleration_m_s2}
+    missing = {name for name, value in up.items() if math.isnan(value)}
+    ignored = sum(bit for name, bit in (("z", IGNORE_Z), ("vz", IGNORE_VZ), ("afz", IGNORE_AZ)) if name in missing)
+    return {
+        "time_boot_ms": now.boot_ms,
+        "coordinate_frame": LOCAL_NED,
+        "type_mask": ignored | _IGNORE_HORIZONTAL,
+        **dict.fromkeys(("x", "y", "vx", "vy", "afx", "afy", "yaw", "yaw_rate"), 0.0),
+        **{name: 0.0 if name in missing else -value for name, value in up.items()},
+    }
+
+
+def attitude_target(now: Snapshot) -> Fields:
+    level = {"type_mask": 0, "q": [1.0, 0.0, 0.0, 0.0]}
+    rates = dict.fromkeys(("body_roll_rate", "body_pitch_rate", "body_yaw_rate"), 0.0)
+    return {"time_boot_ms": now.boot_ms, **level, **rates, "thrust": now.throttle_demand}
+
+
+def controller_output(now: Snapshot) -> Fields:
+    whole = dict.fromkeys(("nav_bearing", "target_bearing", "wp_dist"), 0)
+    rest = dict.fromkeys(("nav_roll", "nav_pitch", "aspd_error", "xtrack_error"), 0.0)
+    return {**whole, **rest, "alt_error": now.altitude_error_m}
 
 
 def vfr_hud(now: Snapshot) -> Fields:
@@ -195,7 +230,10 @@ REPORTS: Final[Mapping[str, Report]] = MappingProxyType(
         "ATTITUDE": Report(30, attitude),
         "LOCAL_POSITION_NED": Report(32, local_position),
         "GLOBAL_POSITION_INT": Report(33, global_position),
+        "NAV_CONTROLLER_OUTPUT": Report(62, controller_output),
         "VFR_HUD": Report(74, vfr_hud),
+        "ATTITUDE_TARGET": Report(83, attitude_target),
+        "POSITION_TARGET_LOCAL_NED": Report(85, position_target),
         "BATTERY_STATUS": Report(147, battery_status),
         "AUTOPILOT_VERSION": Report(148, autopilot_version),
         "FENCE_STATUS": Report(162, fence_status),

@@ -1,16 +1,21 @@
 """Simulated PX4.
 
-Its altitude controller is a simplified cascade with PX4's gains, not a replica; see copter_control.py.
+Its altitude is controlled by the replica of PX4's vertical loop; see px4_control.py. OFFBOARD takes set points of
+position, velocity and acceleration, of which only the vertical parts act.
 """
 
+import contextlib
 import math
 import struct
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import ClassVar, Final
 
+from app.core.control import px4_parameters as loop
+from app.core.errors import InputError
 from app.simdrone.body import ACCEPTED, TEMPORARILY_REJECTED, Body, OutgoingMessage
 from app.simdrone.copter import Copter
-from app.simdrone.copter_control import Phase, TwoStage
+from app.simdrone.copter_control import Phase, SetPoint
 from app.simdrone.copter_parameters import (
     BYTEWISE,
     Behaviour,
@@ -22,14 +27,19 @@ from app.simdrone.copter_parameters import (
     real,
 )
 from app.simdrone.copter_telemetry import HOME_AMSL_M
+from app.simdrone.px4_control import Px4Controller
 from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
 from app.vehicles.mavlink.dialects import COMMON
 
 _MANUAL: Final = 1 | 16 | 64
 _AUTO: Final = 1 | 4 | 8 | 16
 _TAKEOFF: Final = "AUTO.TAKEOFF"
-_CLIMBED_WITHIN_M: Final = 0.8
-"""NAV_MC_ALT_RAD: a takeoff has arrived this far from its height."""
+_OFFBOARD: Final = "OFFBOARD"
+_SLOWEST_STREAM_S: Final = 0.5
+"""Longest interval between set points of one stream."""
+_LARGEST_SET_POINT: Final = 1e6
+_STREAMED_FOR_S: Final = 1.0
+"""A stream counts once it has lasted for so long."""
 _NO_POSITION: Final = 1 << 24 | 13835193
 """Event check_modes_local_pos of the autopilot."""
 _LOCAL_POSITION: Final = 17
@@ -43,7 +53,12 @@ _ERROR: Final = 0x33
 _ARGUMENTS: Final = 40
 _SEQUENCE_NUMBERS: Final = 1 << 16
 _LINK_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.HOLD}
+_OFFBOARD_ACTIONS: Final = dict.fromkeys((0, 1, 2, 5), Reaction.HOLD)
+"""COM_OBL_RC_ACT: hold also in place of the modes of a pilot, which need a radio control that there is not."""
 _FENCE_ACTIONS: Final = {0: Reaction.NONE, 1: Reaction.WARN, 2: Reaction.HOLD}
+
+
+_LOOP_DEFAULTS: Final = asdict(loop.Parameters())
 
 
 def custom_mode(main: int, sub: int = 0) -> int:
@@ -59,12 +74,21 @@ class Px4(Copter):
         autopilot=12,
         version=0x011000FF,
         parameters=(
-            real("MPC_Z_P", 1.0),
-            real("MPC_Z_VEL_P_ACC", 4.0),
-            real("MPC_Z_VEL_I_ACC", 2.0),
-            real("MPC_Z_VEL_D_ACC", 0.0),
+            *(real(name, _LOOP_DEFAULTS[field]) for name, field in loop.FIRMWARE_NAMES.items()),
+            *(real(name, 0.0) for name in loop.UNSUPPORTED),
             real("MPC_TKO_SPEED", 1.5),
-            real("MPC_LAND_SPEED", 0.7),
+            real("MPC_Z_V_AUTO_UP", 3.0),
+            real("MPC_Z_V_AUTO_DN", 1.5),
+            real("MPC_ACC_UP_MAX", 4.0),
+            real("MPC_ACC_DOWN_MAX", 3.0),
+            real("MPC_JERK_AUTO", 4.0),
+            real("HTE_HT_ERR_INIT", 0.1),
+            real("HTE_HT_NOISE", 0.0036),
+            real("HTE_ACC_GATE", 3.0),
+            real("HTE_THR_RANGE", 0.2),
+            real("HTE_VZ_THR", 2.0),
+            real("COM_OF_LOSS_T", 1.0),
+            Parameter("COM_OBL_RC_ACT", Kind.INT32, 0),
             real("MIS_TAKEOFF_ALT", 2.5),
             Parameter("NAV_DLL_ACT", Kind.INT32, 0),
             Parameter("COM_DL_LOSS_T", Kind.INT32, 10),
@@ -99,6 +123,7 @@ class Px4(Copter):
             FlightMode(_TAKEOFF, custom_mode(4, 2), _AUTO, Behaviour.TAKE_OFF),
             FlightMode("AUTO.LOITER", custom_mode(4, 3), _AUTO),
             FlightMode("AUTO.RTL", custom_mode(4, 5), _AUTO, Behaviour.LAND),
+            FlightMode(_OFFBOARD, custom_mode(6), _AUTO, Behaviour.FOLLOW),
             FlightMode("AUTO.LAND", custom_mode(4, 6), _AUTO, Behaviour.LAND, may_arm=False),
         ),
         land="AUTO.LAND",
@@ -113,11 +138,15 @@ class Px4(Copter):
         link_lost="GCS connection lost",
         fence_breached="Geofence violated: maximum altitude exceeded",
         ground_m=0.51,
+        lacks=frozenset({"NAV_CONTROLLER_OUTPUT"}),
     )
 
+    controller: Px4Controller
+
     def __init__(self, body: Body, *, system: int) -> None:
-        self._cascade = TwoStage()
-        super().__init__(body, self._cascade, system=system)
+        defaults = {parameter.name: parameter.default for parameter in self.firmware.parameters}
+        super().__init__(body, Px4Controller(body, defaults, ground_m=self.firmware.ground_m), system=system)
+        self._streamed_s = self._stream_began_s = -math.inf
         self._events = 0
         self._reported_failing: bool | None = None
 
@@ -125,18 +154,25 @@ class Px4(Copter):
         """Advance by one tick. At its takeoff height it switches to hold, and also once it has landed and disarmed. If
         Land is commanded after that, it stays in the landing mode, and does not arm."""
         was_armed = self.armed
+        self._watch_stream()
         messages = super().tick()
+        self.took_off |= self.controller.flies
         if self._is_failing != self._reported_failing:
             self._send_check_events()
         if was_armed and not self.armed and self.mode.behaviour is Behaviour.LAND:
             self.mode = self.find_mode(self.firmware.hold)
-        if self.mode.name == _TAKEOFF and self.flyer.phase is Phase.HOLDING and self.flyer.left_m < _CLIMBED_WITHIN_M:
+        if self.mode.name == _TAKEOFF and self.controller.phase is Phase.HOLDING:
             self.mode = self.find_mode(self.firmware.hold)
         return messages
 
     def prearm_failure(self) -> str | None:
         """Return why it cannot be armed, including the mode."""
         return self.arming_refusal()
+
+    def arming_refusal(self) -> str | None:
+        if self.mode.name == _OFFBOARD and not self._is_streamed_to:
+            return self.firmware.no_estimate
+        return super().arming_refusal()
 
     def report_checks(self) -> None:
         super().report_checks()
@@ -180,29 +216,55 @@ class Px4(Copter):
         self._events += 1
 
     def tune(self) -> None:
-        cascade = self._cascade
-        cascade.altitude_p = self.parameters["MPC_Z_P"]
-        cascade.climb_p = self.parameters["MPC_Z_VEL_P_ACC"]
-        cascade.climb_i = self.parameters["MPC_Z_VEL_I_ACC"]
-        cascade.climb_d = self.parameters["MPC_Z_VEL_D_ACC"]
+        """Pass the parameters to the loop. With values for which it is not defined, it keeps those it had."""
+        with contextlib.suppress(InputError):
+            self.controller.tune(self.parameters.values())
 
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:
         wanted = custom_mode(max(main, 0), max(sub, 0))
         return next((mode for mode in self.firmware.modes if mode.custom_mode == wanted), None)
 
+    def mode_refusal(self, mode: FlightMode) -> str | None:
+        """Refuse OFFBOARD without a stream of set points."""
+        is_refused = mode.name == _OFFBOARD and not self._is_streamed_to
+        return "Switching to Offboard is currently not available" if is_refused else None
+
+    def follow(self, target: SetPoint, type_mask: int) -> None:  # noqa: ARG002  NaN tells what is not given
+        """Store a set point, in which the altitude, its rate or the acceleration is given."""
+        if not target.given or max(map(abs, target.given)) > _LARGEST_SET_POINT:
+            return
+        if self.boot_s - self._streamed_s > _SLOWEST_STREAM_S:
+            self._stream_began_s = self.boot_s
+        self._streamed_s = self.boot_s
+        self.controller.stream(target)
+
+    def follow_stream(self) -> None:
+        self.controller.begin_following()
+
+    @property
+    def _is_streamed_to(self) -> bool:
+        is_fresh = self.boot_s - self._streamed_s <= self.parameters["COM_OF_LOSS_T"]
+        return is_fresh and self.boot_s - self._stream_began_s >= _STREAMED_FOR_S
+
+    def _watch_stream(self) -> None:
+        """React to the loss of the set points in OFFBOARD."""
+        is_lost = self.boot_s - self._streamed_s > self.parameters["COM_OF_LOSS_T"]
+        if self.mode.name == _OFFBOARD and self.controller.flies and is_lost:
+            action = _OFFBOARD_ACTIONS.get(int(self.parameters["COM_OBL_RC_ACT"]), Reaction.LAND)
+            self.react(action, "No offboard signal")
+
     def take_off(self, param7: float) -> int:
         """Take off to `param7` metres above sea level, or, if it is not finite, to MIS_TAKEOFF_ALT above the place of
         takeoff. A disarmed vehicle takes off when it is armed."""
+        if self.mode.name == _OFFBOARD:
+            self.controller.hold()
         self.mode = self.find_mode(_TAKEOFF)
         height_m = param7 - HOME_AMSL_M if math.isfinite(param7) else self.parameters["MIS_TAKEOFF_ALT"]
         if height_m <= 0.0:
             self.send_text("Already higher than takeoff altitude")
-        elif self.armed and not self.flyer.flies:
-            self.climb(height_m, self.parameters["MPC_TKO_SPEED"])
+        elif self.armed and not self.controller.flies:
+            self.climb(height_m)
         return ACCEPTED
-
-    def landing_speed_m_s(self) -> float:
-        return self.parameters["MPC_LAND_SPEED"]
 
     def link_loss(self) -> tuple[float, Reaction]:
         return self.parameters["COM_DL_LOSS_T"], _LINK_ACTIONS.get(int(self.parameters["NAV_DLL_ACT"]), Reaction.LAND)

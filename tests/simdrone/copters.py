@@ -14,6 +14,7 @@ ARM, SET_MODE, TAKE_OFF, SET_INTERVAL = 400, 176, 22, 511
 GUIDED, LAND = 4, 9
 POSITION: Final = 32
 FORCE: Final = 21196
+POSITION_ONLY: Final = 0b110111111000
 
 
 @dataclass(frozen=True)
@@ -22,11 +23,15 @@ class Pilot:
 
     ground: Ground
 
-    def command(self, command: int, *params: float) -> int:
-        """The result in the answer."""
+    def tell(self, command: int, *params: float) -> None:
+        """A command, without waiting for the answer."""
         values = dict.fromkeys((f"param{i}" for i in range(1, 8)), 0.0)
         values |= {f"param{i}": value for i, value in enumerate(params, 1)}
         self.ground.send("COMMAND_LONG", command=command, confirmation=0, **values, **TO)
+
+    def command(self, command: int, *params: float) -> int:
+        """The result in the answer."""
+        self.tell(command, *params)
         result: int = self.ground.expect("COMMAND_ACK", lambda message: message.command == command).result
         return result
 
@@ -52,6 +57,15 @@ class Pilot:
         """As soon as it knows where it is."""
         self.ground.listen(max(3.5 - self.ground.elapsed_s, 0.1))
         assert self.command(ARM, 1.0) == 0
+
+    def go_to(self, height_m: float, mask: int = POSITION_ONLY, **vertical: float) -> None:
+        """A position target in the local frame; `vertical` are `vz` and `afz`."""
+        fields = {
+            **dict.fromkeys(("x", "y", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0.0),
+            **vertical,
+        }
+        frame = {"time_boot_ms": 0, "coordinate_frame": 1, "type_mask": mask}
+        self.ground.send("SET_POSITION_TARGET_LOCAL_NED", z=-height_m, **frame, **fields, **TO)
 
     def height_m(self) -> float:
         """Above the ground it started from, from now on."""

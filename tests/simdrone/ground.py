@@ -56,14 +56,14 @@ class LockstepWire:
 
     def __init__(self, lockstep: Lockstep) -> None:
         self.now_s = lockstep.now_s
-        self._lockstep = lockstep
+        self.lockstep = lockstep
 
     def send(self, data: bytes) -> None:
-        self._lockstep.write(data)
+        self.lockstep.write(data)
 
     def receive(self) -> list[bytes]:
-        self._lockstep.wait_s(TICK_S)
-        return [data for data, _ in self._lockstep.read(0.0)]
+        self.lockstep.wait_s(TICK_S)
+        return [data for data, _ in self.lockstep.read(0.0)]
 
 
 class UdpWire:

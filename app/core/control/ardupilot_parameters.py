@@ -19,8 +19,8 @@ _GRAVITY: Final = 9.80665
 _THROTTLE_FILTER_HZ: Final = 2.0
 _RELAXATION_S: Final = 0.16
 _RAMP_END: Final = 0.9
-_HOVER_MIN: Final = 0.125
-_HOVER_MAX: Final = 0.6875
+HOVER_MIN: Final = 0.125
+HOVER_MAX: Final = 0.6875
 
 # Indices in the packed parameters.
 DT: Final = 0
@@ -110,7 +110,7 @@ class Parameters:
         packed[DT] = dt_s
         packed[[CLIMB, DESCENT, ACCELERATION]] = self.climb_m_s, self.descent_m_s, self.acceleration_m_s2
         packed[JERK] = self.shaping_jerk_m_s3
-        packed[HOVER] = hover = min(max(self.hover_throttle, _HOVER_MIN), _HOVER_MAX)
+        packed[HOVER] = hover = min(max(self.hover_throttle, HOVER_MIN), HOVER_MAX)
         packed[POSITION_P] = self.position_p_1_s
         packed[VELOCITY_P] = self.velocity_p_1_s
         packed[VELOCITY_I] = self.velocity_i_1_s2
@@ -219,9 +219,10 @@ def in_older_names(name: str, value: float) -> tuple[str, float]:
 
 
 def in_newer_names(values: Mapping[str, float]) -> dict[str, float]:
-    """Parameters by the names and in the units that they have since release 4.7."""
+    """Parameters by the names and in the units that they have since release 4.7; unchanged if they were not renamed."""
     newer = {older: (name, 1.0 / factor) for name, (older, factor) in NEWER_NAMES.items()}
-    return {newer[name][0]: _scaled(value, newer[name][1]) for name, value in values.items()}
+    renamed = {name: newer.get(name, (name, 1.0)) for name in values}
+    return {renamed[name][0]: _scaled(value, renamed[name][1]) for name, value in values.items()}
 
 
 def _scaled(value: float, factor: float) -> float:

@@ -9,6 +9,7 @@ estimator reports, which need not be the integral of its acceleration: the diffe
 up, SI, explicit Euler at the rate of the loop.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -81,13 +82,17 @@ Filter = tuple[Samples, Samples]
 
 def accelerometer_filter(cutoff_hz: float, dt_s: float) -> Filter:
     """The second-order Butterworth filter of INS_ACCEL_FILTER; none for a cut-off of 0, or beyond half the rate."""
-    from scipy.signal import butter
-
     if not 0.0 < cutoff_hz < 0.5 / dt_s:
         return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
 
-    numerator, denominator = butter(2, cutoff_hz, fs=1.0 / dt_s)
-    return np.asarray(numerator), np.asarray(denominator)
+    cutoff = math.tan(math.pi * cutoff_hz * dt_s)
+    damping = math.sqrt(2.0) * cutoff
+    scale = 1.0 + damping + cutoff * cutoff
+    passed = cutoff * cutoff / scale
+    return (
+        np.array([passed, 2.0 * passed, passed]),
+        np.array([1.0, 2.0 * (cutoff * cutoff - 1.0) / scale, (1.0 - damping + cutoff * cutoff) / scale]),
+    )
 
 
 def motor_filter(lag_s: float, dt_s: float) -> Filter:
