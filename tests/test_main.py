@@ -97,7 +97,15 @@ def test_health_names_the_version_and_whether_a_worker_runs(client: TestClient) 
 def test_the_catalogue_offers_what_a_campaign_can_be_made_of(client: TestClient) -> None:
     catalogue = client.get("/api/catalogue").json()
     experiments = [experiment["name"] for experiment in catalogue["experiments"]]
-    assert experiments == ["takeoff", "altitude-steps", "takeoff-ardupilot", "takeoff-px4", "pitch-tracking"]
+    assert experiments == [
+        "takeoff",
+        "altitude-steps",
+        "takeoff-ardupilot",
+        "takeoff-px4",
+        "altitude-steps-ardupilot",
+        "altitude-steps-px4",
+        "pitch-tracking",
+    ]
     strategies = [strategy["name"] for strategy in catalogue["strategies"]]
     assert strategies == ["calibrated", "gradient", "identified", "simplex", "manual"]
     assert {kind["name"]: kind["can_fly"] for kind in catalogue["vehicle_kinds"]} == {

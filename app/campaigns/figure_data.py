@@ -32,7 +32,13 @@ from app.figures.theme import ThemeName
 from app.vehicles.registry import get_kind
 
 _TITLES: Final[Mapping[str, str]] = {"altitude_m": "Altitude", "pitch_error_rad": "Pitch error"}
-_CURVES: Final[Mapping[str, str]] = {"altitude-steps": "Altitude steps", "pitch-tracking": "Pitch error curves"}
+_STEPS: Final = "Altitude steps"
+_CURVES: Final[Mapping[str, str]] = {
+    "altitude-steps": _STEPS,
+    "altitude-steps-ardupilot": _STEPS,
+    "altitude-steps-px4": _STEPS,
+    "pitch-tracking": "Pitch error curves",
+}
 _TAKEOFF_CURVES: Final = "Takeoff curves"
 _LIMITS: Final[Mapping[str, Range]] = {"thrust": Range(0.0, 1.0), "throttle": Range(0.0, 1.0)}
 """Limits of commands."""

@@ -8,11 +8,20 @@ from typing import Final
 from app.core.definition import Definition, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.altitude_steps import AltitudeSteps
+from app.core.experiments.altitude_steps_copters import ALTITUDE_STEPS_ARDUPILOT, ALTITUDE_STEPS_PX4
 from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import TAKEOFF_ARDUPILOT, TAKEOFF_PX4, Takeoff
 
-_ALL: Final[tuple[Experiment, ...]] = (Takeoff(), AltitudeSteps(), TAKEOFF_ARDUPILOT, TAKEOFF_PX4, PitchTracking())
+_ALL: Final[tuple[Experiment, ...]] = (
+    Takeoff(),
+    AltitudeSteps(),
+    TAKEOFF_ARDUPILOT,
+    TAKEOFF_PX4,
+    ALTITUDE_STEPS_ARDUPILOT,
+    ALTITUDE_STEPS_PX4,
+    PitchTracking(),
+)
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = MappingProxyType({experiment.name: experiment for experiment in _ALL})
 

@@ -1,13 +1,18 @@
-"""The copter under ArduCopter's vertical loop, along a given reference."""
+"""The copter under ArduCopter's vertical loop, along a given reference, and the reference that the loop shapes."""
+
+import numpy as np
 
 from app.core.control.ardupilot import (
     A_D,
+    STATE_SIZE,
     THROTTLE,
     THROTTLE_FILTERED,
     V_D,
     Z_D,
     State,
     control,
+    shape,
+    start_hover,
 )
 from app.core.control.ardupilot_parameters import DT, THROTTLE_GAIN, Packed
 from app.core.kernels import kernel
@@ -55,3 +60,14 @@ def fly(
         step(state, body, p, copter, references[row], disturbances[row])
         flown[row, 3] = state[THROTTLE]
         flown[row, 4] = flown[row, 5] = state[THROTTLE_FILTERED]
+
+
+@kernel
+def shaped(p: Packed, altitude_m: float, targets: Samples, references: Samples) -> None:
+    """The reference on its way along `targets`, shape (n,), from rest at an altitude; fills the first three columns of
+    `references`, shape (n, 4) as `REFERENCE`: the desired motion at each step. The throttle is never at a limit."""
+    state = np.empty(STATE_SIZE)
+    start_hover(state, p, 0.0, altitude_m, 0.0, 0.0)
+    for row in range(len(targets)):
+        shape(state, p, targets[row])
+        references[row, 0], references[row, 1], references[row, 2] = state[Z_D], state[V_D], state[A_D]

@@ -36,6 +36,7 @@ def problems_of(definition: Definition) -> tuple[Problem, ...]:
     return (
         *_names(definition),
         *_options(definition),
+        *_steps(definition),
         *_fit(definition),
         *_policy(definition),
         *_fractions(definition),
@@ -138,20 +139,31 @@ def _fractions(definition: Definition) -> Iterator[Problem]:
 
 
 def _ceiling(definition: Definition) -> Iterator[Problem]:
-    lowest_m = max(MIN_CEILING_M, _highest_set_point_m(definition) + CEILING_MARGIN_M)
+    lowest_m = max(MIN_CEILING_M, max(_altitudes_m(definition), default=0.0) + CEILING_MARGIN_M)
     if not (math.isfinite(definition.ceiling_m) and lowest_m <= definition.ceiling_m <= MAX_CEILING_M):
         yield Problem(
             "ceiling_m", f"must be between {lowest_m:g} and {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}"
         )
 
 
-def _highest_set_point_m(definition: Definition) -> float:
-    """Zero where the experiment is unknown, has options that are refused, or has no altitude."""
+def _altitudes_m(definition: Definition) -> tuple[float, ...]:
+    """The set points; none where the experiment is unknown, has options that are refused, or has no altitude."""
     experiment, chosen = EXPERIMENTS.get(definition.experiment), definition.experiment_options
     if experiment is None or any(problems_of_options(chosen, experiment.options, field="", owner=experiment.name)):
-        return 0.0
+        return ()
     set_points = experiment.configured(chosen).set_points
-    return 0.0 if set_points is None else max(set_points.altitudes_m)
+    return () if set_points is None else set_points.altitudes_m
+
+
+def _steps(definition: Definition) -> Iterator[Problem]:
+    """A set point below half of the highest one looks like an aborted flight in a record."""
+    altitudes_m = _altitudes_m(definition)
+    if altitudes_m and min(altitudes_m) <= 0.5 * max(altitudes_m):
+        yield Problem(
+            "experiment_options.step_m",
+            f"must leave every set point above half of the highest, {0.5 * max(altitudes_m):g} m, got "
+            f"{min(altitudes_m):g} m",
+        )
 
 
 def _stop(rule: StopRule) -> Iterator[Problem]:

@@ -38,7 +38,8 @@ def test_the_default_definition_has_no_problems() -> None:
         (
             replace(GOOD, experiment="landing"),
             "experiment",
-            "must be one of takeoff, altitude-steps, takeoff-ardupilot, takeoff-px4, pitch-tracking, got 'landing'",
+            "must be one of takeoff, altitude-steps, takeoff-ardupilot, takeoff-px4, altitude-steps-ardupilot, "
+            "altitude-steps-px4, pitch-tracking, got 'landing'",
         ),
         (
             replace(GOOD, strategy="luck"),
