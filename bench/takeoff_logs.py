@@ -15,10 +15,10 @@ from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from typing import Final, Literal
 
-from app.core.analysis.takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis, analyze_takeoffs
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains
+from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis, analyze_takeoffs
 from bench.targets.vehicles import SampledVehicle, fly, population
 
 SEED: Final = 20261126

@@ -13,9 +13,9 @@ from app.campaigns.trials.records import plan_and_import
 from app.campaigns.trials.schemas import TrialPlan
 from app.campaigns.trials.service import evaluate_gate
 from app.common.schemas import uploaded_name
-from app.core.analysis.takeoffs import comparable_takeoffs
 from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.policy import Gains
+from app.core.tuning.logged_takeoffs import comparable_takeoffs
 from app.fleet.schemas import VehicleChoice
 from app.log_analyses.takeoffs import logged_takeoffs
 from app.logs.takeoffs import Takeoff

@@ -4,8 +4,8 @@ import io
 from typing import Final
 
 from app.core.analysis.analysis import analyze
-from app.core.analysis.takeoffs import analyze_takeoffs
 from app.core.errors import Problem, TrajectoryError
+from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.log_analyses.manoeuvres import AnalysedManoeuvres
 from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
 from app.logs.ardupilot_flight import read_ardupilot_flight

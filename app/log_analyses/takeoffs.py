@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
 
-from app.core.analysis.takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.formatting import count, format_gains, number, plus_minus
 from app.core.records.trajectory import Trajectory
+from app.core.tuning.logged_takeoffs import AssessedGains, LoggedTakeoff, TakeoffAnalysis
 from app.figures.panels import Line, Panel, Plot, Style
 from app.figures.scale import thinned
 from app.log_analyses.schemas import (

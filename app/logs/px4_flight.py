@@ -16,7 +16,13 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import SPACE, Px4Loop
 from app.core.analysis.segment import FinerSegment, Segment
 from app.core.control.px4 import FLIGHT, GRAVITY
-from app.core.control.px4_parameters import FIRMWARE_NAMES, UNSUPPORTED, parameters_from
+from app.core.control.px4_parameters import (
+    ESTIMATOR_NAMES,
+    FIRMWARE_NAMES,
+    UNSUPPORTED,
+    estimator_step_s,
+    parameters_from,
+)
 from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
@@ -50,16 +56,14 @@ _LARGEST_LEAN: Final = 0.866
 """Cosine of the lean beyond which rows are left out: 30°."""
 _JUMP_M: Final = 0.5
 _JUMP_M_S: Final = 2.0
-_LONGEST_STEP_S: Final = 0.02
 _EVERY_POSITION_S: Final = 0.0125
 """Rows of the position that are not further apart than this are all that there were."""
 _SET_POINT_LASTS_S: Final = 1.0
 _NEAR_LIMIT: Final = 1e-3
 _LEAST_SHARE: Final = 0.2
 """Of hover thrust: below it, the assumed hover thrust cannot be told from thrust and acceleration."""
-_PERIOD, _IMU_RATE, _VEHICLE = "EKF2_PREDICT_US", "IMU_INTEG_RATE", "MAV_SYS_ID"
-_PERIOD_US, _IMU_HZ = 10_000.0, 200.0
-_USED: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, _PERIOD, _IMU_RATE, _VEHICLE})
+_VEHICLE: Final = "MAV_SYS_ID"
+_USED: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES, _VEHICLE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,9 +210,7 @@ def _step_s(position: Table, given: Parameters) -> float:
     logged_s = float(np.median(np.diff(seconds(position))))
     if 0.0 < logged_s <= _EVERY_POSITION_S:
         return logged_s
-    imu_s = 1.0 / max(given.get(_IMU_RATE, _IMU_HZ), 1.0 / _LONGEST_STEP_S)
-    period_s = given.get(_PERIOD, _PERIOD_US) / 1e6
-    return float(np.clip(imu_s * max(np.floor(period_s / imu_s + 1e-6), 1.0), imu_s, _LONGEST_STEP_S))
+    return estimator_step_s(given)
 
 
 def _logged(topics: Mapping[str, Table]) -> _Logged:

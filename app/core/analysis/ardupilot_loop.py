@@ -7,7 +7,7 @@ from typing import Final, Self
 
 import numpy as np
 
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, transition_of
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps
 from app.core.control import ardupilot as loop
 from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, HOVER, Packed, Parameters, in_newer_names
@@ -73,12 +73,14 @@ _NUDGE: Final = 1e-5
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArduPilotLoop:
     """The loop (`AltitudeLoop`). `filter_hz` is the cut-off of the accelerometer's filter. `has_newer_names` if the
-    vehicle's parameters have the names and units of release 4.7."""
+    vehicle's parameters have the names and units of release 4.7. The acceleration in the log is the sensed one, or the
+    change of the climb rate over `row_s`, a whole number of steps."""
 
     parameters: Parameters
     filter_hz: float
     step_s: float
     has_newer_names: bool = False
+    row_s: float | None = None
 
     texts = _TEXTS
     space = SPACE
@@ -97,6 +99,10 @@ class ArduPilotLoop:
 
     @property
     def accelerometer(self) -> Filter:
+        return self.sensor if self.row_s is None else mean_over(self.row_s, self.step_s)
+
+    @property
+    def sensor(self) -> Filter:
         return accelerometer_filter(self.filter_hz, self.step_s)
 
     def named(self, gains: Mapping[str, float]) -> dict[str, float]:

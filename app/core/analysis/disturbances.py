@@ -27,7 +27,6 @@ def disturbances_of(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: 
     unmodelled = segment.a_m_s2 - sensed
     gust_at_rows, noise_m_s2 = _separated(unmodelled)
     gust = np.interp(steps.time_s, segment.time_s, gust_at_rows)
-    noise = filtered(np.random.default_rng(_SEED).standard_normal(len(gust)), accelerometer)
 
     def beyond(values: Samples, rates: Samples) -> Samples:
         """Rate at which `values`, at the rows, changed beyond the integral of `rates`, constant between two rows."""
@@ -41,8 +40,14 @@ def disturbances_of(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: 
     disturbances[:, 0] = gust
     disturbances[:, 1] = beyond(segment.v_m_s, modelled + gust)
     disturbances[:, 2] = beyond(segment.z_m, steps.v_m_s)
-    disturbances[:, 3] = noise_m_s2 * noise / noise.std()
+    disturbances[:, 3] = sensor_noise(loop, len(gust), noise_m_s2)
     return disturbances
+
+
+def sensor_noise(loop: AltitudeLoop, steps: int, deviation_m_s2: float) -> Samples:
+    """Noise of the acceleration that the loop controls, shape (steps,)."""
+    noise = filtered(np.random.default_rng(_SEED).standard_normal(steps), loop.sensor)
+    return np.asarray(deviation_m_s2 * noise / noise.std())
 
 
 def modelled_acceleration(steps: Steps, copter: Copter, step_s: float) -> Samples:

@@ -11,10 +11,15 @@ from app.core.analysis.segment import Segment
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoggedFlight:
-    """Segments of one flight with the same parameters, and the loop with these."""
+    """Segments of one flight with the same parameters, and the loop with these.
+
+    `activity` is the standard deviation of the demanded throttle about its own 2 Hz low-pass, share of full, if it was
+    recorded: the noise of an accelerometer that is not in the log follows from it.
+    """
 
     loop: AltitudeLoop
     segments: Sequence[Segment]
+    activity: float | None = None
 
     @property
     def error_m(self) -> float:

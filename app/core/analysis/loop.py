@@ -135,6 +135,11 @@ class AltitudeLoop(Protocol):
         """The filter between the vehicle's acceleration and that in the log."""
         ...
 
+    @property
+    def sensor(self) -> Filter:
+        """The filter between the vehicle's acceleration and that which the loop controls."""
+        ...
+
     def named(self, gains: Mapping[str, float]) -> dict[str, float]:
         """Gains by the names and in the units of the vehicle's release."""
         ...
@@ -185,6 +190,12 @@ class AltitudeLoop(Protocol):
 def in_order(gains: Mapping[str, float]) -> str:
     """The values of a gain set in a line."""
     return ", ".join(f"{value:g}" for value in gains.values())
+
+
+def mean_over(row_s: float, step_s: float) -> Filter:
+    """The mean over the steps of the row before: the change of the climb rate as an acceleration."""
+    steps = max(round(row_s / step_s), 1)
+    return np.append(0.0, np.full(steps, 1.0 / steps)), np.array([1.0])
 
 
 def transition_of(after_step: Callable[[Samples], Samples], loop_size: int, nudge: float) -> Samples:

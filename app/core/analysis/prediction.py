@@ -6,17 +6,18 @@ and altitude changed beyond their own derivatives, at the same time of the fligh
 copter flies nearly what was flown; they differ in what they predict for other gains.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from app.core.analysis.disturbances import disturbances_of, in_other_weather
+from app.core.analysis.disturbances import disturbances_of, in_other_weather, sensor_noise
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.loop import AltitudeLoop, Run
 from app.core.analysis.segment import LEAD_S, Segment, Steps, interpolated
-from app.core.models.copter import FLOWN, GRAVITY_M_S2, Copter
+from app.core.models.copter import DISTURBANCES, FLOWN, GRAVITY_M_S2, Copter
 from app.core.records.trajectory import Samples
 
 _SEED: Final = 1
@@ -44,6 +45,8 @@ class FlightModel:
             [_run(flight.loop, segment, each, copter) for segment, each in zip(flight.segments, steps, strict=True)]
             for copter in copters
         ]
+        if flight.activity is not None:
+            self._runs = [self._as_active(runs, flight.activity) for runs in self._runs]
         random = np.random.default_rng(_SEED)
         self._elsewhen = [
             [replace(run, disturbances=in_other_weather(run.disturbances, random)) for run in runs]
@@ -70,6 +73,14 @@ class FlightModel:
         place = np.round((time_s - time_s[0]) / self._flight.loop.step_s).astype(np.int64)
         return np.asarray(flown[np.minimum(place, len(flown) - 1)])
 
+    def _as_active(self, runs: Sequence[Run], activity: float) -> list[Run]:
+        """The runs with the noise of the sensed acceleration that moves the throttle as much as in the flight."""
+        loop = self._flight.loop
+        calm, noisy = ([_with_noise(run, loop, deviation) for run in runs] for deviation in (0.0, 1.0))
+        without, moved = (self._flown(each, loop)[1] ** 2 for each in (calm, noisy))
+        variance = (activity**2 - without) / (moved - without)
+        return [_with_noise(run, loop, math.sqrt(max(variance, 0.0))) for run in runs]
+
     def _flown(self, runs: Sequence[Run], loop: AltitudeLoop) -> tuple[float, float]:
         """Error, m, and throttle activity over all segments."""
         lead = round(LEAD_S / self._flight.loop.step_s)
@@ -79,6 +90,13 @@ class FlightModel:
             deviations.append(np.abs(run.reference[lead:, 0] - flown[:, 0]))
             fast.append(flown[:, FLOWN.index("throttle")] - flown[:, FLOWN.index("throttle_slow")])
         return float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std())
+
+
+def _with_noise(run: Run, loop: AltitudeLoop, deviation_m_s2: float) -> Run:
+    """The run with noise of this standard deviation in the sensed acceleration."""
+    disturbances = run.disturbances.copy()
+    disturbances[:, DISTURBANCES.index("sensed_m_s2")] = sensor_noise(loop, len(disturbances), deviation_m_s2)
+    return replace(run, disturbances=disturbances)
 
 
 def _run(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: Copter) -> Run:

@@ -33,20 +33,25 @@ _Point = tuple[float, ...]
 
 
 def propose(
-    flight: LoggedFlight, copters: Sequence[Copter], starts: Sequence[Mapping[str, float]]
+    flight: LoggedFlight,
+    copters: Sequence[Copter],
+    starts: Sequence[Mapping[str, float]],
+    *,
+    space: GainSpace | None = None,
+    usual: Mapping[str, float] | None = None,
 ) -> dict[str, float] | None:
-    """Gains of the loop's space with three digits, searched for from the best allowed one of `starts` and its gentle
+    """Gains of the loop's space, or of a narrower one, with three digits, searched for from the best allowed one of `starts` and its gentle
     set; None if none is allowed. Of what is found and the starts, those within 5 % of the best error, the one with the
     largest margin.
 
     Allowed are gains within the space that ring with none of the copters within the margin, and move the throttle at
-    most `LARGEST_ACTIVITY` times as much as those of the flight.
+    most `LARGEST_ACTIVITY` times as much as those of the flight, or the `usual` ones.
     """
     from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
-    space = flight.loop.space
+    space = flight.loop.space if space is None else space
     model = FlightModel(flight, copters)
-    _, usual_activity = model.fly(flight.loop)
+    _, usual_activity = model.fly(flight.loop if usual is None else flight.loop.with_gains(usual))
 
     @cache
     def loop_at(point: _Point) -> AltitudeLoop:

@@ -8,7 +8,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, transition_of
+from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps, interpolated
 from app.core.control import px4 as loop
 from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, Parameters, low_pass_gain
@@ -103,9 +103,12 @@ class Px4Loop:
 
     @property
     def accelerometer(self) -> Filter:
-        """The mean over a row, of the steps before."""
-        steps = max(round(self.row_s / self.step_s), 1)
-        return np.append(0.0, np.full(steps, 1.0 / steps)), np.array([1.0])
+        return mean_over(self.row_s, self.step_s)
+
+    @property
+    def sensor(self) -> Filter:
+        """The same: the loop controls no measured acceleration."""
+        return self.accelerometer
 
     def named(self, gains: Mapping[str, float]) -> dict[str, float]:
         return dict(gains)

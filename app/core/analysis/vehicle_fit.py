@@ -1,4 +1,4 @@
-"""Fit of the copter model to a flight, by regression of the sensed acceleration on throttle and climb rate.
+"""Fit of the copter model to flights, by regression of the sensed acceleration on throttle and climb rate.
 
     log(1 + a/g) = s·log u − s·log h − (drag/g)·v + disturbance
 
@@ -40,7 +40,7 @@ _SEED: Final = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CopterEstimate:
-    """What a flight tells about the vehicle: means and standard deviations by the names of `Copter`, and equally
+    """What flights tell about the vehicle: means and standard deviations by the names of `Copter`, and equally
     probable copters. `residual_m_s2` is the standard deviation of what the model leaves of the acceleration."""
 
     mean: Copter
@@ -139,16 +139,20 @@ class _Regression:
     log_likelihood: float
 
 
-def fit_copter(flight: LoggedFlight) -> CopterEstimate:
-    """Estimate the copter from all scored rows of the flight; deterministic."""
+def fit_copter(*flights: LoggedFlight) -> CopterEstimate:
+    """Estimate the copter from all scored rows of its flights under one autopilot, at least one; deterministic."""
     from scipy.stats import norm
 
-    throttle = flight.throttle_mean
-    excitations = [flight.loop.excitation(each, throttle) for each in flight.segments]
-    candidates = [_rows(flight, excitations, lag_s) for lag_s in _LAGS_S.tolist()]
+    loop = flights[0].loop
+    parts = [
+        _Part(flight, segment, *flight.loop.excitation(segment, flight.throttle_mean))
+        for flight in flights
+        for segment in flight.segments
+    ]
+    candidates = [_rows(parts, lag_s) for lag_s in _LAGS_S.tolist()]
     best = min(candidates, key=lambda each: each.variance)
     variance = best.independent_variance(max(_NOISES, key=best.log_likelihood))
-    regressions = [_regress(each, variance, flight.loop) for each in candidates]
+    regressions = [_regress(each, variance, loop) for each in candidates]
     log_weight = np.array([each.log_likelihood + norm.logpdf(each.lag_s, *USUAL_LAG_S) for each in regressions])
     weight = np.exp(log_weight - log_weight.max())
     values = _draws(regressions, weight / weight.sum())
@@ -160,19 +164,29 @@ def fit_copter(flight: LoggedFlight) -> CopterEstimate:
     )
 
 
-def _rows(flight: LoggedFlight, excitations: Sequence[tuple[Samples, Samples]], lag_s: float) -> _Rows:
-    """`excitations` are climb rate and acceleration that follow from the reference, for each segment."""
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A segment of a flight, with the climb rate and acceleration that follow from its reference, shape (n,) each."""
 
+    flight: LoggedFlight
+    segment: Segment
+    excited_v_m_s: Samples
+    excited_a_m_s2: Samples
+
+
+def _rows(parts: Sequence[_Part], lag_s: float) -> _Rows:
     def rows(signal: Callable[[Segment], Samples]) -> Samples:
-        return np.concatenate([signal(each)[each.scored] for each in flight.segments])
+        return np.concatenate([signal(each.segment)[each.segment.scored] for each in parts])
 
     sought = np.log1p(np.maximum(rows(lambda each: each.a_m_s2) / GRAVITY_M_S2, _FREE_FALL))
     ones = np.ones(len(sought))
-    throttle = np.log(rows(lambda each: _sensed_throttle(each, flight, lag_s)))
-    causes = np.column_stack([throttle, rows(lambda each: each.v_m_s), ones])
+    sensed = [_sensed_throttle(each.segment, each.flight, lag_s)[each.segment.scored] for each in parts]
+    causes = np.column_stack([np.log(np.concatenate(sensed)), rows(lambda each: each.v_m_s), ones])
     excited = [
-        np.column_stack([v, *(_before(a, rows=back) for back in range(_INSTRUMENT_ROWS))])[each.scored]
-        for each, (v, a) in zip(flight.segments, excitations, strict=True)
+        np.column_stack(
+            [each.excited_v_m_s, *(_before(each.excited_a_m_s2, rows=back) for back in range(_INSTRUMENT_ROWS))]
+        )[each.segment.scored]
+        for each in parts
     ]
     instruments = np.column_stack([np.concatenate(excited), ones])
     return _with_instruments(lag_s, sought, causes, instruments)

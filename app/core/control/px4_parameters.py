@@ -132,6 +132,20 @@ def low_pass_gain(cutoff_hz: float, sample_s: float) -> float:
     return float(sample / (sample + np.float32(1.0) / (np.float32(2.0 * math.pi) * np.float32(cutoff_hz))))
 
 
+_PREDICTION, _IMU_RATE = "EKF2_PREDICT_US", "IMU_INTEG_RATE"
+_PREDICTION_US, _IMU_HZ = 10_000.0, 200.0
+_LONGEST_STEP_S: Final = 0.02
+ESTIMATOR_NAMES: Final = (_PREDICTION, _IMU_RATE)
+"""Parameters on which the interval of the estimates depends."""
+
+
+def estimator_step_s(values: Mapping[str, float]) -> float:
+    """Interval of the estimates, s, from the firmware's values by name: whole intervals of the IMU."""
+    imu_s = 1.0 / max(values.get(_IMU_RATE, _IMU_HZ), 1.0 / _LONGEST_STEP_S)
+    period_s = values.get(_PREDICTION, _PREDICTION_US) / 1e6
+    return min(max(imu_s * max(math.floor(period_s / imu_s + 1e-6), 1.0), imu_s), _LONGEST_STEP_S)
+
+
 def parameters_from(values: Mapping[str, float]) -> Parameters:
     """Parameters from the firmware's values by name; those missing have their default, other names are ignored.
 

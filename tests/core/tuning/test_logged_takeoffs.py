@@ -8,9 +8,9 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from app.core.analysis.takeoffs import LoggedTakeoff, analyze_takeoffs
 from app.core.errors import TrajectoryError
 from app.core.experiments.takeoff import Takeoff
+from app.core.tuning.logged_takeoffs import LoggedTakeoff, analyze_takeoffs
 from app.logs.readers import read_takeoff
 from tests.core.tuning.flying import compiled_only
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
