@@ -6,7 +6,7 @@ from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.base import ParameterDistribution
 from app.core.experiments.takeoff import Takeoff
-from app.core.tuning.calibration import known_distribution
+from app.core.tuning.campaign_models import known_distribution
 from app.core.tuning.gate import GateResult, check_policy, space_of
 from app.core.tuning.proposals import Advice, advise, next_proposal
 from app.core.tuning.stop_rules import StopVerdict, evaluate_stop_rule

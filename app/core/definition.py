@@ -106,7 +106,8 @@ class Flight:
 
     `outcome` is `valid` or `aborted`; invalid and lost flights are left out. An aborted flight has no error.
     `against_gains` is false if a person aborted the flight for another reason than the vehicle's behaviour. `predicted`
-    is None for gains whose error was not predicted when their flight was planned.
+    is None for gains whose error was not predicted when their flight was planned. `parameters` are those of the
+    vehicle's autopilot in flight, by the firmware's names, as far as they were recorded.
     """
 
     number: int
@@ -116,6 +117,7 @@ class Flight:
     outcome: Literal["valid", "aborted"]
     predicted: Prediction | None = None
     against_gains: bool = True
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 def flight_seed(seed: int, number: int) -> int:

@@ -52,7 +52,7 @@ def fly_changes(
     copter: SimulatedCopter, parameters: Parameters, *, seed: int, manoeuvre: Manoeuvre = "auto"
 ) -> StepFlight:
     """Hover at 5 m, climb and descend twice by 2 m, or by 1 m in steps, in the weather of `seed`."""
-    estimate = float(np.clip(copter.hover_throttle, parameters.hover_thrust - 0.2, parameters.hover_thrust + 0.2))
+    estimate = _estimate(copter, parameters)
     reference = _reference(manoeuvre)
     weather = weather_of(copter, seed, _MOVES * _STEPS, _MOVE_S, climb_rate_wander_s=_CLIMB_RATE_WANDER_S)
     flown, still = (_flown(copter, parameters, estimate, each, reference) for each in (weather, np.zeros_like(weather)))
@@ -82,11 +82,23 @@ def fly_changes(
     )
 
 
+def fly_reference(copter: SimulatedCopter, parameters: Parameters, reference: Samples, *, seed: int) -> Samples:
+    """Fly along this reference, shape (n, 3), from hover at its first altitude: altitude, climb rate, climb rate target
+    and thrust at each step, shape (n, 4)."""
+    weather = weather_of(copter, seed, _MOVES * len(reference), _MOVE_S, climb_rate_wander_s=_CLIMB_RATE_WANDER_S)
+    return _flown(copter, parameters, _estimate(copter, parameters), weather, reference)
+
+
+def _estimate(copter: SimulatedCopter, parameters: Parameters) -> float:
+    """The hover throttle that PX4's estimator finds."""
+    return float(np.clip(copter.hover_throttle, parameters.hover_thrust - 0.2, parameters.hover_thrust + 0.2))
+
+
 def _flown(
     copter: SimulatedCopter, parameters: Parameters, estimate: float, weather: Samples, reference: Samples
 ) -> Samples:
     """Altitude, climb rate, climb rate target and thrust at each step, shape (n, 4)."""
-    p, flown = parameters.packed(), np.empty((_STEPS, 4))
+    p, flown = parameters.packed(), np.empty((len(reference), 4))
     state = np.empty(loop.STATE_SIZE, dtype=np.float32)
     loop.start_hover(state, p, estimate, copter.hover_throttle, 0.0)
     inputs, outputs = np.zeros((1, len(loop.INPUTS)), np.float32), np.empty((1, len(loop.OUTPUTS)), np.float32)

@@ -103,21 +103,9 @@ def sample(random: np.random.Generator) -> SimulatedCopter:
 
 def fly_steps(copter: SimulatedCopter, parameters: Parameters, *, seed: int) -> StepFlight:
     """Hover at 5 m, climb 2 m and descend again, in the weather of `seed`."""
-    p = parameters.packed()
-    state, flown = np.empty(loop.STATE_SIZE), np.empty((_STEPS, 9))
-    loop.start_hover(state, p, copter.hover_throttle, HEIGHT_M, 0.0, 0.0)
     targets = np.full(_STEPS, HEIGHT_M)
     targets[_SCORED_FROM : _SCORED_FROM + round(STEP_LASTS_S / STEP_S)] += CLIMB_M
-    numerator, denominator = accelerometer_filter(FILTER_HZ, STEP_S)
-    _fly(
-        state,
-        p,
-        packed(copter, STEP_S),
-        weather_of(copter, seed, _STEPS, STEP_S),
-        targets,
-        np.concatenate([numerator, denominator]),
-        flown,
-    )
+    flown = fly_targets(copter, parameters, targets, seed=seed)
     scored = flown[_SCORED_FROM:]
     rows = flown[::_ROW_EVERY]
     segment = Segment(
@@ -138,6 +126,26 @@ def fly_steps(copter: SimulatedCopter, parameters: Parameters, *, seed: int) -> 
         activity=float(np.std(scored[:, _THROTTLE] - scored[:, _FILTERED])),
         log=LoggedFlight(loop=loop_of(parameters), segments=[segment]),
     )
+
+
+def fly_targets(copter: SimulatedCopter, parameters: Parameters, targets: Samples, *, seed: int) -> Samples:
+    """Fly along these targets, shape (n,), from hover at the first of them: shape (n, 9), with the columns altitude,
+    climb rate and acceleration as measured, the same as desired, the climb rate target, and the throttle as demanded
+    and as filtered."""
+    p = parameters.packed()
+    state, flown = np.empty(loop.STATE_SIZE), np.empty((len(targets), 9))
+    loop.start_hover(state, p, copter.hover_throttle, float(targets[0]), 0.0, 0.0)
+    numerator, denominator = accelerometer_filter(FILTER_HZ, STEP_S)
+    _fly(
+        state,
+        p,
+        packed(copter, STEP_S),
+        weather_of(copter, seed, len(targets), STEP_S),
+        targets,
+        np.concatenate([numerator, denominator]),
+        flown,
+    )
+    return flown
 
 
 def loop_of(parameters: Parameters) -> ArduPilotLoop:

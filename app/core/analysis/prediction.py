@@ -65,6 +65,20 @@ class FlightModel:
         low_m, high_m = np.quantile(elsewhen + (error_m - elsewhen.mean()), _QUANTILES).tolist()
         return Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity)
 
+    def errors(self, loop: AltitudeLoop) -> Samples:
+        """Error of each copter in the weather of the flight, m, shape (k,)."""
+        return np.array([self._flown(runs, loop)[0] for runs in self._runs])
+
+    def curves(self, loop: AltitudeLoop) -> tuple[Samples, Samples, Samples]:
+        """Times of the steps of the first segment, shape (m,), and what each copter flies in the weather of the flight,
+        and at another time: altitudes, shape (k, m)."""
+        z = FLOWN.index("z_m")
+        altitudes, elsewhen = (
+            np.array([loop.fly(runs[0])[:, z] for runs in every]) for every in (self._runs, self._elsewhen)
+        )
+        time_s = self._flight.segments[0].time_s[0] + self._flight.loop.step_s * np.arange(altitudes.shape[1])
+        return time_s, altitudes, elsewhen
+
     def rows(self, loop: AltitudeLoop) -> Samples:
         """What the first copter flies in the weather of the flight, at the rows of the first segment, shape (n, 6) as
         `FLOWN`."""

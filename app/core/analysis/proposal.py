@@ -40,9 +40,9 @@ def propose(
     space: GainSpace | None = None,
     usual: Mapping[str, float] | None = None,
 ) -> dict[str, float] | None:
-    """Gains of the loop's space, or of a narrower one, with three digits, searched for from the best allowed one of `starts` and its gentle
-    set; None if none is allowed. Of what is found and the starts, those within 5 % of the best error, the one with the
-    largest margin.
+    """Gains of the loop's space, or of a narrower one, with three digits, searched for from the best allowed one of
+    `starts` and its gentle set; None if none is allowed. Of what is found and the starts, those within 5 % of the best
+    error, the one with the largest margin.
 
     Allowed are gains within the space that ring with none of the copters within the margin, and move the throttle at
     most `LARGEST_ACTIVITY` times as much as those of the flight, or the `usual` ones.

@@ -87,8 +87,8 @@ def shaped_reference(loop: ArduPilotLoop, set_points: SetPoints, steps_s: Sample
     return references
 
 
-def straight_reference(_loop: Px4Loop, set_points: SetPoints, steps_s: Samples) -> Samples:
-    """PX4's reference, the set point without rates; the hover throttle is left to the caller."""
+def straight_reference(set_points: SetPoints, steps_s: Samples) -> Samples:
+    """PX4's reference at the times of its steps, shape (m, 4): the set point, without rates and a hover throttle."""
     references = np.zeros((len(steps_s), len(REFERENCE)))
     references[:, 0] = set_points.at(steps_s)
     return references

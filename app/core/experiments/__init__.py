@@ -8,7 +8,7 @@ from typing import Final
 from app.core.definition import Definition, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.altitude_steps import AltitudeSteps
-from app.core.experiments.altitude_steps_copters import ALTITUDE_STEPS_ARDUPILOT, ALTITUDE_STEPS_PX4
+from app.core.experiments.altitude_steps_copters import ArduPilotSteps, Px4Steps
 from app.core.experiments.base import Experiment
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.experiments.takeoff import TAKEOFF_ARDUPILOT, TAKEOFF_PX4, Takeoff
@@ -18,8 +18,8 @@ _ALL: Final[tuple[Experiment, ...]] = (
     AltitudeSteps(),
     TAKEOFF_ARDUPILOT,
     TAKEOFF_PX4,
-    ALTITUDE_STEPS_ARDUPILOT,
-    ALTITUDE_STEPS_PX4,
+    ArduPilotSteps(),
+    Px4Steps(),
     PitchTracking(),
 )
 

@@ -317,6 +317,13 @@ class ModelledExperiment(Experiment, Protocol):
         """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd` have shape (m,)."""
         ...
 
+    def under(self, parameters: Mapping[str, float]) -> Self:
+        """The experiment on a vehicle whose autopilot has these parameters, by the firmware's names.
+
+        Itself if its model does not depend on them.
+        """
+        ...
+
     @property
     def model_parameters(self) -> tuple[ModelParameter, ...]: ...
     @property

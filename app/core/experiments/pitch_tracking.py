@@ -148,6 +148,10 @@ class PitchTracking:
         """The experiment with another aircraft's fitted model: mean and standard deviation, shape (19,)."""
         return type(self)(self._options, informed_parameters(self.model_parameters, mean, sd))
 
+    def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - its only parameters are the gains
+        """The experiment itself."""
+        return self
+
     @property
     def modelled(self) -> Self:
         """The experiment itself."""

@@ -148,6 +148,10 @@ class VerticalLoop(ABC):
         """The experiment with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
         return self.with_parameters(informed_parameters(self.model_parameters, mean, sd))
 
+    def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - its only parameters are the gains
+        """The experiment itself."""
+        return self
+
     @property
     def modelled(self) -> Self:
         """The experiment itself."""

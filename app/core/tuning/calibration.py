@@ -21,20 +21,18 @@ import numpy as np
 
 from app.core.definition import Flight, best_flight
 from app.core.experiments.base import (
-    Experiment,
     FittedParameter,
     Matrix,
     ModelledExperiment,
     ParameterDistribution,
     fitted_parameters,
-    prior_distribution,
 )
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples
 from app.core.tuning.corrected_model import resample_to_grid
 
 EXPERIMENTS: Final = frozenset({"takeoff", "altitude-steps"})
-"""Experiments whose model parameters can be identified from one flight."""
+"""Experiments whose model this calibrates, on one flight or more."""
 MAX_FLIGHTS: Final = 4
 """Number of flights fitted: the best and the latest valid ones. That is enough, and it bounds the computing time."""
 
@@ -146,17 +144,6 @@ def fitted_flights(flights: Sequence[Flight]) -> list[Flight]:
     best = best_flight(valid)
     latest = [flight for flight in valid[-MAX_FLIGHTS:] if flight is not best][1 - MAX_FLIGHTS :]
     return sorted((best, *latest), key=lambda flight: flight.number)
-
-
-def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
-    """Distribution of the vehicle's parameters: the data sheet's until a flight is valid, then the calibrated one.
-
-    Experiments without a calibration always use the data sheet; for those without a model the distribution is empty.
-    """
-    modelled = experiment.modelled
-    if modelled is None or modelled.name not in EXPERIMENTS or all(flight.error is None for flight in flights):
-        return prior_distribution(experiment)
-    return calibrate(modelled, flights).spread()
 
 
 def _rounded(covariance: Matrix, sd: Vector) -> Matrix:

@@ -9,7 +9,8 @@ from app.core.experiments import experiment_of
 from app.core.experiments.base import ModelledExperiment
 from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import PooledScatter, groups_of, pool_scatter
-from app.core.tuning.calibration import EXPERIMENTS, fitted_flights
+from app.core.tuning.calibration import fitted_flights
+from app.core.tuning.campaign_models import MODELS, as_flown
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
 from app.core.tuning.gate import space_of
 from app.core.tuning.predictions import predict_corrected, repeat_proposal, with_interval
@@ -62,6 +63,7 @@ def flight_predictor(
         return None
     if donor is not None:
         experiment = transfer(definition, experiment, flights, donor).experiment
+    experiment = as_flown(experiment, flights)
     strategy, flown = STRATEGIES[definition.strategy], has_flown(flights)
     model = strategy.predict_flight if flown else partial(_first_flight, donor)
     return FlightPredictor(
@@ -85,7 +87,7 @@ def _first_flight(
 def modelled_flights(definition: Definition, flights: Sequence[Flight]) -> frozenset[int]:
     """Numbers of the flights whose records `flight_predictor` needs."""
     valid = [flight for flight in flights if flight.outcome == "valid"]
-    used = fitted_flights(flights) if valid and definition.experiment in EXPERIMENTS else valid
+    used = fitted_flights(flights) if valid and definition.experiment in MODELS else valid
     return frozenset(flight.number for flight in (*valid[:1], *used))
 
 

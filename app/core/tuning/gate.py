@@ -13,7 +13,7 @@ from app.core.experiments import experiment_of
 from app.core.experiments.base import Check, Envelope, Experiment, ModelledExperiment, ParameterDistribution
 from app.core.formatting import percent
 from app.core.policy import Gain, Gains, PolicySpace, Vector
-from app.core.tuning.calibration import known_distribution
+from app.core.tuning.campaign_models import as_flown, known_distribution
 from app.core.tuning.corrected_model import start_gains
 
 
@@ -103,8 +103,8 @@ def _outside(gain: Gain, value: float) -> float:
     return beyond / gain.span if gain.span and math.isfinite(value) else math.inf
 
 
-WAIVED_AFTER_VALID_FLIGHT: Final = frozenset({"altitude", "divergence"})
-"""Checks of simulated takeoffs that do not refuse gains flown before."""
+WAIVED_AFTER_VALID_FLIGHT: Final = frozenset({"altitude", "divergence", "lowest altitude", "margin"})
+"""Checks of simulated flights that do not refuse gains flown before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +151,8 @@ def check_policy(
     """
     if numbers := check_numbers(space, gains):
         return GateResult(numbers)
-    hazards = _hazards(
-        definition, experiment, space, gains, known_distribution(experiment, flights) if spread is None else spread
-    )
+    known = known_distribution(experiment, flights) if spread is None else spread
+    hazards = _hazards(definition, experiment, space, gains, flights, known)
     if was_flown(gains, [flight for flight in flights if flight.outcome == "valid"]):
         hazards = tuple(_flown_before(check) for check in hazards)
     limits = (*check_bounds(space, gains), _step(definition, experiment, space, gains, flights, start))
@@ -161,12 +160,17 @@ def check_policy(
 
 
 def _hazards(
-    definition: Definition, experiment: Experiment, space: PolicySpace, gains: Gains, spread: ParameterDistribution
+    definition: Definition,
+    experiment: Experiment,
+    space: PolicySpace,
+    gains: Gains,
+    flights: Sequence[Flight],
+    spread: ParameterDistribution,
 ) -> tuple[Check, ...]:
     modelled = experiment.modelled
     if modelled is None:
         return ()
-    return modelled.hazards(space.vector(gains), spread, envelope_of(definition, experiment))
+    return as_flown(modelled, flights).hazards(space.vector(gains), spread, envelope_of(definition, experiment))
 
 
 def _flown_before(check: Check) -> Check:

@@ -22,6 +22,7 @@ from app.core.definition import Definition, Flight
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Matrix
 from app.core.policy import Gain, Gains, PolicySpace, Vector
+from app.core.tuning.campaign_models import as_flown
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
 from app.core.tuning.gate import space_of
 from app.core.tuning.strategies import STRATEGIES
@@ -156,6 +157,7 @@ def _error_model(definition: Definition, flights: Sequence[Flight], donor: Fligh
         return None
     if donor is not None:
         experiment = transfer(definition, experiment, flights, donor).experiment
+    experiment = as_flown(experiment, flights)
     if all(flight.outcome != "valid" for flight in flights):
         return (uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)).errors
     return STRATEGIES[definition.strategy].predict_errors(definition, experiment, flights)

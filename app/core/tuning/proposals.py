@@ -12,7 +12,7 @@ from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, short
 from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import Group, groups_of, pool_scatter
-from app.core.tuning.calibration import known_distribution
+from app.core.tuning.campaign_models import as_flown, known_distribution
 from app.core.tuning.confirmation import NO_STEP, Confirmation, compare_winner, confirm, standing_within_bounds
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
 from app.core.tuning.gate import GateResult, check_policy
@@ -51,6 +51,7 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     warm = None if donor is None else transfer(definition, experiment, flights, donor)
     if warm is not None:
         experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
+    experiment = as_flown(experiment, flights)
     if not has_flown(flights):
         return _start(definition, experiment, space, flights, donor)
     scatter = pool_scatter(groups_of(flights), experiment.scatter)

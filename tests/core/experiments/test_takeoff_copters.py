@@ -12,7 +12,7 @@ from app.core.experiments import get_experiment
 from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
-from app.core.tuning.calibration import known_distribution
+from app.core.tuning.campaign_models import known_distribution
 from app.core.tuning.definition_checks import check_definition, problems_of
 from app.core.tuning.gate import check_policy
 from app.core.tuning.proposals import advise, next_proposal

@@ -57,6 +57,9 @@ class QuadraticExperiment:
     def informed(self, mean: Vector, sd: Vector) -> Self:
         return type(self)(informed_parameters(self.model_parameters, mean, sd))
 
+    def under(self, parameters: Mapping[str, float]) -> Self:
+        return self
+
     @property
     def modelled(self) -> Self:
         return self

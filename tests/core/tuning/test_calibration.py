@@ -9,7 +9,8 @@ from app.core.definition import Flight
 from app.core.experiments.base import prior_distribution
 from app.core.experiments.pitch_tracking import PitchTracking
 from app.core.records.trajectory import Trajectory
-from app.core.tuning.calibration import MAX_FLIGHTS, calibrate, known_distribution
+from app.core.tuning.calibration import MAX_FLIGHTS, calibrate
+from app.core.tuning.campaign_models import known_distribution
 from tests.core.tuning.flying import TAKEOFF, compiled_only, fly
 
 pytestmark = compiled_only

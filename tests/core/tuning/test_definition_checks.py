@@ -5,6 +5,7 @@ import pytest
 
 from app.core.definition import Definition, Donor, Start, StopRule
 from app.core.errors import InputError
+from app.core.experiments import EXPERIMENTS
 from app.core.tuning.definition_checks import check_definition, problems_of
 
 GOOD = Definition()
@@ -38,8 +39,7 @@ def test_the_default_definition_has_no_problems() -> None:
         (
             replace(GOOD, experiment="landing"),
             "experiment",
-            "must be one of takeoff, altitude-steps, takeoff-ardupilot, takeoff-px4, altitude-steps-ardupilot, "
-            "altitude-steps-px4, pitch-tracking, got 'landing'",
+            f"must be one of {', '.join(EXPERIMENTS)}, got 'landing'",
         ),
         (
             replace(GOOD, strategy="luck"),

@@ -1,7 +1,8 @@
 """Fit the model to all flights, then choose its optimal gains.
 
-The choice is the robust optimum over a few plausible models inside a trust region around the best flight
-(`trust_region`). A step that the gate would refuse is halved until it passes.
+The model is that of the experiment (`app.core.tuning.campaign_models`). The choice is its optimum over a few plausible
+vehicles inside a trust region around the best flight (`trust_region`). A step that the gate would refuse is halved
+until it passes.
 """
 
 from collections.abc import Sequence
@@ -11,23 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from app.core.definition import Definition, Flight, aborted_by_gains, best_flight, was_flown
-from app.core.experiments.base import Matrix, ModelledExperiment
-from app.core.experiments.vertical_loop import VerticalLoop
+from app.core.definition import Definition, Flight, aborted_by_gains, was_flown
+from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, percent, plus_minus, short
 from app.core.policy import PolicySpace, Vector
-from app.core.tuning.calibration import Calibration, calibrate
+from app.core.tuning.campaign_model import CampaignModel
+from app.core.tuning.campaign_models import MODELS
 from app.core.tuning.gate import allows
-from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
+from app.core.tuning.predictions import FlightPrediction
 from app.core.tuning.strategy import ErrorsOf, Explanation, Kind, ModelPrediction, PredictionOf, Proposal, Strategy
-from app.core.tuning.trust_region import Box, find_robust_optimum, merit, trust_fraction
-
-MODELS: Final = 8
-ROBUSTNESS_SD: Final = 0.75
-"""Distance of the models from the fit in the robust optimisation, in standard deviations. A larger value increases the
-error on vehicles that match the fit, a smaller one on those that do not."""
-MIN_IMPROVEMENT: Final = 0.005
-"""A step predicted to improve the error by less than this share is not worth a flight."""
+from app.core.tuning.trust_region import Box, trust_fraction
 
 _HALVINGS: Final = 5
 _DIFFERENCE: Final = 0.1
@@ -46,29 +40,30 @@ class _ChosenGains:
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
-    """Propose the robust optimum of the calibrated model, within the trust region. At least one flight must be valid.
+    """Propose the optimum of the calibrated model, within the trust region. At least one flight must be valid.
 
-    Raises TypeError for experiments that are not under the vertical loop.
+    Raises TypeError for experiments without such a model, and TrajectoryError if a record does not suffice for it.
     """
-    if not isinstance(experiment, VerticalLoop):
-        raise TypeError(f"calibrated works only under the vertical loop, not with {experiment.name}")
-    calibration, base = _calibrated(experiment, flights)
-    models = calibration.plausible(runs=MODELS, width=ROBUSTNESS_SD)
+    model = _fitted(experiment, flights)
+    base = model.base
     fraction = min(trust_fraction(flights), definition.step_fraction)
     box = Box(*space.reachable(space.vector(base.gains), fraction))
-    choice = _choose(definition, experiment, space, flights, calibration, base, models, box)
-    prediction = predict_flight(calibration, base, choice.gains)
+    choice = _choose(definition, experiment, space, flights, model, box)
+    prediction = model.predict(choice.gains)
     clipped = space.names_where((choice.optimum <= box.low) | (choice.optimum >= box.high))
     explanation = Explanation(
-        summary=_summary(experiment, base, choice, prediction, len(calibration.numbers))
-        + _describe_limit(fraction, flights),
+        summary=_summary(experiment, model, choice, prediction) + _describe_limit(fraction, flights),
         base_flight=base.number,
-        gradient=_gradient(experiment, space, space.nearest(space.vector(base.gains)), models),
+        gradient=_gradient(space, space.nearest(space.vector(base.gains)), model),
         direction=space.by_name(choice.gains - space.vector(base.gains)),
         clipped=clipped,
-        notes=(*choice.notes, "The deviation of the best flight from the model is added inside the control loop."),
-        lesson=_describe_lesson(calibration, prediction),
-        fitted=calibration.fitted,
+        notes=(
+            *choice.notes,
+            *model.notes(choice.gains),
+            "The deviation of the best flight from the model is added inside the control loop.",
+        ),
+        lesson=_describe_lesson(model, prediction),
+        fitted=model.fitted,
         trust_fraction=fraction,
     )
     return Proposal(
@@ -78,53 +73,52 @@ def propose(
         predicted_error=prediction.error,
         explanation=explanation,
         interval=prediction.interval,
-        spread=calibration.spread(),
+        spread=model.spread,
     )
 
 
 def error_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> ErrorsOf:
     """The errors predicted by the calibrated model. At least one flight must be valid."""
-    return partial(predict_errors, *_calibrated(experiment, flights))
+    return _fitted(experiment, flights).errors
 
 
 def flight_model(_definition: Definition, experiment: ModelledExperiment, flights: Sequence[Flight]) -> PredictionOf:
     """The flights predicted by the calibrated model. At least one flight must be valid."""
-    return partial(_predict, *_calibrated(experiment, flights))
+    return partial(_predict, _fitted(experiment, flights))
 
 
-def _calibrated(experiment: ModelledExperiment, flights: Sequence[Flight]) -> tuple[Calibration, Flight]:
-    """The calibration, and the best of its flights."""
-    calibration = calibrate(experiment, flights)
-    return calibration, best_flight([flight for flight in flights if flight.number in calibration.numbers])
+def _fitted(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CampaignModel:
+    if experiment.name not in MODELS:
+        raise TypeError(f"calibrated works only with {', '.join(MODELS)}, not with {experiment.name}")
+    return MODELS[experiment.name](experiment, flights)
 
 
-def _predict(calibration: Calibration, base: Flight, gains: Vector) -> ModelPrediction:
-    found = predict_flight(calibration, base, gains)
+def _predict(model: CampaignModel, gains: Vector) -> ModelPrediction:
+    found = model.predict(gains)
     return ModelPrediction(found.trajectory, found.error, found.interval)
 
 
 def _choose(
     definition: Definition,
-    experiment: VerticalLoop,
+    experiment: ModelledExperiment,
     space: PolicySpace,
     flights: Sequence[Flight],
-    calibration: Calibration,
-    base: Flight,
-    models: Matrix,
+    model: CampaignModel,
     box: Box,
 ) -> _ChosenGains:
-    here = space.nearest(space.vector(base.gains))
-    optimum = find_robust_optimum(experiment, box, models, here[np.newaxis])
-    now, then = merit(experiment, np.stack((here, optimum)), models).tolist()
-    if then > (1.0 - MIN_IMPROVEMENT) * now and was_flown(space.mapping(here), flights):
+    here = space.nearest(space.vector(model.base.gains))
+    optimum = model.optimum(box)
+    if optimum is None:
+        return _ChosenGains("none", here, here, (_NONE_ALLOWED,))
+    if not model.is_worth_a_flight(here, optimum) and was_flown(space.mapping(here), flights):
         return _ChosenGains("none", here, optimum)
     for halvings in range(_HALVINGS):
-        gains = box.nearest(here + (optimum - here) / 2**halvings)
+        gains = np.clip(model.rounded(here + (optimum - here) / 2**halvings), box.low, box.high)
         if was_flown(space.mapping(gains), [flight for flight in flights if flight.outcome == "valid"]):
             break
         if was_flown(space.mapping(gains), flights):
             continue
-        if allows(definition, experiment, gains, calibration.spread()):
+        if allows(definition, experiment, gains, model.spread):
             if halvings == 0:
                 return _ChosenGains("step", gains, optimum)
             note = (
@@ -136,24 +130,34 @@ def _choose(
     return _ChosenGains("none", here, optimum, (note,))
 
 
-def _gradient(experiment: VerticalLoop, space: PolicySpace, base: Vector, models: Matrix) -> dict[str, float]:
+_NONE_ALLOWED: Final = (
+    "No gains that may be flown next keep the margin from ringing on every likely vehicle. Choose gentler gains, or "
+    "reduce the lags of motors and filters."
+)
+
+
+def _gradient(space: PolicySpace, base: Vector, model: CampaignModel) -> dict[str, float]:
     """∂merit/∂gain at the best flight by central differences; zero for a pinned gain."""
-    steps = np.diag(np.maximum(np.rint(_DIFFERENCE * experiment.space.scale), 1.0))
+    steps = _DIFFERENCE * space.scale
+    whole = [gain.integer for gain in space.gains]
+    steps = np.diag(np.where(whole, np.maximum(np.rint(steps), 1.0), steps))
     above, below = np.minimum(base + steps, space.upper), np.maximum(base - steps, space.lower)
-    errors = merit(experiment, np.concatenate((above, below)), models)
+    errors = model.merits(np.concatenate((above, below)))
     run = np.diag(above - below)
     rise = errors[: len(base)] - errors[len(base) :]
     return space.by_name(np.divide(rise, run, out=np.zeros_like(rise), where=run != 0.0))
 
 
 def _summary(
-    experiment: ModelledExperiment, base: Flight, choice: _ChosenGains, prediction: FlightPrediction, flights: int
+    experiment: ModelledExperiment, model: CampaignModel, choice: _ChosenGains, prediction: FlightPrediction
 ) -> str:
-    unit = experiment.error_unit
-    subject = f"The model, calibrated on {count(flights, 'flight')},"
+    unit, base = experiment.error_unit, model.base
+    subject = f"The model, calibrated on {count(len(model.numbers), 'flight')},"
     best = f"flight {base.number} ({format_gains(base.gains)}, error {short(base.error)} {unit})"
     if choice.kind == "none":
-        return f"{subject} predicts no allowed gains that are better than {best} by {percent(MIN_IMPROVEMENT, 1)}."
+        return (
+            f"{subject} predicts no allowed gains that are better than {best} by {percent(model.least_improvement, 1)}."
+        )
     low, high = prediction.interval.lower, prediction.interval.upper
     assert base.error is not None
     share = 1.0 - prediction.error / base.error
@@ -176,13 +180,13 @@ def _describe_limit(fraction: float, flights: Sequence[Flight]) -> str:
     )
 
 
-def _describe_lesson(calibration: Calibration, prediction: FlightPrediction) -> str:
+def _describe_lesson(model: CampaignModel, prediction: FlightPrediction) -> str:
     """The parameter to which the predicted error is most sensitive, as a sentence."""
     values = prediction.models - prediction.models.mean(axis=0)
     errors = prediction.errors - prediction.errors.mean()
     spread = np.linalg.norm(values, axis=0)
     shares = np.divide(np.abs(errors @ values), spread, out=np.zeros_like(spread), where=spread > 0.0)
-    most = calibration.fitted[int(np.argmax(np.round(shares, 9)))]
+    most = model.fitted[int(np.argmax(np.round(shares, 9)))]
     return (
         f"Mostly {most.title.lower()}, now {plus_minus(most.value, most.standard_error, most.unit)}: it contributes "
         "most to the uncertainty of the predicted error."
@@ -197,5 +201,5 @@ CALIBRATED: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
-    experiments=("takeoff", "altitude-steps"),
+    experiments=tuple(MODELS),
 )

@@ -17,7 +17,7 @@ from app.core.definition import Definition, Flight, Option, aborted_by_gains, be
 from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import format_gains, short
 from app.core.policy import PolicySpace, Vector
-from app.core.tuning.calibration import known_distribution
+from app.core.tuning.campaign_models import known_distribution
 from app.core.tuning.corrected_model import CorrectedModel, correct_by_bias, correct_in_loop
 from app.core.tuning.gate import allows
 from app.core.tuning.predictions import predict_corrected

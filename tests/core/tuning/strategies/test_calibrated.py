@@ -41,7 +41,7 @@ def test_it_is_the_first_that_is_offered() -> None:
 
 
 def test_it_refuses_an_experiment_that_it_is_not_made_for() -> None:
-    with pytest.raises(TypeError, match="only under the vertical loop, not with bowl"):
+    with pytest.raises(TypeError, match="px4, not with bowl"):
         propose(CALM, QuadraticExperiment(), QuadraticExperiment.space, [fly_bowl(1, 30.0, 40)])
 
 
@@ -250,6 +250,5 @@ def test_what_remains_reproduces_the_flight_and_fades_without_a_recorded_command
     assert recorded.error == pytest.approx(flight.error, rel=0.05)
 
 
-@compiled_only
-def test_it_is_registered_for_the_experiments_under_the_vertical_loop() -> None:
-    assert CALIBRATED.experiments == ("takeoff", "altitude-steps")
+def test_it_is_registered_for_the_experiments_whose_model_flights_identify() -> None:
+    assert CALIBRATED.experiments == ("takeoff", "altitude-steps", "altitude-steps-ardupilot", "altitude-steps-px4")

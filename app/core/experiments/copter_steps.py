@@ -1,0 +1,240 @@
+"""What altitude steps under ArduCopter and PX4 share: the sequence, its score, and the model of the vehicle.
+
+The model is the copter of `app.core.models.copter` under the replica of the autopilot's loop. It starts in hover at the
+first height, `LEAD_S` before the first step; until then it is where its reference is. Gains beside those in the
+experiment's space, filters and limits are the autopilot's parameters (`under`), by default the firmware's.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar, Final, Self
+
+import numpy as np
+
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import AltitudeLoop, Run
+from app.core.analysis.recorded_flight import Steps
+from app.core.definition import OptionValue
+from app.core.errors import InputError
+from app.core.experiments.base import (
+    Check,
+    Envelope,
+    Matrix,
+    ModelParameter,
+    ParameterDistribution,
+    Scatter,
+    SimplexSearch,
+    informed_parameters,
+)
+from app.core.experiments.copter_steps_hazards import COPTERS, check_altitudes, check_margin
+from app.core.experiments.step_sequence import ALTITUDE, REFERENCE, StepSequence, step_options
+from app.core.models.copter import DISTURBANCES, FLOWN, Copter
+from app.core.policy import PolicySpace, Vector
+from app.core.records.trajectory import Samples, Trajectory
+
+CLIMB_S: Final = 15.0
+"""Time from the command to the first step: ArduCopter's motors are off for 2 s after arming, PX4's thrust rises for 3 s
+in a takeoff, and both then settle."""
+GRID_HZ: Final = 50.0
+"""Rate of a model run's output."""
+
+_SEQUENCE: Final = StepSequence(climb_s=CLIMB_S)
+_SHOWN: Final = {ALTITUDE: "z_m", "climb_rate_m_s": "v_m_s", "throttle": "throttle"}
+
+
+def copter_parameters(hover: tuple[float, float], slope: tuple[float, float]) -> tuple[ModelParameter, ...]:
+    """The parameters of a copter in the order of `copter_of`: those in hover with their means and standard deviations
+    over vehicles."""
+    return (
+        _parameter("hover_throttle", "Hover throttle", "of full", *hover, 0.05, 0.9),
+        _parameter("thrust_slope", "Thrust slope", "1", *slope, 0.2, 3.0),
+        _parameter("motor_lag_s", "Motor lag", "s", 0.05, 0.05, 0.0, 0.25),
+        _parameter("drag_1_s", "Drag", "1/s", 0.3, 0.3, 0.0, 2.0),
+    )
+
+
+def _parameter(name: str, title: str, unit: str, mean: float, sd: float, lower: float, upper: float) -> ModelParameter:
+    return ModelParameter(name, title, unit, mean, lower, upper, prior_sd=sd, known_within=sd)
+
+
+def copter_of(model: Vector) -> Copter:
+    """The copter of model parameters, shape (4,)."""
+    hover_throttle, thrust_slope, motor_lag_s, drag_1_s = model.tolist()
+    return Copter(hover_throttle=hover_throttle, thrust_slope=thrust_slope, motor_lag_s=motor_lag_s, drag_1_s=drag_1_s)
+
+
+def vector_of(copter: Copter) -> Vector:
+    """The model parameters of a copter, shape (4,)."""
+    return np.array([copter.hover_throttle, copter.thrust_slope, copter.motor_lag_s, copter.drag_1_s])
+
+
+class CopterSteps(ABC):
+    """Steps of the altitude set point under an autopilot, with the model of a copter."""
+
+    name: ClassVar[str]
+    autopilot: ClassVar[str]
+    space: ClassVar[PolicySpace]
+    scatter: ClassVar[Scatter]
+    data_sheet: ClassVar[tuple[ModelParameter, ...]]
+    """The parameters of copters under this autopilot in general."""
+
+    options: Final = step_options(largest_step_m=2.0)
+    output: Final = ALTITUDE
+    integrates: Final = False
+    error_unit: Final = "m"
+    scored_from_s: Final = CLIMB_S
+    target_channel: Final = REFERENCE
+    least_model_error: Final = 0.0
+    search: Final = SimplexSearch(of_scale=0.5, evaluations=200)
+    difference: Final = 0.05
+
+    def __init__(
+        self,
+        *,
+        sequence: StepSequence = _SEQUENCE,
+        parameters: Mapping[str, float] | None = None,
+        model_parameters: tuple[ModelParameter, ...] | None = None,
+    ) -> None:
+        self.sequence: Final = sequence
+        self.set_points: Final = sequence.set_points
+        self.window_s: Final = sequence.ends_s
+        self.measure: Final = f"{sequence}, under {self.autopilot}"
+        self.parameters: Final = dict(parameters or {})
+        self.model_parameters: Final = self.data_sheet if model_parameters is None else model_parameters
+
+    @abstractmethod
+    def loop(self, gains: Vector) -> AltitudeLoop:
+        """The loop with these gains, shape (g,), and the autopilot's parameters."""
+
+    @abstractmethod
+    def read(self, trajectory: Trajectory, gains: Vector) -> LoggedFlight:
+        """A flight with these gains as an analysis takes it. Raises TrajectoryError if its record does not suffice."""
+
+    @abstractmethod
+    def references(self, steps_s: Samples) -> Samples:
+        """What the loop is given at the times of its steps, shape (m, 4) as `REFERENCE`; without a hover throttle that
+        it assumes."""
+
+    @property
+    def title(self) -> str:
+        return f"Altitude steps under {self.autopilot}"
+
+    @property
+    def steps(self) -> Steps:
+        """The scored part of a flight."""
+        return Steps(set_points=self.set_points, begin_s=self.scored_from_s, end_s=self.window_s)
+
+    def configured(self, options: Mapping[str, OptionValue]) -> Self:
+        """The experiment with another sequence; itself if that is its own."""
+        sequence = self.sequence.chosen(options, self.options)
+        return self if sequence == self.sequence else self._with(sequence=sequence)
+
+    def under(self, parameters: Mapping[str, float]) -> Self:
+        """The experiment with these parameters of the autopilot; itself if the replica of its loop lacks one."""
+        changed = self._with(parameters=parameters)
+        try:
+            changed.loop(self.space.default)
+        except InputError:
+            return self
+        return changed
+
+    def informed(self, mean: Vector, sd: Vector) -> Self:
+        """The experiment with another vehicle's fitted model: mean and standard deviation, shape (4,)."""
+        return self._with(model_parameters=informed_parameters(self.model_parameters, mean, sd))
+
+    def _with(
+        self,
+        *,
+        sequence: StepSequence | None = None,
+        parameters: Mapping[str, float] | None = None,
+        model_parameters: tuple[ModelParameter, ...] | None = None,
+    ) -> Self:
+        return type(self)(
+            sequence=sequence or self.sequence,
+            parameters=self.parameters if parameters is None else parameters,
+            model_parameters=model_parameters or self.model_parameters,
+        )
+
+    @property
+    def modelled(self) -> Self:
+        """The experiment itself."""
+        return self
+
+    @property
+    def nominal_model(self) -> Vector:
+        return np.array([parameter.nominal for parameter in self.model_parameters])
+
+    @property
+    def grid_s(self) -> Samples:
+        """Every 20 ms from the command to the first instant at or past the end of the window, shape (n,)."""
+        return np.arange(int(np.ceil(self.window_s * GRID_HZ)) + 1) / GRID_HZ
+
+    def set_point(self, time_s: Samples) -> Samples:
+        """The altitude asked for at each time, m."""
+        return self.set_points.at(time_s)
+
+    def errors(self, outputs: Matrix) -> Vector:
+        """Mean absolute distance from the reference, m, over the windows of the steps: (k, n) → (k,)."""
+        return self.sequence.errors(self.grid_s, outputs, self._reference())
+
+    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
+        """The same for a recorded flight, against its recorded reference; raises TrajectoryError if it does not
+        count."""
+        return self.sequence.error(trajectory, accept_gaps=accept_gaps)
+
+    def simulate(self, gains: Vector, model: Vector) -> Trajectory:
+        """One run of the model; before the first step, of its reference."""
+        steps_s, flown = self._fly(gains, model)
+        grid_s, reference = self.grid_s, self._reference()
+        channels = {name: np.interp(grid_s, steps_s, flown[:, FLOWN.index(of)]) for name, of in _SHOWN.items()}
+        channels[ALTITUDE] = np.where(grid_s < steps_s[0], reference, channels[ALTITUDE])
+        named = channels | {REFERENCE: reference, "set_point_m": self.set_point(grid_s)}
+        return Trajectory(grid_s, named, "model", "simulation")
+
+    def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
+        """Altitude of many policies, each on its own model or all on one: gains (k, g) → (k, n)."""
+        grid_s, reference = self.grid_s, self._reference()
+        altitudes = np.tile(reference, (len(gains), 1))
+        for row, (some, copter) in enumerate(zip(gains, np.broadcast_to(model, (len(gains), 4)), strict=True)):
+            steps_s, flown = self._fly(some, copter)
+            after = grid_s >= steps_s[0]
+            altitudes[row, after] = np.interp(grid_s[after], steps_s, flown[:, FLOWN.index("z_m")])
+        return altitudes
+
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
+        """None: a flight's disturbances act on the model of the strategy `calibrated` alone."""
+        return None
+
+    def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:  # noqa: ARG002
+        """`outputs`: there are no disturbances."""
+        return self.outputs(gains, model)
+
+    def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
+        """Altitudes of simulated flights, and the margin from ringing, on a few copters of the distribution."""
+        models = spread.sample(self, COPTERS)
+        altitudes = self.outputs(np.tile(gains, (COPTERS, 1)), models)
+        return (
+            *check_altitudes(altitudes, self.set_points, envelope.ceiling_m),
+            check_margin(self.loop(gains), [copter_of(model) for model in models]),
+        )
+
+    def _fly(self, gains: Vector, model: Vector) -> tuple[Samples, Samples]:
+        """Times of the loop's steps, shape (m,), and what is flown in still air, (m, 6) as `FLOWN`."""
+        loop, copter = self.loop(gains), copter_of(model)
+        steps_s = self.steps.steps_s(loop.step_s)
+        reference = self.references(steps_s)
+        reference[:, 3] = copter.hover_throttle
+        run = Run(
+            copter=loop.packed(copter),
+            reference=reference,
+            disturbances=np.zeros((len(steps_s), len(DISTURBANCES))),
+            start=(copter.hover_throttle, float(reference[0, 0]), 0.0, 0.0),
+        )
+        return steps_s, loop.fly(run)
+
+    def _reference(self) -> Samples:
+        """The altitude that the loop follows, on the grid."""
+        grid_s = self.grid_s
+        step_s = self.loop(self.space.default).step_s
+        steps_s = np.arange(0.0, grid_s[-1] + step_s, step_s)
+        return np.interp(grid_s, steps_s, self.references(steps_s)[:, 0])

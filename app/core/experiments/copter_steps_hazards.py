@@ -1,0 +1,53 @@
+"""What the gate checks of altitude steps under ArduCopter and PX4, on a few copters that the flights allow."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from app.core.analysis.loop import AltitudeLoop
+from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, damping_within_margin
+from app.core.experiments.base import Check, Matrix
+from app.core.models.copter import Copter
+from app.core.models.set_points import SetPoints
+
+COPTERS: Final = 5
+"""Copters of a distribution that are checked, and for which gains are searched."""
+
+
+def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) -> tuple[Check, Check]:
+    """Highest and lowest altitude of simulated flights, shape (k, n): below the ceiling, and above half of the lowest
+    set point."""
+    highest_m, lowest_m = float(altitudes.max()), float(altitudes.min())
+    floor_m = 0.5 * min(set_points.altitudes_m)
+    rises = "rises to" if highest_m <= ceiling_m else "would rise to"
+    falls = "falls to" if lowest_m >= floor_m else "would fall to"
+    return (
+        Check(
+            "altitude",
+            highest_m <= ceiling_m,
+            f"The highest of {len(altitudes)} simulated flights {rises} {highest_m:.2f} m; {ceiling_m:g} m is allowed.",
+            worst=highest_m,
+            limit=ceiling_m,
+        ),
+        Check(
+            "lowest altitude",
+            lowest_m >= floor_m,
+            f"The lowest of {len(altitudes)} simulated flights {falls} {lowest_m:.2f} m; {floor_m:g} m is allowed.",
+            worst=lowest_m,
+            limit=floor_m,
+        ),
+    )
+
+
+def check_margin(loop: AltitudeLoop, copters: Sequence[Copter]) -> Check:
+    """Whether the loop rings with none of the copters, each later than it is, and with more or less gain."""
+    damping = min(damping_within_margin(loop, each) for each in copters)
+    passed = damping >= RINGING_DAMPING
+    return Check(
+        "margin",
+        passed,
+        f"With {1e3 * EXTRA_LAG_S:.0f} ms more {loop.texts.lateness} and up to {REQUIRED_MARGIN:g} times the "
+        f"{loop.texts.fast_gains}, the least damped of {len(copters)} likely vehicles has a damping ratio of "
+        f"{damping:.2f}; {'at least ' if passed else ''}{RINGING_DAMPING:g} is needed.",
+        worst=damping,
+        limit=RINGING_DAMPING,
+    )

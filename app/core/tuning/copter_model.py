@@ -1,0 +1,192 @@
+"""The model of a vehicle under ArduCopter or PX4, fitted to a campaign's altitude steps: a flight is a log.
+
+The vehicle comes from a regression over all fitted flights (`app.core.analysis.vehicle_fit`). Predictions fly the
+autopilot's replica along the reference of the best flight, with the disturbances that this flight had
+(`app.core.analysis.prediction`). Gains are searched as for a log (`app.core.analysis.proposal`): the least error that
+keeps the margin from ringing, and moves the throttle at most 1.5 times as much as the gains of the first flight.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.loop import AltitudeLoop, GainSpace
+from app.core.analysis.margin import (
+    EXTRA_LAG_S,
+    LARGEST_MARGIN,
+    REQUIRED_MARGIN,
+    RINGING_DAMPING,
+    damping_within_margin,
+    gain_margin,
+)
+from app.core.analysis.prediction import FlightModel
+from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
+from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
+from app.core.definition import Flight, best_flight
+from app.core.experiments.base import (
+    FittedParameter,
+    Matrix,
+    ModelledExperiment,
+    ParameterDistribution,
+    fitted_parameters,
+)
+from app.core.experiments.copter_steps import CopterSteps, copter_of, vector_of
+from app.core.experiments.copter_steps_hazards import COPTERS
+from app.core.models.copter import Copter
+from app.core.policy import Vector
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.calibration import fitted_flights
+from app.core.tuning.predictions import CONFIDENCE, FlightPrediction
+from app.core.tuning.strategy import Interval, band_channels
+from app.core.tuning.trust_region import Box
+
+_DIGITS: Final = 3
+
+
+class CopterModel:
+    """A `CampaignModel`."""
+
+    least_improvement: Final = 0.05
+
+    def __init__(self, experiment: CopterSteps, flights: Sequence[Flight]) -> None:
+        """Raises TrajectoryError if a record does not suffice, and InputError for a parameter of the autopilot that its
+        replica lacks."""
+        used = fitted_flights(flights)
+        self.base: Final = best_flight(used)
+        self.numbers: Final = tuple(flight.number for flight in used)
+        self._experiment: Final = experiment.under(self.base.parameters)
+        self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
+        self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
+        first = next(flight for flight in flights if flight.outcome == "valid")
+        self._first: Final = self._loop(experiment.space.vector(first.gains))
+
+    @cached_property
+    def _values(self) -> Matrix:
+        """Parameters of the copters that the flights allow, shape (k, 4)."""
+        return np.array([vector_of(copter) for copter in self._estimate.draws])
+
+    @property
+    def fitted(self) -> tuple[FittedParameter, ...]:
+        parameters = self._experiment.model_parameters
+        return fitted_parameters(
+            parameters, self._values.mean(axis=0), np.diag(vector_of(self._estimate.deviation) ** 2)
+        )
+
+    @cached_property
+    def spread(self) -> ParameterDistribution:
+        beyond = vector_of(self._estimate.deviation) ** 2 - self._values.var(axis=0)
+        covariance = np.cov(self._values.T, bias=True) + np.diag(np.maximum(beyond, 0.0))
+        flights = f"{len(self.numbers)} flight{'s' if len(self.numbers) > 1 else ''}"
+        return ParameterDistribution(
+            mean=tuple(self._values.mean(axis=0).tolist()),
+            covariance=tuple(tuple(row) for row in covariance.tolist()),
+            origin=f"the fit to {flights}",
+        )
+
+    @cached_property
+    def _copters(self) -> Sequence[Copter]:
+        """Those of the gate, for which gains are searched."""
+        return [copter_of(model) for model in self.spread.sample(self._experiment, COPTERS)]
+
+    @property
+    def _log(self) -> LoggedFlight:
+        return self._logs[self.base.number]
+
+    @cached_property
+    def _few(self) -> FlightModel:
+        return FlightModel(self._log, self._copters)
+
+    @cached_property
+    def _all(self) -> FlightModel:
+        return FlightModel(self._log, self._estimate.draws)
+
+    def _loop(self, gains: Vector) -> AltitudeLoop:
+        return self._experiment.loop(gains)
+
+    def optimum(self, box: Box) -> Vector | None:
+        space, here = self._experiment.space, space_within(self._log.loop.space, self._experiment, box)
+        rules = self._log.loop.rules(self._log.throttle_mean)
+        found = propose(
+            self._log, self._copters, [self._log.loop.gains, *rules.values()], space=here, usual=self._first.gains
+        )
+        return None if found is None else space.vector({**self.base.gains, **found})
+
+    def merits(self, gains: Matrix) -> Vector:
+        return np.array([self._few.fly(self._loop(each))[0] for each in gains])
+
+    errors = merits
+
+    def is_worth_a_flight(self, here: Vector, there: Vector) -> bool:
+        now, then = self.merits(np.stack((here, there))).tolist()
+        return bool(then <= (1.0 - self.least_improvement) * now) or self._damping(
+            here
+        ) < RINGING_DAMPING <= self._damping(there)
+
+    def _damping(self, gains: Vector) -> float:
+        return min(damping_within_margin(self._loop(gains), each) for each in self._copters)
+
+    def rounded(self, gains: Vector) -> Vector:
+        return np.array([float(f"{value:.{_DIGITS}g}") for value in gains])
+
+    def predict(self, gains: Vector) -> FlightPrediction:
+        from scipy.special import ndtri
+
+        experiment, loop = self._experiment, self._loop(gains)
+        predicted = self._all.predict(loop)
+        time_s, altitudes, elsewhen = self._all.curves(loop)
+        grid_s = experiment.grid_s
+        reference = experiment.simulate(gains, experiment.nominal_model)[experiment.output]
+        after = grid_s >= time_s[0]
+        reach = float(ndtri(0.5 + CONFIDENCE / 2.0)) * elsewhen.std(axis=0)
+        curve, low, high = (reference.copy() for _ in range(3))
+        mean = altitudes.mean(axis=0)
+        for whole, part in ((curve, mean), (low, mean - reach), (high, mean + reach)):
+            whole[after] = np.interp(grid_s[after], time_s, part)
+        lower, upper = band_channels(experiment.output)
+        return FlightPrediction(
+            trajectory=Trajectory(grid_s, {experiment.output: curve, lower: low, upper: high}, "model", "simulation"),
+            error=predicted.error_m,
+            interval=Interval(lower=predicted.low_m, upper=predicted.high_m, confidence=CONFIDENCE),
+            models=self._values,
+            errors=self._all.errors(loop),
+        )
+
+    def notes(self, gains: Vector) -> tuple[str, ...]:
+        loop, texts = self._loop(gains), self._log.loop.texts
+        activity = self._few.fly(loop)[1] / self._few.fly(self._first)[1]
+        margin = min(gain_margin(loop, each) for each in self._copters)
+        beyond = "at least " if margin == LARGEST_MARGIN else ""
+        moves = (
+            f"The throttle moves {activity:.2f} times as much as with the gains of the first flight; "
+            f"{LARGEST_ACTIVITY:g} times is allowed."
+        )
+        rings = (
+            f"With {1e3 * EXTRA_LAG_S:.0f} ms more {texts.lateness}, the altitude begins to ring with {beyond}"
+            f"{margin:.1f} times the {texts.fast_gains}; {REQUIRED_MARGIN:g} times is required."
+        )
+        return (moves, rings)
+
+
+def _read(experiment: CopterSteps, flight: Flight) -> LoggedFlight:
+    gains = experiment.space.vector(flight.gains)
+    return experiment.under(flight.parameters).read(flight.trajectory.as_stored(), gains)
+
+
+def space_within(space: GainSpace, experiment: CopterSteps, box: Box) -> GainSpace:
+    """The gains of an analysis within a box; where they do not meet, the end of the box that is nearest."""
+    low, high = experiment.space.by_name(box.low), experiment.space.by_name(box.high)
+    bounds: Mapping[str, tuple[float, float]] = {
+        name: (float(np.clip(ends[0], low[name], high[name])), float(np.clip(ends[1], low[name], high[name])))
+        for name, ends in space.bounds.items()
+    }
+    return replace(space, bounds=bounds)
+
+
+def fit_copter_steps(experiment: ModelledExperiment, flights: Sequence[Flight]) -> CopterModel:
+    """The model of these flights; at least one must be valid."""
+    assert isinstance(experiment, CopterSteps)
+    return CopterModel(experiment, flights)

@@ -1,0 +1,221 @@
+"""What the second flight of a campaign of altitude steps is worth on random copters, under ArduCopter and PX4.
+
+    ./dev exec python -m bench.copter_steps                   a few vehicles, against limits
+    ./dev exec python -m bench.copter_steps --vehicles 100    the figures of docs/benchmarks.md
+
+Every vehicle has more physics than the model (bench/copters/simulation.py), gusts, and an estimator that wanders. It
+flies the default gains and then the proposal of `calibrated`, through the campaign's own path: record, score, fit,
+proposal, gate. Errors of gain sets are means of further flights in other weather. The best gains are the best of a grid
+that keep the limits of a proposal, the margin on the vehicle's own linear model. Exits with 1 beyond the limits, which
+are loose because the vehicles are few.
+"""
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, least_damping
+from app.core.analysis.proposal import LARGEST_ACTIVITY
+from app.core.definition import Definition, Flight
+from app.core.errors import TrajectoryError
+from app.core.policy import Gains
+from app.core.records.trajectory import Trajectory
+from app.core.tuning.gate import check_policy
+from app.core.tuning.proposals import next_proposal
+from bench.copters.campaign_flights import RIGS, CampaignRig
+from bench.copters.rigs import RIGS as GRIDS
+from bench.copters.simulation import SimulatedCopter
+
+SEED: Final = 20261128
+QUICK_VEHICLES: Final = 4
+FLIGHTS: Final = 4
+FLIGHTS_OF_THE_GRID: Final = 2
+PROPOSED: Final = "second flight"
+LIMITS: Final[Mapping[str, float]] = {"worse": 0.0, "unsafe": 0.0, "covered": 0.5, "near": 0.5}
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What became of a vehicle: errors, m, by gain set, the least of the grid, the kind of the second proposal and the
+    refusals of the gate, whether its interval contains each flight, and the gain sets that ring or lack the margin."""
+
+    errors_m: Mapping[str, float]
+    best_m: float
+    kind: str
+    refused: int
+    covered: Sequence[bool]
+    predicted_m: float
+    rang: frozenset[str]
+    lacks_margin: frozenset[str]
+    failure: str
+
+
+class Vehicle:
+    """A random copter under an autopilot, and its flights."""
+
+    def __init__(self, rig: CampaignRig, random: np.random.Generator) -> None:
+        self._rig = rig
+        self.copter: SimulatedCopter = rig.sample(random)
+        self.parameters = rig.parameters(self.copter)
+
+    def fly(self, gains: Gains, seed: int) -> Trajectory:
+        """The stored record of a flight."""
+        return self._rig.fly(self._rig.experiment, self.copter, {**self.parameters, **gains}, seed)
+
+    def error(self, gains: Gains, seeds: Sequence[int]) -> float:
+        """Mean error of flights with these gains; infinite if one cannot be scored."""
+        try:
+            return float(np.mean([self._rig.experiment.error(self.fly(gains, seed)) for seed in seeds]))
+        except TrajectoryError:
+            return np.inf
+
+    def flight(self, number: int, gains: Gains, seed: int) -> Flight:
+        """A valid flight of a campaign."""
+        record = self.fly(gains, seed)
+        return Flight(
+            number=number,
+            gains=dict(gains),
+            trajectory=record,
+            error=self._rig.experiment.error(record),
+            outcome="valid",
+            parameters={**self.parameters, **gains},
+        )
+
+    def activity(self, gains: Gains, seeds: Sequence[int]) -> float:
+        """Standard deviation of the demanded throttle about its own mean over half a second, after the first step."""
+        moved = []
+        for seed in seeds:
+            record = self.fly(gains, seed)
+            throttle = record["throttle"][record.time_s >= self._rig.experiment.scored_from_s]
+            slow = np.convolve(throttle, np.full(25, 0.04), mode="same")
+            moved.append(float(np.std((throttle - slow)[25:-25])))
+        return float(np.mean(moved))
+
+    def damping(self, gains: Gains) -> tuple[float, float]:
+        """Least damping of the vehicle's own linear model, as it is and within the margin."""
+        experiment = self._rig.experiment.under(self.parameters)
+        loop, copter = experiment.loop(experiment.space.vector(gains)), self.copter.linear
+        return least_damping(loop, copter), damping_within_margin(loop, copter)
+
+
+def judge(number: int, *, name: str) -> Result:
+    """Fly, propose, and fly what is proposed and what people would set."""
+    rig, random = RIGS[name], np.random.default_rng((SEED, number))
+    vehicle, experiment = Vehicle(rig, random), rig.experiment
+    seeds = random.integers(2**31, size=FLIGHTS + 2).tolist()
+    definition = Definition(experiment=experiment.name, strategy="calibrated")
+    first = vehicle.flight(1, experiment.space.mapping(experiment.space.default), seeds[0])
+    try:
+        proposal = next_proposal(definition, [first])
+    except TrajectoryError as error:
+        return Result({}, np.nan, "failed", 0, (), np.nan, frozenset(), frozenset(), str(error))
+    gate = check_policy(definition, experiment, experiment.space, proposal.gains, [first], spread=proposal.spread)
+    loop = experiment.under(vehicle.parameters).loop(experiment.space.default)
+    rules = loop.rules(vehicle.copter.hover_throttle)
+    sets = {
+        PROPOSED: proposal.gains,
+        **{rule: {**first.gains, **gains} for rule, gains in rules.items()},
+    }
+    errors_m = {each: vehicle.error(gains, seeds[2:]) for each, gains in sets.items()}
+    damping = {each: vehicle.damping(gains) for each, gains in sets.items()}
+    interval = proposal.interval
+    flown = [vehicle.error(proposal.gains, [seed]) for seed in seeds[2:]]
+    return Result(
+        errors_m=errors_m,
+        best_m=least_error(name, vehicle, first.gains, seeds[2:]),
+        kind=proposal.kind,
+        refused=len(gate.refusals),
+        covered=[interval is not None and error in interval for error in flown],
+        predicted_m=proposal.predicted_error or np.nan,
+        rang=frozenset(each for each, (own, _) in damping.items() if own < RINGING_DAMPING),
+        lacks_margin=frozenset(each for each, (_, within) in damping.items() if within < RINGING_DAMPING),
+        failure="",
+    )
+
+
+def least_error(name: str, vehicle: Vehicle, first: Gains, seeds: Sequence[int]) -> float:
+    """Least error, m, of the gains of the grid that keep the limits of a proposal."""
+    some = seeds[:FLIGHTS_OF_THE_GRID]
+    usual = vehicle.activity(first, some)
+    names = GRIDS[name].first_loop(vehicle.copter).space.bounds
+    candidates = []
+    for values in product(*GRIDS[name].grid):
+        gains = {**first, **dict(zip(names, values, strict=True))}
+        if gains.get("PSC_ACCZ_I", 1.0) < gains.get("PSC_ACCZ_P", 0.0):
+            continue
+        if vehicle.damping(gains)[1] >= RINGING_DAMPING and (
+            vehicle.activity(gains, some) <= LARGEST_ACTIVITY * usual or name == "PX4"
+        ):
+            candidates.append((vehicle.error(gains, some), gains))
+    best = min(candidates, key=lambda each: each[0])[1]
+    return vehicle.error(best, seeds)
+
+
+def print_sets(answered: Sequence[Result]) -> None:
+    """A line for each gain set."""
+    best_m = np.array([each.best_m for each in answered])
+    for name in answered[0].errors_m:
+        errors_m = np.array([each.errors_m[name] for each in answered])
+        ratio = errors_m / best_m
+        print(
+            f"{name:40} median {1e3 * np.median(errors_m):.1f} mm, 95 % below {1e3 * np.quantile(errors_m, 0.95):.1f} mm;"
+            f" of the best: median {np.median(ratio):.2f}, within 10 % {np.mean(ratio <= 1.1):.0%}; ring "
+            f"{sum(name in each.rang for each in answered)}, lack the margin "
+            f"{sum(name in each.lacks_margin for each in answered)}"
+        )
+
+
+def measure(name: str, count: int, processes: int) -> bool:
+    """Judge vehicles under an autopilot, print what became of them; whether the limits hold."""
+    with ProcessPoolExecutor(processes) as pool:
+        results = list(pool.map(partial(judge, name=name), range(count)))
+    answered = [each for each in results if not each.failure]
+    print(f"\n{name}: {len(answered)} of {count} vehicles fitted", flush=True)
+    for each in results:
+        if each.failure:
+            print(f"    {each.failure}")
+    defaults = list(answered[0].errors_m)[1]
+    print_sets(answered)
+    best_m = np.array([each.best_m for each in answered])
+    print(f"{'best of the grid':40} median {1e3 * np.median(best_m):.1f} mm")
+    second = np.array([each.errors_m[PROPOSED] for each in answered])
+    usual = np.array([each.errors_m[defaults] for each in answered])
+    found = {
+        "worse": float(np.mean(second > usual)),
+        "unsafe": float(np.mean([PROPOSED in each.rang for each in answered])),
+        "covered": float(np.mean([covered for each in answered for covered in each.covered])),
+        "near": float(np.mean(second <= 1.1 * best_m)),
+    }
+    kinds = [each.kind for each in answered]
+    print(f"proposals: {', '.join(f'{kinds.count(kind)} {kind}' for kind in sorted(set(kinds)))}")
+    print(f"refused by the gate: {sum(each.refused > 0 for each in answered)}")
+    print(f"worse than the default gains {found['worse']:.0%}; flights inside the 90 % interval {found['covered']:.0%}")
+    bias = second / np.array([each.predicted_m for each in answered])
+    print(
+        f"flown over predicted: median {np.median(bias):.2f}, 5 … 95 % {np.quantile(bias, 0.05):.2f} … {np.quantile(bias, 0.95):.2f}"
+    )
+    return all(
+        found[what] <= limit if what in ("worse", "unsafe") else found[what] >= limit for what, limit in LIMITS.items()
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="bench.copter_steps")
+    parser.add_argument("--vehicles", type=int, default=QUICK_VEHICLES)
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--autopilot", choices=list(RIGS), default=None)
+    chosen = parser.parse_args()
+    names = [chosen.autopilot] if chosen.autopilot else list(RIGS)
+    passed = [measure(name, chosen.vehicles, chosen.processes) for name in names]
+    return int(not all(passed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
