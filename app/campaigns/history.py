@@ -31,7 +31,7 @@ from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
 from app.db import trajectories
-from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialRow
+from app.db.models import CampaignRow, FlightRow, OptionsJson, TrajectoryRow, TrialRow
 from app.db.trajectories import trajectory_of, unpack
 from app.db.types import utc_now
 
@@ -49,7 +49,8 @@ def trials_of(session: Session, *campaign_ids: int) -> Sequence[TrialRow]:
 
 
 def flights_of(session: Session, campaign_id: int, *, recorded: Collection[int] | None = None) -> tuple[Flight, ...]:
-    """The valid and aborted flights with their trajectories as stored; of those not in `recorded`, without samples."""
+    """The valid and aborted flights with their trajectories as stored and their autopilot's parameters; of those not in
+    `recorded`, without samples."""
     rows = in_history(trials_of(session, campaign_id))
     wanted = {
         row.number: row.trajectory_id
@@ -57,8 +58,14 @@ def flights_of(session: Session, campaign_id: int, *, recorded: Collection[int] 
         if row.trajectory_id is not None and (recorded is None or row.number in recorded)
     }
     records = trajectories.samples_of(session, wanted.values())
+    settings = repository.settings(session, [row.id for row in rows])
     return tuple(
-        _flight(row, _recorded(row, records[wanted[row.number]]) if row.number in wanted else _NOTHING) for row in rows
+        _flight(
+            row,
+            _recorded(row, records[wanted[row.number]]) if row.number in wanted else _NOTHING,
+            _numbers(settings[row.id]),
+        )
+        for row in rows
     )
 
 
@@ -73,12 +80,19 @@ def donor_of(session: Session, experiment: Experiment, donor: Donor) -> Flight |
         return None
     record = trajectory_of(session, rows[0].trajectory.id)
     error = experiment.error(record, accept_gaps=True)
-    return Flight(number=rows[0].number, gains=rows[0].gains, trajectory=record, error=error, outcome="valid")
+    return Flight(
+        number=rows[0].number,
+        gains=rows[0].gains,
+        trajectory=record,
+        error=error,
+        outcome="valid",
+        parameters=_numbers(rows[0].settings),
+    )
 
 
 def flown_gains(trials: Sequence[TrialRow]) -> tuple[Flight, ...]:
-    """The flights without samples, for checks that look at gains only."""
-    return tuple(_flight(row, _NOTHING) for row in in_history(trials))
+    """The flights without samples and parameters, for checks that look at gains only."""
+    return tuple(_flight(row, _NOTHING, {}) for row in in_history(trials))
 
 
 def valid_flights(session: Session, campaign_id: int) -> tuple[Flight, ...]:
@@ -190,7 +204,7 @@ def _recorded(row: TrialRow, record: TrajectoryRow) -> Trajectory:
         ) from error
 
 
-def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
+def _flight(row: TrialRow, trajectory: Trajectory, parameters: Mapping[str, float]) -> Flight:
     outcome: Literal["valid", "aborted"] = "valid" if row.state == TrialState.VALID else "aborted"
     return Flight(
         number=row.number,
@@ -200,7 +214,17 @@ def _flight(row: TrialRow, trajectory: Trajectory) -> Flight:
         outcome=outcome,
         predicted=_predicted(row),
         against_gains=_is_against_gains(row),
+        parameters=parameters,
     )
+
+
+def _numbers(settings: OptionsJson) -> dict[str, float]:
+    """The numbers among a flight's settings, with the parameters of its autopilot."""
+    return {
+        name: float(value)
+        for name, value in settings.items()
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    }
 
 
 def _is_against_gains(row: TrialRow) -> bool:

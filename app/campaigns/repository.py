@@ -16,6 +16,7 @@ from app.db.models import (
     CampaignRow,
     FlightRow,
     GainsJson,
+    OptionsJson,
     ProposalRow,
     RehearsalRow,
     TrajectoryRow,
@@ -59,6 +60,12 @@ def checksums(session: Session, campaign_id: int) -> Mapping[int, str]:
     """Checksums of the trials' records, by trial id."""
     wanted = select(TrialRow.id, TrajectoryRow.checksum).join(TrialRow.trajectory)
     return dict(session.execute(wanted.where(TrialRow.campaign_id == campaign_id)).all())
+
+
+def settings(session: Session, trial_ids: Collection[int]) -> Mapping[int, OptionsJson]:
+    """What the vehicles reported of these trials' flights, by trial id."""
+    wanted = select(TrialRow.id, TrialRow.settings).where(TrialRow.id.in_(trial_ids))
+    return dict(session.execute(wanted).all())
 
 
 def gated(session: Session, campaign_id: int) -> Sequence[tuple[int, TrialState, bool]]:

@@ -83,7 +83,7 @@ def _asked(session: Session, campaign: CampaignRow, asked: Gains) -> tuple[dict[
     definition = definition_of(campaign)
     experiment, space = experiment_of(definition), space_of(definition)
     gains = space.complete(asked)
-    flown = history.flown_gains(history.trials_of(session, campaign.id))
+    flown = history.flights_of(session, campaign.id, recorded=())
     searched = definition.start.kind == "simplex" and not any(flight.outcome == "valid" for flight in flown)
     gate = check_policy(
         definition,
