@@ -15,7 +15,6 @@ from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, STEP_S, parame
 from app.core.experiments import get_experiment
 from app.core.experiments.copter_steps import CopterSteps
 from app.core.models.set_points import SetPoints
-from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
 from bench.copters import px4_simulation, simulation
 from bench.copters.px4_simulation import sample_px4
@@ -29,12 +28,14 @@ _RECORD_HZ: Final = 50.0
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignRig:
     """An autopilot with random vehicles: its experiment, what of the vehicle's parameters differs from the firmware's
-    defaults, and flights with gains and a seed of the weather; `grid` has values of each gain that is searched."""
+    defaults, and flights with gains and a seed of the weather. `counts_reference` if the throttle that the reference
+    alone commands counts as activity."""
 
     experiment: CopterSteps
     sample: Callable[[np.random.Generator], SimulatedCopter]
     parameters: Callable[[SimulatedCopter], Mapping[str, float]]
     fly: Callable[[CopterSteps, SimulatedCopter, Mapping[str, float], int], Trajectory]
+    counts_reference: bool
 
 
 def _copter_steps(name: str) -> CopterSteps:
@@ -88,22 +89,19 @@ def _px4_parameters(copter: SimulatedCopter) -> Mapping[str, float]:
     return {**values, "MPC_THR_HOVER": copter.assumed_hover_throttle, "IMU_INTEG_RATE": 250.0}
 
 
-def with_gains(parameters: Mapping[str, float], gains: Gains) -> Mapping[str, float]:
-    """The vehicle's parameters in a flight with these gains."""
-    return {**parameters, **gains}
-
-
 RIGS: Final[Mapping[str, CampaignRig]] = {
     "ArduCopter": CampaignRig(
         experiment=_copter_steps("altitude-steps-ardupilot"),
         sample=sample,
         parameters=_ardupilot_parameters,
         fly=_fly_ardupilot,
+        counts_reference=True,
     ),
     "PX4": CampaignRig(
         experiment=_copter_steps("altitude-steps-px4"),
         sample=sample_px4,
         parameters=_px4_parameters,
         fly=_fly_px4,
+        counts_reference=False,
     ),
 }
