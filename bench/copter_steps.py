@@ -71,10 +71,14 @@ class Vehicle:
         """The stored record of a flight."""
         return self._rig.fly(self._rig.experiment, self.copter, {**self.parameters, **gains}, seed)
 
-    def error(self, gains: Gains, seeds: Sequence[int]) -> float:
-        """Mean error of flights with these gains; infinite if one cannot be scored."""
+    def records(self, gains: Gains, seeds: Sequence[int]) -> list[Trajectory]:
+        """The records of several flights."""
+        return [self.fly(gains, seed) for seed in seeds]
+
+    def error(self, records: Sequence[Trajectory]) -> float:
+        """Mean error of flights; infinite if one cannot be scored."""
         try:
-            return float(np.mean([self._rig.experiment.error(self.fly(gains, seed)) for seed in seeds]))
+            return float(np.mean([self._rig.experiment.error(each) for each in records]))
         except TrajectoryError:
             return np.inf
 
@@ -90,12 +94,11 @@ class Vehicle:
             parameters={**self.parameters, **gains},
         )
 
-    def activity(self, gains: Gains, seeds: Sequence[int]) -> float:
-        """Throttle activity as in the analysis, from the first step on."""
+    def activity(self, gains: Gains, seeds: Sequence[int], records: Sequence[Trajectory]) -> float:
+        """Throttle activity of flights as in the analysis, from the first step on."""
         calm = replace(self.copter, gust_m_s2=0.0, noise_m_s2=0.0, wander_m_s=0.0, wander_m=0.0)
         found = []
-        for seed in seeds:
-            record = self.fly(gains, seed)
+        for seed, record in zip(seeds, records, strict=True):
             moved = record["throttle"]
             if not self._rig.counts_reference:
                 still = self._rig.fly(self._rig.experiment, calm, {**self.parameters, **gains}, seed)
@@ -130,10 +133,10 @@ def judge(number: int, *, name: str) -> Result:
         PROPOSED: proposal.gains,
         **{rule: {**first.gains, **gains} for rule, gains in rules.items()},
     }
-    errors_m = {each: vehicle.error(gains, seeds[2:]) for each, gains in sets.items()}
+    errors_m = {each: vehicle.error(vehicle.records(gains, seeds[2:])) for each, gains in sets.items()}
     damping = {each: vehicle.damping(gains) for each, gains in sets.items()}
     interval = proposal.interval
-    flown = [vehicle.error(proposal.gains, [seed]) for seed in seeds[2:]]
+    flown = [vehicle.error([record]) for record in vehicle.records(proposal.gains, seeds[2:])]
     return Result(
         errors_m=errors_m,
         best_m=least_error(name, vehicle, first.gains, seeds[2:]),
@@ -150,7 +153,7 @@ def judge(number: int, *, name: str) -> Result:
 def least_error(name: str, vehicle: Vehicle, first: Gains, seeds: Sequence[int]) -> float:
     """Least error, m, of the gains of the grid that keep the limits of a proposal."""
     some = seeds[:FLIGHTS_OF_THE_GRID]
-    usual = vehicle.activity(first, some)
+    usual = vehicle.activity(first, some, vehicle.records(first, some))
     names = GRIDS[name].first_loop(vehicle.copter).space.bounds
     candidates = []
     for values in product(*GRIDS[name].grid):
@@ -159,10 +162,11 @@ def least_error(name: str, vehicle: Vehicle, first: Gains, seeds: Sequence[int])
             continue
         if vehicle.damping(gains)[1] < RINGING_DAMPING:
             continue
-        if vehicle.activity(gains, some) <= LARGEST_ACTIVITY * usual:
-            candidates.append((vehicle.error(gains, some), gains))
+        records = vehicle.records(gains, some)
+        if vehicle.activity(gains, some, records) <= LARGEST_ACTIVITY * usual:
+            candidates.append((vehicle.error(records), gains))
     best = min(candidates, key=lambda each: each[0])[1]
-    return vehicle.error(best, seeds)
+    return vehicle.error(vehicle.records(best, seeds))
 
 
 def print_sets(answered: Sequence[Result]) -> None:

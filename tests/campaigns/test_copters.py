@@ -135,7 +135,7 @@ def test_a_registered_copter_flies_the_takeoff_of_its_own_gains(client: TestClie
 def test_the_catalogue_says_which_experiments_have_no_model_and_what_they_can_be_flown_with(client: TestClient) -> None:
     catalogue = get(client, "/api/catalogue")
     without = [each["name"] for each in catalogue["experiments"] if not each["has_model"]]
-    assert without == ["takeoff-ardupilot", "takeoff-px4", "altitude-steps-ardupilot", "altitude-steps-px4"]
+    assert without == ["takeoff-ardupilot", "takeoff-px4"]
     usable = [each["name"] for each in catalogue["strategies"] if "takeoff-px4" in each["experiments"]]
     assert usable == ["manual"]
     assert create_campaign(client, vehicle="import", definition=PX4)["state"] == "draft"

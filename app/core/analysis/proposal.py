@@ -87,21 +87,32 @@ def propose(
     if not allowed:
         return None
 
+    found = min(allowed, key=cost)
+    free = high > low
+
+    def whole(point: Samples) -> _Point:
+        """All coordinates, shape (k,), from those that are free to change."""
+        coordinates = low.copy()
+        coordinates[free] = point
+        return tuple(coordinates.tolist())
+
     def cost_at(point: Samples) -> float:
-        return cost(tuple(point.tolist()))
+        return cost(whole(point))
 
     def excess_at(point: Samples) -> Samples:
-        return np.array(excess(tuple(point.tolist())))
+        return np.array(excess(whole(point)))
 
-    found = minimize(
-        cost_at,
-        np.array(min(allowed, key=cost)),
-        method="COBYQA",
-        bounds=Bounds(low, high),
-        constraints=NonlinearConstraint(excess_at, -np.inf, -_ROUNDING),
-        options={"maxfev": _MOST_FLIGHTS, "initial_tr_radius": _FIRST_STEP, "final_tr_radius": _LAST_STEP},
-    )
-    rounded = tuple(space.coordinates(_rounded(space, space.gains_at(found.x))).tolist())
+    if free.any():
+        result = minimize(
+            cost_at,
+            np.array(found)[free],
+            method="COBYQA",
+            bounds=Bounds(low[free], high[free]),
+            constraints=NonlinearConstraint(excess_at, -np.inf, -_ROUNDING),
+            options={"maxfev": _MOST_FLIGHTS, "initial_tr_radius": _FIRST_STEP, "final_tr_radius": _LAST_STEP},
+        )
+        found = whole(result.x)
+    rounded = tuple(space.coordinates(_rounded(space, space.gains_at(np.array(found)))).tolist())
     candidates = [point for point in (rounded, *allowed) if max(excess(point)) <= 0.0]
     least = min(map(cost, candidates))
     best = max((point for point in candidates if cost(point) <= least + _AS_GOOD), key=margin)

@@ -107,13 +107,14 @@ def read_ardupilot(loop: ArduPilotLoop, trajectory: Trajectory, steps: Steps) ->
     demanded = np.interp(steps_s, trajectory.time_s, trajectory["throttle"])
     gain = ardupilot_parameters.low_pass_gain(_THROTTLE_HZ, loop.step_s)
     sent = filtered(demanded, (np.array([gain]), np.array([1.0, gain - 1.0])))
-    scored = steps_s >= steps.begin_s
+    scored = (trajectory.time_s >= steps.begin_s) & (trajectory.time_s <= steps.end_s)
+    moved = trajectory["throttle"] - np.interp(trajectory.time_s, steps_s, sent)
     return LoggedFlight(
         loop=loop,
         segments=[
             _segment(trajectory, rows_s, (z_d, v_d, a_d), steps_s, sent, np.full(len(rows_s), np.nan)),
         ],
-        activity=float(np.std((demanded - sent)[scored])),
+        activity=float(np.std(moved[scored])),
     )
 
 

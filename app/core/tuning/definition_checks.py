@@ -9,6 +9,7 @@ from app.core.errors import InputError, Problem
 from app.core.experiments import EXPERIMENTS
 from app.core.policy import PolicySpace
 from app.core.tuning.strategies import STRATEGIES
+from app.core.tuning.strategies.simplex import SIMPLEX
 
 MAX_FLIGHTS: Final = 200
 MAX_IMPROVEMENT: Final = 0.5
@@ -67,11 +68,14 @@ def _options(definition: Definition) -> Iterator[Problem]:
 def _fit(definition: Definition) -> Iterator[Problem]:
     if definition.strategy not in STRATEGIES or definition.experiment not in EXPERIMENTS:
         return
-    strategy = STRATEGIES[definition.strategy]
-    if EXPERIMENTS[definition.experiment].modelled is None:
+    strategy, experiment = STRATEGIES[definition.strategy], EXPERIMENTS[definition.experiment]
+    if experiment.modelled is None:
         yield from _without_model(definition)
-    elif strategy.experiments and definition.experiment not in strategy.experiments:
+        return
+    if strategy.experiments and definition.experiment not in strategy.experiments:
         yield Problem("strategy", f"{strategy.name!r} works only with {', '.join(strategy.experiments)}")
+    if definition.start.kind == "simplex" and not SIMPLEX.works_with(experiment):
+        yield Problem("start.kind", f"'simplex' works only with {', '.join(SIMPLEX.experiments)}")
 
 
 def _without_model(definition: Definition) -> Iterator[Problem]:

@@ -6,12 +6,19 @@ from typing import Final
 import numpy as np
 import pytest
 
-from app.core.definition import Definition, OptionValue
+from app.core.definition import Definition, OptionValue, Start
 from app.core.experiments import get_experiment
+from app.core.experiments.altitude_steps_copters import ArduPilotSteps, Px4Steps
+from app.core.experiments.base import Check, Envelope, prior_distribution
+from app.core.experiments.copter_steps import CopterSteps
+from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.definition_checks import problems_of
+from tests.core.tuning.flying import compiled_only
 
 NAMES: Final = ("altitude-steps-ardupilot", "altitude-steps-px4")
+SHORT: Final = {"steps": 2, "step_window_s": 3.0}
+BOTH: Final[tuple[CopterSteps, ...]] = (ArduPilotSteps().configured(SHORT), Px4Steps().configured(SHORT))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -49,8 +56,9 @@ def test_the_score_is_the_mean_distance_from_the_recorded_reference(name: str) -
     assert steps.error(Trajectory(time_s, channels, "ardupilot", "vehicle")) == pytest.approx(0.1, abs=1e-3)
 
 
+@compiled_only
 def test_px4_is_scored_against_the_set_point_and_arducopter_against_the_target_that_it_shapes() -> None:
-    """1 m within 1 m/s² and 5 m/s³ takes two seconds; until then the shaped target is 0.46 m away on average."""
+    """1 m within 1 m/s² and 5 m/s³ takes two and a half seconds."""
     shaped, straight = (get_experiment(name) for name in NAMES)
     on_set_point = straight.set_point(straight.grid_s)[np.newaxis]
     assert straight.errors(on_set_point) == pytest.approx([0.0], abs=1e-9)
@@ -71,3 +79,73 @@ def test_steps_may_be_larger_but_stay_above_half_of_the_height(
 ) -> None:
     asked = Definition(experiment=NAMES[0], experiment_options=dict(options), strategy="manual", ceiling_m=8.0)
     assert [problem.reason for problem in problems_of(asked)] == ([] if reason is None else [reason])
+
+
+def test_only_what_allows_for_the_throttle_and_the_margin_searches_for_gains() -> None:
+    """A search on the model in still air alone would end at the largest gains."""
+    asked = Definition(experiment=NAMES[1], strategy="gradient", start=Start(kind="simplex"))
+    assert [(problem.field, problem.reason) for problem in problems_of(asked)] == [
+        ("strategy", "'gradient' works only with takeoff, altitude-steps, pitch-tracking"),
+        ("start.kind", "'simplex' works only with takeoff, altitude-steps, pitch-tracking"),
+    ]
+
+
+@compiled_only
+@pytest.mark.parametrize("steps", BOTH, ids=NAMES)
+def test_many_runs_score_as_single_ones_and_follow_the_reference_until_the_first_step(steps: CopterSteps) -> None:
+    gains = np.stack((steps.space.default, 1.2 * steps.space.default))
+    outputs = steps.outputs(gains, steps.nominal_model)
+    singles = [steps.simulate(each, steps.nominal_model) for each in gains]
+    assert steps.errors(outputs) == pytest.approx([steps.error(each) for each in singles], rel=1e-6)
+    assert steps.errors(outputs)[1] < steps.errors(outputs)[0]
+    assert np.array_equal(steps.disturbed_outputs(gains, steps.nominal_model, outputs), outputs)
+    assert steps.disturbances(singles[0], gains[0], steps.nominal_model) is None
+    before = steps.grid_s < 13.0
+    assert np.array_equal(outputs[0, before], singles[0]["reference_m"][before])
+    assert outputs[0, 0] == pytest.approx(3.0)
+
+
+def hazards(steps: CopterSteps, gains: Gains, ceiling_m: float = 4.5) -> dict[str, Check]:
+    envelope = Envelope(ceiling_m=ceiling_m, safe_gains=steps.space.mapping(steps.space.default))
+    return {
+        check.name: check for check in steps.hazards(steps.space.vector(gains), prior_distribution(steps), envelope)
+    }
+
+
+@compiled_only
+@pytest.mark.parametrize("steps", BOTH, ids=NAMES)
+def test_the_gate_allows_the_firmwares_gains_on_likely_vehicles(steps: CopterSteps) -> None:
+    checks = hazards(steps, steps.space.mapping(steps.space.default))
+    assert list(checks) == ["altitude", "lowest altitude", "margin"]
+    assert all(check.passed for check in checks.values())
+    assert checks["altitude"].worst == pytest.approx(3.05, abs=0.1)
+    assert checks["lowest altitude"].worst == pytest.approx(1.95, abs=0.1)
+
+
+@compiled_only
+def test_the_gate_refuses_gains_that_ring_with_more_lag_and_flights_above_the_ceiling() -> None:
+    steps = BOTH[0]
+    wild = hazards(steps, {**steps.space.mapping(steps.space.default), "PSC_ACCZ_P": 2.0, "PSC_ACCZ_I": 4.0})
+    assert [name for name, check in wild.items() if not check.passed] == ["margin"]
+    assert wild["margin"].worst < 0.0
+    assert "would rise to" in hazards(steps, steps.space.mapping(steps.space.default), 2.9)["altitude"].sentence
+
+
+@compiled_only
+def test_the_vehicles_own_filters_and_limits_count_unless_the_replica_lacks_one() -> None:
+    steps = BOTH[0]
+    default = steps.space.mapping(steps.space.default)
+    slow = steps.under({"PSC_ACCZ_FLTE": 2.0, "WP_ACC_Z": 0.5})
+    assert hazards(slow, default)["margin"].worst < hazards(steps, default)["margin"].worst - 0.05
+    assert (
+        slow.references(np.arange(13.0, 16.0, 0.0025))[-1, 0] > steps.references(np.arange(13.0, 16.0, 0.0025))[-1, 0]
+    )
+    assert steps.under({"PSC_ACCZ_NTF": 1.0}) is steps
+
+
+def test_another_vehicles_fitted_model_keeps_the_steps() -> None:
+    steps = BOTH[1]
+    informed = steps.informed(np.array([0.4, 1.1, 0.1, 0.2]), np.full(4, 0.01))
+    assert informed.nominal_model.tolist() == [0.4, 1.1, 0.1, 0.2]
+    assert informed.measure == steps.measure
+    assert informed.title == "Altitude steps under PX4"

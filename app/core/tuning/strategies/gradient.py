@@ -263,4 +263,5 @@ GRADIENT: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
+    experiments=("takeoff", "altitude-steps", "pitch-tracking"),
 )

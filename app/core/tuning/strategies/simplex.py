@@ -67,5 +67,6 @@ SIMPLEX: Final = Strategy(
     propose=propose,
     predict_errors=error_model,
     predict_flight=flight_model,
+    experiments=("takeoff", "altitude-steps", "pitch-tracking"),
     corrects_model=False,
 )

@@ -61,6 +61,7 @@ const catalogue = {
       experiments: ["takeoff", "pitch-tracking"],
     },
     { name: "identified", options: [], experiments: ["pitch-tracking"] },
+    { name: "simplex", options: [], experiments: ["takeoff", "pitch-tracking"] },
     { name: "manual", options: [], experiments: ["takeoff", "takeoff-px4", "pitch-tracking"] },
   ],
   vehicle_kinds: [
@@ -164,10 +165,16 @@ test("the simulation is offered first, flights made elsewhere last", () => {
 
 test("an experiment is offered the vehicles and strategies that fit it", () => {
   expect(kindsFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual(["lti"]);
-  expect(strategiesFor(catalogue, "takeoff").map(({ name }) => name)).toEqual(["calibrated", "gradient", "manual"]);
+  expect(strategiesFor(catalogue, "takeoff").map(({ name }) => name)).toEqual([
+    "calibrated",
+    "gradient",
+    "simplex",
+    "manual",
+  ]);
   expect(strategiesFor(catalogue, "pitch-tracking").map(({ name }) => name)).toEqual([
     "gradient",
     "identified",
+    "simplex",
     "manual",
   ]);
 });

@@ -52,9 +52,9 @@ export function hasModel(catalogue: Catalogue, experiment: string): boolean {
   return catalogue.experiments.find(({ name }) => name === experiment)?.has_model ?? false;
 }
 
-/** Available sources of the first gains. */
+/** Available sources of the first gains: a search on the model only where it is a strategy too. */
 export function startsFor(catalogue: Catalogue, experiment: string): StartKind[] {
-  return hasModel(catalogue, experiment)
+  return strategiesFor(catalogue, experiment).some(({ name }) => name === "simplex")
     ? ["default", "simplex", "campaign", "given"]
     : ["default", "campaign", "given"];
 }

@@ -8,6 +8,7 @@ from app.core.tuning.strategies import recommended_strategy
     [
         ("takeoff", "calibrated"),
         ("takeoff-ardupilot", "manual"),
+        ("altitude-steps-px4", "calibrated"),
         ("pitch-tracking", "gradient"),
         ("no such experiment", "calibrated"),
     ],

@@ -1,0 +1,128 @@
+"""Campaigns of altitude steps under ArduCopter and PX4: the model from flights over a link, and what it proposes."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Final
+
+import numpy as np
+import pytest
+
+from app.core.definition import Definition, Flight, StopRule
+from app.core.errors import TrajectoryError
+from app.core.experiments.base import prior_distribution
+from app.core.policy import Gains
+from app.core.tuning.campaign_models import known_distribution
+from app.core.tuning.copter_model import CopterModel
+from app.core.tuning.flight_predictor import flight_predictor, modelled_flights
+from app.core.tuning.gate import check_policy
+from app.core.tuning.proposals import next_proposal
+from app.core.tuning.strategy import Proposal
+from app.core.tuning.trust_region import Box
+from bench.copters.campaign_flights import RIGS, CampaignRig
+from tests.core.analysis.px4_flights import CALM
+from tests.core.tuning.flying import compiled_only
+
+OPTIONS: Final = {"steps": 2, "step_window_s": 3.0}
+
+
+def definition_of(rig: CampaignRig) -> Definition:
+    return Definition(experiment=rig.experiment.name, experiment_options=dict(OPTIONS), strategy="calibrated")
+
+
+def fly(rig: CampaignRig, number: int, gains: Gains) -> Flight:
+    steps = rig.experiment.configured(OPTIONS)
+    parameters = {**rig.parameters(CALM), **gains}
+    record = rig.fly(steps, CALM, parameters, number)
+    return Flight(
+        number=number,
+        gains=dict(gains),
+        trajectory=record,
+        error=steps.error(record),
+        outcome="valid",
+        parameters=parameters,
+    )
+
+
+@cache
+def flown(autopilot: str) -> tuple[Flight, Proposal]:
+    """The first flight of a campaign and the proposal that follows."""
+    rig = RIGS[autopilot]
+    first = fly(rig, 1, next_proposal(definition_of(rig), []).gains)
+    return first, next_proposal(definition_of(rig), [first])
+
+
+@compiled_only
+@pytest.mark.parametrize("autopilot", list(RIGS))
+def test_the_second_flight_is_better_and_where_it_was_predicted(autopilot: str) -> None:
+    rig, (first, proposal) = RIGS[autopilot], flown(autopilot)
+    steps = rig.experiment.configured(OPTIONS)
+    second = fly(rig, 2, proposal.gains)
+    assert proposal.kind == "step"
+    assert check_policy(definition_of(rig), steps, steps.space, proposal.gains, [first]).passed
+    assert first.error is not None
+    assert second.error is not None
+    assert proposal.interval is not None
+    assert second.error < 0.85 * first.error
+    assert proposal.interval.lower < second.error < 1.2 * proposal.interval.upper
+    assert proposal.predicted is not None
+    assert {"altitude_m_lower", "altitude_m_upper"} <= proposal.predicted.channels.keys()
+    explanation = proposal.explanation
+    fitted = {each.name: each for each in explanation.fitted}
+    assert fitted["hover_throttle"].value == pytest.approx(CALM.hover_throttle, rel=0.05)
+    assert "times as much as with the gains of the first flight; 1.5 times is allowed." in explanation.notes[0]
+    assert "2 times is required" in explanation.notes[1]
+
+
+@compiled_only
+def test_several_flights_are_fitted_together_and_the_throttle_is_still_compared_with_the_first() -> None:
+    rig, (first, proposal) = RIGS["PX4"], flown("PX4")
+    flights = [first, fly(rig, 2, proposal.gains)]
+    steps = rig.experiment.configured(OPTIONS)
+    alone, both = (CopterModel(steps, some) for some in (flights[:1], flights))
+    assert (both.numbers, both.base.number) == ((1, 2), 2)
+    assert both.fitted[1].standard_error < alone.fitted[1].standard_error
+    assert both.spread.origin == "the fit to 2 flights"
+    assert not both.is_worth_a_flight(*[steps.space.vector(proposal.gains)] * 2)
+    predictor = flight_predictor(definition_of(rig), flights)
+    assert predictor is not None
+    again = predictor.predict(proposal.gains)
+    assert again.predicted_error == pytest.approx(flights[1].error, rel=0.1)
+    assert modelled_flights(definition_of(rig), flights) == {1, 2}
+
+
+@compiled_only
+def test_gains_outside_what_is_searched_and_pinned_ones_are_kept() -> None:
+    rig, (first, _) = RIGS["ArduCopter"], flown("ArduCopter")
+    model = CopterModel(rig.experiment.configured(OPTIONS), [first])
+    space = rig.experiment.space
+    low, high = space.vector(first.gains), space.vector(first.gains)
+    high[space.names.index("PSC_ACCZ_I")] = 2.0
+    optimum = model.optimum(Box(low, high))
+    assert optimum is not None
+    kept = {name: value for name, value in space.mapping(optimum).items() if name != "PSC_ACCZ_I"}
+    assert kept == {name: value for name, value in first.gains.items() if name != "PSC_ACCZ_I"}
+    assert space.mapping(optimum)["PSC_ACCZ_I"] > 1.2
+
+
+@compiled_only
+def test_where_every_gain_set_rings_on_a_likely_vehicle_no_step_is_proposed() -> None:
+    """Gains for a stiff loop, and bounds that leave no gentler ones."""
+    rig, (first, _) = RIGS["ArduCopter"], flown("ArduCopter")
+    stiff = {"PSC_ACCZ_P": (1.9, 2.0), "PSC_ACCZ_I": (3.9, 4.0)}
+    ringing = replace(first, gains={**first.gains, "PSC_ACCZ_P": 2.0, "PSC_ACCZ_I": 4.0})
+    definition = replace(definition_of(rig), bounds=stiff, stop=StopRule(kind="budget"))
+    proposal = next_proposal(definition, [ringing])
+    assert proposal.explanation.notes[0].startswith("No gains that may be flown next keep the margin from ringing")
+    assert proposal.kind == "none"
+
+
+def test_a_record_without_the_throttle_is_refused_and_tells_nothing_of_the_vehicle() -> None:
+    rig = RIGS["PX4"]
+    steps = rig.experiment.configured(OPTIONS)
+    flight = fly(rig, 1, steps.space.mapping(steps.space.default))
+    channels = {name: each for name, each in flight.trajectory.channels.items() if name != "throttle"}
+    bare = replace(flight, trajectory=replace(flight.trajectory, channels=channels))
+    assert known_distribution(steps, [bare]) == prior_distribution(steps)
+    with pytest.raises(TrajectoryError, match="cannot be fitted"):
+        next_proposal(definition_of(rig), [bare])
+    assert np.isfinite(flight.error or np.nan)
