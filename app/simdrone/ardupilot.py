@@ -34,7 +34,6 @@ _REPORT_ONLY: Final = 0
 _ALTITUDE_FENCE: Final = 1
 _SLOWEST_LANDING_CM_S: Final = 10.0
 
-SCHED_LOOP_RATE: Final = "SCHED_LOOP_RATE"
 _HOVER: Final = "MOT_THST_HOVER"
 _POSITION_ONLY: Final = 0b000111111000
 _POSITION_BITS: Final = 0b000111111111
@@ -54,7 +53,7 @@ _COMMON: Final = (
     real("FENCE_ALT_MAX", 100.0),
     Parameter("LAND_SPEED", Kind.INT16, 50),
     Parameter("GUID_OPTIONS", Kind.INT32, 0),
-    Parameter(SCHED_LOOP_RATE, Kind.INT16, LOOP_HZ),
+    Parameter("SCHED_LOOP_RATE", Kind.INT16, LOOP_HZ),
     Parameter("MOT_HOVER_LEARN", Kind.INT8, 2),
     real("MOT_SPOOL_TIME", 0.5),
     real("INS_ACCEL_FILTER", 20.0),

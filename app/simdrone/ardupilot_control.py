@@ -147,10 +147,10 @@ class ArduPilotController(AltitudeController):
 
     def learned_hover(self) -> float | None:
         """Return the hover throttle, corrected by that of this tick (MOT_HOVER_LEARN), or None unless it hovers."""
-        state, hover = self._state, float(self._packed[HOVER])
-        throttle, climb_m_s = float(state[loop.THROTTLE_FILTERED]), self._body.climb_rate_m_s
-        hovers = self._is_in_flight and abs(state[loop.V_D]) < _AT_REST_M_S and abs(climb_m_s) < _LEARNING_BELOW_M_S
-        if not (hovers and throttle > 0.0):
+        if self.phase is not Phase.HOLDING or abs(self._body.climb_rate_m_s) >= _LEARNING_BELOW_M_S:
+            return None
+        throttle, hover = float(self._state[loop.THROTTLE_FILTERED]), float(self._packed[HOVER])
+        if throttle <= 0.0 or abs(self._state[loop.V_D]) >= _AT_REST_M_S:
             return None
         hover += TICK_S / (TICK_S + _LEARNING_S) * (throttle - hover)
         self._packed[HOVER] = self._landing[HOVER] = hover = min(max(hover, HOVER_MIN), HOVER_MAX)

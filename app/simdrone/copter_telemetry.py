@@ -52,7 +52,7 @@ class Snapshot:
     ready: bool
     """Whether its arming checks pass."""
     set_point: SetPoint
-    """Set point of the altitude controller; its altitude is in the local frame."""
+    """Set point of the altitude controller."""
     altitude_error_m: float
     throttle_demand: float
 
@@ -102,7 +102,7 @@ def attitude(now: Snapshot) -> Fields:
 def position_target(now: Snapshot) -> Fields:
     """Return POSITION_TARGET_LOCAL_NED: the set point in force, not the shaped one."""
     given = now.set_point
-    up = {"z": given.altitude_m, "vz": given.climb_m_s, "afz": given.acceleration_m_s2}
+    up = {"z": given.altitude_m + now.local_m - now.altitude_m, "vz": given.climb_m_s, "afz": given.acceleration_m_s2}
     missing = {name for name, value in up.items() if math.isnan(value)}
     ignored = sum(bit for name, bit in (("z", IGNORE_Z), ("vz", IGNORE_VZ), ("afz", IGNORE_AZ)) if name in missing)
     return {

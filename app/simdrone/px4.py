@@ -248,8 +248,9 @@ class Px4(Copter):
 
     def _watch_stream(self) -> None:
         """React to the loss of the set points in OFFBOARD."""
-        is_lost = self.boot_s - self._streamed_s > self.parameters["COM_OF_LOSS_T"]
-        if self.mode.name == _OFFBOARD and self.controller.flies and is_lost:
+        if self.mode.name != _OFFBOARD or not self.controller.flies:
+            return
+        if self.boot_s - self._streamed_s > self.parameters["COM_OF_LOSS_T"]:
             action = _OFFBOARD_ACTIONS.get(int(self.parameters["COM_OBL_RC_ACT"]), Reaction.LAND)
             self.react(action, "No offboard signal")
 

@@ -340,7 +340,7 @@ def test_the_other_autopilots_fly_a_trial_with_gains_of_their_own(autopilot: str
         vehicle.close()
     flight = record.trajectory
     assert (record.ending, record.reason) == ("completed", "")
-    assert TAKEOFF.error(flight) < 0.2
+    assert 0.3 < TAKEOFF.error(flight) < 0.55, "spool-up and ramp take 4 to 5 s, in which 3 m are missing"
     before, settled = flight.time_s < 0.0, flight.time_s > 20.0
     np.testing.assert_allclose(flight["altitude_m"][before], 0.0, atol=0.1)
     np.testing.assert_allclose(flight["altitude_m"][settled], 3.0, atol=0.2)
