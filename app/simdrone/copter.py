@@ -312,9 +312,7 @@ class Copter(ABC):
             breach_type=_ALTITUDE_BREACH if self._is_breached else 0,
             breaches=self._breaches,
             ready=self.prearm_failure() is None,
-            set_point=self.controller.set_point,
-            altitude_error_m=self.controller.error_m,
-            throttle_demand=self.controller.demand,
+            controller=self.controller,
         )
 
     def _send_parameter(self, place: int) -> None:

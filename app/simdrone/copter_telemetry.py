@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Final
 
 from app.simdrone.body import ARMED, Fields
-from app.simdrone.copter_control import IGNORE_AZ, IGNORE_VZ, IGNORE_Z, LOCAL_NED, SetPoint
+from app.simdrone.copter_control import IGNORE_AZ, IGNORE_VZ, IGNORE_Z, LOCAL_NED, AltitudeController
 
 LATITUDE_E7: Final = 473977420
 LONGITUDE_E7: Final = 85455940
@@ -51,10 +51,7 @@ class Snapshot:
     breaches: int
     ready: bool
     """Whether its arming checks pass."""
-    set_point: SetPoint
-    """Set point of the altitude controller."""
-    altitude_error_m: float
-    throttle_demand: float
+    controller: AltitudeController
 
     @property
     def boot_ms(self) -> int:
@@ -101,7 +98,7 @@ def attitude(now: Snapshot) -> Fields:
 
 def position_target(now: Snapshot) -> Fields:
     """Return POSITION_TARGET_LOCAL_NED: the set point in force, not the shaped one."""
-    given = now.set_point
+    given = now.controller.set_point
     up = {"z": given.altitude_m + now.local_m - now.altitude_m, "vz": given.climb_m_s, "afz": given.acceleration_m_s2}
     missing = {name for name, value in up.items() if math.isnan(value)}
     ignored = sum(bit for name, bit in (("z", IGNORE_Z), ("vz", IGNORE_VZ), ("afz", IGNORE_AZ)) if name in missing)
@@ -117,13 +114,13 @@ def position_target(now: Snapshot) -> Fields:
 def attitude_target(now: Snapshot) -> Fields:
     level = {"type_mask": 0, "q": [1.0, 0.0, 0.0, 0.0]}
     rates = dict.fromkeys(("body_roll_rate", "body_pitch_rate", "body_yaw_rate"), 0.0)
-    return {"time_boot_ms": now.boot_ms, **level, **rates, "thrust": now.throttle_demand}
+    return {"time_boot_ms": now.boot_ms, **level, **rates, "thrust": now.controller.demand}
 
 
 def controller_output(now: Snapshot) -> Fields:
     whole = dict.fromkeys(("nav_bearing", "target_bearing", "wp_dist"), 0)
     rest = dict.fromkeys(("nav_roll", "nav_pitch", "aspd_error", "xtrack_error"), 0.0)
-    return {**whole, **rest, "alt_error": now.altitude_error_m}
+    return {**whole, **rest, "alt_error": now.controller.error_m}
 
 
 def vfr_hud(now: Snapshot) -> Fields:

@@ -13,9 +13,9 @@ import numpy as np
 
 from app.core.control import px4 as loop
 from app.core.control.px4_parameters import parameters_from
+from app.simdrone import px4_hover
 from app.simdrone.body import TICK_S, Body
 from app.simdrone.copter_control import AltitudeController, Phase, SetPoint
-from app.simdrone.px4_hover import HoverSettings, HoverThrustEstimator
 from app.simdrone.px4_trajectory import Limits, Trajectory
 
 LOOP_TICKS: Final = 2
@@ -54,7 +54,7 @@ class Px4Controller(AltitudeController):
         self._tick = 0
         self._climb_m_s = 0.0
         self.tune(values)
-        self._estimator = HoverThrustEstimator(self._hover)
+        self._estimate = self._hover.start()
 
     def tune(self, values: Mapping[str, float]) -> None:
         """Use these parameters, by the firmware's names, from the next run on. Raises InputError if the loop is not
@@ -68,7 +68,7 @@ class Px4Controller(AltitudeController):
         self._takeoff = Limits(speed, min(self._up.acceleration_m_s2, gentle), jerk)
         self._land_m_s = positive["MPC_LAND_SPEED"]
         self._fast_up_m_s, self._fast_down_m_s = values["MPC_Z_VEL_MAX_UP"], values["MPC_Z_VEL_MAX_DN"]
-        self._hover = HoverSettings(
+        self._hover = px4_hover.HoverSettings(
             hover_thrust=positive["MPC_THR_HOVER"],
             initial_error=values["HTE_HT_ERR_INIT"],
             noise_1_s=values["HTE_HT_NOISE"],
@@ -76,13 +76,14 @@ class Px4Controller(AltitudeController):
             range=values["HTE_THR_RANGE"],
             fast_m_s=values["HTE_VZ_THR"],
         )
+        self._hover_packed = self._hover.packed()
 
     # ------------------------------------------------------------ commands
 
     def arm(self) -> None:
         super().arm()
         loop.start(self._state, self._packed)
-        self._estimator.reset(self._hover)
+        self._estimate = self._hover.start()
 
     def take_off(self, height_m: float) -> None:
         self._goal_m, self._follows = height_m, False
@@ -198,13 +199,8 @@ class Px4Controller(AltitudeController):
         self._climb_m_s = climb_m_s
         if self._state[loop.TAKEOFF] != loop.FLIGHT or self._body.altitude_m < _ESTIMATES_ABOVE_M:
             return math.nan
-        return self._estimator.update(
-            self._hover,
-            acceleration_m_s2=(climb_m_s - before_m_s) / LOOP_S,
-            thrust=self.demand,
-            climb_m_s=climb_m_s,
-            dt_s=LOOP_S,
-        )
+        acceleration_m_s2 = (climb_m_s - before_m_s) / LOOP_S
+        return px4_hover.update(self._estimate, self._hover_packed, acceleration_m_s2, self.demand, climb_m_s, LOOP_S)
 
     def _start_trajectory(self) -> None:
         """Begin the trajectory of an auto mode; a running one goes on."""

@@ -4,10 +4,22 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from app.core.models.copter import GRAVITY_M_S2
+import numpy as np
 
-_NOISE_VARIANCE: Final = 5.0
-_NOISE_RANGE: Final = (1.0, 400.0)
+from app.core.kernels import kernel
+from app.core.models.copter import GRAVITY_M_S2
+from app.core.records.trajectory import Samples
+
+# Indices in the state array.
+THRUST: Final = 0
+_VARIANCE: Final = 1
+_NOISE_VARIANCE: Final = 2
+_MEAN_INNOVATION: Final = 3
+_MEAN_RATIO: Final = 4
+_STEADY_S: Final = 5
+STATE_SIZE: Final = 6
+
+_FIRST_NOISE_VARIANCE: Final = 5.0
 _NOISE_S: Final = 2.0
 _INNOVATION_S: Final = 1.0
 _BIASED_ABOVE: Final = 0.2
@@ -21,60 +33,54 @@ _LEAST_THRUST: Final = 0.05
 class HoverSettings:
     """MPC_THR_HOVER, and HTE_HT_ERR_INIT, HTE_HT_NOISE, HTE_ACC_GATE, HTE_THR_RANGE and HTE_VZ_THR."""
 
-    hover_thrust: float = 0.5
-    initial_error: float = 0.1
-    noise_1_s: float = 0.0036
-    gate: float = 3.0
-    range: float = 0.2
-    fast_m_s: float = 2.0
+    hover_thrust: float
+    initial_error: float
+    noise_1_s: float
+    gate: float
+    range: float
+    fast_m_s: float
 
-    def limited(self, thrust: float) -> float:
-        """Limit an estimate to its range about MPC_THR_HOVER."""
-        lowest = min(max(self.hover_thrust - self.range, 0.0), 0.8)
+    def start(self) -> Samples:
+        """Return the state while disarmed, shape (STATE_SIZE,): MPC_THR_HOVER."""
+        state = np.zeros(STATE_SIZE)
+        state[THRUST] = self.hover_thrust
+        state[_VARIANCE], state[_NOISE_VARIANCE] = self.initial_error**2, _FIRST_NOISE_VARIANCE
+        return state
+
+    def packed(self) -> Samples:
+        """Return the constants for `update`, shape (5,)."""
+        lowest = max(min(max(self.hover_thrust - self.range, 0.0), 0.8), _LEAST_THRUST)
         highest = min(max(self.hover_thrust + self.range, 0.2), 0.9)
-        return min(max(thrust, lowest, _LEAST_THRUST), highest)
+        return np.array([self.noise_1_s, self.gate, lowest, highest, self.fast_m_s])
 
 
-class HoverThrustEstimator:
-    """Estimate of the thrust in hover, a share of full thrust."""
-
-    def __init__(self, settings: HoverSettings) -> None:
-        self.reset(settings)
-
-    def reset(self, settings: HoverSettings) -> None:
-        """Begin with MPC_THR_HOVER, as while disarmed."""
-        self.thrust = settings.limited(settings.hover_thrust)
-        self._variance = settings.initial_error**2
-        self._noise_variance = _NOISE_VARIANCE
-        self._mean_innovation = self._mean_ratio = self._steady_s = 0.0
-
-    def update(
-        self, settings: HoverSettings, *, acceleration_m_s2: float, thrust: float, climb_m_s: float, dt_s: float
-    ) -> float:
-        """Advance by `dt_s` with the acceleration, up, under `thrust`; return it, or NaN until it is valid."""
-        grown = (settings.noise_1_s * dt_s) ** 2
-        self._variance += grown
-        slope = -GRAVITY_M_S2 * thrust / self.thrust**2
-        noise = self._noise_variance * max(1.0, abs(climb_m_s) - settings.fast_m_s + 1.0) ** 2
-        total = max(slope**2 * self._variance + noise, noise)
-        innovation = self._innovation(acceleration_m_s2, thrust)
-        ratio = innovation**2 / (settings.gate**2 * total)
-        if ratio < 1.0:
-            gain = self._variance * slope / total
-            self.thrust = settings.limited(self.thrust + gain * innovation)
-            self._variance = min(max((1.0 - gain * slope) * self._variance, 1e-10), 1.0)
-            innovation = self._innovation(acceleration_m_s2, thrust)
-        elif abs(self._mean_ratio) > _BIASED_ABOVE:
-            self._variance += _FORGETTING * grown
-        share = dt_s / (_INNOVATION_S + dt_s)
-        self._mean_ratio += share * (math.copysign(min(ratio, 1.0), innovation) - self._mean_ratio)
-        self._mean_innovation += share * (innovation - self._mean_innovation)
-        scatter = (innovation - self._mean_innovation) ** 2 + slope**2 * self._variance
-        noise_variance = self._noise_variance + dt_s / (_NOISE_S + dt_s) * (scatter - self._noise_variance)
-        self._noise_variance = min(max(noise_variance, _NOISE_RANGE[0]), _NOISE_RANGE[1])
-        is_steady = self._variance < _VALID_BELOW and (ratio < 1.0 or self._steady_s >= _VALID_AFTER_S)
-        self._steady_s = self._steady_s + dt_s if is_steady else 0.0
-        return self.thrust if self._steady_s >= _VALID_AFTER_S else math.nan
-
-    def _innovation(self, acceleration_m_s2: float, thrust: float) -> float:
-        return acceleration_m_s2 - GRAVITY_M_S2 * (thrust / self.thrust - 1.0)
+@kernel
+def update(state: Samples, settings: Samples, a: float, thrust: float, climb: float, dt: float) -> float:
+    """Advance by `dt`, s, with the acceleration `a`, m/s² up, under `thrust`, a share of full, at the climb rate
+    `climb`, m/s; return the estimate, or NaN until it is valid. `settings` are packed."""
+    grown = (settings[0] * dt) ** 2
+    hover, variance = state[THRUST], state[_VARIANCE] + grown
+    slope = -GRAVITY_M_S2 * thrust / (hover * hover)
+    noise = state[_NOISE_VARIANCE] * max(1.0, abs(climb) - settings[4] + 1.0) ** 2
+    total = slope * slope * variance + noise
+    innovation = a - GRAVITY_M_S2 * (thrust / hover - 1.0)
+    ratio = innovation * innovation / (settings[1] * settings[1] * total)
+    if ratio < 1.0:
+        gain = variance * slope / total
+        hover = min(max(hover + gain * innovation, settings[2]), settings[3])
+        variance = min(max((1.0 - gain * slope) * variance, 1e-10), 1.0)
+        innovation = a - GRAVITY_M_S2 * (thrust / hover - 1.0)
+    elif abs(state[_MEAN_RATIO]) > _BIASED_ABOVE:
+        variance += _FORGETTING * grown
+    state[THRUST], state[_VARIANCE] = hover, variance
+    share = dt / (_INNOVATION_S + dt)
+    state[_MEAN_RATIO] += share * (math.copysign(min(ratio, 1.0), innovation) - state[_MEAN_RATIO])
+    state[_MEAN_INNOVATION] += share * (innovation - state[_MEAN_INNOVATION])
+    scatter = (innovation - state[_MEAN_INNOVATION]) ** 2 + slope * slope * variance
+    noise_variance = state[_NOISE_VARIANCE] + dt / (_NOISE_S + dt) * (scatter - state[_NOISE_VARIANCE])
+    state[_NOISE_VARIANCE] = min(max(noise_variance, 1.0), 400.0)
+    was_valid = state[_STEADY_S] >= _VALID_AFTER_S
+    is_steady = variance < _VALID_BELOW and (ratio < 1.0 or was_valid)
+    state[_STEADY_S] = state[_STEADY_S] + dt if is_steady else 0.0
+    estimate: float = hover if state[_STEADY_S] >= _VALID_AFTER_S else math.nan
+    return estimate
