@@ -127,6 +127,7 @@ class ArduPilot(Copter):
 
     firmware: ClassVar[FirmwareProfile] = _FIRMWARE
     ground_station: ClassVar[str] = _GROUND_STATION
+    integral_gain: ClassVar[str] = "PSC_ACCZ_I"
 
     controller: ArduPilotController
 
@@ -149,6 +150,16 @@ class ArduPilot(Copter):
         if self.parameters["MOT_HOVER_LEARN"] and (hover := self.controller.learned_hover()) is not None:
             self.parameters[_HOVER] = hover
         return messages
+
+    def prearm_failure(self) -> str | None:
+        return super().prearm_failure() or self._gain_failure()
+
+    def arming_refusal(self) -> str | None:
+        return super().arming_refusal() or self._gain_failure()
+
+    def _gain_failure(self) -> str | None:
+        """Return the failed check of the gains: without the integral a wrong MOT_THST_HOVER is never corrected."""
+        return None if self.parameters[self.integral_gain] > 0.0 else f"Arm: {self.integral_gain} must be > 0"
 
     def requested_mode(self, main: int, sub: int) -> FlightMode | None:  # noqa: ARG002  one number suffices
         return next((mode for mode in self.firmware.modes if mode.custom_mode == main), None)
@@ -196,3 +207,4 @@ class ArduPilot47(ArduPilot):
         parameters=_ids("MAV_SYSID", _GROUND_STATION_4_7) + _COMMON + tuple(map(_renamed, _loop())),
     )
     ground_station: ClassVar[str] = _GROUND_STATION_4_7
+    integral_gain: ClassVar[str] = "PSC_D_ACC_I"

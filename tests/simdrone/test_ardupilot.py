@@ -150,11 +150,19 @@ def test_armed_and_idle_it_disarms_after_ten_seconds(pilot: ArduPilot) -> None:
     assert not pilot.is_armed()
 
 
-def test_its_gains_act_without_its_integral_gain_it_floats_too_low(pilot: ArduPilot) -> None:
+def test_without_its_integral_gain_it_does_not_arm(pilot: ArduPilot) -> None:
+    assert pilot.set("PSC_ACCZ_I", 0.0) == 0.0
+    pilot.ground.listen(3.5)
+    assert pilot.command(ARM, 1.0) == 4
+    assert pilot.words() == ["Arm: PSC_ACCZ_I must be > 0"]
+
+
+def test_its_gains_act_if_it_loses_its_integral_gain_it_floats_too_low(pilot: ArduPilot) -> None:
     """It believes to hover on 0.58 of its thrust and hovers on 0.61: 0.03 that the other gains must make up."""
-    given = {"MOT_THST_HOVER": 0.58, "MOT_HOVER_LEARN": 0.0, "PSC_ACCZ_P": 0.6, "PSC_ACCZ_I": 0.0}
+    given = {"MOT_THST_HOVER": 0.58, "MOT_HOVER_LEARN": 0.0, "PSC_ACCZ_P": 0.6}
     for name, value in given.items():
         assert pilot.set(name, value) == pytest.approx(value)
     pilot.hover(3.0)
+    assert pilot.set("PSC_ACCZ_I", 0.0) == 0.0
     pilot.ground.listen(10.0)
     assert pilot.height_m() == pytest.approx(3.0 - 0.03 / (0.1 * 0.6 * 5.0 * 1.0), abs=0.005)
