@@ -55,6 +55,7 @@ class Px4Controller(AltitudeController):
         self._climb_m_s = 0.0
         self.tune(values)
         self._estimate = self._hover.start()
+        self._estimates = False
 
     def tune(self, values: Mapping[str, float]) -> None:
         """Use these parameters, by the firmware's names, from the next run on. Raises InputError if the loop is not
@@ -194,10 +195,12 @@ class Px4Controller(AltitudeController):
         return rises and self._streamed_age_s < _SET_POINT_FRESH_S
 
     def _estimated_hover(self) -> float:
-        """Return the estimated hover thrust, or NaN; estimates begin at a height of 1 m."""
+        """Return the estimated hover thrust, or NaN; estimates begin at a height of 1 m, once in flight."""
         climb_m_s, before_m_s = self._body.climb_rate_m_s, self._climb_m_s
         self._climb_m_s = climb_m_s
-        if self._state[loop.TAKEOFF] != loop.FLIGHT or self._body.altitude_m < _ESTIMATES_ABOVE_M:
+        is_flying = self._state[loop.TAKEOFF] == loop.FLIGHT
+        self._estimates = is_flying and (self._estimates or self._body.altitude_m > _ESTIMATES_ABOVE_M)
+        if not self._estimates:
             return math.nan
         acceleration_m_s2 = (climb_m_s - before_m_s) / LOOP_S
         return px4_hover.update(self._estimate, self._hover_packed, acceleration_m_s2, self.demand, climb_m_s, LOOP_S)
