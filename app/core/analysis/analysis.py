@@ -43,7 +43,7 @@ class Behaviour:
 class Assessment:
     """A gain set on the copters that the flight allows, by the names of the vehicle's release.
 
-    `activity` is relative to the gains of the flight; `margin` is the least of those copters, 0 if one rings.
+    `activity` is relative to the gains of the flight; `margin` is that of the likeliest copter, 0 if it rings.
     """
 
     name: str
@@ -265,13 +265,12 @@ def _assess(
 ) -> Assessment:
     loop = flown.with_gains(gains)
     prediction = model.predict(loop)
-    margins = [gain_margin(loop, each) for each in estimate.few]
     return Assessment(
         name=name,
         gains=flown.named(gains),
         prediction=prediction,
         activity=prediction.activity / model.fly(flown)[1],
-        margin=min(margins),
+        margin=gain_margin(loop, estimate.mean),
     )
 
 

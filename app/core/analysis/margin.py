@@ -1,5 +1,6 @@
 """How far the loop is from ringing: damping of its modes with more gain and more lag than the vehicle has."""
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
@@ -44,6 +45,17 @@ def damping_within_margin(loop: AltitudeLoop, copter: Copter) -> float:
     """Least damping ratio with 0.7 … `REQUIRED_MARGIN` times the loop's fast gains and a copter `EXTRA_LAG_S` later.
     Less gain counts too: a large integral gain beside a small proportional one rings when the gain falls."""
     return min(_slower_damping(loop, copter, factor) for factor in _IN_RANGE)
+
+
+def robust_damping(loop: AltitudeLoop, copters: Sequence[Copter]) -> float:
+    """Least damping ratio that decides on gains: of the first copter, which is the likeliest, within the margin; of the
+    others that are likely, with `REQUIRED_MARGIN` times the loop's fast gains. Their lags differ already, so that none
+    is added."""
+    likeliest, *others = copters
+    return min(
+        damping_within_margin(loop, likeliest),
+        *(least_damping(loop.with_fast_gains(factor), each) for each in others for factor in (1.0, REQUIRED_MARGIN)),
+    )
 
 
 def _slower_damping(loop: AltitudeLoop, copter: Copter, factor: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.loop import AltitudeLoop, GainSpace
-from app.core.analysis.margin import RINGING_DAMPING, damping_within_margin, gain_margin
+from app.core.analysis.margin import RINGING_DAMPING, gain_margin, robust_damping
 from app.core.analysis.prediction import FlightModel
 from app.core.models.copter import Copter
 from app.core.records.trajectory import Samples
@@ -23,7 +23,7 @@ _PRICE_OF_ACTIVITY: Final = 0.05
 """Relative error that is as good as a relative throttle activity: 1 % of one for 20 % of the other."""
 _AS_GOOD: Final = math.log(1.05)
 _ACTIVITY_SOUGHT: Final = 0.97 * LARGEST_ACTIVITY
-"""The few copters of a search differ from all of them by up to 3 %."""
+"""The likeliest copter differs from the mean of all by up to 3 %."""
 _DIGITS: Final = 3
 _DECIMALS: Final = 2
 _ROUNDING: Final = 0.005
@@ -44,13 +44,15 @@ def propose(
     `starts` and its gentle set; None if none is allowed. Of what is found and the starts, those within 5 % of the best
     error, the one with the largest margin.
 
-    Allowed are gains within the space that ring with none of the copters within the margin, and move the throttle at
-    most `LARGEST_ACTIVITY` times as much as those of the flight, or the `usual` ones.
+    The first of `copters` is the likeliest: error, throttle activity and margin are its. Allowed are gains within the
+    space with which no copter rings (`robust_damping`), and that move the throttle at most `LARGEST_ACTIVITY` times as
+    much as those of the flight, or the `usual` ones.
     """
     from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
     space = flight.loop.space if space is None else space
-    model = FlightModel(flight, copters)
+    likeliest = copters[0]
+    model = FlightModel(flight, [likeliest])
     _, usual_activity = model.fly(flight.loop if usual is None else flight.loop.with_gains(usual))
 
     @cache
@@ -71,15 +73,14 @@ def propose(
     def excess(point: _Point) -> tuple[float, ...]:
         """How far the point is beyond what is allowed: in damping, activity, and the order of gains; allowed if none is
         positive."""
-        damping = min(damping_within_margin(loop_at(point), each) for each in copters)
         return (
-            RINGING_DAMPING - damping,
+            RINGING_DAMPING - robust_damping(loop_at(point), copters),
             flown(point)[1] - math.log(_ACTIVITY_SOUGHT),
             *space.disorder(np.array(point)),
         )
 
     def margin(point: _Point) -> float:
-        return min(gain_margin(loop_at(point), each) for each in copters)
+        return gain_margin(loop_at(point), likeliest)
 
     low, high = (space.coordinates({name: ends[end] for name, ends in space.bounds.items()}) for end in (0, 1))
     points = [tuple(space.coordinates(start).tolist()) for start in (*starts, space.gentle)]

@@ -50,8 +50,8 @@ class CopterEstimate:
 
     @property
     def few(self) -> Sequence[Copter]:
-        """The first draws, which are far from each other."""
-        return self.draws[:_FEW]
+        """The likeliest copter, then some draws that are far from each other."""
+        return (self.mean, *self.draws[:_FEW])
 
 
 @dataclass(frozen=True, slots=True)

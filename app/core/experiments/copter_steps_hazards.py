@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from app.core.analysis.loop import AltitudeLoop
-from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, damping_within_margin
+from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
 from app.core.experiments.base import Check, Matrix
 from app.core.models.copter import Copter
 from app.core.models.set_points import SetPoints
@@ -39,15 +39,15 @@ def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) 
 
 
 def check_margin(loop: AltitudeLoop, copters: Sequence[Copter]) -> Check:
-    """Whether the loop rings with none of the copters, each later than it is, and with more or less gain."""
-    damping = min(damping_within_margin(loop, each) for each in copters)
+    """Whether the loop rings with none of the copters (`robust_damping`), of which the first is the likeliest."""
+    damping = robust_damping(loop, copters)
     passed = damping >= RINGING_DAMPING
     return Check(
         "margin",
         passed,
-        f"With {1e3 * EXTRA_LAG_S:.0f} ms more {loop.texts.lateness} and up to {REQUIRED_MARGIN:g} times the "
-        f"{loop.texts.fast_gains}, the least damped of {len(copters)} likely vehicles has a damping ratio of "
-        f"{damping:.2f}; {'at least ' if passed else ''}{RINGING_DAMPING:g} is needed.",
+        f"With up to {REQUIRED_MARGIN:g} times the {loop.texts.fast_gains}, and {1e3 * EXTRA_LAG_S:.0f} ms more "
+        f"{loop.texts.lateness} for the likeliest vehicle, the least damped of {len(copters)} likely vehicles has a "
+        f"damping ratio of {damping:.2f}; {'at least ' if passed else ''}{RINGING_DAMPING:g} is needed.",
         worst=damping,
         limit=RINGING_DAMPING,
     )

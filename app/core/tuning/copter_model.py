@@ -20,8 +20,8 @@ from app.core.analysis.margin import (
     LARGEST_MARGIN,
     REQUIRED_MARGIN,
     RINGING_DAMPING,
-    damping_within_margin,
     gain_margin,
+    robust_damping,
 )
 from app.core.analysis.prediction import FlightModel
 from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
@@ -89,7 +89,7 @@ class CopterModel:
 
     @cached_property
     def _copters(self) -> Sequence[Copter]:
-        """Those of the gate, for which gains are searched."""
+        """Those of the gate, for which gains are searched: the likeliest one first."""
         return [copter_of(model) for model in self.spread.sample(self._experiment, COPTERS)]
 
     @property
@@ -97,8 +97,8 @@ class CopterModel:
         return self._logs[self.base.number]
 
     @cached_property
-    def _few(self) -> FlightModel:
-        return FlightModel(self._log, self._copters)
+    def _likeliest(self) -> FlightModel:
+        return FlightModel(self._log, self._copters[:1])
 
     @cached_property
     def _all(self) -> FlightModel:
@@ -116,7 +116,7 @@ class CopterModel:
         return None if found is None else space.vector({**self.base.gains, **found})
 
     def merits(self, gains: Matrix) -> Vector:
-        return np.array([self._few.fly(self._loop(each))[0] for each in gains])
+        return np.array([self._likeliest.fly(self._loop(each))[0] for each in gains])
 
     errors = merits
 
@@ -127,7 +127,7 @@ class CopterModel:
         ) < RINGING_DAMPING <= self._damping(there)
 
     def _damping(self, gains: Vector) -> float:
-        return min(damping_within_margin(self._loop(gains), each) for each in self._copters)
+        return robust_damping(self._loop(gains), self._copters)
 
     def rounded(self, gains: Vector) -> Vector:
         return np.array([float(f"{value:.{_DIGITS}g}") for value in gains])
@@ -157,8 +157,8 @@ class CopterModel:
 
     def notes(self, gains: Vector) -> tuple[str, ...]:
         loop, texts = self._loop(gains), self._log.loop.texts
-        activity = self._few.fly(loop)[1] / self._few.fly(self._first)[1]
-        margin = min(gain_margin(loop, each) for each in self._copters)
+        activity = self._likeliest.fly(loop)[1] / self._likeliest.fly(self._first)[1]
+        margin = gain_margin(loop, self._copters[0])
         beyond = "at least " if margin == LARGEST_MARGIN else ""
         moves = (
             f"The throttle moves {activity:.2f} times as much as with the gains of the first flight; "
