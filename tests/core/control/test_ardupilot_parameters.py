@@ -50,6 +50,7 @@ def test_gains_are_written_by_the_names_and_in_the_units_of_release_4_7() -> Non
     assert in_newer_names(gains) == {
         "PSC_D_POS_P": 3.0, "PSC_D_VEL_P": 8.0, "PSC_D_ACC_P": 0.0854, "PSC_D_ACC_I": 0.3,
     }  # fmt: skip
+    assert in_newer_names({"MOT_THST_HOVER": 0.4}) == {"MOT_THST_HOVER": 0.4}
 
 
 @pytest.mark.parametrize(
