@@ -14,6 +14,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -45,10 +46,12 @@ LIMITS: Final[Mapping[str, float]] = {"worse": 0.0, "unsafe": 0.0, "covered": 0.
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What became of a vehicle: errors, m, by gain set, the least of the grid, the kind of the second proposal and the
-    refusals of the gate, whether its interval contains each flight, and the gain sets that ring or lack the margin."""
+    """What became of a vehicle: errors, m, and numbers of flights that could not be scored, by gain set; the least
+    error of the grid; the kind of the second proposal, and its refusals by the gate; whether its interval contains each
+    flight; the gain sets that ring, and those that lack the margin."""
 
     errors_m: Mapping[str, float]
+    unscored: Mapping[str, int]
     best_m: float
     kind: str
     refused: int
@@ -75,12 +78,18 @@ class Vehicle:
         """The records of several flights."""
         return [self.fly(gains, seed) for seed in seeds]
 
+    def errors(self, records: Sequence[Trajectory]) -> list[float]:
+        """Errors of the flights that can be scored."""
+        found = []
+        for each in records:
+            with suppress(TrajectoryError):
+                found.append(self._rig.experiment.error(each))
+        return found
+
     def error(self, records: Sequence[Trajectory]) -> float:
-        """Mean error of flights; infinite if one cannot be scored."""
-        try:
-            return float(np.mean([self._rig.experiment.error(each) for each in records]))
-        except TrajectoryError:
-            return np.inf
+        """Mean error of the flights that can be scored; infinite if none can."""
+        errors = self.errors(records)
+        return float(np.mean(errors)) if errors else np.inf
 
     def flight(self, number: int, gains: Gains, seed: int) -> Flight:
         """A valid flight of a campaign."""
@@ -125,7 +134,7 @@ def judge(number: int, *, name: str) -> Result:
     try:
         proposal = next_proposal(definition, [first])
     except TrajectoryError as error:
-        return Result({}, np.nan, "failed", 0, (), np.nan, frozenset(), frozenset(), str(error))
+        return Result({}, {}, np.nan, "failed", 0, (), np.nan, frozenset(), frozenset(), str(error))
     gate = check_policy(definition, experiment, experiment.space, proposal.gains, [first], spread=proposal.spread)
     loop = experiment.under(vehicle.parameters).loop(experiment.space.default)
     rules = loop.rules(vehicle.copter.hover_throttle)
@@ -133,16 +142,17 @@ def judge(number: int, *, name: str) -> Result:
         PROPOSED: proposal.gains,
         **{rule: {**first.gains, **gains} for rule, gains in rules.items()},
     }
-    errors_m = {each: vehicle.error(vehicle.records(gains, seeds[2:])) for each, gains in sets.items()}
+    records = {each: vehicle.records(gains, seeds[2:]) for each, gains in sets.items()}
     damping = {each: vehicle.damping(gains) for each, gains in sets.items()}
     interval = proposal.interval
-    flown = [vehicle.error([record]) for record in vehicle.records(proposal.gains, seeds[2:])]
+    unscored = {each: len(some) - len(vehicle.errors(some)) for each, some in records.items()}
     return Result(
-        errors_m=errors_m,
+        errors_m={each: vehicle.error(some) for each, some in records.items()},
+        unscored=unscored,
         best_m=least_error(name, vehicle, first.gains, seeds[2:]),
         kind=proposal.kind,
         refused=len(gate.refusals),
-        covered=[interval is not None and error in interval for error in flown],
+        covered=[interval is not None and error in interval for error in vehicle.errors(records[PROPOSED])],
         predicted_m=proposal.predicted_error or np.nan,
         rang=frozenset(each for each, (own, _) in damping.items() if own < RINGING_DAMPING),
         lacks_margin=frozenset(each for each, (_, within) in damping.items() if within < RINGING_DAMPING),
@@ -180,7 +190,8 @@ def print_sets(answered: Sequence[Result]) -> None:
             f"{1e3 * np.quantile(errors_m, 0.95):.1f} mm; of the best: median {np.median(ratio):.2f}, within 10 % "
             f"{np.mean(ratio <= 1.1):.0%}; ring "
             f"{sum(name in each.rang for each in answered)}, lack the margin "
-            f"{sum(name in each.lacks_margin for each in answered)}"
+            f"{sum(name in each.lacks_margin for each in answered)}, not scored "
+            f"{sum(each.unscored[name] for each in answered)} of {FLIGHTS * len(answered)} flights"
         )
 
 

@@ -1,7 +1,7 @@
 """Search for the gains with the least predicted error that keep the margin and the throttle's activity."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Final
 
@@ -48,8 +48,6 @@ def propose(
     space with which no copter rings (`robust_damping`), and that move the throttle at most `LARGEST_ACTIVITY` times as
     much as those of the flight, or the `usual` ones.
     """
-    from scipy.optimize import Bounds, NonlinearConstraint, minimize
-
     space = flight.loop.space if space is None else space
     likeliest = copters[0]
     model = FlightModel(flight, [likeliest])
@@ -88,11 +86,29 @@ def propose(
     if not allowed:
         return None
 
-    found = min(allowed, key=cost)
+    found = _minimum(cost, excess, min(allowed, key=cost), low, high)
+    rounded = tuple(space.coordinates(_rounded(space, space.gains_at(np.array(found)))).tolist())
+    candidates = [point for point in (rounded, *allowed) if max(excess(point)) <= 0.0]
+    least = min(map(cost, candidates))
+    best = max((point for point in candidates if cost(point) <= least + _AS_GOOD), key=margin)
+    return _rounded(space, space.gains_at(np.array(best)))
+
+
+def _minimum(
+    cost: Callable[[_Point], float],
+    excess: Callable[[_Point], tuple[float, ...]],
+    start: _Point,
+    low: Samples,
+    high: Samples,
+) -> _Point:
+    """The least cost without excess, searched from `start` within the ends, shape (k,) each, which may be equal."""
+    from scipy.optimize import Bounds, NonlinearConstraint, minimize
+
     free = high > low
+    if not free.any():
+        return start
 
     def whole(point: Samples) -> _Point:
-        """All coordinates, shape (k,), from those that are free to change."""
         coordinates = low.copy()
         coordinates[free] = point
         return tuple(coordinates.tolist())
@@ -103,21 +119,15 @@ def propose(
     def excess_at(point: Samples) -> Samples:
         return np.array(excess(whole(point)))
 
-    if free.any():
-        result = minimize(
-            cost_at,
-            np.array(found)[free],
-            method="COBYQA",
-            bounds=Bounds(low[free], high[free]),
-            constraints=NonlinearConstraint(excess_at, -np.inf, -_ROUNDING),
-            options={"maxfev": _MOST_FLIGHTS, "initial_tr_radius": _FIRST_STEP, "final_tr_radius": _LAST_STEP},
-        )
-        found = whole(result.x)
-    rounded = tuple(space.coordinates(_rounded(space, space.gains_at(np.array(found)))).tolist())
-    candidates = [point for point in (rounded, *allowed) if max(excess(point)) <= 0.0]
-    least = min(map(cost, candidates))
-    best = max((point for point in candidates if cost(point) <= least + _AS_GOOD), key=margin)
-    return _rounded(space, space.gains_at(np.array(best)))
+    found = minimize(
+        cost_at,
+        np.array(start)[free],
+        method="COBYQA",
+        bounds=Bounds(low[free], high[free]),
+        constraints=NonlinearConstraint(excess_at, -np.inf, -_ROUNDING),
+        options={"maxfev": _MOST_FLIGHTS, "initial_tr_radius": _FIRST_STEP, "final_tr_radius": _LAST_STEP},
+    )
+    return whole(found.x)
 
 
 def _rounded(space: GainSpace, gains: Mapping[str, float]) -> dict[str, float]:

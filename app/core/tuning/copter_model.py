@@ -23,7 +23,7 @@ from app.core.analysis.margin import (
     gain_margin,
     robust_damping,
 )
-from app.core.analysis.prediction import FlightModel
+from app.core.analysis.prediction import FlightModel, Prediction
 from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
 from app.core.definition import Flight, best_flight
@@ -45,6 +45,9 @@ from app.core.tuning.strategy import Interval, band_channels
 from app.core.tuning.trust_region import Box
 
 _DIGITS: Final = 3
+_MODEL_ERROR: Final = 0.04
+"""Relative error of even the best fit: without it, 75 % of the flights of random vehicles under PX4 were inside their
+90 % interval."""
 
 
 class CopterModel:
@@ -150,7 +153,7 @@ class CopterModel:
         return FlightPrediction(
             trajectory=Trajectory(grid_s, {experiment.output: curve, lower: low, upper: high}, "model", "simulation"),
             error=predicted.error_m,
-            interval=Interval(lower=predicted.low_m, upper=predicted.high_m, confidence=CONFIDENCE),
+            interval=_interval(predicted),
             models=self._values,
             errors=self._all.errors(loop),
         )
@@ -169,6 +172,19 @@ class CopterModel:
             f"{margin:.1f} times the {texts.fast_gains}; {REQUIRED_MARGIN:g} times is required."
         )
         return (moves, rings)
+
+
+def _interval(predicted: Prediction) -> Interval:
+    """The interval of a flight in other weather, wider by the model's own error."""
+    from scipy.special import ndtri
+
+    reach = float(ndtri(0.5 + CONFIDENCE / 2.0)) * _MODEL_ERROR * predicted.error_m
+    below, above = (np.hypot(end - predicted.error_m, reach) for end in (predicted.low_m, predicted.high_m))
+    return Interval(
+        lower=max(predicted.error_m - float(below), 0.0),
+        upper=predicted.error_m + float(above),
+        confidence=CONFIDENCE,
+    )
 
 
 def _read(experiment: CopterSteps, flight: Flight) -> LoggedFlight:

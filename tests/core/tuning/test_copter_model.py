@@ -99,6 +99,7 @@ def test_gains_outside_what_is_searched_and_pinned_ones_are_kept() -> None:
     high[space.names.index("PSC_ACCZ_I")] = 2.0
     optimum = model.optimum(Box(low, high))
     assert optimum is not None
+    assert model.optimum(Box(low, low)) == pytest.approx(low)
     kept = {name: value for name, value in space.mapping(optimum).items() if name != "PSC_ACCZ_I"}
     assert kept == {name: value for name, value in first.gains.items() if name != "PSC_ACCZ_I"}
     assert space.mapping(optimum)["PSC_ACCZ_I"] > 1.2
