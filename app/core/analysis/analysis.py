@@ -21,8 +21,8 @@ _LEAST_CHANGE_M: Final = 0.3
 _LARGEST_SATURATION: Final = 0.05
 _LEAST_VARIATION: Final = 1e-6
 _OTHER_CONTROLLER_SHARE: Final = 0.05
-_LARGEST_RESIDUAL_M_S2: Final = 1.5
-_LARGEST_MISFIT: Final = (0.005, 0.25)
+LARGEST_RESIDUAL_M_S2: Final = 1.5
+LARGEST_MISFIT: Final = (0.005, 0.25)
 _LARGEST_SLOPE_DEVIATION: Final = 0.15
 
 
@@ -233,13 +233,13 @@ def _require_own_controller(flight: LoggedFlight) -> None:
 
 
 def _require_likeness(loop: AltitudeLoop, behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> None:
-    if estimate.residual_m_s2 > _LARGEST_RESIDUAL_M_S2:
+    if estimate.residual_m_s2 > LARGEST_RESIDUAL_M_S2:
         raise _unanswered(
             loop,
             f"has accelerations that throttle and climb rate do not explain, {estimate.residual_m_s2:.1f} m/s² rms: "
             "gusts too strong, oscillating rate controllers, or vibration compensation",
         )
-    least, share = _LARGEST_MISFIT
+    least, share = LARGEST_MISFIT
     misfit_m = abs(present.prediction.error_m - behaviour.error_m)
     if misfit_m > max(least, share * behaviour.error_m):
         raise _unanswered(

@@ -31,6 +31,7 @@ _THROTTLE_HZ: Final = 2.0
 _LATENESS_S: Final = (np.arange(-0.2, 1.2, 0.05), np.arange(-0.05, 0.051, 0.01))
 """How late a set point may take effect, coarsely, then beside the best of these."""
 _LARGEST_MISFIT_M: Final = 0.1
+_LEAST_VARIATION: Final = 1e-6
 _RATE_HZ: Final = 400.0
 _FILTER_HZ: Final = 20.0
 
@@ -204,6 +205,8 @@ def _require_channels(trajectory: Trajectory, steps: Steps) -> None:
         if name not in trajectory.channels:
             raise _unanswered(name, f"is not among the recorded channels ({', '.join(trajectory.channels)})")
     within = trajectory.time_s[(trajectory.time_s >= steps.begin_s - LEAD_S) & (trajectory.time_s <= steps.end_s)]
+    if np.ptp(np.interp(within, trajectory.time_s, trajectory["throttle"])) < _LEAST_VARIATION:
+        raise _unanswered("throttle", "is constant: nothing can be learned from it")
     interval_s = float(np.median(np.diff(within)))
     if interval_s > _LARGEST_INTERVAL_S:
         raise _unanswered("time_s", f"has a sample every {interval_s:.2f} s; {_LARGEST_INTERVAL_S:g} s are needed")

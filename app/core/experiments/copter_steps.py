@@ -131,11 +131,18 @@ class CopterSteps(ABC):
 
     def under(self, parameters: Mapping[str, float]) -> Self:
         """The experiment with these parameters of the autopilot; itself if the replica of its loop lacks one."""
-        changed = self._with(parameters=parameters)
         try:
-            changed.loop(self.space.default)
+            return self.exactly_under(parameters)
         except InputError:
             return self
+
+    def exactly_under(self, parameters: Mapping[str, float]) -> Self:
+        """The experiment with these parameters of the autopilot, with its own if there are none.
+
+        Raises InputError for one that the replica of its loop lacks.
+        """
+        changed = self._with(parameters=parameters or self.parameters)
+        changed.loop(self.space.default)
         return changed
 
     def informed(self, mean: Vector, sd: Vector) -> Self:

@@ -23,6 +23,11 @@ class CampaignModel(Protocol):
         ...
 
     @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the gains that the optimum may change."""
+        ...
+
+    @property
     def fitted(self) -> tuple[FittedParameter, ...]:
         """What was fitted."""
         ...

@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Final
 
 from app.core.definition import Flight
-from app.core.errors import TrajectoryError
+from app.core.errors import InputError, TrajectoryError
 from app.core.experiments.base import Experiment, ModelledExperiment, ParameterDistribution, prior_distribution
 from app.core.tuning.campaign_model import CampaignModel
 from app.core.tuning.copter_model import fit_copter_steps
@@ -25,15 +25,15 @@ MODELS: Final[Mapping[str, Callable[[ModelledExperiment, Sequence[Flight]], Camp
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
     """Distribution of the vehicle's parameters: the data sheet's until a flight is valid, then that of the fit.
 
-    Experiments without a fit, and flights whose record does not suffice for one, use the data sheet; without a model
-    the distribution is empty.
+    Experiments without a fit, and flights that do not suffice for one, use the data sheet; without a model the
+    distribution is empty.
     """
     modelled = experiment.modelled
     if modelled is None or modelled.name not in MODELS or all(flight.error is None for flight in flights):
         return prior_distribution(experiment)
     try:
         return MODELS[modelled.name](modelled, flights).spread
-    except TrajectoryError:
+    except (InputError, TrajectoryError):
         return prior_distribution(experiment)
 
 

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from app.core.analysis.analysis import LARGEST_MISFIT, LARGEST_RESIDUAL_M_S2
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.loop import AltitudeLoop, GainSpace
 from app.core.analysis.margin import (
@@ -27,6 +28,7 @@ from app.core.analysis.prediction import FlightModel, Prediction
 from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
 from app.core.definition import Flight, best_flight
+from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import (
     FittedParameter,
     Matrix,
@@ -61,9 +63,13 @@ class CopterModel:
         used = fitted_flights(flights)
         self.base: Final = best_flight(used)
         self.numbers: Final = tuple(flight.number for flight in used)
-        self._experiment: Final = experiment.under(self.base.parameters)
+        self._experiment: Final = experiment.exactly_under(self.base.parameters)
         self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
         self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
+        if (left_m_s2 := self._estimate.residual_m_s2) > LARGEST_RESIDUAL_M_S2:
+            raise _unlike(
+                f"has accelerations that throttle and climb rate do not explain, {left_m_s2:.1f} m/s² rms: gusts too strong, oscillating rate controllers, or vibration compensation"
+            )
         first = next(flight for flight in flights if flight.outcome == "valid")
         self._first: Final = self._loop(experiment.space.vector(first.gains))
 
@@ -71,6 +77,10 @@ class CopterModel:
     def _values(self) -> Matrix:
         """Parameters of the copters that the flights allow, shape (k, 4)."""
         return np.array([vector_of(copter) for copter in self._estimate.draws])
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        return tuple(self._log.loop.space.bounds)
 
     @property
     def fitted(self) -> tuple[FittedParameter, ...]:
@@ -111,6 +121,14 @@ class CopterModel:
         return self._experiment.loop(gains)
 
     def optimum(self, box: Box) -> Vector | None:
+        """As in the interface. Raises TrajectoryError if the model does not fly as the best flight did."""
+        flown_m, modelled_m = self._log.error_m, self._few.fly(self._log.loop)[0]
+        least_m, share = LARGEST_MISFIT
+        if abs(modelled_m - flown_m) > max(least_m, share * flown_m):
+            raise _unlike(
+                f"deviates by {1e3 * flown_m:.1f} mm, where its gains make the fitted vehicle deviate by "
+                f"{1e3 * modelled_m:.1f} mm: it flew with other gains or parameters"
+            )
         space, here = self._experiment.space, space_within(self._log.loop.space, self._experiment, box)
         rules = self._log.loop.rules(self._log.throttle_mean)
         found = propose(
@@ -174,6 +192,14 @@ class CopterModel:
         return (moves, rings)
 
 
+def _unlike(reason: str) -> TrajectoryError:
+    return TrajectoryError(
+        "The best flight cannot be modelled.",
+        hint="Mark the flight invalid, and fly again with the gains of the campaign in weaker wind.",
+        problems=(Problem("trajectory", f"The flight {reason}."),),
+    )
+
+
 def _interval(predicted: Prediction) -> Interval:
     """The interval of a flight in other weather, wider by the model's own error."""
     from scipy.special import ndtri
@@ -189,7 +215,7 @@ def _interval(predicted: Prediction) -> Interval:
 
 def _read(experiment: CopterSteps, flight: Flight) -> LoggedFlight:
     gains = experiment.space.vector(flight.gains)
-    return experiment.under(flight.parameters).read(flight.trajectory.as_stored(), gains)
+    return experiment.exactly_under(flight.parameters).read(flight.trajectory.as_stored(), gains)
 
 
 def space_within(space: GainSpace, experiment: CopterSteps, box: Box) -> GainSpace:

@@ -32,6 +32,10 @@ class VerticalModel:
         self.base: Final = best_flight([flight for flight in flights if flight.number in self.numbers])
 
     @property
+    def searched(self) -> tuple[str, ...]:
+        return self._experiment.space.names
+
+    @property
     def fitted(self) -> tuple[FittedParameter, ...]:
         return self._calibration.fitted
 

@@ -1,5 +1,6 @@
 """Campaigns of altitude steps under ArduCopter and PX4: the model from flights over a link, and what it proposes."""
 
+import pickle
 from dataclasses import replace
 from functools import cache
 from typing import Final
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition, Flight, StopRule
-from app.core.errors import TrajectoryError
+from app.core.errors import InputError, TrajectoryError
 from app.core.experiments.base import prior_distribution
 from app.core.policy import Gains
 from app.core.tuning.campaign_models import known_distribution
@@ -107,14 +108,44 @@ def test_gains_outside_what_is_searched_and_pinned_ones_are_kept() -> None:
 
 @compiled_only
 def test_where_every_gain_set_rings_on_a_likely_vehicle_no_step_is_proposed() -> None:
-    """Gains for a stiff loop, and bounds that leave no gentler ones."""
+    """Bounds that leave a stiff loop alone."""
     rig, (first, _) = RIGS["ArduCopter"], flown("ArduCopter")
     stiff = {"PSC_ACCZ_P": (1.9, 2.0), "PSC_ACCZ_I": (3.9, 4.0)}
-    ringing = replace(first, gains={**first.gains, "PSC_ACCZ_P": 2.0, "PSC_ACCZ_I": 4.0})
     definition = replace(definition_of(rig), bounds=stiff, stop=StopRule(kind="budget"))
-    proposal = next_proposal(definition, [ringing])
+    proposal = next_proposal(definition, [first])
     assert proposal.explanation.notes[0].startswith("No gains that may be flown next keep the margin from ringing")
     assert proposal.kind == "none"
+
+
+@compiled_only
+def test_a_flight_that_the_model_does_not_fly_is_refused() -> None:
+    """One with other gains than it is said to have, one in a storm, and one with a filter that the replica lacks."""
+    rig, (first, _) = RIGS["ArduCopter"], flown("ArduCopter")
+    steps = rig.experiment.configured(OPTIONS)
+    other = replace(first, gains={**first.gains, "PSC_ACCZ_P": 1.5, "PSC_ACCZ_I": 3.0})
+    with pytest.raises(TrajectoryError, match="cannot be modelled") as refused:
+        next_proposal(definition_of(rig), [other])
+    assert "it flew with other gains or parameters" in refused.value.problems[0].reason
+    noise = np.random.default_rng(1).normal(0.0, 0.3, len(first.trajectory.time_s))
+    channels = {**first.trajectory.channels, "climb_rate_m_s": first.trajectory["climb_rate_m_s"] + noise}
+    stormy = replace(first, trajectory=replace(first.trajectory, channels=channels))
+    with pytest.raises(TrajectoryError) as refused:
+        CopterModel(steps, [stormy])
+    assert "that throttle and climb rate do not explain" in refused.value.problems[0].reason
+    filtered = replace(first, parameters={**first.parameters, "PSC_ACCZ_NTF": 1.0})
+    with pytest.raises(InputError):
+        CopterModel(steps, [filtered])
+    assert known_distribution(steps, [filtered]) == prior_distribution(steps)
+
+
+@compiled_only
+@pytest.mark.parametrize("autopilot", list(RIGS))
+def test_an_error_landscape_can_be_computed_in_another_process(autopilot: str) -> None:
+    rig, (first, _) = RIGS[autopilot], flown(autopilot)
+    steps = rig.experiment.configured(OPTIONS)
+    gains = np.stack((steps.space.default, 0.9 * steps.space.default))
+    predict_errors = CopterModel(steps, [first]).errors
+    assert pickle.loads(pickle.dumps(predict_errors))(gains).tolist() == predict_errors(gains).tolist()
 
 
 def test_a_record_without_the_throttle_is_refused_and_tells_nothing_of_the_vehicle() -> None:

@@ -50,13 +50,13 @@ def propose(
     box = Box(*space.reachable(space.vector(base.gains), fraction))
     choice = _choose(definition, experiment, space, flights, model, box)
     prediction = model.predict(choice.gains)
-    clipped = space.names_where((choice.optimum <= box.low) | (choice.optimum >= box.high))
+    at_end = space.names_where((choice.optimum <= box.low) | (choice.optimum >= box.high))
     explanation = Explanation(
         summary=_summary(experiment, model, choice, prediction) + _describe_limit(fraction, flights),
         base_flight=base.number,
         gradient=_gradient(space, space.nearest(space.vector(base.gains)), model),
         direction=space.by_name(choice.gains - space.vector(base.gains)),
-        clipped=clipped,
+        clipped=tuple(name for name in at_end if name in model.searched),
         notes=(
             *choice.notes,
             *model.notes(choice.gains),
