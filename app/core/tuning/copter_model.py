@@ -68,7 +68,8 @@ class CopterModel:
         self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
         if (left_m_s2 := self._estimate.residual_m_s2) > LARGEST_RESIDUAL_M_S2:
             raise _unlike(
-                f"has accelerations that throttle and climb rate do not explain, {left_m_s2:.1f} m/s² rms: gusts too strong, oscillating rate controllers, or vibration compensation"
+                f"has accelerations that throttle and climb rate do not explain, {left_m_s2:.1f} m/s² rms: gusts "
+                "too strong, oscillating rate controllers, or vibration compensation"
             )
         first = next(flight for flight in flights if flight.outcome == "valid")
         self._first: Final = self._loop(experiment.space.vector(first.gains))
