@@ -123,7 +123,7 @@ class CopterModel:
 
     def optimum(self, box: Box) -> Vector | None:
         """As in the interface. Raises TrajectoryError if the model does not fly as the best flight did."""
-        flown_m, modelled_m = self._log.error_m, self._few.fly(self._log.loop)[0]
+        flown_m, modelled_m = self._log.error_m, self._likeliest.fly(self._log.loop)[0]
         least_m, share = LARGEST_MISFIT
         if abs(modelled_m - flown_m) > max(least_m, share * flown_m):
             raise _unlike(
