@@ -320,7 +320,9 @@ class FlightMonitor:
 
     def sample(self, sample: Sample) -> None:
         output = self._experiment.output
-        self._score(sample.time_s, abs(self._target(sample) - sample[output]))
+        target = self._target(sample)
+        if target is not None:
+            self._score(sample.time_s, abs(target - sample[output]))
         others = [name for name in sample.channels if name != output]
         self._columns = ["time_s", output, *others]
         self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
@@ -350,11 +352,12 @@ class FlightMonitor:
             return None
         return self._integral if self._experiment.integrates else self._integral / (self._last[0] - self._scored_from_s)
 
-    def _target(self, sample: Sample) -> float:
-        """What the output is compared with: a channel of the sample, or the set point."""
+    def _target(self, sample: Sample) -> float | None:
+        """What the output is compared with: a channel of the sample, None if the vehicle does not send it, or the set
+        point."""
         channel = self._experiment.target_channel
         if channel is not None:
-            return sample[channel]
+            return sample.channels.get(channel)
         return float(self._experiment.set_point(np.array([sample.time_s]))[0])
 
     def _score(self, time_s: float, deviation: float) -> None:

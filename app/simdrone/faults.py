@@ -117,6 +117,15 @@ class LinkLost(Fault):
         return True
 
 
+class AcknowledgementLost(Fault):
+    """Waypoints are taken, but their acknowledgements are lost."""
+
+    name = "ack-lost"
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [message for message in messages if message.kind != "MISSION_ACK"]
+
+
 class Deaf(Fault):
     """The drone receives nothing; its own packets arrive."""
 
@@ -293,6 +302,7 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
             NoLiftOff,
             LinkLost,
             Deaf,
+            AcknowledgementLost,
             TakenOver,
             FrozenPosition,
             JumpingPosition,

@@ -53,6 +53,8 @@ class Sample:
 
 ALTITUDE_LIMIT_M: Final = 4.5
 """Height above the ground under a vehicle with a link at which its flight is aborted."""
+HIGHEST_SET_POINT_M: Final = ALTITUDE_LIMIT_M - 1.0
+"""Highest set point of such a vehicle, with room for its overshoot."""
 RECORDED_BEYOND_S: Final = 0.4
 """Time recorded after the end of the scored window."""
 LAND_COMMAND_S: Final = 2.0
@@ -66,7 +68,7 @@ class FlightOptions:
     `seed` makes scatter repeatable: the same vehicle, gains and seed give the same flight. `speed` is simulated time
     over the time of the `clock` (10.0: ten times real time); None runs as fast as possible. Real vehicles ignore both.
     `window_s` is the end of the scored time after the takeoff command; a vehicle with one manoeuvre of fixed length
-    ignores it. Only simulated vehicles fly other `set_points` than the takeoff's.
+    ignores it. The set points after the first are flown once the vehicle is at rest there.
     """
 
     seed: int

@@ -138,8 +138,8 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
 
 
 def _experiments(options: Options) -> tuple[str, ...]:
-    """Return the experiment whose gains the autopilot has."""
-    return (PROFILES[str(options["autopilot"])].experiment,)
+    """Return the experiments whose gains the autopilot has."""
+    return PROFILES[str(options["autopilot"])].experiments
 
 
 def _check_gains(options: Options, gains: Gains) -> None:
@@ -166,7 +166,7 @@ MAVLINK: Final = VehicleKind(
     line="A real vehicle with Paparazzi, ArduCopter or PX4, or a simulated one with the same protocol.",
     is_real=True,
     can_fly=True,
-    experiments=tuple(profile.experiment for profile in PROFILES.values()),
+    experiments=tuple(name for profile in PROFILES.values() for name in profile.experiments),
     options=(
         VehicleOption(
             "autopilot", "Autopilot: paparazzi, ardupilot or px4", "", "paparazzi", label="Kind of autopilot"

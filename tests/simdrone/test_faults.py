@@ -228,7 +228,7 @@ def test_a_pilot_takes_it_over_holds_it_and_hands_it_back(
 
 def test_the_registry_holds_what_was_promised() -> None:
     promised = (
-        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost deaf taken-over frozen-position "
+        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost deaf ack-lost taken-over frozen-position "
         "jumping-position low-battery reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost "
         "mocap-frozen mocap-drift"
     )

@@ -170,6 +170,7 @@ class Action(StrEnum):
 
     ARM = "arm"
     TAKE_OFF = "take off"
+    FLY_TO = "fly to its next set point"
     LAND = "land"
     MOTORS_OFF = "motors off"
     """On the ground only: some autopilots refuse it in flight."""
@@ -232,10 +233,13 @@ class DuplicateVehicleDetected:
 
 @dataclass(frozen=True, slots=True)
 class ActionDone:
-    """The vehicle has acknowledged all messages of an action."""
+    """The vehicle has acknowledged all messages of an action. `sent_s` are the times at which the last message was
+    sent, `replied_s` is the time at which its reply was received; None without a reply."""
 
     action: Action
     now_s: float
+    sent_s: tuple[float, ...] = ()
+    replied_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,7 +272,10 @@ Event = (
 
 @dataclass(frozen=True, slots=True)
 class PerformAction:
+    """Carry out an action; `altitude_m` is the altitude to fly to, on the vehicle's datum."""
+
     action: Action
+    altitude_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,13 +299,15 @@ class RestoreGains:
 
 @dataclass(frozen=True, slots=True)
 class RecordSample:
-    """A sample of the record, with its set point, the altitude of the second source, and the throttle if reported."""
+    """A sample of the record, with its set point, the altitude of the second source, and if known the throttle and the
+    autopilot's own reference. Altitudes are on the vehicle's datum."""
 
     position: Position
     set_point_m: float
     battery_v: float | None
     second_m: float | None = None
     throttle: float | None = None
+    reference_m: float | None = None
 
 
 Command = PerformAction | SendGain | RequestGain | RestoreGains | RecordSample

@@ -41,6 +41,8 @@ class Failure(StrEnum):
     OWN_LANDING = "F11"
     DUPLICATE = "F12"
     FALL = "F13"
+    SET_POINT = "F14a"
+    NOT_SETTLED = "F14b"
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +158,18 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "note",
             "quarantine",
             "The vehicle fell.",
+        ),
+        Failure.SET_POINT: Response(
+            "a new set point refused, or unconfirmed after three attempts, 0.5 s apart",
+            "land",
+            "invalid",
+            "The vehicle did not confirm a new set point.",
+        ),
+        Failure.NOT_SETTLED: Response(
+            "not at rest within 0.2 m in the 2 s before the first step",
+            "land",
+            "invalid",
+            "The steps were not flown.",
         ),
     }
 )

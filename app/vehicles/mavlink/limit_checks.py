@@ -78,19 +78,20 @@ def find_unexpected(
     return Finding(failure=Failure.UNEXPECTED, why=why) if why else None
 
 
-def find_interrupted_climb(watch: TrialObservation, limits: Limits) -> Finding | None:
-    """Find a vehicle that hovers before it has been near its set point: its failsafe or a person has stopped it."""
+def find_interrupted_climb(watch: TrialObservation, limits: Limits, climb_to_m: float) -> Finding | None:
+    """Find a vehicle that hovers before it has been near its first set point: its failsafe or a person has stopped
+    it."""
     mode = mode_of(watch, limits)
-    if mode not in limits.hovering_modes or watch.highest_m >= limits.set_point_m - _CLIMBED_WITHIN_M:
+    if mode not in limits.hovering_modes or watch.highest_m >= climb_to_m - _CLIMBED_WITHIN_M:
         return None
     why = f"The vehicle entered mode {_named(mode, limits)} before it had climbed."
     return Finding(failure=Failure.UNEXPECTED, why=why)
 
 
-def find_incomplete_climb(watch: TrialObservation, limits: Limits) -> Finding | None:
-    """Find at the end of a record that the vehicle has never been near its set point. Its gains may have kept it low,
-    or a change of mode that no heartbeat reported."""
-    if watch.highest_m >= limits.set_point_m - _CLIMBED_WITHIN_M:
+def find_incomplete_climb(watch: TrialObservation, climb_to_m: float) -> Finding | None:
+    """Find at the end of a record that the vehicle has never been near its first set point. Its gains may have kept it
+    low, or a change of mode that no heartbeat reported."""
+    if watch.highest_m >= climb_to_m - _CLIMBED_WITHIN_M:
         return None
     why = (
         f"It did not come within {_CLIMBED_WITHIN_M:g} m of its set point, because of its gains or of a change of mode "

@@ -103,6 +103,8 @@ class TrialObservation:
     """Since when all positions have been too late to be fresh."""
     side: int = -1
     crossings: int = 0
+    may_overshoot: bool = False
+    """Whether its next crossing is the overshoot after a change of the set point, which does not count."""
     armed: bool = False
     armed_since_s: float = 0.0
     mode: str = ""
@@ -150,6 +152,12 @@ def reset_altitude(watch: TrialObservation) -> TrialObservation:
     """Return the observation of a vehicle on the ground whose altitude was reset, without its earlier altitudes."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
     return replace(watch, jumped_m=0.0, lifted=False, unseen=False, behind_m=0.0, side=-1, crossings=0, second=second)
+
+
+def change_set_point(watch: TrialObservation, set_point_m: float) -> TrialObservation:
+    """Return the observation of a vehicle that is to fly to another set point, on whose one side it is now."""
+    is_above = watch.last is not None and watch.last.altitude_m > set_point_m
+    return replace(watch, side=1 if is_above else -1, may_overshoot=True)
 
 
 def update(
@@ -400,7 +408,7 @@ def _with_latency(watch: TrialObservation, position: Position, now_s: float) -> 
 def _accept(watch: TrialObservation, position: Position, now_s: float, limits: Limits) -> TrialObservation:
     above_m = position.altitude_m - limits.set_point_m
     side = watch.side if abs(above_m) <= limits.crossing_m else (1 if above_m > 0.0 else -1)
-    crossed = watch.crossings + (side != watch.side)
+    has_crossed = side != watch.side
     return replace(
         watch,
         behind_m=_behind_m(watch, position),
@@ -411,7 +419,8 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
         last=position,
         origin=watch.origin or position,
         side=side,
-        crossings=crossed,
+        crossings=watch.crossings + (has_crossed and not watch.may_overshoot),
+        may_overshoot=watch.may_overshoot and not has_crossed,
         other=None,
     )
 

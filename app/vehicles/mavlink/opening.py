@@ -72,10 +72,10 @@ def open_radio(
 
 
 def limits_of(options: Options, radio: AutopilotLink) -> Limits:
-    """Return the limits of a vehicle that stands at its own zero."""
+    """Return the limits of a vehicle that stands at its own zero and takes off to the altitude of its target."""
     profile = radio.profile
     return Limits(
-        set_point_m=TAKEOFF_ALTITUDE_M,
+        set_point_m=radio.target.altitude_m,
         heartbeat_s=profile.heartbeat_s,
         min_battery_v=float(options["min_battery_v"]),
         radius_m=float(options["radius_m"]),

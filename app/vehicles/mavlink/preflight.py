@@ -9,7 +9,16 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
-from app.vehicles.base import LAND_COMMAND_S, CheckItem, Identity, SafeGainsError, VehicleError
+from app.core.models.set_points import SetPoints
+from app.vehicles.base import (
+    ALTITUDE_LIMIT_M,
+    HIGHEST_SET_POINT_M,
+    LAND_COMMAND_S,
+    CheckItem,
+    Identity,
+    SafeGainsError,
+    VehicleError,
+)
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
 from app.vehicles.mavlink.events import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
@@ -344,6 +353,21 @@ def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
         if passed
         else "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
         "setting “Paparazzi: time limit of the flight plan's takeoff”.",
+    )
+
+
+def evaluate_set_points(set_points: SetPoints) -> CheckItem:
+    """Check that the set points are well below the altitude limit and well above the ground."""
+    first_m, lowest_m, highest_m = set_points.altitudes_m[0], min(set_points.altitudes_m), max(set_points.altitudes_m)
+    passed = highest_m <= HIGHEST_SET_POINT_M and lowest_m > 0.5 * first_m
+    return CheckItem(
+        name="altitudes",
+        title="Altitudes",
+        passed=passed,
+        found=f"set points from {lowest_m:g} to {highest_m:g} m",
+        needed=f"above {0.5 * first_m:g} m, half of the first, and at most {HIGHEST_SET_POINT_M:g} m: the flight is "
+        f"aborted at {ALTITUDE_LIMIT_M:g} m",
+        hint="" if passed else "Choose a lower height, or smaller steps.",
     )
 
 

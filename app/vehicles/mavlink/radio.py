@@ -254,8 +254,8 @@ class CommandSequence:
     def __init__(self, action: Action, steps: tuple[Step, ...], radio: AutopilotLink, *, description: str = "") -> None:
         self._action, self._radio, self._description = action, radio, description or action
         self._steps = list(steps)
-        self._sent_s = 0.0
-        self._attempts = 0
+        self._sent_s: list[float] = []
+        self._replied_s: float | None = None
         self._send()
 
     def proceed(self, packets: list[PacketReceived]) -> ActionDone | ActionRefused | None:
@@ -264,14 +264,15 @@ class CommandSequence:
             if self._steps and (accepted := _verdict(self._steps[0], each.measurement)) is not None:
                 if not accepted and self._steps[0].needed:
                     return self._refused(each.measurement)
+                self._replied_s = each.now_s
                 self._next()
         now_s = self._radio.clock.now_s()
-        while self._steps and not self._steps[0].awaits and now_s - self._sent_s >= self._steps[0].pause_s:
+        while self._steps and not self._steps[0].awaits and now_s - self._sent_s[-1] >= self._steps[0].pause_s:
             self._next()
         if not self._steps:
-            return ActionDone(self._action, now_s)
-        if self._steps[0].awaits and now_s - self._sent_s >= self._radio.reply_timeout_s:
-            if self._attempts < self._steps[0].attempts:
+            return ActionDone(self._action, now_s, tuple(self._sent_s), self._replied_s)
+        if self._steps[0].awaits and now_s - self._sent_s[-1] >= self._radio.reply_timeout_s:
+            if len(self._sent_s) < self._steps[0].attempts:
                 self._send()
             elif not self._steps[0].needed:
                 self._next()
@@ -281,13 +282,13 @@ class CommandSequence:
 
     def _next(self) -> None:
         self._steps.pop(0)
-        self._attempts = 0
-        self._send()
+        if self._steps:
+            self._sent_s, self._replied_s = [], None
+            self._send()
 
     def _send(self) -> None:
         if self._steps:
-            self._sent_s = self._radio.clock.now_s()
-            self._attempts += 1
+            self._sent_s.append(self._radio.clock.now_s())
             self._radio.send(*self._steps[0].sends)
 
     def _refused(self, measurement: Measurement | None) -> ActionRefused:

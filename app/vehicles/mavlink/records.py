@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from app.core.errors import TrajectoryError
+from app.core.experiments.altitude_steps import REFERENCE
 from app.core.formatting import count
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
@@ -138,6 +139,8 @@ def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[st
         channels["battery_v"] = sample.battery_v
     if sample.throttle is not None:
         channels["throttle"] = sample.throttle
+    if sample.reference_m is not None:
+        channels[REFERENCE] = sample.reference_m - datum_m
     if sample.second_m is not None:
         second_m = sample.second_m - datum_m
         scored_m, other_m = (own_m, second_m) if scored == "vehicle" else (second_m, own_m)

@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+
 from app.vehicles.base import Sample, ShouldStop, StopRequest, VehicleError
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
@@ -26,6 +28,7 @@ from app.vehicles.mavlink.events import (
     Tick,
 )
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
+from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
@@ -47,12 +50,14 @@ _SAMPLE_EVERY_S: Final = 0.015
 @dataclass(frozen=True, slots=True)
 class TrialResult:
     """Final state and samples of a trial; `error` is the first exception of the caller's functions. `offset_s` converts
-    the vehicle's clock to ours, by the packet with the least latency."""
+    the vehicle's clock to ours, by the packet with the least latency; `reference` computes the autopilot's own
+    reference, if it does not send it."""
 
     trial: Trial
     samples: tuple[RecordSample, ...]
     offset_s: float
     error: BaseException | None
+    reference: Reference | None = None
 
 
 def _no_secondary() -> Sequence[SecondaryAltitudeReceived]:
@@ -64,7 +69,7 @@ class TrialRunner:
 
     `restore` writes the safe gains, reads them back, and returns the problem, or an empty string. `look` returns the
     samples of the second source of altitude since the last call; `channels` converts a record's sample and a datum to
-    the channels of live telemetry.
+    the channels of live telemetry; `reference` computes the autopilot's own reference, if it does not send it.
     """
 
     def __init__(
@@ -78,7 +83,9 @@ class TrialRunner:
         should_stop: ShouldStop,
         channels: Callable[[RecordSample, float], dict[str, float]],
         look: Callable[[], Sequence[SecondaryAltitudeReceived]] = _no_secondary,
+        reference: Reference | None = None,
     ) -> None:
+        self._reference = reference
         self._radio, self._restore, self._channels, self._look = radio, restore, channels, look
         self._offset_s = float("inf")
         self._on_sample, self._should_stop = on_sample, should_stop
@@ -121,7 +128,7 @@ class TrialRunner:
         while not self._trial.is_over:
             self._guarded(self._listen)
             self._guarded(self._evaluate)
-        return TrialResult(self._trial, tuple(self._samples), self._offset_s, self._error)
+        return TrialResult(self._trial, tuple(self._samples), self._offset_s, self._error, self._reference)
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
@@ -184,8 +191,8 @@ class TrialRunner:
     def _carry_out(self, commands: tuple[Command, ...]) -> None:
         for command in commands:
             match command:
-                case PerformAction(action):
-                    self._perform(action)
+                case PerformAction(action, altitude_m):
+                    self._perform(action, altitude_m)
                 case SendGain(setting):
                     radio = self._radio
                     radio.send(radio.profile.set_parameter(radio.target, setting.parameter, setting.value))
@@ -195,10 +202,21 @@ class TrialRunner:
                     self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
                 case RecordSample():
                     throttle = self._radio.seen.throttle_at(self._radio.clock.now_s())
-                    self._record_sample(replace(command, throttle=throttle))
+                    reference_m = self._reference_m(command.position)
+                    self._record_sample(replace(command, throttle=throttle, reference_m=reference_m))
 
-    def _perform(self, action: Action) -> None:
-        self._sequence = CommandSequence(action, self._radio.profile.steps(action, self._radio.target), self._radio)
+    def _perform(self, action: Action, altitude_m: float | None) -> None:
+        target = self._radio.target if altitude_m is None else replace(self._radio.target, altitude_m=altitude_m)
+        self._sequence = CommandSequence(action, self._radio.profile.steps(action, target), self._radio)
+
+    def _reference_m(self, position: Position) -> float | None:
+        """Return the autopilot's own reference now, on the vehicle's datum; None if it is not known."""
+        trial = self._trial
+        if self._reference is None or trial.commanded_boot_s is None:
+            return None
+        time_s = np.array([position.time_boot_s - trial.commanded_boot_s])
+        flown = at_last_times(trial.plan.takeoff, trial.changes)
+        return float(self._reference(flown, time_s)[0]) + trial.plan.datum_m
 
     def _restored(self) -> str:
         try:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from app.vehicles.mavlink import limit_checks
+from app.vehicles.mavlink import limit_checks, set_point_schedule
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
     AbortRequested,
@@ -113,6 +113,8 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
         return trial, ()
     if trial.state is State.ARM:
         trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
+    elif trial.state is State.RECORD:
+        trial = set_point_schedule.note_settling(trial, positions)
     to_m = trial.plan.ground_m if trial.state not in _STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
     return trial, tuple(RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)
@@ -217,14 +219,29 @@ def _record(trial: Trial, event: Event) -> Step:
     trial = _resting(trial, now_s)
     if _has_rested(trial, DOWN_S, now_s):
         return fail(trial, Finding(failure=Failure.ENVELOPE, why="It descended to the ground by itself."), now_s)
+    if (changed := _change_set_point(trial, event)) is not None:
+        return changed
     if not _is_whole(trial) or _may_be_by_hand(trial, now_s):
         return _overtime(trial, now_s)
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
-    incomplete = limit_checks.find_incomplete_climb(trial.watch, trial.plan.limits)
+    incomplete = limit_checks.find_incomplete_climb(trial.watch, trial.plan.climb_to_m)
     if trial.plan.climbs_from_ground and incomplete:
         trial = note(trial, incomplete)
     return land(trial, State.LAND, now_s)
+
+
+def _change_set_point(trial: Trial, event: Event) -> Step | None:
+    """Command the next set point when it is due, and note its confirmation; None if there is nothing to do."""
+    now_s = event.now_s
+    if isinstance(event, ActionRefused) and event.action is Action.FLY_TO:
+        return fail(trial, Finding(failure=Failure.SET_POINT, why=event.why), now_s)
+    if isinstance(event, ActionDone) and event.action is Action.FLY_TO:
+        return set_point_schedule.confirm(trial, event), ()
+    if not set_point_schedule.is_due(trial, now_s) or _may_be_by_hand(trial, now_s):
+        return None
+    finding = set_point_schedule.find_unsettled(trial)
+    return set_point_schedule.command_next(trial) if finding is None else fail(trial, finding, now_s)
 
 
 def _is_whole(trial: Trial) -> bool:
@@ -406,7 +423,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     return (
         _taken_over(trial)
         or limit_checks.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
-        or (limit_checks.find_interrupted_climb(watch, plan.limits) if _modes(trial) else None)
+        or (limit_checks.find_interrupted_climb(watch, plan.limits, plan.climb_to_m) if _modes(trial) else None)
         or limit_checks.find_duplicate(watch)
         or limit_checks.find_link(watch, plan.limits, now_s)
         or limit_checks.find_jump(watch)

@@ -9,7 +9,8 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Final, Literal
 
-from app.core.experiments.takeoff import WINDOW_S
+from app.core.experiments.takeoff import SET_POINTS, WINDOW_S
+from app.core.models.set_points import SetPoints
 from app.vehicles.base import RECORDED_BEYOND_S, motors_off_requested
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import (
@@ -115,12 +116,15 @@ class Plan:
 
     `safe_gains` are in the order in which an abort sends them; `ground_m` is the ground on the vehicle's datum;
     `climbs_from_ground`: the commanded altitude counts from there; `record_s`: length of the record after the takeoff
-    command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again.
+    command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again;
+    `set_points`: the takeoff's altitude, and those that follow, in the record's altitude. The set point of `limits` is
+    the current one.
     """
 
     safe_gains: tuple[Setting, ...]
     limits: Limits
     ground_m: float
+    set_points: SetPoints = SET_POINTS
     climbs_from_ground: bool = False
     record_s: float = RECORD_S
     lift_off_s: float = 1.5
@@ -138,16 +142,38 @@ class Plan:
         """Zero of the record's altitude, on the vehicle's datum."""
         return self.ground_m if self.climbs_from_ground else 0.0
 
+    @property
+    def takeoff(self) -> SetPoints:
+        """The takeoff's set point alone."""
+        return SetPoints(self.set_points.times_s[:1], self.set_points.altitudes_m[:1])
+
+    @property
+    def climb_to_m(self) -> float:
+        """First set point, on the vehicle's datum."""
+        return self.set_points.altitudes_m[0] + self.datum_m
+
+    def with_set_point(self, set_point_m: float) -> "Plan":
+        """Return the plan with another current set point, on the vehicle's datum."""
+        return replace(self, limits=replace(self.limits, set_point_m=set_point_m))
+
     def on_ground_at(self, ground_m: float) -> "Plan":
         """Return the plan with another height of the ground."""
         moved = replace(self, ground_m=ground_m)
-        set_point_m = self.limits.set_point_m + moved.datum_m - self.datum_m
-        return replace(moved, limits=replace(self.limits, set_point_m=set_point_m))
+        return moved.with_set_point(self.limits.set_point_m + moved.datum_m - self.datum_m)
 
 
 Contact = Literal["unknown", "stayed", "landed", "fell"]
 """Contact with the ground once the motors have stopped. stayed: it has never left the ground. fell: its motors may have
 been stopped in the air, or it hit the ground hard. unknown: its motors were not seen to stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetPointChange:
+    """A set point that the vehicle has confirmed, in the record's altitude. `times_s`, in s since the takeoff command
+    by the vehicle's clock: when it took effect, if it was the first, second, … sending of the message that did."""
+
+    altitude_m: float
+    times_s: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +185,9 @@ class Trial:
     command may still be under way to it. `failure` is the first failure. `stopped`: a person has requested motors off;
     `answered`: the vehicle has replied to the command to stop them. `ground_samples` are its positions between arming
     and the takeoff command, `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is
-    the reason why it will be quarantined at the end, however it lands.
+    the reason why it will be quarantined at the end, however it lands. `changes` are the set points after the
+    takeoff's that it has confirmed; `changes_set_point`: it has not confirmed the newest; `settling` are the positions
+    that show whether it is at rest before the first of them.
     """
 
     plan: Plan
@@ -187,6 +215,9 @@ class Trial:
     answered: bool = False
     doubt: str = ""
     contact: Contact = "unknown"
+    changes: tuple[SetPointChange, ...] = ()
+    changes_set_point: bool = False
+    settling: tuple[Position, ...] = ()
 
     @property
     def is_over(self) -> bool:

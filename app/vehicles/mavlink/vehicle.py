@@ -6,8 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from app.core.clock import Clock
+from app.core.models.set_points import SetPoints
 from app.core.policy import Gains
+from app.core.records.trajectory import Samples
 from app.vehicles.base import (
     CheckItem,
     Condition,
@@ -28,6 +32,7 @@ from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, Altitud
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
 from app.vehicles.mavlink.events import Action, PacketReceived, RecordSample
 from app.vehicles.mavlink.failures import HELP, Failure
+from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference, with_flown_set_points
 from app.vehicles.mavlink.opening import limits_of, open_radio
 from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_for, written
 from app.vehicles.mavlink.preflight import Ground
@@ -155,7 +160,7 @@ class MavlinkVehicle:
         on_sample: Callable[[Sample], None],
         should_stop: ShouldStop,
     ) -> FlightRecord:
-        """Arm, take off to 3 m, record for `order.record_s`, land, disarm, and restore the safe gains.
+        """Arm, take off, fly to the set points, record for `order.record_s`, land, disarm, restore the safe gains.
 
         `order.speed` and `order.seed` are ignored. `should_stop` is called once the vehicle is ready for arming, and
         then every 10 ms. Raises VehicleError, with `not_flown` set, if no gains were staged, the vehicle is not ready
@@ -165,9 +170,11 @@ class MavlinkVehicle:
         try:
             self._require_not_quarantined()
             self._require_staged()
-            ground = self._observe_ground(STANDSTILL_S, order.record_s)
+            self._radio.target = replace(self._radio.target, altitude_m=order.set_points.altitudes_m[0])
+            ground = self._observe_ground(STANDSTILL_S, order)
             self._require_staged()  # again: a restart meanwhile leaves none
             self._parameters.set()
+            reference = self._reference(order, ground)
             stop = should_stop()
         except BaseException as error:
             if isinstance(error, VehicleError):
@@ -177,7 +184,7 @@ class MavlinkVehicle:
         if stop is not None:
             self._restore_or_quarantine()
             return self._not_begun(ground, stop.reason, has_flown=False)
-        flown = self._fly(ground, order.record_s, on_sample, should_stop)
+        flown = self._fly(ground, order, reference, on_sample, should_stop)
         if flown.error is not None:
             raise flown.error
         return self._record(flown, ground)
@@ -499,11 +506,13 @@ class MavlinkVehicle:
                 hint="Stage the gains, check the read-back, then fly.",
             )
 
-    def _observe_ground(self, watched_s: float, record_s: float) -> Ground:
+    def _observe_ground(self, watched_s: float, order: FlightOptions) -> Ground:
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
         watched, items = self._check(watched_s)
         if self._radio.profile.flying_blocks:
-            items = (*items, preflight.evaluate_flight_time(record_s, plan_time_s=float(self._options["plan_time_s"])))
+            plan_time_s = float(self._options["plan_time_s"])
+            items = (*items, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
+        items = (*items, preflight.evaluate_set_points(order.set_points))
         self._require_not_quarantined()
         preflight.require(items)
         return watched.ground
@@ -530,13 +539,31 @@ class MavlinkVehicle:
         positions = tuple(position for _, position in self._radio.seen.positions)
         return replace(watched, positions=positions), items
 
+    def _reference(self, order: FlightOptions, ground: Ground) -> Reference | None:
+        """Return the function that computes the autopilot's own reference for set points that follow the takeoff's;
+        None if it is not needed or not known. It is called once, because its first call may take seconds."""
+        if len(order.set_points.times_s) == 1 or not self._radio.profile.simulates_reference:
+            return None
+        ground_m = ground.altitude_m
+
+        def reference(set_points: SetPoints, time_s: Samples) -> Samples:
+            return simulate_reference(set_points, ground_m, time_s, order.record_s)
+
+        reference(order.set_points, np.zeros(1))
+        return reference
+
     def _fly(
-        self, ground: Ground, record_s: float, on_sample: Callable[[Sample], None], should_stop: ShouldStop
+        self,
+        ground: Ground,
+        order: FlightOptions,
+        reference: Reference | None,
+        on_sample: Callable[[Sample], None],
+        should_stop: ShouldStop,
     ) -> TrialResult:
         last = ground.last
         self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
-        plan = replace(self._plan(ground), record_s=record_s)
+        plan = replace(self._plan(ground), record_s=order.record_s, set_points=order.set_points)
         self._gains.staged = self._repeated = None
         watch = watching.begin(
             self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S
@@ -552,6 +579,7 @@ class MavlinkVehicle:
             should_stop=should_stop,
             channels=lambda sample, datum_m: records.channels_of(sample, datum_m, self._scored),
             look=list if self._secondary is None else self._secondary.take_samples,
+            reference=reference,
         )
         try:
             flown = self._flight.fly()
@@ -618,7 +646,15 @@ class MavlinkVehicle:
             refusal = VehicleError(reason, hint="Inspect the vehicle, correct this, then fly again.")
             refusal.not_flown = True
             raise refusal
-        both = AlignedRecord(trajectory=records.trajectory_of(flown.samples, start_s, trial.plan.datum_m))
+        plan = trial.plan
+        own = with_flown_set_points(
+            records.trajectory_of(flown.samples, start_s, plan.datum_m),
+            plan.takeoff,
+            trial.changes,
+            ground_m=plan.ground_m - plan.datum_m,
+            reference=flown.reference,
+        )
+        both = AlignedRecord(trajectory=own)
         if self._secondary is not None:
             zero_s, name = start_s + flown.offset_s, self._secondary.source.name
             both = add_secondary_altitude(

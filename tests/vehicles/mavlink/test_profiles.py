@@ -210,7 +210,7 @@ def test_gains_are_clamped_here_because_no_autopilot_does() -> None:
 
 @pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
 def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_every_release(profile: Profile) -> None:
-    space = get_experiment(profile.experiment).space
+    space = get_experiment(profile.experiments[0]).space
     for gain_set in profile.gain_sets:
         for edge in (space.lower, space.default, space.upper):
             gains = space.mapping(edge)
@@ -220,7 +220,7 @@ def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_eve
 @pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
 def test_the_gains_of_a_vehicle_have_the_order_of_its_experiment(profile: Profile) -> None:
     for gain_set in profile.gain_sets:
-        assert tuple(gain.gain for gain in gain_set) == get_experiment(profile.experiment).space.names
+        assert tuple(gain.gain for gain in gain_set) == get_experiment(profile.experiments[0]).space.names
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400])

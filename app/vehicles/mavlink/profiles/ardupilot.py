@@ -32,13 +32,14 @@ class ArduPilot:
 
     name: Final = "ardupilot"
     title: Final = "ArduCopter"
-    experiment: Final = "takeoff-ardupilot"
+    experiments: Final[tuple[str, ...]] = ("takeoff-ardupilot",)
     dialect: Final = ARDUPILOTMEGA
     autopilot: Final = 3
     heartbeat_s: Final = 1.0
     lift_off_s: Final = 6.0
     land_again_s: Final = 1.0
     climbs_from_ground: Final = True
+    simulates_reference: Final = False
     flying_modes: Final = frozenset({str(GUIDED)})
     hovering_modes: Final[frozenset[str]] = frozenset()
     landing_modes: Final = frozenset({str(LAND)})
@@ -124,6 +125,8 @@ class ArduPilot:
             case Action.TAKE_OFF:
                 above = base.command(target, _TAKE_OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, target.altitude_m)
                 return (Step((above,), awaits="command 22", attempts=1),)
+            case Action.FLY_TO:
+                return ()
             case Action.LAND:
                 return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, LAND),)),)
             case Action.MOTORS_OFF:

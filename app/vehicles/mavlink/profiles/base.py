@@ -44,6 +44,8 @@ FORCED: Final = 21196.0
 REAL32: Final = 9
 AUTOPILOT: Final = 1
 """Default component id of autopilots."""
+SET_POINT_ATTEMPTS: Final = 3
+"""Sendings of a set point; together shorter than the time between two set points."""
 _FENCES: Final = MappingProxyType({1: "its least altitude", 2: "its greatest altitude", 3: "its boundary"})
 """FENCE_BREACH."""
 _LANDED_STATES: Final = MappingProxyType({1: True, 2: False, 4: False})
@@ -186,8 +188,8 @@ class Profile(Protocol):
     @property
     def title(self) -> str: ...
     @property
-    def experiment(self) -> str:
-        """Experiment that tunes its gains."""
+    def experiments(self) -> tuple[str, ...]:
+        """Experiments that tune its gains, the default first."""
         ...
 
     @property
@@ -213,6 +215,11 @@ class Profile(Protocol):
     @property
     def climbs_from_ground(self) -> bool:
         """Whether the altitude commanded is above the place of takeoff, rather than above the autopilot's origin."""
+        ...
+
+    @property
+    def simulates_reference(self) -> bool:
+        """Whether its own reference is computed by the replica of its loop, because it does not send it."""
         ...
 
     @property

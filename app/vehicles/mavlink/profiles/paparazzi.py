@@ -43,13 +43,14 @@ class Paparazzi:
 
     name: Final = "paparazzi"
     title: Final = "Paparazzi"
-    experiment: Final = "takeoff"
+    experiments: Final = ("takeoff", "altitude-steps")
     dialect: Final = DIALECT
     autopilot: Final = 9
     heartbeat_s: Final = 0.5
     lift_off_s: Final = 1.5
     land_again_s: Final = 6.0
     climbs_from_ground: Final = False
+    simulates_reference: Final = True
     flying_modes: Final = frozenset({_NAV})
     hovering_modes: Final[frozenset[str]] = frozenset()
     landing_modes: Final = frozenset({_NAV})
@@ -123,6 +124,8 @@ class Paparazzi:
                 )
             case Action.TAKE_OFF:
                 return (Step(_block(target, TAKE_OFF)),)
+            case Action.FLY_TO:
+                return (Step((_climb_here(target),), awaits="waypoint", attempts=base.SET_POINT_ATTEMPTS),)
             case Action.LAND:
                 return (Step(_block(target, LAND)),)
             case Action.MOTORS_OFF | Action.KILL:

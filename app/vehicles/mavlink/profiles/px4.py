@@ -30,13 +30,14 @@ class Px4:
 
     name: Final = "px4"
     title: Final = "PX4"
-    experiment: Final = "takeoff-px4"
+    experiments: Final[tuple[str, ...]] = ("takeoff-px4",)
     dialect: Final = COMMON
     autopilot: Final = 12
     heartbeat_s: Final = 1.0
     lift_off_s: Final = 8.0
     land_again_s: Final = 1.0
     climbs_from_ground: Final = True
+    simulates_reference: Final = False
     flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
     hovering_modes: Final = frozenset({f"{_AUTO}.{_LOITER}"})
     landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
@@ -106,6 +107,8 @@ class Px4:
             case Action.TAKE_OFF:
                 mode = base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
                 return (Step((mode,), awaits="command 176", attempts=1),)
+            case Action.FLY_TO:
+                return ()
             case Action.LAND:
                 return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
             case Action.MOTORS_OFF:

@@ -1,0 +1,147 @@
+"""Whole trials of altitude steps against the simulated Paparazzi, in lockstep."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.core.experiments.altitude_steps import AltitudeSteps
+from app.core.models.set_points import SetPoints
+from app.vehicles.base import FlightOptions, FlightRecord, StopRequest, VehicleError
+from app.vehicles.mavlink.dialects import number
+from app.vehicles.registry import open_vehicle
+from tests.core.tuning.flying import compiled_only
+from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
+from tests.vehicles.mavlink.rigs import LockstepRig
+
+STEPS = AltitudeSteps().configured({"steps": 2, "step_window_s": 3.0})
+"""At 10 s from 3 m to 2 m, at 13 s back; scored until 16 s."""
+ORDER = FlightOptions(seed=1, window_s=STEPS.window_s, set_points=STEPS.set_points)
+TOLERANCE_M = 0.001
+"""The steps are up to 10 ms early or late, and the link sends positions 51 times a second, rounded to 1/256 m."""
+
+
+def fly(rig: LockstepRig, order: FlightOptions = ORDER, watcher: Watcher | None = None) -> FlightRecord:
+    vehicle = rig.vehicle()
+    vehicle.stage(TUNED)
+    watch, decide = (unwatched, never) if watcher is None else (watcher.see, watcher.decide)
+    record = vehicle.fly(order, on_sample=watch, should_stop=decide)
+    assert vehicle.read_gains() == SAFE
+    assert rig.drone.body.stands
+    vehicle.close()
+    return record
+
+
+def waypoints(rig: LockstepRig) -> list[float]:
+    return [number(message, "z") for message in rig.told("MISSION_ITEM")]
+
+
+@compiled_only
+def test_the_steps_score_as_the_same_body_does_without_a_link() -> None:
+    with open_vehicle("twin", {"scatter": 0.0}, safe_gains=SAFE) as twin:
+        twin.stage(TUNED)
+        alone = STEPS.error(twin.fly(ORDER, on_sample=unwatched, should_stop=never).trajectory)
+    watcher = Watcher()
+    with LockstepRig() as rig:
+        record = fly(rig, watcher=watcher)
+        assert waypoints(rig) == [3.0, 2.0, 3.0]
+    flight = record.trajectory
+    assert (record.ending, record.reason) == ("completed", "")
+    assert STEPS.error(flight) == pytest.approx(alone, abs=TOLERANCE_M)
+    changes_s = flight.time_s[1:][np.diff(flight["set_point_m"]) != 0.0]
+    assert changes_s == pytest.approx([0.0, 10.0, 13.0], abs=0.03)
+    assert flight["set_point_m"][-1] == 3.0
+    live_s, live_m = np.array([(sample.time_s, sample["reference_m"]) for sample in watcher.samples]).T
+    assert np.interp(live_s, flight.time_s, flight["reference_m"]) == pytest.approx(live_m, abs=1e-9)
+
+
+@compiled_only
+@pytest.mark.parametrize("lost", ["deaf:0.1@9.95", "ack-lost:0.1@9.95"])
+def test_a_set_point_that_was_repeated_took_effect_when_the_vehicle_began_to_move(lost: str) -> None:
+    with LockstepRig() as rig:
+        expected = STEPS.error(fly(rig).trajectory)
+    with LockstepRig(faults=[lost]) as rig:
+        record = fly(rig)
+        assert waypoints(rig) == [3.0, 2.0, 2.0, 3.0]
+    late_s = 0.5 if lost.startswith("deaf") else 0.0
+    flight = record.trajectory
+    changes_s = flight.time_s[1:][np.diff(flight["set_point_m"]) != 0.0]
+    assert changes_s == pytest.approx([0.0, 10.0 + late_s, 13.0], abs=0.03)
+    assert record.ending == "completed"
+    assert STEPS.error(flight) == pytest.approx(expected, abs=3 * TOLERANCE_M)
+
+
+@compiled_only
+def test_a_set_point_that_is_never_confirmed_ends_the_flight_as_invalid() -> None:
+    with LockstepRig(faults=["ack-lost:5@12"]) as rig:
+        record = fly(rig)
+        assert waypoints(rig) == [3.0, 2.0, 3.0, 3.0, 3.0]
+    assert (record.ending, record.reason) == (
+        "invalid",
+        "The vehicle did not confirm a new set point. The vehicle did not reply to the command to fly to its next set "
+        "point.",
+    )
+    assert "reference_m" not in record.trajectory.channels
+    assert record.trajectory["set_point_m"][-1] == pytest.approx(0.1, abs=0.01)
+
+
+@compiled_only
+@pytest.mark.parametrize(("at_s", "sent"), [(8.0, 1), (10.01, 2), (10.3, 2), (12.0, 3)])
+def test_an_abort_in_any_phase_lands_on_the_safe_gains_and_sends_no_further_set_point(at_s: float, sent: int) -> None:
+    """The first step is repeated at 10.5 s, because its acknowledgement is lost."""
+    with LockstepRig(faults=["ack-lost:0.1@9.95"]) as rig:
+        record = fly(rig, watcher=Watcher(abort_at_s=at_s))
+        assert waypoints(rig) == [3.0, 2.0, 2.0][:sent]
+    assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
+
+
+@compiled_only
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [("link-lost:3@10.5", "The link was lost in flight."), ("frozen-position:2@13.2", "froze while packets")],
+)
+def test_a_failure_during_a_step_lands_it_as_invalid(fault: str, reason: str) -> None:
+    with LockstepRig(faults=[fault]) as rig:
+        record = fly(rig)
+        assert record.ending == "invalid"
+        assert reason in record.reason
+
+
+@compiled_only
+def test_motors_off_during_a_step_stops_it_at_once() -> None:
+    def decide() -> StopRequest | None:
+        return StopRequest("it burns", motors_off=True) if watcher.samples[-1].time_s > 10.3 else None
+
+    watcher = Watcher()
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
+        vehicle.stage(TUNED)
+        stop = lambda: decide() if watcher.samples else None  # noqa: E731
+        record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=stop)
+        assert waypoints(rig) == [3.0, 2.0]
+    assert (record.ending, record.settings["landed"]) == ("aborted", False)
+    assert record.reason.startswith("Motors off was requested: it burns.")
+
+
+def test_set_points_too_near_the_altitude_limit_or_the_ground_are_refused_on_the_ground() -> None:
+    for low_m, high_m in ((3.0, 3.6), (3.0, 1.5)):
+        order = replace(ORDER, set_points=SetPoints((0.0, 10.0), (low_m, high_m)))
+        with LockstepRig() as rig:
+            vehicle = rig.vehicle()
+            vehicle.stage(TUNED)
+            with pytest.raises(VehicleError, match=r"needed: above 1.5 m, half of the first, and at most 3.5 m") as why:
+                vehicle.fly(order, on_sample=unwatched, should_stop=never)
+            assert why.value.not_flown
+            assert waypoints(rig) == []
+
+
+@compiled_only
+def test_the_next_takeoff_climbs_to_its_own_height() -> None:
+    with LockstepRig() as rig:
+        vehicle = rig.vehicle()
+        for height_m in (3.4, 3.0):
+            steps = STEPS.configured({"steps": 2, "step_window_s": 3.0, "height_m": height_m, "step_m": 0.25})
+            vehicle.stage(TUNED)
+            order = FlightOptions(seed=1, window_s=steps.window_s, set_points=steps.set_points)
+            record = vehicle.fly(order, on_sample=unwatched, should_stop=never)
+            assert record.trajectory["altitude_m"][-1] == pytest.approx(height_m, abs=0.05)

@@ -1,0 +1,243 @@
+"""Altitude steps in the trial machine: the schedule, its limits, and every failure in every phase of it."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass, replace
+
+import pytest
+
+from app.core.models.set_points import SetPoints
+from app.vehicles.mavlink.events import (
+    Action,
+    ActionDone,
+    ActionRefused,
+    BlockEntered,
+    Command,
+    MotorsOffRequested,
+    PerformAction,
+)
+from app.vehicles.mavlink.failures import Failure
+from app.vehicles.mavlink.trial_reactions import State
+from tests.vehicles.mavlink import test_trial_machine as befall
+from tests.vehicles.mavlink.walking import PLAN, SAFE_GAINS, STEP_S, TrialDriver
+
+LATENCY_S = 0.06
+SET_POINTS = SetPoints((0.0, 6.0, 9.0, 12.0), (3.0, 2.0, 3.0, 2.0))
+LIMITS = replace(
+    PLAN.limits,
+    blocks={4: "Takeoff", 13: "land here"},
+    flying_blocks=frozenset({"Takeoff"}),
+    landing_blocks=frozenset({"land here"}),
+)
+STEPS = replace(PLAN, set_points=SET_POINTS, limits=LIMITS, record_s=20.0)
+
+
+@dataclass
+class Stepping(TrialDriver):
+    """A vehicle that confirms a set point after `LATENCY_S`, unless it is `unheard`, and flies there at 1 m/s."""
+
+    unheard: bool = False
+    moves: bool = True
+    commanded_s: float = 0.0
+    wanted_m: float | None = None
+    confirmed: bool = True
+
+    def pass_s(self, seconds: float) -> "Stepping":
+        for _ in range(round(seconds / STEP_S)):
+            if not self.unheard and not self.confirmed and self.now_s - self.commanded_s >= LATENCY_S - STEP_S / 2:
+                self.confirmed = True
+                self.give(ActionDone(Action.FLY_TO, self.now_s, (self.commanded_s,), self.now_s))
+            if self.confirmed and self.moves and self.wanted_m is not None:
+                self.climb_rate_m_s = max(-1.0, min((self.wanted_m - self.altitude_m) / STEP_S, 1.0))
+            super().pass_s(STEP_S)
+        return self
+
+    def _note(self, commands: tuple[Command, ...]) -> None:
+        super()._note(commands)
+        for command in commands:
+            if isinstance(command, PerformAction) and command.action is Action.FLY_TO:
+                self.commanded_s, self.wanted_m, self.confirmed = self.now_s, command.altitude_m, False
+            elif isinstance(command, PerformAction):
+                self.wanted_m = None
+
+    @property
+    def flown_s(self) -> float:
+        """Since the takeoff command, by the vehicle's clock."""
+        assert self.trial.commanded_boot_s is not None
+        return self.boot_s - self.trial.commanded_boot_s
+
+    @property
+    def altitudes(self) -> list[float | None]:
+        return [
+            command.altitude_m
+            for _, command in self.told
+            if isinstance(command, PerformAction) and command.action is Action.FLY_TO
+        ]
+
+    def until_s(self, flown_s: float) -> "Stepping":
+        while self.flown_s < flown_s - STEP_S / 2:
+            self.pass_s(STEP_S)
+        return self
+
+
+def hovering(until_s: float = 5.0, *, unheard: bool = False) -> Stepping:
+    walk = Stepping(plan=STEPS, unheard=unheard)
+    walk.lift_off()
+    return walk.until_s(until_s)
+
+
+def climbing() -> Stepping:
+    walk = Stepping(plan=STEPS)
+    walk.arm()
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(1.0)
+    walk.climb_rate_m_s = 0.0
+    return walk
+
+
+def unconfirmed() -> Stepping:
+    """While a set point is under way and may have to be repeated."""
+    walk = hovering(6.1, unheard=True)
+    assert walk.trial.changes_set_point
+    return walk
+
+
+PHASES: dict[str, Callable[[], Stepping]] = {
+    "climb": climbing,
+    "settling": hovering,
+    "unconfirmed": unconfirmed,
+    "during a step": lambda: hovering(6.4),
+    "between steps": lambda: hovering(8.0),
+    "after the last": lambda: hovering(14.0),
+}
+
+
+def test_each_set_point_is_commanded_by_the_vehicles_clock_and_becomes_that_of_all_limits() -> None:
+    walk = hovering(14.5)
+    assert walk.altitudes == [2.0, 3.0, 2.0]
+    assert walk.trial.plan.limits.set_point_m == 2.0
+    due_s = [walk.when(Action.FLY_TO)[place] - walk.when(Action.TAKE_OFF)[0] for place in range(3)]
+    assert due_s == pytest.approx([6.0, 9.0, 12.0], abs=0.03)
+    took = walk.trial.changes
+    assert [change.altitude_m for change in took] == [2.0, 3.0, 2.0]
+    assert [change.times_s[0] for change in took] == pytest.approx([at_s + LATENCY_S for at_s in due_s], abs=1e-6)
+    kept = {sample.set_point_m for sample in walk.kept if sample.position.time_boot_s > walk.boot_s - 12.0}
+    assert kept == {2.0, 3.0}
+    walk.until_s(20.1)
+    assert (walk.state, walk.trial.failure, walk.altitudes) == (State.LAND, None, [2.0, 3.0, 2.0])
+
+
+def test_a_slow_clock_of_the_vehicle_delays_its_steps() -> None:
+    walk = Stepping(plan=STEPS, tempo=0.95)
+    walk.lift_off()
+    walk.until_s(6.5)
+    assert walk.when(Action.FLY_TO)[0] - walk.when(Action.TAKE_OFF)[0] == pytest.approx(6.0 / 0.95, abs=0.03)
+
+
+def test_steps_that_overshoot_by_a_third_are_no_oscillation_and_further_crossings_are() -> None:
+    walk = hovering()
+    for due_s, to_m in ((6.0, 2.0), (9.0, 3.0), (12.0, 2.0)):
+        walk.until_s(due_s + 0.1)
+        walk.wanted_m = to_m + (0.35 if to_m == 3.0 else -0.35)
+        walk.until_s(due_s + 1.7)
+        walk.wanted_m = to_m
+    walk.until_s(14.0)
+    assert (walk.state, walk.trial.watch.crossings) == (State.RECORD, 0)
+    walk.until_s(14.0)
+    for number in range(6):
+        walk.wanted_m = 2.0 + (-0.35 if number % 2 == 0 else 0.35)
+        walk.pass_s(0.7)
+    assert walk.trial.failure is Failure.ENVELOPE
+    assert "It crossed its set point 4 times" in walk.trial.why
+
+
+def land_by_itself(walk: TrialDriver) -> None:
+    walk.hear(BlockEntered(13))
+
+
+def stop_the_motors(walk: TrialDriver) -> None:
+    walk.give(MotorsOffRequested("it burns", walk.now_s))
+
+
+FAILURES: list[tuple[Callable[[TrialDriver], None], State, Failure]] = [
+    (befall.fall_silent, State.LINK_LOST, Failure.LINK),
+    (befall.lose_heartbeats, State.LINK_LOST, Failure.LINK),
+    (befall.cross_its_fence, State.ABORT_LAND, Failure.ENVELOPE),
+    (befall.fly_too_high, State.ABORT_LAND, Failure.ENVELOPE),
+    (befall.press_abort, State.ABORT_LAND, Failure.OPERATOR),
+    (befall.drain, State.ABORT_LAND, Failure.BATTERY),
+    (befall.freeze, State.ABORT_LAND, Failure.FROZEN),
+    (befall.lose_its_position, State.ABORT_LAND, Failure.FROZEN),
+    (befall.jump_about, State.ABORT_LAND, Failure.LOST_POSITION),
+    (befall.reboot, State.ABORT_LAND, Failure.UNEXPECTED),
+    (befall.go_astray, State.ABORT_LAND, Failure.UNEXPECTED),
+    (befall.stop_by_itself, State.ABORT_LAND, Failure.UNEXPECTED),
+    (befall.be_taken_over, State.QUARANTINE, Failure.TAKEN_OVER),
+    (befall.be_one_of_two, State.ABORT_LAND, Failure.DUPLICATE),
+    (land_by_itself, State.ABORT_LAND, Failure.OWN_LANDING),
+    (stop_the_motors, State.DISARM, Failure.OPERATOR),
+]
+
+
+@pytest.mark.parametrize("phase", PHASES)
+def test_every_failure_in_every_phase_leads_where_it_must_and_no_set_point_follows(phase: str) -> None:
+    begun = PHASES[phase]()
+    for happens, then, failure in FAILURES:
+        walk = deepcopy(begun)
+        walk.moves = False
+        happens(walk)
+        assert (walk.state, walk.trial.failure) == (then, failure), happens
+        flown = len(walk.altitudes)
+        if failure in {Failure.ENVELOPE, Failure.OPERATOR} and then is State.ABORT_LAND:
+            assert walk.gains_sent[0] == SAFE_GAINS[0]
+        walk.give(ActionDone(Action.FLY_TO, walk.now_s, (walk.now_s - 0.1,), walk.now_s))
+        walk.pass_s(4.0)
+        assert len(walk.altitudes) == flown, happens
+
+
+def test_a_set_point_that_is_refused_or_never_confirmed_lands_the_vehicle() -> None:
+    for why in ("The vehicle refused it.", "The vehicle did not reply."):
+        walk = unconfirmed()
+        walk.give(ActionRefused(Action.FLY_TO, why, walk.now_s))
+        assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.SET_POINT, "invalid")
+        assert (walk.trial.why, walk.actions[-1], walk.gains_sent) == (why, Action.LAND, [])
+        assert walk.pass_s(8.0).altitudes == [2.0]
+
+
+def test_while_a_set_point_is_not_confirmed_no_other_is_commanded() -> None:
+    walk = hovering(10.0, unheard=True)
+    assert (walk.altitudes, walk.state) == ([2.0], State.RECORD)
+
+
+def test_a_set_point_whose_message_was_repeated_may_have_taken_effect_at_each_sending() -> None:
+    walk = unconfirmed()
+    sent_s = walk.commanded_s
+    walk.give(ActionDone(Action.FLY_TO, sent_s + 0.6, (sent_s, sent_s + 0.5), sent_s + 0.6))
+    [change] = walk.trial.changes
+    assert change.altitude_m == 2.0
+    assert change.times_s == pytest.approx((6.1, 6.6), abs=0.03)
+
+
+def test_a_vehicle_that_is_not_at_rest_before_the_first_step_is_landed_and_told_why() -> None:
+    walk = hovering(4.0)
+    walk.climb_rate_m_s = 0.2
+    walk.until_s(6.1)
+    assert (walk.state, walk.trial.failure, walk.altitudes) == (State.ABORT_LAND, Failure.NOT_SETTLED, [])
+    assert walk.trial.why.startswith("The vehicle had not settled before the first step, at 6 s: it changed by 0.3")
+    low = climbing()
+    low.until_s(6.1)
+    assert low.trial.failure is Failure.NOT_SETTLED
+    assert low.trial.why == "The vehicle had not reached half of 3 m before the first step, at 6 s."
+
+
+def test_no_set_point_is_commanded_while_a_pilot_may_be_flying() -> None:
+    walk = hovering(5.4)
+    walk.mode = "64"
+    walk.until_s(6.2)
+    assert walk.altitudes == []
+
+
+def test_the_takeoff_alone_has_no_further_set_points() -> None:
+    walk = TrialDriver().lift_off().pass_s(4.0)
+    assert Action.FLY_TO not in walk.actions
+    assert walk.trial.settling == ()
