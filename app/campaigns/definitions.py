@@ -21,7 +21,7 @@ from app.core.errors import InputError, Problem
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Experiment
 from app.core.tuning.confirmation import compare_winner
-from app.core.tuning.definition_checks import check_definition
+from app.core.tuning.definition_checks import check_definition, highest_set_point_m
 from app.db.models import CampaignRow, JsonObject, TrialRow
 from app.fleet.schemas import VehicleChoice
 from app.vehicles.base import OptionValue
@@ -124,6 +124,12 @@ def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionVal
     elif options and definition.experiment not in (flies := described.experiments_with(options)):
         reason = f"{definition.experiment!r} tunes gains that this vehicle does not have; it flies {', '.join(flies)}"
         yield Problem("definition.experiment", reason)
+    elif (excess_m := highest_set_point_m(definition) - described.highest_set_point_m) > 0.0:
+        yield Problem(
+            "definition.experiment_options.height_m",
+            f"must be lower by {excess_m:g} m, or the steps smaller: the highest set point of {kind} is "
+            f"{described.highest_set_point_m:g} m",
+        )
 
 
 def _refusals(check: Callable[[], None], prefix: str) -> list[Problem]:

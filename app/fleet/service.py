@@ -140,13 +140,15 @@ def require_ready(session: Session, row: VehicleRow, action: str) -> None:
 
 def require_window_fits(row: VehicleRow, window_s: float) -> None:
     """Raise ConflictError when the vehicle cannot fly for as long as the scored window needs."""
-    longest_s = get_kind(row.kind).longest_window_s(settings_of(row))
+    settings = settings_of(row)
+    longest_s = get_kind(row.kind).longest_window_s(settings)
     if window_s > longest_s:
+        needed_s = float(settings["plan_time_s"]) + window_s - longest_s
         raise ConflictError(
             f"{row.name} can fly a scored window of at most {longest_s:g} s; the campaign's is {window_s:g} s. Its "
             "flight plan would land it before the end.",
             hint="Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
-            "setting “Paparazzi: time limit of the flight plan's takeoff”.",
+            f"setting “Paparazzi: time limit of the flight plan's takeoff” (plan_time_s), to {needed_s:g} s or more.",
         )
 
 

@@ -55,6 +55,7 @@ class VehicleKind:
     `check_gains(options, gains)` raises GainsError for gains that are never written to such a vehicle, even if a person
     overrules the gate. `longest_window_s(options)` is the longest window, s, that such a vehicle can fly.
     `altitude_limit_m` is the height above the ground at which its flight is aborted; None if there is no such limit.
+    `highest_set_point_m` is the highest altitude that it is commanded to fly to.
     """
 
     name: str
@@ -72,6 +73,7 @@ class VehicleKind:
     check_gains: Callable[[Options, Gains], None] = _accept_any_gains
     longest_window_s: Callable[[Options], float] = _unlimited
     altitude_limit_m: float | None = None
+    highest_set_point_m: float = math.inf
 
     def experiments_with(self, options: Options) -> tuple[str, ...]:
         """Experiments that a vehicle with these complete, checked options can fly; the first is the default."""

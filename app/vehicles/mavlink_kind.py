@@ -10,6 +10,7 @@ from app.core.errors import InputError, Problem
 from app.core.policy import Gains
 from app.vehicles.base import (
     ALTITUDE_LIMIT_M,
+    HIGHEST_SET_POINT_M,
     LAND_COMMAND_S,
     RECORDED_BEYOND_S,
     ConnectedVehicle,
@@ -252,4 +253,5 @@ MAVLINK: Final = VehicleKind(
     check_gains=_check_gains,
     longest_window_s=_longest_window_s,
     altitude_limit_m=ALTITUDE_LIMIT_M,
+    highest_set_point_m=HIGHEST_SET_POINT_M,
 )

@@ -28,6 +28,7 @@ from tests.builders import (
 from tests.bundles.builders import download_bundle, import_bundle, second_installation
 from tests.campaigns.test_landscapes import run_landscapes
 from tests.core.tuning.flying import compiled_only
+from tests.fleet.vehicles import create_campaign_on, create_connected
 from tests.vehicles.flying import SAFE
 
 Json = dict[str, Any]
@@ -139,11 +140,30 @@ def test_the_error_so_far_begins_with_the_first_step_and_ends_at_the_error(
     assert heard[-1].error_so_far == pytest.approx(error, abs=2e-4)
 
 
-def test_vehicles_with_a_link_and_flights_flown_elsewhere_are_refused_with_a_plain_sentence(client: TestClient) -> None:
-    for kind in ("mavlink", "import"):
-        said = refused(client, {"kind": kind}, SHORT)
-        assert said["definition.experiment"] == f"'altitude-steps' cannot be flown by {kind}"
-        assert said["vehicle.kind"] == f"'{kind}' flies only takeoff, takeoff-ardupilot, takeoff-px4"
+def test_flights_flown_elsewhere_are_refused_with_a_plain_sentence(client: TestClient) -> None:
+    said = refused(client, {"kind": "import"}, SHORT)
+    assert said["definition.experiment"] == "'altitude-steps' cannot be flown by import"
+    assert said["vehicle.kind"] == "'import' flies only takeoff, takeoff-ardupilot, takeoff-px4"
+
+
+def test_a_vehicle_with_a_link_flies_to_no_set_point_near_its_altitude_limit(client: TestClient) -> None:
+    high = {**SHORT, "experiment_options": {**OPTIONS, "order": "up first"}}
+    assert refused(client, {"kind": "mavlink"}, high) == {
+        "definition.experiment_options.height_m": "must be lower by 0.5 m, or the steps smaller: the highest set point "
+        "of mavlink is 3.5 m"
+    }
+
+
+def test_steps_that_last_longer_than_the_flight_plan_allows_are_refused_with_the_time_that_is_needed(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    definition = {**SHORT, "experiment_options": {"steps": 6, "step_window_s": 8.0}}
+    campaign = create_campaign_on(client, database, vehicle, definition=definition)
+    proposal = get(client, f"/api/campaigns/{campaign['id']}/proposal")["proposal"]["id"]
+    answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"proposal_id": proposal, "fly": {}})
+    assert answer.status_code == 409
+    assert answer.json()["hint"].endswith("(plan_time_s), to 60.4 s or more.")
 
 
 def test_a_ceiling_below_the_highest_step_is_refused_by_its_field(client: TestClient) -> None:
@@ -197,6 +217,6 @@ def test_the_catalogue_offers_it_on_simulated_vehicles_with_its_options(client: 
     [steps] = [each for each in offered["experiments"] if each["name"] == "altitude-steps"]
     assert [option["name"] for option in steps["options"]] == ["height_m", "step_m", "steps", "order", "step_window_s"]
     kinds = [kind["name"] for kind in offered["vehicle_kinds"] if "altitude-steps" in kind["experiments"]]
-    assert kinds == ["jsbsim", "twin"]
+    assert kinds == ["jsbsim", "twin", "mavlink"]
     strategies = [each["name"] for each in offered["strategies"] if "altitude-steps" in each["experiments"]]
     assert strategies == ["calibrated", "gradient", "simplex", "manual"]

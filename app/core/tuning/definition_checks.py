@@ -143,11 +143,16 @@ def _fractions(definition: Definition) -> Iterator[Problem]:
 
 
 def _ceiling(definition: Definition) -> Iterator[Problem]:
-    lowest_m = max(MIN_CEILING_M, max(_altitudes_m(definition), default=0.0) + CEILING_MARGIN_M)
+    lowest_m = max(MIN_CEILING_M, highest_set_point_m(definition) + CEILING_MARGIN_M)
     if not (math.isfinite(definition.ceiling_m) and lowest_m <= definition.ceiling_m <= MAX_CEILING_M):
         yield Problem(
             "ceiling_m", f"must be between {lowest_m:g} and {MAX_CEILING_M:g} m, got {definition.ceiling_m:g}"
         )
+
+
+def highest_set_point_m(definition: Definition) -> float:
+    """Zero where the experiment is unknown, has options that are refused, or has no altitude."""
+    return max(_altitudes_m(definition), default=0.0)
 
 
 def _altitudes_m(definition: Definition) -> tuple[float, ...]:

@@ -352,7 +352,7 @@ def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
         hint=""
         if passed
         else "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
-        "setting “Paparazzi: time limit of the flight plan's takeoff”.",
+        f"setting “Paparazzi: time limit of the flight plan's takeoff” (plan_time_s), to {needed_s:g} s or more.",
     )
 
 

@@ -1,5 +1,5 @@
-"""The set points that follow the takeoff's, as pure functions of a trial: when each is commanded, whether the vehicle is
-at rest before the first, and when each took effect.
+"""The set points that follow the takeoff's, as pure functions of a trial: when each is commanded, whether the vehicle
+is at rest before the first, and when each took effect.
 
 Times are by the vehicle's clock, which is known from its positions and their latency, up to the least latency itself.
 """

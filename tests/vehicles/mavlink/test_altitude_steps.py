@@ -76,10 +76,10 @@ def test_a_set_point_that_is_never_confirmed_ends_the_flight_as_invalid() -> Non
     with LockstepRig(faults=["ack-lost:5@12"]) as rig:
         record = fly(rig)
         assert waypoints(rig) == [3.0, 2.0, 3.0, 3.0, 3.0]
-    assert (record.ending, record.reason) == (
-        "invalid",
+    assert record.ending == "invalid"
+    assert record.reason == (
         "The vehicle did not confirm a new set point. The vehicle did not reply to the command to fly to its next set "
-        "point.",
+        "point."
     )
     assert "reference_m" not in record.trajectory.channels
     assert record.trajectory["set_point_m"][-1] == pytest.approx(0.1, abs=0.01)
