@@ -60,6 +60,7 @@ TUNED: Final[Mapping[str, Mapping[str, float]]] = {
 }
 _WILD: Final = ({"kp": 250, "ki": 2000, "kd": 0}, {"kp": 100, "ki": 300, "kd": 10}, {"kp": 4000, "ki": 2000, "kd": 20})
 _SPREAD: Final = 0.05
+_STEPS_EVERY: Final = 12
 
 _DELAYS_S: Final[Mapping[State, float]] = {
     State.CONNECT: 0.2,
@@ -107,6 +108,12 @@ class Case:
     @property
     def has_second_source(self) -> bool:
         return any(each.kind.startswith("mocap") for each in self.faults)
+
+    @property
+    def flies_steps(self) -> bool:
+        """Whether it flies altitude steps after its takeoff, as every second block of seeds under Paparazzi does."""
+        is_wild = any(each.kind == WILD_GAINS for each in self.faults)
+        return self.autopilot == "paparazzi" and not is_wild and self.seed // _STEPS_EVERY % 2 == 0
 
     @property
     def safe(self) -> Mapping[str, float]:

@@ -297,6 +297,9 @@ class _Checker:
                 yield f"Land was not repeated for {max(gaps):.1f} s while the link was lost"
             if any(lost_s <= at_s < min(end_s, self.stop_asked_s) for at_s in self.states.times_of(Command.MOTORS_OFF)):
                 yield "motors off was sent while the link was lost"
+        for at_s in self.states.times_of(Command.SET_POINT):
+            if (state := self.states.at(at_s)) not in (State.ARM, *AIR):
+                yield f"a set point was sent in the state {state}"
         yield from self._first_command_out_of_the_air()
 
     def _first_command_out_of_the_air(self) -> Iterator[str]:

@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Final
 
+from app.core.experiments.altitude_steps import CLIMB_S, StepSequence
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import Case
 from bench.hazards.rig import InjectedFault, MotorStop, Rig
 from bench.hazards.trial_states import TrialStates
+
+_STEPS: Final = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,8 +123,16 @@ def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[FlightRecord | No
     if held != rig.case.gains:
         return None, f"it holds {held}"
     rig.wait_s(rig.case.staged_s)
-    record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
+    record = vehicle.fly(_order(rig.case), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
     return record, record.reason
+
+
+def _order(case: Case) -> FlightOptions:
+    """Return the order for a takeoff, or for altitude steps of the same length."""
+    order = FlightOptions(seed=1)
+    step_s = (order.window_s - CLIMB_S) / _STEPS
+    steps = StepSequence(steps=_STEPS, step_window_s=step_s)
+    return replace(order, set_points=steps.set_points) if case.flies_steps else order
 
 
 def _ignore_sample(_sample: Sample) -> None:

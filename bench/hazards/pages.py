@@ -129,6 +129,8 @@ The checks are:
 - Was no packet that stops motors sent while the drone was more than 0.15 m above the ground, except by the operator?
 - Did the drone take off with the gains that were read back?
 - Were Land and the safe gains sent in the order that the table requires, and was Land repeated while the link was lost?
+- Was no set point sent after the flight had ended, for whatever reason? Under Paparazzi half of the trials fly altitude
+  steps after their takeoff.
 - Was nothing sent before a heartbeat was received?
 - Were all time limits kept: the record, 40 s to land, 5 s to disarm, 60 s without a link?
 

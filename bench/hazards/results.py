@@ -58,6 +58,7 @@ def _line(case: Case) -> dict[str, object]:
     return {
         "seed": case.seed,
         "autopilot": case.autopilot,
+        "flies_steps": case.flies_steps,
         "faults": [_rounded(asdict(each)) for each in case.faults],
         "gains": dict(case.gains),
         "safe": dict(case.safe),

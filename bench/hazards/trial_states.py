@@ -98,7 +98,7 @@ class TrialStates:
                 return State.RESTORE
             case Command.GAIN if flown or (now is State.DISARM and height_m > LIFTED_M):
                 return State.ABORT_LAND
-            case Command.PREPARE_ARMING | Command.ARM if now in (State.PREFLIGHT, State.SET_GAINS):
+            case Command.PREPARE_ARMING | Command.SET_POINT | Command.ARM if now in (State.PREFLIGHT, State.SET_GAINS):
                 return State.ARM
             case Command.TAKE_OFF if now is State.ARM:
                 return State.TAKEOFF

@@ -16,6 +16,7 @@ class Command(StrEnum):
     PREPARE_ARMING = "prepare arming"
     ARM = "arm"
     TAKE_OFF = "take off"
+    SET_POINT = "set point"
     LAND = "land"
     MOTORS_OFF = "motors off"
 
@@ -80,7 +81,7 @@ def _paparazzi(message: Message) -> Command:
         case "SCRIPT_ITEM":
             return _BLOCKS.get(int(number(message, "seq")), Command.PREPARE_ARMING)
         case "MISSION_ITEM":
-            return Command.PREPARE_ARMING
+            return Command.SET_POINT
         case _:
             return _gain_or_request("paparazzi", message)
 
