@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from app.core.experiments.altitude_steps import CLIMB_S, StepSequence
+from app.core.experiments.altitude_steps import AltitudeSteps
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
@@ -130,8 +130,9 @@ def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[FlightRecord | No
 def _order(case: Case) -> FlightOptions:
     """Return the order for a takeoff, or for altitude steps of the same length."""
     order = FlightOptions(seed=1)
-    step_s = (order.window_s - CLIMB_S) / _STEPS
-    steps = StepSequence(steps=_STEPS, step_window_s=step_s)
+    steps = AltitudeSteps()
+    step_s = (order.window_s - steps.scored_from_s) / _STEPS
+    steps = steps.configured({"steps": _STEPS, "step_window_s": step_s})
     return replace(order, set_points=steps.set_points) if case.flies_steps else order
 
 

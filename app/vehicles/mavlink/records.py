@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from app.core.errors import TrajectoryError
-from app.core.experiments.altitude_steps import REFERENCE
+from app.core.experiments.step_sequence import REFERENCE
 from app.core.formatting import count
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.experiments.altitude_steps import SETTLED_FOR_S, unsettled
+from app.core.experiments.step_sequence import SETTLED_FOR_S, unsettled
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import Action, ActionDone, PerformAction, Position
 from app.vehicles.mavlink.failures import Failure, Finding
