@@ -49,9 +49,24 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Throttle:
-    """Throttle as the vehicle reports it: a `share` of full, 0 … 1."""
+    """Throttle as the vehicle reports it: a `share` of full, 0 … 1; `exact`: not in whole percents."""
 
     share: float
+    exact: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AltitudeError:
+    """How far the autopilot's own reference is above the vehicle."""
+
+    error_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class TargetAltitude:
+    """Altitude of the position target that the autopilot follows."""
+
+    altitude_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +156,8 @@ Measurement = (
     | Heartbeat
     | Battery
     | Throttle
+    | AltitudeError
+    | TargetAltitude
     | StatusText
     | Parameter
     | CommandReply
@@ -170,6 +187,8 @@ class Action(StrEnum):
 
     ARM = "arm"
     TAKE_OFF = "take off"
+    HOLD = "hold its first set point"
+    """By position targets, which it follows from now on."""
     FLY_TO = "fly to its next set point"
     LAND = "land"
     MOTORS_OFF = "motors off"

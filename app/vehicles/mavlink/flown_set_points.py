@@ -55,8 +55,9 @@ def with_flown_set_points(
     after = time_s > 0.0
     flies = after & (channels["set_point_m"] != ground_m)
     changed = {**channels, "set_point_m": np.where(flies, flown.at(time_s), channels["set_point_m"])}
-    if reference is not None and np.array_equal(flies, after):
-        changed[REFERENCE] = reference(flown, time_s)
+    if reference is not None:
+        computed = {REFERENCE: reference(flown, time_s)} if np.array_equal(flies, after) else {}
+        changed = {name: values for name, values in changed.items() if name != REFERENCE} | computed
     return replace(trajectory, channels=changed)
 
 

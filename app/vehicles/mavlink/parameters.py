@@ -5,7 +5,7 @@
 import json
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +21,8 @@ from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing,
 from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink
 
 LIST_ATTEMPTS: Final = 3
+_KNOWN_ATTEMPTS: Final = 2
+"""Attempts for a parameter that the vehicle may lack."""
 LIST_ENDS_S: Final = 2.0
 """The list has ended if no parameter has arrived for this long."""
 
@@ -68,6 +70,12 @@ def read_parameter(radio: AutopilotLink, parameter: str, *, attempts: int = ATTE
 def write_parameter(radio: AutopilotLink, parameter: str, value: float) -> float | None:
     """Write a parameter; return the value in the vehicle's reply, None if it does not reply."""
     return _request_parameter(radio, radio.profile.set_parameter(radio.target, parameter, value), parameter)
+
+
+def read_known(radio: AutopilotLink, names: Iterable[str]) -> dict[str, float]:
+    """Return those of these parameters that the vehicle has."""
+    read = {name: read_parameter(radio, name, attempts=_KNOWN_ATTEMPTS) for name in names}
+    return {name: value for name, value in read.items() if value is not None}
 
 
 def read_all(radio: AutopilotLink, on_progress: Callable[[int, int], None]) -> dict[str, float]:
@@ -201,6 +209,11 @@ class GainStore:
         return self.safe if self.staged is None else self.staged
 
     @property
+    def release(self) -> int:
+        """Place of its gains among the profile's sets, which are those of its releases."""
+        return self._radio.profile.gain_sets.index(self._found())
+
+    @property
     def safe_settings(self) -> tuple[Setting, ...]:
         """Safe gains in the order in which an abort sends them."""
         return settings(self._found(), self.safe)
@@ -280,10 +293,10 @@ class TrialParameters:
         self._radio, self._named = radio, files
         self._changed: dict[str, ChangedParameter] | None = None
 
-    def set(self) -> None:
-        """Set the parameters for takeoff. Raises VehicleError if the vehicle does not report the current values or
+    def set(self, settings: tuple[Setting, ...]) -> None:
+        """Set the parameters for a flight. Raises VehicleError if the vehicle does not report the current values or
         does not accept the new ones, or if the current values cannot be stored."""
-        for setting in self._radio.profile.take_off_settings(self._radio.target):
+        for setting in settings:
             held = read_parameter(self._radio, setting.parameter)
             if held is None:
                 raise _unset(setting)
@@ -375,6 +388,6 @@ def _unusable(file: Path, error: Exception) -> VehicleError:
 
 def _unset(setting: Setting) -> VehicleError:
     return VehicleError(
-        f"The vehicle could not be set up: the takeoff needs {setting.parameter} = {setting.value:g}.",
+        f"The vehicle could not be set up: the flight needs {setting.parameter} = {setting.value:g}.",
         hint="Check that the vehicle is connected and that no other program writes its parameters, then try again.",
     )

@@ -231,6 +231,11 @@ def prepare(radio: AutopilotLink, telemetry_hz: float) -> None:
     _set_up(radio, radio.profile.prepare(radio.target, telemetry_hz))
 
 
+def prepare_set_points(radio: AutopilotLink) -> None:
+    """Request the further telemetry of a flight with several set points. Raises VehicleError if it is refused."""
+    _set_up(radio, radio.profile.prepare_set_points(radio.target))
+
+
 def make_armable(radio: AutopilotLink) -> None:
     """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm. Raises VehicleError if it
     refuses."""
@@ -354,6 +359,11 @@ def evaluate_flight_time(record_s: float, *, plan_time_s: float) -> CheckItem:
         else "Choose a shorter window; or raise the time limit of Takeoff in its flight plan, then the vehicle's "
         f"setting “Paparazzi: time limit of the flight plan's takeoff” (plan_time_s), to {needed_s:g} s or more.",
     )
+
+
+def evaluate_set_point_requirements(radio: AutopilotLink) -> tuple[CheckItem, ...]:
+    """Read and check the further requirements of a flight with several set points."""
+    return tuple(_failsafe(radio, requirement) for requirement in radio.profile.set_point_requirements)
 
 
 def evaluate_set_points(set_points: SetPoints) -> CheckItem:

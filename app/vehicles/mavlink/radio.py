@@ -15,6 +15,7 @@ from app.vehicles.mavlink.events import (
     Action,
     ActionDone,
     ActionRefused,
+    AltitudeError,
     Battery,
     BlockEntered,
     CommandReply,
@@ -24,13 +25,14 @@ from app.vehicles.mavlink.events import (
     Parameter,
     Position,
     StatusText,
+    TargetAltitude,
     Throttle,
     VehicleEvent,
     Version,
 )
 from app.vehicles.mavlink.failures import CONFIRMATION_PERIODS, HEARTBEATS_MISSED
 from app.vehicles.mavlink.link import Link, LinkHealth, Received
-from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Step, Target
+from app.vehicles.mavlink.profiles.base import TARGET, Outgoing, Profile, ReferenceSource, Step, Target
 
 REPLY_TIMEOUT_S: Final = 0.5
 ATTEMPTS: Final = 5
@@ -40,6 +42,9 @@ RATE_OVER_S: Final = 2.0
 LOSS_OVER_S: Final = 10.0
 _COUNT_EVERY_S: Final = 1.0
 _MAX_AGE_S: Final = 2.0
+_REFERENCE_HOLDS_S: Final = 0.25
+"""Greatest age of a report of the autopilot's reference."""
+_SAME_TARGET_M: Final = 0.01
 
 
 @dataclass(slots=True)
@@ -58,6 +63,11 @@ class VehicleMemory:
     battery_v: float | None = None
     throttle: float | None = None
     throttle_s: float = float("-inf")
+    exact_throttle_s: float = float("-inf")
+    altitude_error_m: float = 0.0
+    altitude_error_s: float = float("-inf")
+    target_m: float = 0.0
+    target_s: float = float("-inf")
     may_arm: bool | None = None
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
@@ -75,6 +85,24 @@ class VehicleMemory:
     def throttle_at(self, now_s: float) -> float | None:
         """Return the throttle last reported, as a share of full; None without a recent report."""
         return self.throttle if now_s - self.throttle_s <= THROTTLE_HOLDS_S else None
+
+    def reference_at(self, source: ReferenceSource, altitude_m: float, now_s: float) -> float | None:
+        """Return the autopilot's own reference of a vehicle at this altitude; None without a recent report."""
+        if source == "error" and now_s - self.altitude_error_s <= _REFERENCE_HOLDS_S:
+            return altitude_m + self.altitude_error_m
+        return self.target_m if source == "target" and now_s - self.target_s <= _REFERENCE_HOLDS_S else None
+
+    def _note_loop(self, measurement: Throttle | AltitudeError | TargetAltitude, now_s: float) -> None:
+        """Note what is reported of the vertical loop: a less exact throttle only while no exact one arrives."""
+        match measurement:
+            case Throttle(share=share, exact=exact):
+                self.exact_throttle_s = now_s if exact else self.exact_throttle_s
+                if exact or now_s - self.exact_throttle_s > THROTTLE_HOLDS_S:
+                    self.throttle, self.throttle_s = share, now_s
+            case AltitudeError(error_m=error_m):
+                self.altitude_error_m, self.altitude_error_s = error_m, now_s
+            case TargetAltitude(altitude_m=altitude_m):
+                self.target_m, self.target_s = altitude_m, now_s
 
     def forget_vehicle(self) -> None:
         """Discard its identity and the results of its arming checks."""
@@ -94,8 +122,8 @@ class VehicleMemory:
             case Battery(voltage_v=volts, may_arm=may_arm):
                 self.battery_v = volts if volts is not None else self.battery_v
                 self.may_arm = may_arm
-            case Throttle(share=share):
-                self.throttle, self.throttle_s = share, now_s
+            case Throttle() | AltitudeError() | TargetAltitude():
+                self._note_loop(measurement, now_s)
             case VehicleEvent():
                 self.arming_checks.take(measurement)
             case Position():
@@ -310,6 +338,10 @@ def _verdict(step: Step, measurement: Measurement | None) -> bool | None:
             return accepted
         case Parameter(name=name) if name == step.awaits:
             return True
+        case Heartbeat(mode=mode) if step.awaits == f"mode {mode}":
+            return True
+        case TargetAltitude(altitude_m=altitude_m) if step.awaits == TARGET:
+            return True if abs(altitude_m - step.altitude_m) < _SAME_TARGET_M else None
         case _:
             return None
 

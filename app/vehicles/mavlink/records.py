@@ -2,6 +2,7 @@
 which is scored; its ending and the reason.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
@@ -148,14 +149,27 @@ def channels_of(sample: RecordSample, datum_m: float, scored: Scored) -> dict[st
     return channels
 
 
-def trajectory_of(samples: Sequence[RecordSample], start_s: float, datum_m: float) -> Trajectory:
+def trajectory_of(
+    samples: Sequence[RecordSample], start_s: float, datum_m: float, *, referred_from_s: float = math.inf
+) -> Trajectory:
     """Return the vehicle's own samples as a trajectory by its clock from `start_s` on. Channels that some samples lack
-    are omitted, and so is the second source, of which each sample contains only the last value received."""
-    rows = [channels_of(replace(sample, second_m=None), datum_m, "vehicle") for sample in samples]
+    are omitted, and so is the second source, of which each sample contains only the last value received.
+
+    If any sample has the autopilot's reference, it is the altitude where it is unknown earlier than `referred_from_s`
+    after the start, as on the ground.
+    """
+    begin_s = start_s + (referred_from_s if any(sample.reference_m is not None for sample in samples) else -math.inf)
+    rows = [channels_of(_referred(replace(sample, second_m=None), begin_s), datum_m, "vehicle") for sample in samples]
     names = [name for name in rows[-1] if all(name in row for row in rows)] if rows else []
     time_s = np.array([round(sample.position.time_boot_s - start_s, 6) for sample in samples])
     channels = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
     return Trajectory(time_s, channels, SOURCE, "vehicle")
+
+
+def _referred(sample: RecordSample, begin_s: float) -> RecordSample:
+    if sample.reference_m is not None or sample.position.time_boot_s >= begin_s:
+        return sample
+    return replace(sample, reference_m=sample.position.altitude_m)
 
 
 def has_flown(trial: Trial) -> bool:

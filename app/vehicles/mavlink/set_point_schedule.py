@@ -4,25 +4,42 @@ is at rest before the first, and when each took effect.
 Times are by the vehicle's clock, which is known from its positions and their latency, up to the least latency itself.
 """
 
+import math
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from app.core.experiments.step_sequence import SETTLED_FOR_S, unsettled
+from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import Action, ActionDone, PerformAction, Position
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.trial_reactions import SetPointChange, Step, Trial
+from app.vehicles.mavlink.trial_reactions import Plan, SetPointChange, Step, Trial
 
+HELD_BEFORE_S: Final = 6.0
+"""Time before the first step from which a vehicle holds the first set point by position targets."""
 LEAD_S: Final = 0.02
 """Usual time from the command of a set point to its effect: it is commanded so much before it is due."""
 
 
+def with_hold(set_points: SetPoints) -> SetPoints:
+    """The set points with the first one again, for a vehicle that must hold it by position targets before it steps."""
+    first_s, *others_s = set_points.times_s
+    first_m, *others_m = set_points.altitudes_m
+    return SetPoints((first_s, others_s[0] - HELD_BEFORE_S, *others_s), (first_m, first_m, *others_m))
+
+
+def referred_from_s(plan: Plan) -> float:
+    """Time since the takeoff command from which the autopilot's reference must be known; infinite without steps."""
+    times_s = plan.set_points.times_s
+    return times_s[plan.first_step] - SETTLED_FOR_S if len(times_s) > 1 else math.inf
+
+
 def note_settling(trial: Trial, positions: tuple[Position, ...]) -> Trial:
     """Note the positions by which the vehicle is at rest before the first step; none if there is no step."""
-    first_s, start_s = _next_due_s(trial), trial.commanded_boot_s
-    if trial.changes or trial.changes_set_point or first_s is None or start_s is None:
+    first_s, start_s = _first_step_s(trial), trial.commanded_boot_s
+    if len(trial.changes) >= trial.plan.first_step or first_s is None or start_s is None:
         return trial
     recent = tuple(each for each in positions if each.time_boot_s - start_s >= first_s - SETTLED_FOR_S)
     return replace(trial, settling=(*trial.settling, *recent)) if recent else trial
@@ -30,33 +47,44 @@ def note_settling(trial: Trial, positions: tuple[Position, ...]) -> Trial:
 
 def is_due(trial: Trial, now_s: float) -> bool:
     """Whether the next set point is to be commanded now. While the vehicle has not confirmed the previous one, none
-    is."""
-    due_s = _next_due_s(trial)
-    return due_s is not None and not trial.changes_set_point and _elapsed_s(trial, now_s) >= due_s - LEAD_S
+    is; it holds the first one once its climb is over, but no later than it must be at rest."""
+    due_s, first_s = _next_due_s(trial), _first_step_s(trial)
+    if due_s is None or first_s is None or trial.changes_set_point:
+        return False
+    elapsed_s = _elapsed_s(trial, now_s)
+    waits = is_hold(trial) and _climbs(trial) and elapsed_s < first_s - SETTLED_FOR_S
+    return elapsed_s >= due_s - LEAD_S and not waits
+
+
+def is_hold(trial: Trial) -> bool:
+    """Whether the next set point is the first one again."""
+    return trial.plan.holds_first and not trial.changes
 
 
 def find_unsettled(trial: Trial) -> Finding | None:
-    """Find that the vehicle is not at rest before the first step."""
-    first_s, start_s = _next_due_s(trial), trial.commanded_boot_s
-    if trial.changes or first_s is None or start_s is None:
-        return None
-    time_s = np.array([each.time_boot_s - start_s for each in trial.settling])
-    altitude_m = np.array([each.altitude_m - trial.plan.datum_m for each in trial.settling])
-    why = unsettled(time_s, altitude_m, first_s, trial.plan.set_points.altitudes_m[0])
+    """Find that the vehicle is not at rest before the first step, or still climbs when it should hold."""
+    first_s, start_s = _first_step_s(trial), trial.commanded_boot_s
+    why: str | None = None
+    if is_hold(trial):
+        why = "had not ended its climb by itself in time for the first step" if _climbs(trial) else None
+    elif len(trial.changes) + 1 == trial.plan.first_step and first_s is not None and start_s is not None:
+        time_s = np.array([each.time_boot_s - start_s for each in trial.settling])
+        altitude_m = np.array([each.altitude_m - trial.plan.datum_m for each in trial.settling])
+        why = unsettled(time_s, altitude_m, first_s, trial.plan.set_points.altitudes_m[0])
     return None if why is None else Finding(failure=Failure.NOT_SETTLED, why=f"The vehicle {why}.")
 
 
 def command_next(trial: Trial) -> Step:
     """Command the next set point, to which all limits refer from now on."""
     set_point_m = trial.plan.set_points.altitudes_m[len(trial.changes) + 1] + trial.plan.datum_m
+    action = Action.HOLD if is_hold(trial) else Action.FLY_TO
     trial = replace(
         trial,
         plan=trial.plan.with_set_point(set_point_m),
         watch=watching.change_set_point(trial.watch, set_point_m),
         changes_set_point=True,
-        settling=(),
     )
-    return trial, (PerformAction(Action.FLY_TO, set_point_m),)
+    return trial, (PerformAction(action, set_point_m),)
 
 
 def confirm(trial: Trial, done: ActionDone) -> Trial:
@@ -69,7 +97,20 @@ def confirm(trial: Trial, done: ActionDone) -> Trial:
     delay_s = (done.now_s if done.replied_s is None else done.replied_s) - sent_s[-1]
     altitude_m = trial.plan.set_points.altitudes_m[len(trial.changes) + 1]
     times_s = tuple(_elapsed_s(trial, at_s + delay_s) for at_s in sent_s)
-    return replace(trial, changes=(*trial.changes, SetPointChange(altitude_m, times_s)), changes_set_point=False)
+    changes = (*trial.changes, SetPointChange(altitude_m, times_s))
+    return replace(trial, changes=changes, changes_set_point=False)
+
+
+def _climbs(trial: Trial) -> bool:
+    """Whether the vehicle has not yet entered the mode in which it hovers after the climb, if there is one."""
+    limits = trial.plan.limits
+    return bool(limits.hovering_modes) and watching.mode_of(trial.watch, limits) not in limits.hovering_modes
+
+
+def _first_step_s(trial: Trial) -> float | None:
+    """Time of the first step since the takeoff command; None without steps."""
+    times_s = trial.plan.set_points.times_s
+    return times_s[trial.plan.first_step] if len(times_s) > 1 else None
 
 
 def _next_due_s(trial: Trial) -> float | None:

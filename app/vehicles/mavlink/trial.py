@@ -30,6 +30,7 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
 from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.profiles.base import Outgoing, Target
 from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
 from app.vehicles.mavlink.transports import LinkError
 from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
@@ -37,6 +38,7 @@ from app.vehicles.mavlink.trial_reactions import LANDING, State
 
 LISTEN_S: Final = 0.01
 """Longest delay before the loop processes an abort."""
+STREAM_EVERY_S: Final = 0.05
 SINKS_M: Final = 0.3
 """A vehicle that has descended by less than this in five seconds is not landing."""
 STALL_S: Final = 0.2
@@ -91,6 +93,9 @@ class TrialRunner:
         self._on_sample, self._should_stop = on_sample, should_stop
         self._samples: list[RecordSample] = []
         self._sequence: CommandSequence | None = None
+        self._target = radio.target
+        self._stream: tuple[Outgoing, ...] = ()
+        self._streamed_s = float("-inf")
         self._error: BaseException | None = None
         self._shown_s = float("-inf")
         self._listened_s = self._sank_s = radio.clock.now_s()
@@ -139,6 +144,7 @@ class TrialRunner:
             self._error = self._error or error
 
     def _listen(self) -> None:
+        self._keep_streaming()
         packets = self._radio.receive(LISTEN_S)
         now_s = self._radio.clock.now_s()
         stalled_s = now_s - self._listened_s
@@ -185,7 +191,7 @@ class TrialRunner:
         before = self._trial.state
         self._trial, commands = advance(self._trial, event)
         if self._trial.state is not before:
-            self._sequence = None  # the commands of the previous state are obsolete
+            self._sequence, self._stream = None, ()  # the commands of the previous state are obsolete
         self._carry_out(commands)
 
     def _carry_out(self, commands: tuple[Command, ...]) -> None:
@@ -206,14 +212,34 @@ class TrialRunner:
                     self._record_sample(replace(command, throttle=throttle, reference_m=reference_m))
 
     def _perform(self, action: Action, altitude_m: float | None) -> None:
-        target = self._radio.target if altitude_m is None else replace(self._radio.target, altitude_m=altitude_m)
-        self._sequence = CommandSequence(action, self._radio.profile.steps(action, target), self._radio)
+        profile, target = self._radio.profile, self._radio.target
+        if altitude_m is not None:
+            target = self._target = replace(self._place(action), altitude_m=altitude_m)
+            self._stream = profile.stream(target)
+        self._sequence = CommandSequence(action, profile.steps(action, target), self._radio)
+
+    def _place(self, action: Action) -> Target:
+        """Return the target of set points at the place where the vehicle hovers when it begins to hold the first."""
+        last = self._trial.watch.last
+        if action is not Action.HOLD or last is None:
+            return self._target
+        return replace(self._target, north_m=last.north_m, east_m=last.east_m)
+
+    def _keep_streaming(self) -> None:
+        """Send the set point again, if it is due: some autopilots leave the mode, and land, without a stream."""
+        now_s = self._radio.clock.now_s()
+        if self._stream and now_s - self._streamed_s >= STREAM_EVERY_S:
+            self._streamed_s = now_s
+            self._radio.send(*self._stream)
 
     def _reference_m(self, position: Position) -> float | None:
-        """Return the autopilot's own reference now, on the vehicle's datum; None if it is not known."""
-        trial = self._trial
-        if self._reference is None or trial.commanded_boot_s is None:
+        """Return the autopilot's own reference now, on the vehicle's datum; None if it is not known or needed."""
+        trial, now_s = self._trial, self._radio.clock.now_s()
+        if len(trial.plan.set_points.times_s) == 1 or trial.commanded_boot_s is None:
             return None
+        if self._reference is None:
+            source = self._radio.profile.reference
+            return self._radio.seen.reference_at(source, position.altitude_m, now_s)
         time_s = np.array([position.time_boot_s - trial.commanded_boot_s])
         flown = at_last_times(trial.plan.takeoff, trial.changes)
         return float(self._reference(flown, time_s)[0]) + trial.plan.datum_m

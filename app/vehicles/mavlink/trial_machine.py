@@ -67,6 +67,7 @@ _REPLY_S: Final = 0.5
 """Interval at which a reply after the takeoff command is requested."""
 _OTHER_M: Final = 1.0
 """After a greater jump of the altitude, another vehicle may be answering."""
+_SET_POINT_ACTIONS: Final = frozenset({Action.HOLD, Action.FLY_TO})
 _ARMING_S: Final = 15.0
 """Longest time that arming may take, with all repetitions."""
 
@@ -234,9 +235,9 @@ def _record(trial: Trial, event: Event) -> Step:
 def _change_set_point(trial: Trial, event: Event) -> Step | None:
     """Command the next set point when it is due, and note its confirmation; None if there is nothing to do."""
     now_s = event.now_s
-    if isinstance(event, ActionRefused) and event.action is Action.FLY_TO:
+    if isinstance(event, ActionRefused) and event.action in _SET_POINT_ACTIONS:
         return fail(trial, Finding(failure=Failure.SET_POINT, why=event.why), now_s)
-    if isinstance(event, ActionDone) and event.action is Action.FLY_TO:
+    if isinstance(event, ActionDone) and event.action in _SET_POINT_ACTIONS:
         return set_point_schedule.confirm(trial, event), ()
     if not set_point_schedule.is_due(trial, now_s) or _may_be_by_hand(trial, now_s):
         return None
@@ -468,7 +469,8 @@ def _modes(trial: Trial) -> frozenset[str]:
         return frozenset()
     if has_stayed or watch.heartbeat_s - command_s < _MODE_KNOWN_S:
         return frozenset()
-    return limits.flying_modes | limits.landing_modes
+    follows = trial.plan.holds_first and trial.changes and trial.state is State.RECORD
+    return (trial.plan.following_modes if follows else limits.flying_modes) | limits.landing_modes
 
 
 def _blocks(trial: Trial) -> frozenset[str]:

@@ -117,14 +117,17 @@ class Plan:
     `safe_gains` are in the order in which an abort sends them; `ground_m` is the ground on the vehicle's datum;
     `climbs_from_ground`: the commanded altitude counts from there; `record_s`: length of the record after the takeoff
     command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again;
-    `set_points`: the takeoff's altitude, and those that follow, in the record's altitude. The set point of `limits` is
-    the current one.
+    `set_points`: the takeoff's altitude, and those that follow, in the record's altitude; `holds_first`: the second of
+    them is the takeoff's again, commanded by `Action.HOLD`, after which the vehicle may only be in `following_modes`
+    until it lands. The set point of `limits` is the current one.
     """
 
     safe_gains: tuple[Setting, ...]
     limits: Limits
     ground_m: float
     set_points: SetPoints = SET_POINTS
+    holds_first: bool = False
+    following_modes: frozenset[str] = frozenset()
     climbs_from_ground: bool = False
     record_s: float = RECORD_S
     lift_off_s: float = 1.5
@@ -146,6 +149,11 @@ class Plan:
     def takeoff(self) -> SetPoints:
         """The takeoff's set point alone."""
         return SetPoints(self.set_points.times_s[:1], self.set_points.altitudes_m[:1])
+
+    @property
+    def first_step(self) -> int:
+        """Place of the first step among the set points."""
+        return 2 if self.holds_first else 1
 
     @property
     def climb_to_m(self) -> float:

@@ -30,7 +30,7 @@ from app.vehicles.mavlink import addresses, limit_checks, parameters, preflight,
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource, AltitudeSource
 from app.vehicles.mavlink.boot_clock import RESTARTED_S
-from app.vehicles.mavlink.events import Action, PacketReceived, RecordSample
+from app.vehicles.mavlink.events import Action, PacketReceived, RecordSample, Setting
 from app.vehicles.mavlink.failures import HELP, Failure
 from app.vehicles.mavlink.flown_set_points import Reference, simulate_reference, with_flown_set_points
 from app.vehicles.mavlink.opening import limits_of, open_radio
@@ -39,6 +39,7 @@ from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.radio import StatusReader
 from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
+from app.vehicles.mavlink.set_point_schedule import referred_from_s, with_hold
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
 from app.vehicles.mavlink.trial_machine import Plan, Trial
@@ -106,6 +107,7 @@ class MavlinkVehicle:
         self._flight: TrialRunner | None = None
         self._repeated: RepeatedCommand | None = None
         self._is_restoring = False
+        self._loop: dict[str, float] = {}
         self._secondary = None if source is None else AlignedAltitudeSource(source)
         on_message = None if source is None else source.on_message
         self._on_wait = on_wait
@@ -170,11 +172,14 @@ class MavlinkVehicle:
         try:
             self._require_not_quarantined()
             self._require_staged()
+            self._loop = {}
             self._radio.target = replace(self._radio.target, altitude_m=order.set_points.altitudes_m[0])
+            if _flies_steps(order):
+                self._prepare_set_points()
             ground = self._observe_ground(STANDSTILL_S, order)
             self._require_staged()  # again: a restart meanwhile leaves none
-            self._parameters.set()
             reference = self._reference(order, ground)
+            self._parameters.set(self._settings(order))
             stop = should_stop()
         except BaseException as error:
             if isinstance(error, VehicleError):
@@ -512,6 +517,8 @@ class MavlinkVehicle:
         if self._radio.profile.flying_blocks:
             plan_time_s = float(self._options["plan_time_s"])
             items = (*items, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
+        if _flies_steps(order):
+            items = (*items, *preflight.evaluate_set_point_requirements(self._radio))
         items = (*items, preflight.evaluate_set_points(order.set_points))
         self._require_not_quarantined()
         preflight.require(items)
@@ -539,10 +546,24 @@ class MavlinkVehicle:
         positions = tuple(position for _, position in self._radio.seen.positions)
         return replace(watched, positions=positions), items
 
+    def _settings(self, order: FlightOptions) -> tuple[Setting, ...]:
+        """Return the parameters that the flight needs."""
+        profile, target = self._radio.profile, self._radio.target
+        settings = profile.take_off_settings(target)
+        return (*settings, *profile.set_point_settings(target)) if _flies_steps(order) else settings
+
+    def _prepare_set_points(self) -> None:
+        """Request the telemetry that a flight with several set points needs, and read the parameters of its loop."""
+        self._identify()
+        self._require_not_quarantined()
+        preflight.prepare_set_points(self._radio)
+        names = self._radio.profile.loop_parameters
+        self._loop = parameters.read_known(self._radio, names[self._gains.release]) if names else {}
+
     def _reference(self, order: FlightOptions, ground: Ground) -> Reference | None:
-        """Return the function that computes the autopilot's own reference for set points that follow the takeoff's;
-        None if it is not needed or not known. It is called once, because its first call may take seconds."""
-        if len(order.set_points.times_s) == 1 or not self._radio.profile.simulates_reference:
+        """Return the function that computes the autopilot's own reference; None if it sends that, or if it is not
+        needed. It is called once, because its first call may take seconds."""
+        if not _flies_steps(order) or self._radio.profile.reference != "replica":
             return None
         ground_m = ground.altitude_m
 
@@ -563,7 +584,7 @@ class MavlinkVehicle:
         last = ground.last
         self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
-        plan = replace(self._plan(ground), record_s=order.record_s, set_points=order.set_points)
+        plan = self._plan_of(order, ground)
         self._gains.staged = self._repeated = None
         watch = watching.begin(
             self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S
@@ -599,6 +620,21 @@ class MavlinkVehicle:
             with suppress(LinkError):
                 self._repeated = RepeatedCommand(self._radio, Action.LAND, by_person=False)
                 self._requested = _LAND_REPEATED
+
+    def _plan_of(self, order: FlightOptions, ground: Ground) -> Plan:
+        """Return the plan with the set points of the order."""
+        profile = self._radio.profile
+        plan = replace(self._plan(ground), record_s=order.record_s, set_points=order.set_points)
+        if not _flies_steps(order) or not profile.holds_first:
+            return plan
+        modes = plan.limits.flying_modes | profile.following_modes
+        return replace(
+            plan,
+            set_points=with_hold(order.set_points),
+            holds_first=True,
+            following_modes=profile.following_modes,
+            limits=replace(plan.limits, flying_modes=modes),
+        )
 
     def _plan(self, ground: Ground) -> Plan:
         profile = self._radio.profile
@@ -648,7 +684,7 @@ class MavlinkVehicle:
             raise refusal
         plan = trial.plan
         own = with_flown_set_points(
-            records.trajectory_of(flown.samples, start_s, plan.datum_m),
+            records.trajectory_of(flown.samples, start_s, plan.datum_m, referred_from_s=referred_from_s(plan)),
             plan.takeoff,
             trial.changes,
             ground_m=plan.ground_m - plan.datum_m,
@@ -669,7 +705,7 @@ class MavlinkVehicle:
                 if part
             ),
             has_flown=records.has_flown(trial),
-            settings={**self._options, **both.settings, **records.contact_of(trial)},
+            settings={**self._options, **self._loop, **both.settings, **records.contact_of(trial)},
         )
 
     def _not_begun(self, ground: Ground, reason: str, *, has_flown: bool) -> FlightRecord:
@@ -698,3 +734,8 @@ class MavlinkVehicle:
         if state not in TRANSITIONS[self._state]:
             raise AssertionError(f"A vehicle cannot go from {self._state} to {state}.")
         self._state = state
+
+
+def _flies_steps(order: FlightOptions) -> bool:
+    """Whether set points follow the takeoff's."""
+    return len(order.set_points.times_s) > 1

@@ -49,7 +49,12 @@ _SPEED: Final = 8.0
 _BYTEWISE: Final = 6
 _FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
     "ardupilot": (("FS_GCS_ENABLE", 2, 5), ("FENCE_ENABLE", 2, 1), ("FENCE_ACTION", 2, 2), ("FENCE_ALT_MAX", 9, 10)),
-    "px4": (("NAV_DLL_ACT", _BYTEWISE, 3), ("GF_ACTION", _BYTEWISE, 5), ("GF_MAX_VER_DIST", 9, 10)),
+    "px4": (
+        ("NAV_DLL_ACT", _BYTEWISE, 3),
+        ("GF_ACTION", _BYTEWISE, 5),
+        ("GF_MAX_VER_DIST", 9, 10),
+        ("COM_OBL_RC_ACT", _BYTEWISE, 4),
+    ),
 }
 """Name, MAVLink's type, value."""
 

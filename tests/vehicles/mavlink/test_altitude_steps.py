@@ -1,17 +1,19 @@
-"""Whole trials of altitude steps against the simulated Paparazzi, in lockstep."""
+"""Whole trials of altitude steps against the simulated autopilots, in lockstep."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from app.core.experiments import get_experiment
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints
-from app.vehicles.base import FlightOptions, FlightRecord, StopRequest, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, StopRequest, VehicleError
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import compiled_only
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
+from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
 
 STEPS = AltitudeSteps().configured({"steps": 2, "step_window_s": 3.0})
@@ -145,3 +147,91 @@ def test_the_next_takeoff_climbs_to_its_own_height() -> None:
             order = FlightOptions(seed=1, window_s=steps.window_s, set_points=steps.set_points)
             record = vehicle.fly(order, on_sample=unwatched, should_stop=never)
             assert record.trajectory["altitude_m"][-1] == pytest.approx(height_m, abs=0.05)
+
+
+SHORT: dict[str, OptionValue] = {"steps": 2, "step_window_s": 3.0}
+TARGET = "SET_POSITION_TARGET_LOCAL_NED"
+ERRORS_M = {"ardupilot": (0.03, 0.08), "ardupilot-4.7": (0.03, 0.08), "px4": (0.2, 0.4)}
+"""Around those of longer steps: 49 mm and 229 mm."""
+
+
+def copter(release: str) -> LockstepRig:
+    rig = LockstepRig(release.partition("-")[0], release=release)
+    rig.switch_on_failsafes()
+    return rig
+
+
+def order_of(autopilot: str) -> FlightOptions:
+    steps = get_experiment(f"altitude-steps-{autopilot}", SHORT)
+    assert steps.set_points is not None
+    return FlightOptions(seed=1, window_s=steps.window_s, set_points=steps.set_points)
+
+
+@compiled_only
+@pytest.mark.parametrize("release", ["ardupilot", pytest.param("ardupilot-4.7", marks=pytest.mark.complete), "px4"])
+def test_the_copters_hold_by_a_position_target_then_step_and_report_their_reference(release: str) -> None:
+    with copter(release) as rig:
+        name, order = rig.autopilot, order_of(rig.autopilot)
+        learns = rig.drone.autopilot.held("MOT_HOVER_LEARN") if name == "ardupilot" else None
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE[name])
+        record = vehicle.fly(order, on_sample=unwatched, should_stop=never)
+        assert (record.ending, record.reason) == ("completed", "")
+        assert rig.drone.body.stands
+        if name == "ardupilot":
+            assert rig.drone.autopilot.held("MOT_HOVER_LEARN") == learns == 2.0
+        targets = [(at_s, -number(message, "z")) for at_s, message in rig.heard if message.get_type() == TARGET]
+        commanded_s = next(at_s for at_s, message in reversed(rig.heard) if message.get_type() == "COMMAND_LONG")
+        vehicle.close()
+    flight = record.trajectory
+    low, high = ERRORS_M[release]
+    assert low < get_experiment(f"altitude-steps-{name}", SHORT).error(flight) < high
+    ground_m = 0.51 if name == "px4" else 0.0
+    altitudes_m = np.array([altitude_m for _, altitude_m in targets]) - ground_m
+    assert altitudes_m[np.diff(altitudes_m, prepend=0.0) != 0.0] == pytest.approx([3.0, 2.0, 3.0], abs=0.02)
+    if name == "px4":
+        assert np.diff([at_s for at_s, _ in targets]).max() < 0.1
+        assert targets[-1][0] < commanded_s
+    else:
+        assert np.diff([at_s for at_s, _ in targets]) == pytest.approx([6.0, 3.0], abs=0.05)
+    changes_s = flight.time_s[1:][np.diff(flight["set_point_m"]) != 0.0]
+    assert changes_s == pytest.approx([0.0, 15.0, 18.0], abs=0.05)
+    own = {"ardupilot": "MOT_THST_HOVER", "px4": "MPC_THR_HOVER"}[name]
+    assert record.settings[own] == pytest.approx(rig.drone.autopilot.held(own))
+    percents = np.round(flight["throttle"] * 100.0) / 100.0
+    assert np.abs(flight["throttle"] - percents).max() > 0.003, "it is not VFR_HUD's"
+
+
+@compiled_only
+def test_an_abort_during_a_px4s_step_ends_the_stream_and_lands() -> None:
+    watcher = Watcher(abort_at_s=15.5)
+    with copter("px4") as rig:
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE["px4"])
+        record = vehicle.fly(order_of("px4"), on_sample=watcher.see, should_stop=watcher.decide)
+        assert rig.drone.body.stands
+        assert vehicle.read_gains() == OWN_SAFE["px4"]
+        vehicle.close()
+    assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
+    last_s = max(at_s for at_s, message in rig.heard if message.get_type() == TARGET)
+    first_gain_s = next(at_s for at_s, message in rig.heard if at_s > last_s and message.get_type() == "PARAM_SET")
+    assert first_gain_s - last_s < 0.1
+    assert record.trajectory["altitude_m"][-1] < 0.3
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "parameter", "value", "needed"),
+    [("px4", "COM_OF_LOSS_T", 5.0, "2 s or less"), ("ardupilot", "GUID_OPTIONS", 64.0, "without bit 6")],
+)
+def test_what_steps_require_of_a_copter_is_checked_before_they_are_flown_and_not_for_takeoffs(
+    autopilot: str, parameter: str, value: float, needed: str
+) -> None:
+    with copter(autopilot) as rig:
+        rig.drone.autopilot.parameters[parameter] = value  # type: ignore[attr-defined]
+        vehicle = rig.vehicle()
+        assert all(item.passed for item in vehicle.check())
+        vehicle.stage(OWN_SAFE[autopilot])
+        with pytest.raises(VehicleError, match=f"{parameter}: {value:g}, needed: {needed}") as refusal:
+            vehicle.fly(order_of(autopilot), on_sample=unwatched, should_stop=never)
+        assert refusal.value.not_flown
+        vehicle.close()

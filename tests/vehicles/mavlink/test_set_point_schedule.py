@@ -41,12 +41,13 @@ class Stepping(TrialDriver):
     commanded_s: float = 0.0
     wanted_m: float | None = None
     confirmed: bool = True
+    action: Action = Action.FLY_TO
 
     def pass_s(self, seconds: float) -> "Stepping":
         for _ in range(round(seconds / STEP_S)):
             if not self.unheard and not self.confirmed and self.now_s - self.commanded_s >= LATENCY_S - STEP_S / 2:
                 self.confirmed = True
-                self.give(ActionDone(Action.FLY_TO, self.now_s, (self.commanded_s,), self.now_s))
+                self.give(ActionDone(self.action, self.now_s, (self.commanded_s,), self.now_s))
             if self.confirmed and self.moves and self.wanted_m is not None:
                 self.climb_rate_m_s = max(-1.0, min((self.wanted_m - self.altitude_m) / STEP_S, 1.0))
             super().pass_s(STEP_S)
@@ -55,7 +56,8 @@ class Stepping(TrialDriver):
     def _note(self, commands: tuple[Command, ...]) -> None:
         super()._note(commands)
         for command in commands:
-            if isinstance(command, PerformAction) and command.action is Action.FLY_TO:
+            if isinstance(command, PerformAction) and command.altitude_m is not None:
+                self.action = command.action
                 self.commanded_s, self.wanted_m, self.confirmed = self.now_s, command.altitude_m, False
             elif isinstance(command, PerformAction):
                 self.wanted_m = None
@@ -241,3 +243,65 @@ def test_the_takeoff_alone_has_no_further_set_points() -> None:
     walk = TrialDriver().lift_off().pass_s(4.0)
     assert Action.FLY_TO not in walk.actions
     assert walk.trial.settling == ()
+
+
+OFFBOARD, LOITER = "6.0", "4.3"
+HOLDS_FIRST = replace(
+    STEPS,
+    set_points=SetPoints((0.0, 4.0, 9.0, 12.0), (3.0, 3.0, 2.0, 3.0)),
+    holds_first=True,
+    following_modes=frozenset({OFFBOARD}),
+    limits=replace(
+        PLAN.limits,
+        flying_modes=frozenset({"4.2", LOITER, OFFBOARD}),
+        hovering_modes=frozenset({LOITER}),
+        landing_modes=frozenset({"4.6"}),
+        automatic_modes=frozenset({"4.2", LOITER, OFFBOARD, "4.6"}),
+    ),
+)
+
+
+def climbed() -> Stepping:
+    """A vehicle that is to hold its first set point by position targets, and still is in the mode of its takeoff."""
+    walk = Stepping(plan=HOLDS_FIRST, mode="4.2")
+    walk.lift_off()
+    return walk.until_s(4.5)
+
+
+def following() -> Stepping:
+    """A vehicle that has entered the mode in which it follows set points, and confirmed the first."""
+    walk = climbed()
+    assert Action.HOLD not in walk.actions
+    walk.mode, walk.unheard = LOITER, True
+    walk.until_s(6.0)
+    assert walk.actions[-1] is Action.HOLD
+    walk.mode = OFFBOARD
+    walk.until_s(6.6)
+    walk.unheard = False
+    return walk.until_s(7.0)
+
+
+def test_a_vehicle_holds_its_first_set_point_once_it_hovers_and_before_it_steps() -> None:
+    walk = following()
+    assert [change.altitude_m for change in walk.trial.changes] == [3.0]
+    walk.until_s(14.0)
+    assert (walk.state, walk.altitudes) == (State.RECORD, [2.0, 3.0])
+
+
+def test_a_vehicle_that_leaves_the_mode_in_which_it_follows_set_points_is_landed() -> None:
+    walk = following()
+    walk.mode = LOITER
+    walk.until_s(8.5)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
+    assert walk.altitudes == []
+
+
+def test_a_vehicle_whose_climb_does_not_end_or_that_refuses_to_hold_is_landed() -> None:
+    walk = climbed().until_s(7.1)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.NOT_SETTLED)
+    assert Action.HOLD not in walk.actions
+    walk = climbed()
+    walk.mode, walk.unheard = LOITER, True
+    walk.until_s(6.0)
+    walk.give(ActionRefused(Action.HOLD, "The vehicle refused to hold its first set point.", walk.now_s))
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.SET_POINT)

@@ -54,7 +54,7 @@ def test_px4_s_thrust_command_is_read_where_it_is_used_and_possible(
     thrust: float, mask: int, share: float | None
 ) -> None:
     found = measured(PROFILES["px4"], "ATTITUDE_TARGET", **TARGET, thrust=thrust, type_mask=mask)
-    assert found == (None if share is None else Throttle(share))
+    assert found == (None if share is None else Throttle(share, exact=True))
 
 
 @pytest.mark.parametrize("gains", FLOWN)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, NEWER_NAMES, UNSUPPORTED
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
 from app.vehicles.mavlink.profiles import base
@@ -18,13 +19,20 @@ _SET_MESSAGE_INTERVAL: Final = 511
 _REQUEST_MESSAGE: Final = 512
 _SYS_STATUS: Final = 1
 _LOCAL_POSITION_NED: Final = 32
+_NAV_CONTROLLER_OUTPUT: Final = 62
 _VFR_HUD: Final = 74
+_ATTITUDE_TARGET: Final = 83
+_POSITION_TARGET_LOCAL_NED: Final = 85
 _FENCE_STATUS: Final = 162
 _EXTENDED_SYS_STATE: Final = 245
 _STATUS_HZ: Final = 4.0
 _THROTTLE_HZ: Final = 10.0
+REFERENCE_HZ: Final = 50.0
+"""Rate of what is compared with the altitude, sample by sample."""
 _AUTOPILOT_VERSION: Final = 148
 _CUSTOM_MODE: Final = 1.0
+_LOOP: Final = (*FIRMWARE_NAMES, *UNSUPPORTED, "INS_ACCEL_FILTER", "SCHED_LOOP_RATE")
+_RENAMED: Final = frozenset(older for older, _ in NEWER_NAMES.values())
 
 
 class ArduPilot:
@@ -32,15 +40,17 @@ class ArduPilot:
 
     name: Final = "ardupilot"
     title: Final = "ArduCopter"
-    experiments: Final[tuple[str, ...]] = ("takeoff-ardupilot",)
+    experiments: Final = ("takeoff-ardupilot", "altitude-steps-ardupilot")
     dialect: Final = ARDUPILOTMEGA
     autopilot: Final = 3
     heartbeat_s: Final = 1.0
     lift_off_s: Final = 6.0
     land_again_s: Final = 1.0
     climbs_from_ground: Final = True
-    simulates_reference: Final = False
+    reference: Final = "error"
+    holds_first: Final = True
     flying_modes: Final = frozenset({str(GUIDED)})
+    following_modes: Final = frozenset({str(GUIDED)})
     hovering_modes: Final[frozenset[str]] = frozenset()
     landing_modes: Final = frozenset({str(LAND)})
     mode_names: Final = MappingProxyType(
@@ -90,6 +100,11 @@ class ArduPilot:
         Requirement("FS_EKF_ACTION", "1 or 3 (land when its position is lost)", frozenset({1.0, 3.0})),
     )
 
+    set_point_requirements: Final = (
+        Requirement("GUID_OPTIONS", "without bit 6 (targets flown by the position controller)", clear_bits=1 << 6),
+    )
+    loop_parameters: Final = (_LOOP, (*(name for name in _LOOP if name not in _RENAMED), *NEWER_NAMES))
+
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
@@ -103,10 +118,24 @@ class ArduPilot:
         """Request telemetry: without requests, only heartbeats are sent on a direct link."""
         return request_telemetry(target, telemetry_hz)
 
+    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
+        return (
+            _request(target, _NAV_CONTROLLER_OUTPUT, REFERENCE_HZ),
+            request_target(target),
+            request_throttle(target),
+        )
+
     def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
+        return ()
+
+    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the same for all
+        """Return that the hover throttle is not learned: the gains are compared with one and the same."""
+        return (Setting("MOT_HOVER_LEARN", 0.0),)
+
+    def stream(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - it keeps its target by itself
         return ()
 
     def version_request(self, target: Target) -> Outgoing:
@@ -125,8 +154,8 @@ class ArduPilot:
             case Action.TAKE_OFF:
                 above = base.command(target, _TAKE_OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, target.altitude_m)
                 return (Step((above,), awaits="command 22", attempts=1),)
-            case Action.FLY_TO:
-                return ()
+            case Action.HOLD | Action.FLY_TO:
+                return (base.follow_target(target),)
             case Action.LAND:
                 return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, LAND),)),)
             case Action.MOTORS_OFF:
@@ -152,6 +181,16 @@ def request_telemetry(target: Target, telemetry_hz: float) -> tuple[Step, ...]:
     )
 
 
+def request_target(target: Target) -> Step:
+    """Return the request for the position target that it follows."""
+    return _request(target, _POSITION_TARGET_LOCAL_NED, REFERENCE_HZ)
+
+
+def request_throttle(target: Target) -> Step:
+    """Return the request for the throttle that its loop demands."""
+    return _request(target, _ATTITUDE_TARGET, REFERENCE_HZ)
+
+
 def _request(target: Target, message: int, rate_hz: float, *, needed: bool = True) -> Step:
     request = base.command(target, _SET_MESSAGE_INTERVAL, message, round(1e6 / rate_hz))
     return Step((request,), awaits="command 511", attempts=5 if needed else 2, needed=needed)
@@ -166,4 +205,10 @@ def _heartbeat(message: Message) -> Measurement | None:
     return base.heartbeat(message, f"{number(message, 'custom_mode'):.0f}")
 
 
-_READERS: Final[base.Readers] = {**base.READERS, "HEARTBEAT": _heartbeat}
+_READERS: Final[base.Readers] = {
+    **base.READERS,
+    "HEARTBEAT": _heartbeat,
+    "NAV_CONTROLLER_OUTPUT": base.altitude_error,
+    "POSITION_TARGET_LOCAL_NED": base.target_altitude,
+    "ATTITUDE_TARGET": base.commanded_throttle,
+}

@@ -5,7 +5,7 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Final, Literal, Protocol
 
 from app.core.errors import GainsError, Problem
 from app.core.policy import Gains, shortened
@@ -21,6 +21,7 @@ from app.vehicles.mavlink.dialects import (
 )
 from app.vehicles.mavlink.events import (
     Action,
+    AltitudeError,
     Battery,
     CommandReply,
     FenceBreach,
@@ -31,6 +32,7 @@ from app.vehicles.mavlink.events import (
     Position,
     Setting,
     StatusText,
+    TargetAltitude,
     Throttle,
     Version,
 )
@@ -44,6 +46,12 @@ FORCED: Final = 21196.0
 REAL32: Final = 9
 AUTOPILOT: Final = 1
 """Default component id of autopilots."""
+TARGET: Final = "position target"
+"""`Step.awaits` of a step that ends when the vehicle reports the position target of the step."""
+POSITION_ALONE: Final = 0b110111111000
+"""POSITION_TARGET_TYPEMASK: everything but the position is ignored."""
+_IGNORES_Z: Final = 1 << 2
+_LOCAL_NED: Final = 1
 SET_POINT_ATTEMPTS: Final = 3
 """Sendings of a set point; together shorter than the time between two set points."""
 _FENCES: Final = MappingProxyType({1: "its least altitude", 2: "its greatest altitude", 3: "its boundary"})
@@ -96,6 +104,9 @@ class GainParameter:
 
 
 GainSet = tuple[GainParameter, ...]
+ReferenceSource = Literal["replica", "error", "target"]
+"""Source of an autopilot's own reference: the replica of its loop computes it; it sends its altitude error; it is the
+position target, which it sends."""
 
 
 def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
@@ -119,19 +130,22 @@ def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
 @dataclass(frozen=True, slots=True)
 class Requirement:
     """Part of a failsafe that must be enabled before a flight: a parameter with one of these values, or else above
-    zero, at most `most`, and with all of these `bits`. `what`: these values, with their effect in brackets.
-    `newer_name`: the parameter's name in newer releases."""
+    zero, at most `most`, and with all of these `bits`; or, if there are any `clear_bits`, without these. `what`: these
+    values, with their effect in brackets. `newer_name`: the parameter's name in newer releases."""
 
     parameter: str
     what: str
     values: frozenset[float] = frozenset()
     bits: int = 0
+    clear_bits: int = 0
     most: float = math.inf
     newer_name: str = ""
 
     def is_met(self, value: float) -> bool:
         if self.values:
             return value in self.values
+        if self.clear_bits:
+            return not int(value) & self.clear_bits
         return 0.0 < value <= self.most and int(value) & self.bits == self.bits
 
 
@@ -145,14 +159,16 @@ class Outgoing:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Messages sent together, up to `attempts` times, and the reply that ends the step (see `CommandReply.to`); if it
-    awaits none, the step ends after `pause_s`. A step that is not `needed` may be refused, or have no reply."""
+    """Messages sent together, up to `attempts` times, and the reply that ends the step: see `CommandReply.to`, or
+    `TARGET` with its `altitude_m`, or "mode " and the mode of a heartbeat; if it awaits none, the step ends after
+    `pause_s`. A step that is not `needed` may be refused, or have no reply."""
 
     sends: tuple[Outgoing, ...]
     awaits: str = ""
     attempts: int = 5
     pause_s: float = 0.0
     needed: bool = True
+    altitude_m: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,12 +234,22 @@ class Profile(Protocol):
         ...
 
     @property
-    def simulates_reference(self) -> bool:
-        """Whether its own reference is computed by the replica of its loop, because it does not send it."""
+    def reference(self) -> ReferenceSource:
+        """Where its own reference comes from."""
+        ...
+
+    @property
+    def holds_first(self) -> bool:
+        """Whether it must hold its first set point by position targets (`Action.HOLD`) before it flies to others."""
         ...
 
     @property
     def flying_modes(self) -> frozenset[str]: ...
+    @property
+    def following_modes(self) -> frozenset[str]:
+        """Modes that it may be in once it follows set points."""
+        ...
+
     @property
     def hovering_modes(self) -> frozenset[str]:
         """Flying modes that it enters after the climb; none if it climbs and hovers in one mode."""
@@ -272,6 +298,17 @@ class Profile(Protocol):
 
     @property
     def requirements(self) -> tuple[Requirement, ...]: ...
+    @property
+    def set_point_requirements(self) -> tuple[Requirement, ...]:
+        """Further requirements of flights with several set points."""
+        ...
+
+    @property
+    def loop_parameters(self) -> tuple[tuple[str, ...], ...]:
+        """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set
+        points; it may lack some. None if the replica of its loop has no parameters but its gains."""
+        ...
+
     def measure(self, message: Message) -> Measurement | None: ...
     def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:
         """Return the blocks of the flight plan, if there is one. Raises VehicleError if a required one is missing."""
@@ -285,12 +322,24 @@ class Profile(Protocol):
         """Return the steps that request telemetry, without lasting changes."""
         ...
 
+    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
+        """Return the steps that request the further telemetry of a flight with several set points."""
+        ...
+
     def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
         """Return the steps out of a mode in which it does not arm; none for other modes."""
         ...
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
         """Return the parameters required for a takeoff to the altitude of `target`."""
+        ...
+
+    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:
+        """Return the further parameters required for a flight with several set points."""
+        ...
+
+    def stream(self, target: Target) -> tuple[Outgoing, ...]:
+        """Return the messages that it must receive all the time while it follows set points."""
         ...
 
     def version_request(self, target: Target) -> Outgoing | None:
@@ -393,6 +442,42 @@ def battery(message: Message) -> Battery:
     )
 
 
+def position_target(target: Target) -> Outgoing:
+    """Return SET_POSITION_TARGET_LOCAL_NED: position alone, in the vehicle's local frame, whose z points down."""
+    unused = dict.fromkeys(("vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0.0)
+    return Outgoing(
+        "SET_POSITION_TARGET_LOCAL_NED",
+        {
+            "time_boot_ms": 0,
+            "target_system": target.aircraft,
+            "target_component": target.component,
+            "coordinate_frame": _LOCAL_NED,
+            "type_mask": POSITION_ALONE,
+            "x": target.north_m,
+            "y": target.east_m,
+            "z": -target.altitude_m,
+            **unused,
+        },
+    )
+
+
+def follow_target(target: Target) -> Step:
+    """Return the step that sends a position target until the vehicle reports it."""
+    sends = (position_target(target),)
+    return Step(sends, awaits=TARGET, attempts=SET_POINT_ATTEMPTS, altitude_m=target.altitude_m)
+
+
+def altitude_error(message: Message) -> AltitudeError:
+    """Read NAV_CONTROLLER_OUTPUT."""
+    return AltitudeError(number(message, "alt_error"))
+
+
+def target_altitude(message: Message) -> TargetAltitude | None:
+    """Read POSITION_TARGET_LOCAL_NED; None if it has no altitude."""
+    has_none = int(number(message, "type_mask")) & _IGNORES_Z
+    return None if has_none else TargetAltitude(-number(message, "z"))
+
+
 def throttle(message: Message) -> Throttle | None:
     """Read VFR_HUD, whose throttle is in percent; None if it is out of range."""
     return _throttle(number(message, "throttle") / 100.0)
@@ -401,11 +486,11 @@ def throttle(message: Message) -> Throttle | None:
 def commanded_throttle(message: Message) -> Throttle | None:
     """Read ATTITUDE_TARGET, whose thrust is a share of full; None if it is out of range or marked as unused."""
     is_unused = int(number(message, "type_mask")) & _THROTTLE_UNUSED
-    return None if is_unused else _throttle(number(message, "thrust"))
+    return None if is_unused else _throttle(number(message, "thrust"), exact=True)
 
 
-def _throttle(share: float) -> Throttle | None:
-    return Throttle(share) if 0.0 <= share <= 1.0 else None
+def _throttle(share: float, *, exact: bool = False) -> Throttle | None:
+    return Throttle(share, exact) if 0.0 <= share <= 1.0 else None
 
 
 def parameter(message: Message) -> Parameter:

@@ -50,8 +50,10 @@ class Paparazzi:
     lift_off_s: Final = 1.5
     land_again_s: Final = 6.0
     climbs_from_ground: Final = False
-    simulates_reference: Final = True
+    reference: Final = "replica"
+    holds_first: Final = False
     flying_modes: Final = frozenset({_NAV})
+    following_modes: Final = frozenset({_NAV})
     hovering_modes: Final[frozenset[str]] = frozenset()
     landing_modes: Final = frozenset({_NAV})
     mode_names: Final = MappingProxyType(
@@ -73,6 +75,8 @@ class Paparazzi:
     )
     stop_settings: Final = ("kil_thr", "aut_kil_thr")
     requirements: Final[tuple[Requirement, ...]] = ()
+    set_point_requirements: Final[tuple[Requirement, ...]] = ()
+    loop_parameters: Final[tuple[tuple[str, ...], ...]] = ()
 
     def measure(self, message: Message) -> Measurement | None:
         """Read a message; altitude only from LOCAL_POSITION_NED, because other messages mix their units."""
@@ -102,10 +106,19 @@ class Paparazzi:
     def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
         return ()
 
+    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - it sends all that it can
+        return ()
+
     def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
+        return ()
+
+    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - none
+        return ()
+
+    def stream(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - it flies to its waypoint by itself
         return ()
 
     def version_request(self, target: Target) -> None:
@@ -124,7 +137,7 @@ class Paparazzi:
                 )
             case Action.TAKE_OFF:
                 return (Step(_block(target, TAKE_OFF)),)
-            case Action.FLY_TO:
+            case Action.HOLD | Action.FLY_TO:
                 return (Step((_climb_here(target),), awaits="waypoint", attempts=base.SET_POINT_ATTEMPTS),)
             case Action.LAND:
                 return (Step(_block(target, LAND)),)

@@ -5,10 +5,16 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
+from app.core.control.px4_parameters import FIRMWARE_NAMES, UNSUPPORTED
 from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.ardupilot import request_telemetry, request_version
+from app.vehicles.mavlink.profiles.ardupilot import (
+    request_target,
+    request_telemetry,
+    request_throttle,
+    request_version,
+)
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
@@ -23,6 +29,8 @@ _LAND: Final = 6
 _OFFBOARD: Final = 6
 _TERMINATION: Final = 10
 _INT32: Final = 6
+_STREAMED_FOR_S: Final = 1.2
+"""It accepts the offboard mode once set points have arrived for a second."""
 
 
 class Px4:
@@ -30,15 +38,17 @@ class Px4:
 
     name: Final = "px4"
     title: Final = "PX4"
-    experiments: Final[tuple[str, ...]] = ("takeoff-px4",)
+    experiments: Final = ("takeoff-px4", "altitude-steps-px4")
     dialect: Final = COMMON
     autopilot: Final = 12
     heartbeat_s: Final = 1.0
     lift_off_s: Final = 8.0
     land_again_s: Final = 1.0
     climbs_from_ground: Final = True
-    simulates_reference: Final = False
+    reference: Final = "target"
+    holds_first: Final = True
     flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
+    following_modes: Final = frozenset({f"{_OFFBOARD}.0"})
     hovering_modes: Final = frozenset({f"{_AUTO}.{_LOITER}"})
     landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
     mode_names: Final = MappingProxyType(
@@ -73,6 +83,12 @@ class Px4:
         Requirement("GF_MAX_VER_DIST", "10 m or less (altitude of its fence above home)", most=10.0),
     )
 
+    set_point_requirements: Final = (
+        Requirement("COM_OF_LOSS_T", "2 s or less (until it lands without set points)", most=2.0),
+        Requirement("COM_OBL_RC_ACT", "4 (land without set points)", frozenset({4.0})),
+    )
+    loop_parameters: Final = ((*FIRMWARE_NAMES, *UNSUPPORTED, "EKF2_PREDICT_US", "IMU_INTEG_RATE", "HTE_THR_RANGE"),)
+
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
@@ -85,6 +101,9 @@ class Px4:
     def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
         return request_telemetry(target, telemetry_hz)
 
+    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
+        return (request_target(target), request_throttle(target))
+
     def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
         """Leave the landing mode, in which it does not arm, and in which it stays if Land arrives after the landing."""
         if mode not in self.landing_modes:
@@ -93,6 +112,12 @@ class Px4:
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
         return (Setting(TAKE_OFF_ALTITUDE, target.altitude_m),)
+
+    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - none
+        return ()
+
+    def stream(self, target: Target) -> tuple[Outgoing, ...]:
+        return (base.position_target(target),)
 
     def version_request(self, target: Target) -> Outgoing:
         return request_version(target)
@@ -107,14 +132,20 @@ class Px4:
             case Action.TAKE_OFF:
                 mode = base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
                 return (Step((mode,), awaits="command 176", attempts=1),)
+            case Action.HOLD:
+                mode = base.command(target, _SET_MODE, _CUSTOM_MODE, _OFFBOARD)
+                return (
+                    Step((base.position_target(target),), pause_s=_STREAMED_FOR_S),
+                    Step((mode,), awaits="command 176", attempts=base.SET_POINT_ATTEMPTS),
+                    Step((), awaits=f"mode {_OFFBOARD}.0"),
+                    base.follow_target(target),
+                )
             case Action.FLY_TO:
-                return ()
+                return (base.follow_target(target),)
             case Action.LAND:
                 return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
-            case Action.MOTORS_OFF:
-                return (Step((base.disarm(target),)),)
-            case Action.KILL:
-                return (Step((base.disarm(target, forced=True),)),)
+            case Action.MOTORS_OFF | Action.KILL:
+                return (Step((base.disarm(target, forced=action is Action.KILL),)),)
 
     def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
         return base.set_parameter(target, parameter, value, component=base.AUTOPILOT)
@@ -146,4 +177,5 @@ _READERS: Final[base.Readers] = {
     "PARAM_VALUE": _parameter,
     "EVENT": _event,
     "ATTITUDE_TARGET": base.commanded_throttle,
+    "POSITION_TARGET_LOCAL_NED": base.target_altitude,
 }
