@@ -16,6 +16,7 @@ from app.simdrone.px4 import Px4
 _ARDUPILOT_FAILSAFES: Final = {"FS_GCS_ENABLE": 5.0, "FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0, "FENCE_ALT_MAX": 10.0}
 """Land when the ground station is lost; stay inside the fence."""
 _LAND: Final = 3.0
+_LAND_WITHOUT_SET_POINTS: Final = 4.0
 _LAND_AT_FENCE: Final = 5.0
 
 Make = Callable[[Body, int], Autopilot]
@@ -122,7 +123,13 @@ AUTOPILOTS: Final[Mapping[str, AutopilotKind]] = MappingProxyType(
                 system=1,
                 link="udp:127.0.0.1:14550",
                 make=_px4,
-                set_up=_with(_px4, NAV_DLL_ACT=_LAND, GF_ACTION=_LAND_AT_FENCE, GF_MAX_VER_DIST=10.0),
+                set_up=_with(
+                    _px4,
+                    NAV_DLL_ACT=_LAND,
+                    GF_ACTION=_LAND_AT_FENCE,
+                    GF_MAX_VER_DIST=10.0,
+                    COM_OBL_RC_ACT=_LAND_WITHOUT_SET_POINTS,
+                ),
             ),
         )
     }

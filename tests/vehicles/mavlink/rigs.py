@@ -236,6 +236,11 @@ class UdpRig(_Heard):
         source = open_source(place, self) if place else None
         return MavlinkVehicle(chosen, SAFE[self.autopilot], is_real=False, clock=self, source=source)
 
+    def switch_on_failsafes(self) -> None:
+        """Before its thread starts."""
+        for name, _, value in _FAILSAFES[self.autopilot]:
+            self.drone.autopilot.parameters[name] = float(value)  # type: ignore[attr-defined]  # a copter's
+
     # ---- the drone's thread
 
     def _run(self) -> None:
