@@ -125,7 +125,7 @@ def test_flights_made_elsewhere_with_different_gains_do_not_get_in_each_others_w
 def test_a_registered_copter_flies_the_takeoff_of_its_own_gains(client: TestClient) -> None:
     options = {"simulated": True, "autopilot": "px4"}
     vehicle = client.post("/api/vehicles", json={"name": "Copter", "kind": "mavlink", "options": options}).json()
-    assert vehicle["experiments"] == ["takeoff-px4"]
+    assert vehicle["experiments"] == ["takeoff-px4", "altitude-steps-px4"]
     choice = {"kind": "mavlink", "id": vehicle["id"]}
     answer = client.post("/api/campaigns", json={"name": "Test", "vehicle": choice, "definition": PX4})
     assert answer.status_code == 201, answer.text

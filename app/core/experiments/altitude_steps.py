@@ -65,12 +65,12 @@ class AltitudeSteps(VerticalLoop):
     def sketch_errors(self, altitude: Matrix, until_s: float) -> Vector:  # noqa: ARG002
         """Mean distance from the reference after the first step."""
         first = -(-self._first // SKETCH_EVERY)
-        reference = self._reference[::SKETCH_EVERY][first : altitude.shape[1]]
+        reference = self.reference[::SKETCH_EVERY][first : altitude.shape[1]]
         return np.asarray(np.abs(altitude[:, first:] - reference).mean(axis=1))
 
     def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute distance from the loop's reference, m, over the windows of the steps: (k, n) → (k,)."""
-        return self.sequence.errors(self.grid_s, outputs, self._reference)
+        return self.sequence.errors(self.grid_s, outputs, self.reference)
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same for a recorded flight, against its recorded reference; raises TrajectoryError if it does not
@@ -78,5 +78,6 @@ class AltitudeSteps(VerticalLoop):
         return self.sequence.error(trajectory, accept_gaps=accept_gaps)
 
     @property
-    def _reference(self) -> Samples:
+    def reference(self) -> Samples:
+        """The loop's reference in a model run."""
         return reference_altitude(self.set_points, self._samples)

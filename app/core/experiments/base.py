@@ -285,6 +285,12 @@ class Experiment(Protocol):
         ...
 
     @property
+    def reference(self) -> Samples | None:
+        """What that channel is in a model run, on its grid, (n,), if a flight may be late in following it: its distance
+        from the recorded channel is then what a model run explains. None: model runs explain its output."""
+        ...
+
+    @property
     def set_points(self) -> SetPoints | None:
         """Altitudes that the vehicle is told to fly to; None for a manoeuvre of its own."""
         ...

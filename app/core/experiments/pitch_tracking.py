@@ -98,6 +98,7 @@ class PitchTracking:
     scored_from_s: Final = 0.0
     measure: Final = "pitch tracking"
     target_channel: Final = None
+    reference: Final = None
     set_points: Final = None
     least_model_error: Final = 0.0
     scatter: Final = Scatter(sd=0.001, degrees_of_freedom=4.0)

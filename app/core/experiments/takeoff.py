@@ -132,6 +132,7 @@ class CopterTakeoff:
     measure: Final = _PAPER.measure
     scored_from_s: Final = _PAPER.scored_from_s
     target_channel: Final = _PAPER.target_channel
+    reference: Final = _PAPER.reference
     set_points: Final = _PAPER.set_points
 
     def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...], *, paper: Takeoff = _PAPER) -> None:

@@ -121,6 +121,11 @@ class VerticalLoop(ABC):
         self.window_s: Final = window_s
         self._samples: Final = int(np.ceil(window_s * RATE_HZ)) + 1
 
+    @property
+    def reference(self) -> Samples | None:
+        """See `Experiment`."""
+        return None
+
     @abstractmethod
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """See `Experiment`, as for the next two."""

@@ -18,10 +18,15 @@ if TYPE_CHECKING:
 def resample_to_grid(experiment: Experiment, flight: Flight) -> Samples:
     """The flight's scored output on the grid of a model run, from the trajectory as stored.
 
-    Outside the recorded time, the nearest sample holds.
+    Outside the recorded time, the nearest sample holds. Over a link a set point takes effect some hundredths of a
+    second before or after its time in a model run: the distance from the recorded reference is that from the model's.
     """
-    measured = flight.trajectory.as_stored()
-    return np.interp(experiment.grid_s, measured.time_s, measured[experiment.output])
+    measured, reference = flight.trajectory.as_stored(), experiment.reference
+    output = np.interp(experiment.grid_s, measured.time_s, measured[experiment.output])
+    channel = experiment.target_channel
+    if reference is None or channel is None or channel not in measured.channels:
+        return output
+    return reference + output - np.interp(experiment.grid_s, measured.time_s, measured[channel])
 
 
 @dataclass(frozen=True, slots=True)

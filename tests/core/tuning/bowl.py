@@ -44,6 +44,7 @@ class QuadraticExperiment:
     scored_from_s: Final = 0.0
     measure: Final = "a bowl"
     target_channel: Final = None
+    reference: Final = None
     set_points: Final = None
     least_model_error: Final = 0.0
     grid_s: Final = np.linspace(0.0, 1.0, 11)

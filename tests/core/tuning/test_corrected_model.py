@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from app.core.definition import Flight
+from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import correct_by_bias, uncorrected_model
 from tests.core.tuning.bowl import QuadraticExperiment, fly
@@ -40,3 +42,22 @@ def test_flights_sampled_otherwise_are_brought_to_the_grid_and_held_beyond_their
 
 def test_before_any_flight_nothing_is_corrected() -> None:
     assert not uncorrected_model(TAKEOFF).bias.any()
+
+
+def test_a_step_that_takes_effect_late_corrects_nothing_where_the_reference_was_recorded() -> None:
+    """Over a link it does. A third of the speed of a step, 0.7 m/s, times 40 ms would be taken for the gains'."""
+    steps = AltitudeSteps().configured({"steps": 2, "step_window_s": 3.0})
+    gains = steps.space.mapping(steps.space.default)
+    altitude, grid_s = uncorrected_model(steps).outputs(steps.space.default[np.newaxis])[0], steps.grid_s
+    late_s = grid_s - 0.04 * (grid_s > 9.0)
+    channels = {
+        "altitude_m": np.interp(late_s, grid_s, altitude),
+        "reference_m": np.interp(late_s, grid_s, steps.reference),
+    }
+    largest = []
+    for names in (("altitude_m",), ("altitude_m", "reference_m")):
+        record = Trajectory(grid_s, {name: channels[name] for name in names}, "mavlink", "vehicle")
+        flight = Flight(number=1, gains=gains, trajectory=record, error=0.1, outcome="valid")
+        largest.append(float(np.abs(correct_by_bias(steps, flight).bias).max()))
+    assert largest[0] > 0.02
+    assert largest[1] < 0.01
