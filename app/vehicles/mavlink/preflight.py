@@ -558,11 +558,14 @@ def _flight_plan(problem: str) -> CheckItem:
 def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
     parameter = radio.target.newer_names.get(requirement.parameter, requirement.parameter)
     value = read_parameter(radio, parameter)
+    is_failsafe = not requirement.clear_bits
     return CheckItem(
         name=f"failsafe {requirement.parameter}",
-        title=f"Failsafe {parameter}",
+        title=f"{'Failsafe' if is_failsafe else 'Setting'} {parameter}",
         passed=value is not None and requirement.is_met(value),
         found="not reported" if value is None else f"{value:g}" if value else "off",
         needed=requirement.what,
-        hint="Set this in the autopilot: if the link is lost, only its own failsafe lands the vehicle.",
+        hint="Set this in the autopilot: if the link is lost, only its own failsafe lands the vehicle."
+        if is_failsafe
+        else "Set this in the autopilot: it must fly the steps by its position controller.",
     )
