@@ -30,6 +30,8 @@ def test_every_preset_is_a_campaign_that_can_be_created(name: str) -> None:
         "ardupilot-takeoff": "takeoff-ardupilot",
         "px4-takeoff": "takeoff-px4",
         "ardrone-altitude-steps": "altitude-steps",
+        "ardupilot-altitude-steps": "altitude-steps-ardupilot",
+        "px4-altitude-steps": "altitude-steps-px4",
     }
     assert definition.experiment == of_its_own.get(name, "takeoff")
     assert len(file.gains) == (definition.stop.max_flights if definition.strategy == "manual" else 0)
