@@ -454,12 +454,16 @@ def test_paparazzi_tells_every_change_of_block() -> None:
         (PX4, "COM_DL_LOSS_T", {5.0, 15.0}, {0.0, 300.0}),
         (PX4, "GF_ACTION", {2.0, 5.0}, {0.0, 1.0, 3.0, 4.0}),
         (PX4, "GF_MAX_VER_DIST", {5.0, 10.0}, {0.0, 120.0}),
+        (ARDUPILOT, "GUID_OPTIONS", {0.0, 1.0, 191.0}, {64.0, 65.0}),
+        (PX4, "COM_OF_LOSS_T", {0.5, 2.0}, {0.0, 5.0}),
+        (PX4, "COM_OBL_RC_ACT", {4.0}, {0.0, 3.0, 5.0}),
     ],
 )
 def test_only_a_failsafe_that_brings_the_vehicle_down_without_climbing_or_stopping_its_motors_will_do(
     profile: Profile, parameter: str, protects: set[float], does_not: set[float]
 ) -> None:
-    requirement = next(each for each in profile.requirements if each.parameter == parameter)
+    every = (*profile.requirements, *profile.set_point_requirements)
+    requirement = next(each for each in every if each.parameter == parameter)
     assert {value for value in protects | does_not if requirement.is_met(value)} == protects
 
 
@@ -493,3 +497,24 @@ def test_paparazzis_mode_is_read_with_and_without_the_bit_for_a_custom_mode(base
     )
     assert isinstance(beat, Heartbeat)
     assert beat.mode == mode
+
+
+@pytest.mark.parametrize("profile", [ARDUPILOT, PX4])
+def test_a_copters_set_point_is_a_target_of_position_alone_that_it_must_report(profile: Profile) -> None:
+    target = Target(system=1, aircraft=1, component=1, north_m=2.0, east_m=-1.0, altitude_m=2.5)
+    [step] = profile.steps(Action.FLY_TO, target)
+    [message] = step.sends
+    assert message.kind == "SET_POSITION_TARGET_LOCAL_NED"
+    told = {name: message.fields[name] for name in ("coordinate_frame", "type_mask", "x", "y", "z")}
+    assert told == {"coordinate_frame": 1, "type_mask": 0b110111111000, "x": 2.0, "y": -1.0, "z": -2.5}
+    assert (step.awaits, step.altitude_m, step.attempts) == ("position target", 2.5, 3)
+    assert profile.stream(target) == (() if profile is ARDUPILOT else (message,))
+
+
+def test_paparazzis_set_point_is_its_waypoint_and_is_acknowledged() -> None:
+    target = Target(system=31, aircraft=31, east_m=-1.0, altitude_m=2.0)
+    [step] = PAPARAZZI.steps(Action.FLY_TO, target)
+    assert [(message.kind, message.fields["seq"], message.fields["z"]) for message in step.sends] == [
+        ("MISSION_ITEM", 2, 2.0)
+    ]
+    assert (step.awaits, step.attempts) == ("waypoint", 3)
