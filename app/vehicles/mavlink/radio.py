@@ -289,7 +289,7 @@ class CommandSequence:
     def proceed(self, packets: list[PacketReceived]) -> ActionDone | ActionRefused | None:
         """Process packets and send the next messages; return the result once the sequence has ended."""
         for each in packets:
-            if self._steps and (accepted := _verdict(self._steps[0], each.measurement)) is not None:
+            if self._steps and (accepted := self._verdict(each.measurement)) is not None:
                 if not accepted and self._steps[0].needed:
                     return self._refused(each.measurement)
                 self._replied_s = each.now_s
@@ -307,6 +307,13 @@ class CommandSequence:
             elif self._steps[0].attempts > 1:
                 return self._unanswered()
         return None
+
+    def _verdict(self, measurement: Measurement | None) -> bool | None:
+        """Return whether a reply accepts the step; None if it is not one to it, or a refusal that is not final."""
+        step = self._steps[0]
+        accepted = _verdict(step, measurement)
+        is_final = not step.persists or len(self._sent_s) >= step.attempts
+        return accepted if accepted or is_final else None
 
     def _next(self) -> None:
         self._steps.pop(0)

@@ -229,6 +229,19 @@ def test_the_copters_hold_by_a_position_target_then_step_and_report_their_refere
 
 
 @compiled_only
+def test_a_px4_that_refuses_to_follow_set_points_at_first_is_asked_again() -> None:
+    """It does, until they have arrived for a second."""
+    with LockstepRig("px4", faults=["deaf:0.7@9.4"]) as rig:
+        rig.switch_on_failsafes()
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE["px4"])
+        record = vehicle.fly(order_of("px4"), on_sample=unwatched, should_stop=never)
+        assert "Offboard is currently not available" in " ".join(vehicle._radio.seen.status_texts)
+        vehicle.close()
+    assert (record.ending, record.reason) == ("completed", "")
+
+
+@compiled_only
 def test_an_abort_during_a_px4s_step_ends_the_stream_and_lands() -> None:
     watcher = Watcher(abort_at_s=15.5)
     with copter("px4") as rig:

@@ -161,13 +161,15 @@ class Outgoing:
 class Step:
     """Messages sent together, up to `attempts` times, and the reply that ends the step: see `CommandReply.to`, or
     `TARGET` with its `altitude_m`, or "mode " and the mode of a heartbeat; if it awaits none, the step ends after
-    `pause_s`. A step that is not `needed` may be refused, or have no reply."""
+    `pause_s`. A step that is not `needed` may be refused, or have no reply; one that `persists` is sent again after a
+    refusal, up to `attempts` times."""
 
     sends: tuple[Outgoing, ...]
     awaits: str = ""
     attempts: int = 5
     pause_s: float = 0.0
     needed: bool = True
+    persists: bool = False
     altitude_m: float = math.nan
 
 

@@ -136,7 +136,7 @@ class Px4:
                 mode = base.command(target, _SET_MODE, _CUSTOM_MODE, _OFFBOARD)
                 return (
                     Step((base.position_target(target),), pause_s=_STREAMED_FOR_S),
-                    Step((mode,), awaits="command 176", attempts=base.SET_POINT_ATTEMPTS),
+                    Step((mode,), awaits="command 176", persists=True),
                     Step((), awaits=f"mode {_OFFBOARD}.0"),
                     base.follow_target(target),
                 )
