@@ -48,7 +48,7 @@ class ProposalComputation:
 def compute(past: CampaignHistory) -> ProposalComputation:
     """Compute the next proposal. Deterministic: the same history gives the same result.
 
-    Takes up to a second; call it outside of any transaction.
+    Takes up to a second, or some seconds under ArduCopter and PX4; call it outside of any transaction.
     """
     definition, flights = _with_reopening(past), past.flights
     experiment = experiment_of(definition)

@@ -35,6 +35,28 @@ class Prediction:
     activity: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictedCurve:
+    """A prediction with what is behind it: error of each copter, m, shape (k,); times of the loop's steps in the first
+    segment, s, (m,), and the altitudes of each copter then, in the weather of the flight and at another time, (k, m).
+    """
+
+    prediction: Prediction
+    errors_m: Samples
+    time_s: Samples
+    altitudes_m: Samples
+    elsewhen_m: Samples
+
+
+@dataclass(frozen=True, slots=True)
+class _Flown:
+    """Error, m, and throttle activity of a copter over all segments, and its altitude in the first one, shape (m,)."""
+
+    error_m: float
+    activity: float
+    altitude_m: Samples
+
+
 class FlightModel:
     """A flight and the copters that it allows; predicts it with other gains."""
 
@@ -55,29 +77,27 @@ class FlightModel:
 
     def fly(self, loop: AltitudeLoop) -> tuple[float, float]:
         """Error, m, and throttle activity in the weather of the flight, means of the copters."""
-        error_m, activity = np.mean([self._flown(runs, loop) for runs in self._runs], axis=0).tolist()
-        return error_m, activity
+        return _means([self._flown(runs, loop) for runs in self._runs])
 
     def predict(self, loop: AltitudeLoop) -> Prediction:
         """Prediction for a single flight: the disturbances of the interval meet the reference at other times."""
-        error_m, activity = self.fly(loop)
-        elsewhen = np.array([self._flown(runs, loop)[0] for runs in self._elsewhen])
+        return self.predict_curve(loop).prediction
+
+    def predict_curve(self, loop: AltitudeLoop) -> PredictedCurve:
+        """The same, with what each copter flies."""
+        now, then = ([self._flown(runs, loop) for runs in every] for every in (self._runs, self._elsewhen))
+        error_m, activity = _means(now)
+        elsewhen = np.array([each.error_m for each in then])
         low_m, high_m = np.quantile(elsewhen + (error_m - elsewhen.mean()), _QUANTILES).tolist()
-        return Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity)
-
-    def errors(self, loop: AltitudeLoop) -> Samples:
-        """Error of each copter in the weather of the flight, m, shape (k,)."""
-        return np.array([self._flown(runs, loop)[0] for runs in self._runs])
-
-    def curves(self, loop: AltitudeLoop) -> tuple[Samples, Samples, Samples]:
-        """Times of the steps of the first segment, shape (m,), and what each copter flies in the weather of the flight,
-        and at another time: altitudes, shape (k, m)."""
-        z = FLOWN.index("z_m")
-        altitudes, elsewhen = (
-            np.array([loop.fly(runs[0])[:, z] for runs in every]) for every in (self._runs, self._elsewhen)
+        altitudes = np.array([each.altitude_m for each in now])
+        begin_s, step_s = self._flight.segments[0].time_s[0], self._flight.loop.step_s
+        return PredictedCurve(
+            prediction=Prediction(error_m=error_m, low_m=max(low_m, 0.0), high_m=high_m, activity=activity),
+            errors_m=np.array([each.error_m for each in now]),
+            time_s=begin_s + step_s * np.arange(altitudes.shape[1]),
+            altitudes_m=altitudes,
+            elsewhen_m=np.array([each.altitude_m for each in then]),
         )
-        time_s = self._flight.segments[0].time_s[0] + self._flight.loop.step_s * np.arange(altitudes.shape[1])
-        return time_s, altitudes, elsewhen
 
     def rows(self, loop: AltitudeLoop) -> Samples:
         """What the first copter flies in the weather of the flight, at the rows of the first segment, shape (n, 6) as
@@ -91,19 +111,27 @@ class FlightModel:
         """The runs with the noise of the sensed acceleration that moves the throttle as much as in the flight."""
         loop = self._flight.loop
         calm, noisy = ([_with_noise(run, loop, deviation) for run in runs] for deviation in (0.0, 1.0))
-        without, moved = (self._flown(each, loop)[1] ** 2 for each in (calm, noisy))
+        without, moved = (self._flown(each, loop).activity ** 2 for each in (calm, noisy))
         variance = (activity**2 - without) / (moved - without)
         return [_with_noise(run, loop, math.sqrt(max(variance, 0.0))) for run in runs]
 
-    def _flown(self, runs: Sequence[Run], loop: AltitudeLoop) -> tuple[float, float]:
-        """Error, m, and throttle activity over all segments."""
+    def _flown(self, runs: Sequence[Run], loop: AltitudeLoop) -> _Flown:
+        """What a copter flies in all segments."""
         lead = round(LEAD_S / self._flight.loop.step_s)
-        deviations, fast = [], []
+        deviations, fast, altitudes = [], [], []
         for run in runs:
-            flown = loop.fly(run)[lead:]
+            whole = loop.fly(run)
+            altitudes.append(whole[:, FLOWN.index("z_m")])
+            flown = whole[lead:]
             deviations.append(np.abs(run.reference[lead:, 0] - flown[:, 0]))
             fast.append(flown[:, FLOWN.index("throttle")] - flown[:, FLOWN.index("throttle_slow")])
-        return float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std())
+        return _Flown(float(np.concatenate(deviations).mean()), float(np.concatenate(fast).std()), altitudes[0])
+
+
+def _means(flown: Sequence[_Flown]) -> tuple[float, float]:
+    """Mean error, m, and throttle activity of copters."""
+    error_m, activity = np.mean([(each.error_m, each.activity) for each in flown], axis=0).tolist()
+    return error_m, activity
 
 
 def _with_noise(run: Run, loop: AltitudeLoop, deviation_m_s2: float) -> Run:

@@ -158,23 +158,22 @@ class CopterModel:
         from scipy.special import ndtri
 
         experiment, loop = self._experiment, self._loop(gains)
-        predicted = self._all.predict(loop)
-        time_s, altitudes, elsewhen = self._all.curves(loop)
+        predicted = self._all.predict_curve(loop)
         grid_s = experiment.grid_s
         reference = experiment.simulate(gains, experiment.nominal_model)[experiment.output]
-        after = grid_s >= time_s[0]
-        reach = float(ndtri(0.5 + CONFIDENCE / 2.0)) * elsewhen.std(axis=0)
+        after = grid_s >= predicted.time_s[0]
+        reach = float(ndtri(0.5 + CONFIDENCE / 2.0)) * predicted.elsewhen_m.std(axis=0)
         curve, low, high = (reference.copy() for _ in range(3))
-        mean = altitudes.mean(axis=0)
+        mean = predicted.altitudes_m.mean(axis=0)
         for whole, part in ((curve, mean), (low, mean - reach), (high, mean + reach)):
-            whole[after] = np.interp(grid_s[after], time_s, part)
+            whole[after] = np.interp(grid_s[after], predicted.time_s, part)
         lower, upper = band_channels(experiment.output)
         return FlightPrediction(
             trajectory=Trajectory(grid_s, {experiment.output: curve, lower: low, upper: high}, "model", "simulation"),
-            error=predicted.error_m,
-            interval=_interval(predicted),
+            error=predicted.prediction.error_m,
+            interval=_interval(predicted.prediction),
             models=self._values,
-            errors=self._all.errors(loop),
+            errors=predicted.errors_m,
         )
 
     def notes(self, gains: Vector) -> tuple[str, ...]:

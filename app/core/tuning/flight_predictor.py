@@ -56,7 +56,7 @@ def flight_predictor(
 ) -> FlightPredictor | None:
     """The predictor after these flights, with the model that `next_proposal` uses for them; None without a model.
 
-    A fit takes up to half a second; a prediction some milliseconds.
+    A fit takes up to half a second; a prediction some milliseconds, or a tenth of a second under ArduCopter.
     """
     experiment, space = experiment_of(definition).modelled, space_of(definition)
     if experiment is None:
