@@ -185,9 +185,11 @@ def print_sets(answered: Sequence[Result]) -> None:
     for name in answered[0].errors_m:
         errors_m = np.array([each.errors_m[name] for each in answered])
         ratio = errors_m / best_m
+        with np.errstate(invalid="ignore"):
+            most_m = np.quantile(errors_m, 0.95)
         print(
             f"{name:40} median {1e3 * np.median(errors_m):.1f} mm, 95 % below "
-            f"{1e3 * np.quantile(errors_m, 0.95):.1f} mm; of the best: median {np.median(ratio):.2f}, within 10 % "
+            f"{1e3 * most_m:.1f} mm; of the best: median {np.median(ratio):.2f}, within 10 % "
             f"{np.mean(ratio <= 1.1):.0%}; ring "
             f"{sum(name in each.rang for each in answered)}, lack the margin "
             f"{sum(name in each.lacks_margin for each in answered)}, not scored "
