@@ -324,7 +324,9 @@ class FlightMonitor:
         if target is not None:
             self._score(sample.time_s, abs(target - sample[output]))
         others = [name for name in sample.channels if name != output]
-        self._columns = ["time_s", output, *others]
+        if (columns := ["time_s", output, *others]) != self._columns:  # a vehicle may report more from some time on
+            self.flush()
+            self._columns = columns
         self._rows.append([sample.time_s, sample[output], *(sample[name] for name in others)])
         now_s = self._clock.now_s()
         if now_s >= self._due_s or len(self._rows) >= ROWS_PER_MESSAGE:

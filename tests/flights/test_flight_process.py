@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,21 @@ def test_a_flight_computed_at_once_is_sent_in_messages_that_the_live_link_takes(
     monitor.flush()
     assert [row[0] for said in heard for row in said.samples] == [sample.time_s for sample in sent]
     assert max(len(encode(said)) for said in heard) < MAX_LINE_BYTES
+
+
+def test_a_reference_that_is_reported_later_begins_a_message_and_is_scored_from_then_on() -> None:
+    heard: list[Telemetry] = []
+    steps = replace(flight_of(), experiment="altitude-steps")
+    monitor = FlightMonitor(
+        steps, lambda said: heard.append(said) if isinstance(said, Telemetry) else None, ManualClock()
+    )
+    for number in range(4):
+        known = {"reference_m": 2.0 + 0.1 * number} if number > 1 else {}
+        monitor.sample(Sample(11.0 + number, {"altitude_m": 2.0, **known}))
+    monitor.flush()
+    assert all(len(row) == len(said.columns) for said in heard for row in said.samples)
+    assert heard[0].error_so_far is None
+    assert heard[-1].error_so_far == pytest.approx((3.0 * 0.2 + 0.25) / 4.0)
 
 
 def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
