@@ -156,20 +156,37 @@ def trajectory_of(
     are omitted, and so is the second source, of which each sample contains only the last value received.
 
     If any sample has the autopilot's reference, it is the altitude where it is unknown earlier than `referred_from_s`
-    after the start, as on the ground.
+    after the start, as on the ground; later, a gap no longer than that of a record may be is interpolated, or the
+    last one held.
     """
-    begin_s = start_s + (referred_from_s if any(sample.reference_m is not None for sample in samples) else -math.inf)
-    rows = [channels_of(_referred(replace(sample, second_m=None), begin_s), datum_m, "vehicle") for sample in samples]
+    referred = _with_references(samples, start_s + referred_from_s)
+    rows = [channels_of(replace(sample, second_m=None), datum_m, "vehicle") for sample in referred]
     names = [name for name in rows[-1] if all(name in row for row in rows)] if rows else []
     time_s = np.array([round(sample.position.time_boot_s - start_s, 6) for sample in samples])
     channels = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
     return Trajectory(time_s, channels, SOURCE, "vehicle")
 
 
-def _referred(sample: RecordSample, begin_s: float) -> RecordSample:
-    if sample.reference_m is not None or sample.position.time_boot_s >= begin_s:
-        return sample
-    return replace(sample, reference_m=sample.position.altitude_m)
+def _with_references(samples: Sequence[RecordSample], begin_s: float) -> Sequence[RecordSample]:
+    """Return the samples with the references that follow from the others, if any has one."""
+    known = [(sample.position.time_boot_s, sample.reference_m) for sample in samples if sample.reference_m is not None]
+    if not known:
+        return samples
+    known_s, known_m = np.array(known).T
+
+    def reference_m(time_s: float, altitude_m: float) -> float | None:
+        after = int(np.searchsorted(known_s, time_s))
+        next_s = known_s[after] if after < len(known_s) else time_s
+        if after and next_s - known_s[after - 1] <= MAX_GAP_S:
+            return float(np.interp(time_s, known_s, known_m))
+        return altitude_m if time_s < begin_s else None
+
+    return [
+        sample
+        if sample.reference_m is not None
+        else replace(sample, reference_m=reference_m(sample.position.time_boot_s, sample.position.altitude_m))
+        for sample in samples
+    ]
 
 
 def has_flown(trial: Trial) -> bool:

@@ -8,7 +8,8 @@ import pytest
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.glitches import find_glitches
 from app.core.records.trajectory import Samples, Trajectory
-from app.vehicles.mavlink.records import add_secondary_altitude
+from app.vehicles.mavlink.events import Position, RecordSample
+from app.vehicles.mavlink.records import add_secondary_altitude, trajectory_of
 
 ZERO_S = 700.0
 """The record's time 0 on the ground's clock."""
@@ -104,3 +105,27 @@ def test_a_source_that_saw_nothing_leaves_the_record_as_it_is(seen: list[tuple[f
     both = add_secondary_altitude(own, seen, name="motion capture", zero_s=ZERO_S, scored="mocap")
     assert both.trajectory is own
     assert both.remark.startswith("No altitudes came from motion capture, the second source;")
+
+
+def reported(*references_m: float | None) -> list[RecordSample]:
+    """A sample every tenth of a second at 2.9 m, with what the autopilot reported of its reference."""
+    return [
+        RecordSample(
+            Position(time_boot_s=40.0 + 0.1 * number, altitude_m=2.9, climb_rate_m_s=0.0, north_m=0.0, east_m=0.0),
+            set_point_m=3.0,
+            battery_v=None,
+            reference_m=reference_m,
+        )
+        for number, reference_m in enumerate(references_m)
+    ]
+
+
+def test_reports_of_the_reference_that_come_late_do_not_cost_the_flight() -> None:
+    """Seen: one sample in 2000 had none, after a stall of this computer, and the flight could not be scored."""
+    record = trajectory_of(reported(None, 3.0, None, 3.2, None), 40.0, 0.0, referred_from_s=0.1)
+    np.testing.assert_allclose(record["reference_m"], [2.9, 3.0, 3.1, 3.2, 3.2])
+
+
+@pytest.mark.parametrize("samples", [reported(3.0, None, None, None, 3.0), reported(3.0, None, None, None)])
+def test_a_reference_that_was_not_reported_for_longer_is_not_invented(samples: list[RecordSample]) -> None:
+    assert "reference_m" not in trajectory_of(samples, 40.0, 0.0, referred_from_s=0.0).channels
