@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -43,7 +44,7 @@ class Behaviour:
 class Assessment:
     """A gain set on the copters that the flight allows, by the names of the vehicle's release.
 
-    `activity` is relative to the gains of the flight; `margin` is that of the likeliest copter, 0 if it rings.
+    `activity`, relative to the gains of the flight, and `margin` are those of the likeliest copter; 0 if it rings.
     """
 
     name: str
@@ -125,14 +126,16 @@ def analyze(flight: LoggedFlight) -> Analysis:
     _require_signals(flight)
     _require_own_controller(flight)
     estimate = fit_copter(flight)
-    model = FlightModel(flight, estimate.draws)
-    present = _assess("As flown", loop.gains, loop, model, estimate)
+    assess = partial(
+        _assess, flight, FlightModel(flight, estimate.draws), FlightModel(flight, [estimate.mean]), estimate
+    )
+    present = assess("As flown", loop.gains)
     _require_likeness(loop, behaviour, estimate, present)
     usual = loop.rules(flight.throttle_mean)
-    compared = [present, *(_assess(name, gains, loop, model, estimate) for name, gains in usual.items())]
+    compared = [present, *(assess(name, gains) for name, gains in usual.items())]
     insufficient = _insufficient(loop, estimate)
     gains = None if insufficient else propose(flight, estimate.few, [loop.gains, *usual.values()])
-    proposed = _assess("Proposed", gains, loop, model, estimate) if gains else None
+    proposed = assess("Proposed", gains) if gains else None
     if proposed is None:
         insufficient = insufficient or f"{_NONE_ALLOWED} {loop.texts.lags}."
     elif not _is_better(proposed, present):
@@ -261,15 +264,20 @@ def _insufficient(loop: AltitudeLoop, estimate: CopterEstimate) -> str | None:
 
 
 def _assess(
-    name: str, gains: Mapping[str, float], flown: AltitudeLoop, model: FlightModel, estimate: CopterEstimate
+    flight: LoggedFlight,
+    model: FlightModel,
+    likeliest: FlightModel,
+    estimate: CopterEstimate,
+    name: str,
+    gains: Mapping[str, float],
 ) -> Assessment:
+    flown = flight.loop
     loop = flown.with_gains(gains)
-    prediction = model.predict(loop)
     return Assessment(
         name=name,
         gains=flown.named(gains),
-        prediction=prediction,
-        activity=prediction.activity / model.fly(flown)[1],
+        prediction=model.predict(loop),
+        activity=likeliest.fly(loop)[1] / likeliest.fly(flown)[1],
         margin=gain_margin(loop, estimate.mean),
     )
 
