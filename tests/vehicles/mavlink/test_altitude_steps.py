@@ -36,22 +36,25 @@ def fly(rig: LockstepRig, order: FlightOptions = ORDER, watcher: Watcher | None 
     return record
 
 
+def error_without_a_link() -> float:
+    with open_vehicle("twin", {"scatter": 0.0}, safe_gains=SAFE) as twin:
+        twin.stage(TUNED)
+        return STEPS.error(twin.fly(ORDER, on_sample=unwatched, should_stop=never).trajectory)
+
+
 def waypoints(rig: LockstepRig) -> list[float]:
     return [number(message, "z") for message in rig.told("MISSION_ITEM")]
 
 
 @compiled_only
 def test_the_steps_score_as_the_same_body_does_without_a_link() -> None:
-    with open_vehicle("twin", {"scatter": 0.0}, safe_gains=SAFE) as twin:
-        twin.stage(TUNED)
-        alone = STEPS.error(twin.fly(ORDER, on_sample=unwatched, should_stop=never).trajectory)
     watcher = Watcher()
     with LockstepRig() as rig:
         record = fly(rig, watcher=watcher)
         assert waypoints(rig) == [3.0, 2.0, 3.0]
     flight = record.trajectory
     assert (record.ending, record.reason) == ("completed", "")
-    assert STEPS.error(flight) == pytest.approx(alone, abs=TOLERANCE_M)
+    assert STEPS.error(flight) == pytest.approx(error_without_a_link(), abs=TOLERANCE_M)
     changes_s = flight.time_s[1:][np.diff(flight["set_point_m"]) != 0.0]
     assert changes_s == pytest.approx([0.0, 10.0, 13.0], abs=0.03)
     assert flight["set_point_m"][-1] == 3.0
@@ -62,8 +65,6 @@ def test_the_steps_score_as_the_same_body_does_without_a_link() -> None:
 @compiled_only
 @pytest.mark.parametrize("lost", ["deaf:0.1@9.95", "ack-lost:0.1@9.95"])
 def test_a_set_point_that_was_repeated_took_effect_when_the_vehicle_began_to_move(lost: str) -> None:
-    with LockstepRig() as rig:
-        expected = STEPS.error(fly(rig).trajectory)
     with LockstepRig(faults=[lost]) as rig:
         record = fly(rig)
         assert waypoints(rig) == [3.0, 2.0, 2.0, 3.0]
@@ -72,7 +73,7 @@ def test_a_set_point_that_was_repeated_took_effect_when_the_vehicle_began_to_mov
     changes_s = flight.time_s[1:][np.diff(flight["set_point_m"]) != 0.0]
     assert changes_s == pytest.approx([0.0, 10.0 + late_s, 13.0], abs=0.03)
     assert record.ending == "completed"
-    assert STEPS.error(flight) == pytest.approx(expected, abs=3 * TOLERANCE_M)
+    assert STEPS.error(flight) == pytest.approx(error_without_a_link(), abs=3 * TOLERANCE_M)
 
 
 @compiled_only
@@ -104,7 +105,10 @@ def test_an_abort_in_any_phase_lands_on_the_safe_gains_and_sends_no_further_set_
     ("fault", "abort_at_s", "ending", "reason", "sent"),
     [
         ("ack-lost:0.4@9.9", 12.0, "aborted", "the operator pressed Abort", [3.0, 2.0, 2.0]),
-        ("link-lost:3@10.5", math.inf, "invalid", "The link was lost in flight.", [3.0, 2.0]),
+        pytest.param(
+            *("link-lost:3@10.5", math.inf, "invalid", "The link was lost in flight.", [3.0, 2.0]),
+            marks=pytest.mark.complete,
+        ),
     ],
 )
 def test_over_real_sockets_it_ends_as_well(
@@ -164,6 +168,7 @@ def test_set_points_too_near_the_altitude_limit_or_the_ground_are_refused_on_the
 
 
 @compiled_only
+@pytest.mark.complete
 def test_the_next_takeoff_climbs_to_its_own_height() -> None:
     with LockstepRig() as rig:
         vehicle = rig.vehicle()

@@ -193,7 +193,7 @@ def test_every_failure_in_every_phase_leads_where_it_must_and_no_set_point_follo
         if failure in {Failure.ENVELOPE, Failure.OPERATOR} and then is State.ABORT_LAND:
             assert walk.gains_sent[0] == SAFE_GAINS[0]
         walk.give(ActionDone(Action.FLY_TO, walk.now_s, (walk.now_s - 0.1,), walk.now_s))
-        walk.pass_s(4.0)
+        walk.pass_s(3.2)
         assert len(walk.altitudes) == flown, happens
 
 
