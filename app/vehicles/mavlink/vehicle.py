@@ -9,9 +9,7 @@ from typing import Final
 import numpy as np
 
 from app.core.clock import Clock
-from app.core.models.set_points import SetPoints
 from app.core.policy import Gains
-from app.core.records.trajectory import Samples
 from app.vehicles.base import (
     CheckItem,
     Condition,
@@ -175,7 +173,7 @@ class MavlinkVehicle:
             self._loop = {}
             self._radio.target = replace(self._radio.target, altitude_m=order.set_points.altitudes_m[0])
             if _flies_steps(order):
-                self._prepare_set_points()
+                self._prepare_set_points(order)
             ground = self._observe_ground(STANDSTILL_S, order)
             self._require_staged()  # again: a restart meanwhile leaves none
             reference = self._reference(order, ground)
@@ -552,8 +550,11 @@ class MavlinkVehicle:
         settings = profile.take_off_settings(target)
         return (*settings, *profile.set_point_settings(target)) if _flies_steps(order) else settings
 
-    def _prepare_set_points(self) -> None:
-        """Request the telemetry that a flight with several set points needs, and read the parameters of its loop."""
+    def _prepare_set_points(self, order: FlightOptions) -> None:
+        """Request the telemetry that a flight with several set points needs, and read the parameters of its loop. The
+        first computation of a reference may take seconds, which must not pass after the ground was observed."""
+        if self._radio.profile.reference == "replica":
+            simulate_reference(order.set_points, 0.0, np.zeros(1), order.record_s)
         self._identify()
         self._require_not_quarantined()
         preflight.prepare_set_points(self._radio)
@@ -562,16 +563,12 @@ class MavlinkVehicle:
 
     def _reference(self, order: FlightOptions, ground: Ground) -> Reference | None:
         """Return the function that computes the autopilot's own reference; None if it sends that, or if it is not
-        needed. It is called once, because its first call may take seconds."""
+        needed."""
         if not _flies_steps(order) or self._radio.profile.reference != "replica":
             return None
         ground_m = ground.altitude_m
 
-        def reference(set_points: SetPoints, time_s: Samples) -> Samples:
-            return simulate_reference(set_points, ground_m, time_s, order.record_s)
-
-        reference(order.set_points, np.zeros(1))
-        return reference
+        return lambda set_points, time_s: simulate_reference(set_points, ground_m, time_s, order.record_s)
 
     def _fly(
         self,
