@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.control.ardupilot_log import LoopLog
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, UNSUPPORTED, in_older_names, parameters_from
+from app.core.control.ardupilot_parameters import (
+    FIRMWARE_NAMES,
+    LOOP_RATE,
+    LOOP_RATES_HZ,
+    UNSUPPORTED,
+    in_older_names,
+    parameters_from,
+)
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
@@ -23,7 +30,6 @@ _LIMITED: Final = 1
 _WAYPOINT_NAVIGATION: Final = 1 << 6
 _SAME_LOOP_S: Final = 0.0012
 _RATE_HZ: Final = 400.0
-_RATES_HZ: Final = (50.0, 2000.0)
 
 
 def read_ardupilot_log(stream: BinaryIO, *, name: str) -> LoopLog:
@@ -46,11 +52,11 @@ def read_ardupilot_log(stream: BinaryIO, *, name: str) -> LoopLog:
     values = _values(tables, float(time_s[0]))
     if "PSC_POSZ_P" not in values:
         raise _refused(name, "PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
-    rate_hz = values.get("SCHED_LOOP_RATE", _RATE_HZ)
+    rate_hz = values.get(LOOP_RATE, _RATE_HZ)
     control, tuning = (_beside(tables.get(each, {}), time_s) for each in ("PIDA", "CTUN"))
     return LoopLog(
         parameters=parameters_from(values),
-        rate_hz=rate_hz if _RATES_HZ[0] <= rate_hz <= _RATES_HZ[1] else _RATE_HZ,
+        rate_hz=rate_hz if LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1] else _RATE_HZ,
         time_s=time_s,
         z_m=up["PD"][rows],
         z_d_m=up["DPD"][rows],
@@ -82,7 +88,7 @@ def _longest_in_guided(
 
 def _values(tables: Mapping[str, Table], until_s: float) -> dict[str, float]:
     """Parameters by name as they were when the flight began."""
-    wanted = {*FIRMWARE_NAMES, *UNSUPPORTED, "SCHED_LOOP_RATE", "GUID_OPTIONS"}
+    wanted = {*FIRMWARE_NAMES, *UNSUPPORTED, LOOP_RATE, "GUID_OPTIONS"}
     logged = dict(in_older_names(each, value) for at_s, each, value in parameters_in(tables) if at_s <= until_s)
     return {each: value for each, value in logged.items() if each in wanted}
 

@@ -18,6 +18,7 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import LEAD_S, FinerSegment
 from app.core.control import ardupilot_parameters, px4_parameters
+from app.core.control.parameter_checks import require_within
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.ardupilot_copter import shaped
 from app.core.models.copter import REFERENCE, filtered
@@ -34,6 +35,10 @@ _LARGEST_MISFIT_M: Final = 0.1
 _LEAST_VARIATION: Final = 1e-6
 _RATE_HZ: Final = 400.0
 _FILTER_HZ: Final = 20.0
+_RANGES: Final = {
+    ardupilot_parameters.LOOP_RATE: ardupilot_parameters.LOOP_RATES_HZ,
+    ardupilot_parameters.ACCELEROMETER_FILTER: (0.0, ardupilot_parameters.LOOP_RATES_HZ[1]),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,13 +61,14 @@ class Steps:
 def ardupilot_loop(parameters: Mapping[str, float]) -> ArduPilotLoop:
     """The loop with the vehicle's parameters by the names of its release; those missing have their default.
 
-    Raises InputError for one that the replica lacks.
+    Raises InputError for one that the replica lacks, or that is outside its range.
     """
     given = dict(ardupilot_parameters.in_older_names(*each) for each in parameters.items())
-    step_s = 1.0 / given.get("SCHED_LOOP_RATE", _RATE_HZ)
+    require_within(given, _RANGES)
+    step_s = 1.0 / given.get(ardupilot_parameters.LOOP_RATE, _RATE_HZ)
     return ArduPilotLoop(
         parameters=ardupilot_parameters.parameters_from(given),
-        filter_hz=given.get("INS_ACCEL_FILTER", _FILTER_HZ),
+        filter_hz=given.get(ardupilot_parameters.ACCELEROMETER_FILTER, _FILTER_HZ),
         step_s=step_s,
         row_s=_whole_steps(step_s),
     )

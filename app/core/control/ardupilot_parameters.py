@@ -209,6 +209,11 @@ NEWER_NAMES: Final[Mapping[str, tuple[str, float]]] = MappingProxyType(
 acceleration in m/s² instead of cm/s², throttle as a share instead of per mille, m instead of cm
 (<https://ardupilot.org/copter/docs/common-param-name-changes.html>)."""
 
+LOOP_RATE: Final = "SCHED_LOOP_RATE"
+ACCELEROMETER_FILTER: Final = "INS_ACCEL_FILTER"
+LOOP_RATES_HZ: Final = (50.0, 2000.0)
+"""Rates of the loop that the firmware allows, with room on both sides."""
+
 _SINGLE_PRECISION_DIGITS: Final = 7
 
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.control.parameter_checks import require_defined
+from app.core.control.parameter_checks import require_defined, require_within
 from app.core.errors import InputError, Problem
 
 STEP_S: Final = 1 / 125
@@ -135,12 +135,18 @@ def low_pass_gain(cutoff_hz: float, sample_s: float) -> float:
 _PREDICTION, _IMU_RATE = "EKF2_PREDICT_US", "IMU_INTEG_RATE"
 _PREDICTION_US, _IMU_HZ = 10_000.0, 200.0
 _LONGEST_STEP_S: Final = 0.02
+_RANGES: Final = {_PREDICTION: (0.0, 1e6), _IMU_RATE: (0.0, 1000.0)}
+"""With these no step is shorter than 1 ms."""
 ESTIMATOR_NAMES: Final = (_PREDICTION, _IMU_RATE)
 """Parameters on which the interval of the estimates depends."""
 
 
 def estimator_step_s(values: Mapping[str, float]) -> float:
-    """Interval of the estimates, s, from the firmware's values by name: whole intervals of the IMU."""
+    """Interval of the estimates, s, from the firmware's values by name: whole intervals of the IMU.
+
+    Raises InputError for a value outside its range.
+    """
+    require_within(values, _RANGES)
     imu_s = 1.0 / max(values.get(_IMU_RATE, _IMU_HZ), 1.0 / _LONGEST_STEP_S)
     period_s = values.get(_PREDICTION, _PREDICTION_US) / 1e6
     return min(max(imu_s * max(math.floor(period_s / imu_s + 1e-6), 1.0), imu_s), _LONGEST_STEP_S)
@@ -151,7 +157,7 @@ def parameters_from(values: Mapping[str, float]) -> Parameters:
 
     Raises InputError that names a value outside its range, or one that the replica lacks.
     """
-    if problems := tuple(Problem(name, "must be 0") for name in UNSUPPORTED if values.get(name, 0.0) > 0.0):
+    if problems := tuple(Problem(name, "must be 0") for name in UNSUPPORTED if not values.get(name, 0.0) <= 0.0):
         raise InputError(
             "The replica has no notch filter of the velocity.",
             hint="Record the loop with the filter off, its default.",

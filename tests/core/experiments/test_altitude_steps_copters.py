@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition, OptionValue, Start
+from app.core.errors import InputError
 from app.core.experiments import get_experiment
 from app.core.experiments.altitude_steps_copters import ArduPilotSteps, Px4Steps
 from app.core.experiments.base import Check, Envelope, prior_distribution
@@ -149,3 +150,26 @@ def test_another_vehicles_fitted_model_keeps_the_steps() -> None:
     assert informed.nominal_model.tolist() == [0.4, 1.1, 0.1, 0.2]
     assert informed.measure == steps.measure
     assert informed.title == "Altitude steps under PX4"
+
+
+@pytest.mark.parametrize(
+    ("steps", "parameters", "problem"),
+    [
+        (BOTH[0], {"SCHED_LOOP_RATE": 0.0}, "SCHED_LOOP_RATE: must be 50 to 2000, got 0"),
+        (BOTH[0], {"SCHED_LOOP_RATE": -400.0}, "SCHED_LOOP_RATE: must be 50 to 2000, got -400"),
+        (BOTH[0], {"SCHED_LOOP_RATE": 1.0}, "SCHED_LOOP_RATE: must be 50 to 2000, got 1"),
+        (BOTH[0], {"SCHED_LOOP_RATE": 1e9}, "SCHED_LOOP_RATE: must be 50 to 2000, got 1e+09"),
+        (BOTH[0], {"SCHED_LOOP_RATE": np.nan}, "SCHED_LOOP_RATE: must be 50 to 2000, got nan"),
+        (BOTH[0], {"INS_ACCEL_FILTER": np.inf}, "INS_ACCEL_FILTER: must be 0 to 2000, got inf"),
+        (BOTH[0], {"PSC_VELZ_P": 1e30}, "velocity_p_1_s: must be at least 0 and at most 1e+06"),
+        (BOTH[1], {"IMU_INTEG_RATE": 1e9, "EKF2_PREDICT_US": 0.0}, "IMU_INTEG_RATE: must be 0 to 1000, got 1e+09"),
+        (BOTH[1], {"EKF2_PREDICT_US": np.nan}, "EKF2_PREDICT_US: must be 0 to 1e+06, got nan"),
+        (BOTH[1], {"MPC_VEL_NF_FRQ": np.nan}, "MPC_VEL_NF_FRQ: must be 0"),
+    ],
+)
+def test_parameters_with_which_no_loop_runs_are_refused_by_name(
+    steps: CopterSteps, parameters: Mapping[str, float], problem: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        steps.exactly_under(parameters)
+    assert problem in str(refused.value)
