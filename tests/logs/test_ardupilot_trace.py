@@ -55,7 +55,7 @@ def test_a_trace_is_recognised_by_its_columns() -> None:
         (content(without="params"), "line 1, params: must be a JSON object"),
         (content(params={"PSC_POSZ_P": "2"}), "line 1, PSC_POSZ_P: must be a finite number"),
         (content(params={"PSC_POSZ_P": True}), "line 1, PSC_POSZ_P: must be a finite number"),
-        (content(params={"PSC_POSZ_P": -2}), "position_p_1_s: must be positive"),
+        (content(params={"PSC_POSZ_P": -2}), "PSC_POSZ_P: must be positive"),
         (content(without="dt_s"), "line 1, dt_s: must be a finite number"),
         (content(dt_s=0), "line 1, dt_s: must be positive"),
         (content(start="landed"), "line 1, start: must be hover or ramp, got 'landed'"),

@@ -78,7 +78,7 @@ def test_a_trace_is_recognised_by_its_columns() -> None:
     [
         (content(parameters=[1]), "line 1, parameters: must be a JSON object"),
         (content(parameters={"MPC_Z_P": True}), "line 1, MPC_Z_P: must be a finite number"),
-        (content(parameters={"MPC_Z_P": -1}), "position_p_1_s: must be at least 0"),
+        (content(parameters={"MPC_Z_P": -1}), "MPC_Z_P: must be at least 0"),
         (content(filter_sample_s="fast"), "line 1, filter_sample_s: must be a finite number"),
         (content(filter_sample_s=0), "line 1, filter_sample_s: must be positive"),
         (content({}, {"dt_s": "0"}), "line 4, dt_s: must be positive"),

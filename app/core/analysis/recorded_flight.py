@@ -18,7 +18,7 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import LEAD_S, FinerSegment
 from app.core.control import ardupilot_parameters, px4_parameters
-from app.core.control.parameter_checks import require_within
+from app.core.control.parameter_checks import PLAUSIBLE, require_within
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.ardupilot_copter import shaped
 from app.core.models.copter import REFERENCE, filtered
@@ -36,6 +36,7 @@ _LEAST_VARIATION: Final = 1e-6
 _RATE_HZ: Final = 400.0
 _FILTER_HZ: Final = 20.0
 _RANGES: Final = {
+    **dict.fromkeys(ardupilot_parameters.FIRMWARE_NAMES, PLAUSIBLE),
     ardupilot_parameters.LOOP_RATE: ardupilot_parameters.LOOP_RATES_HZ,
     ardupilot_parameters.ACCELEROMETER_FILTER: (0.0, ardupilot_parameters.LOOP_RATES_HZ[1]),
 }
@@ -76,6 +77,7 @@ def ardupilot_loop(parameters: Mapping[str, float]) -> ArduPilotLoop:
 
 def px4_loop(parameters: Mapping[str, float]) -> Px4Loop:
     """The same for PX4."""
+    require_within(parameters, dict.fromkeys(px4_parameters.FIRMWARE_NAMES, PLAUSIBLE))
     given, step_s = px4_parameters.parameters_from(parameters), px4_parameters.estimator_step_s(parameters)
     return Px4Loop(parameters=given, step_s=step_s, row_s=_whole_steps(step_s), descent_m_s=given.descent_m_s)
 

@@ -90,7 +90,7 @@ class Parameters:
     takeoff_throttle: float = 0.9
 
     def __post_init__(self) -> None:
-        require_defined(asdict(self), _POSITIVE)
+        require_defined(asdict(self), _POSITIVE, {field: name for name, (field, _) in FIRMWARE_NAMES.items()})
 
     @property
     def shaping_jerk_m_s3(self) -> float:
@@ -213,6 +213,9 @@ LOOP_RATE: Final = "SCHED_LOOP_RATE"
 ACCELEROMETER_FILTER: Final = "INS_ACCEL_FILTER"
 LOOP_RATES_HZ: Final = (50.0, 2000.0)
 """Rates of the loop that the firmware allows, with room on both sides."""
+
+LOOP_NAMES: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, LOOP_RATE, ACCELEROMETER_FILTER})
+"""All that the loop depends on, by the older names."""
 
 _SINGLE_PRECISION_DIGITS: Final = 7
 

@@ -1,21 +1,22 @@
 """Checks that the parameters of a replica describe a loop."""
 
+import math
 from collections.abc import Collection, Iterable, Mapping
 from typing import Final
 
 from app.core.errors import InputError, Problem
 
-_LARGEST: Final = 1e6
-"""No parameter of a loop comes near it; far beyond it, the replica's numbers overflow."""
+PLAUSIBLE: Final = (0.0, 1e6)
+"""No parameter of a vehicle's loop comes near the upper end; far beyond it, the replica's numbers overflow."""
 
 
-def require_defined(values: Mapping[str, float], positive: Collection[str]) -> None:
-    """Raise InputError naming every value that is negative, above 1e6 or not a number, or is 0 although it must be
-    positive."""
+def require_defined(values: Mapping[str, float], positive: Collection[str], names: Mapping[str, str]) -> None:
+    """Raise InputError naming every value that is negative or not finite, or is 0 although it must be positive, by the
+    `names` of the fields."""
     _require(
-        Problem(name, f"must be {'positive' if name in positive else 'at least 0'} and at most {_LARGEST:g}")
-        for name, value in values.items()
-        if not (0.0 <= value <= _LARGEST) or (name in positive and not value)
+        Problem(names[field], "must be positive" if field in positive else "must be at least 0")
+        for field, value in values.items()
+        if not (0.0 <= value < math.inf) or (field in positive and not value)
     )
 
 

@@ -59,7 +59,7 @@ class Parameters:
     land_speed_m_s: float = 0.7
 
     def __post_init__(self) -> None:
-        require_defined(asdict(self), _POSITIVE)
+        require_defined(asdict(self), _POSITIVE, {field: name for name, field in FIRMWARE_NAMES.items()})
 
     @property
     def gains(self) -> dict[str, float]:
@@ -139,6 +139,8 @@ _RANGES: Final = {_PREDICTION: (0.0, 1e6), _IMU_RATE: (0.0, 1000.0)}
 """With these no step is shorter than 1 ms."""
 ESTIMATOR_NAMES: Final = (_PREDICTION, _IMU_RATE)
 """Parameters on which the interval of the estimates depends."""
+LOOP_NAMES: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES})
+"""All that the loop depends on."""
 
 
 def estimator_step_s(values: Mapping[str, float]) -> float:

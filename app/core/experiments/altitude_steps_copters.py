@@ -4,6 +4,7 @@ ArduCopter is scored against the target that it shapes, PX4 against the set poin
 that may be written to such a vehicle at all: a campaign narrows them to suit its vehicle.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -18,6 +19,7 @@ from app.core.analysis.recorded_flight import (
     shaped_reference,
     straight_reference,
 )
+from app.core.control import ardupilot_parameters, px4_parameters
 from app.core.experiments.base import Scatter
 from app.core.experiments.copter_steps import CopterSteps, copter_parameters
 from app.core.experiments.takeoff import ARDUPILOT_GAINS, PX4_GAINS
@@ -44,6 +46,11 @@ class ArduPilotSteps(CopterSteps):
         """The loop with these gains, shape (5,), and the autopilot's parameters."""
         return ardupilot_loop(self.parameters).with_gains(self.space.mapping(gains))
 
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Those on which the loop depends, by the names until release 4.6."""
+        older = dict(ardupilot_parameters.in_older_names(*each) for each in parameters.items())
+        return {name: value for name, value in older.items() if name in ardupilot_parameters.LOOP_NAMES}
+
     def read(self, trajectory: Trajectory, gains: Vector) -> LoggedFlight:
         """A flight with these gains as an analysis takes it. Raises TrajectoryError if its record does not suffice."""
         return read_ardupilot(self.loop(gains), trajectory, self.steps)
@@ -66,6 +73,10 @@ class Px4Steps(CopterSteps):
     def loop(self, gains: Vector) -> Px4Loop:
         """The loop with these gains, shape (4,), and the autopilot's parameters."""
         return px4_loop(self.parameters).with_gains(self.space.mapping(gains))
+
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Those on which the loop and its estimates depend."""
+        return {name: value for name, value in parameters.items() if name in px4_parameters.LOOP_NAMES}
 
     def read(self, trajectory: Trajectory, gains: Vector) -> LoggedFlight:
         """A flight with these gains as an analysis takes it. Raises TrajectoryError if its record does not suffice."""

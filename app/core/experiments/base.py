@@ -326,8 +326,13 @@ class ModelledExperiment(Experiment, Protocol):
     def under(self, parameters: Mapping[str, float]) -> Self:
         """The experiment on a vehicle whose autopilot has these parameters, by the firmware's names.
 
-        Itself if its model does not depend on them.
+        Itself if its model does not depend on them. If the model does not hold with them, it keeps its own, and
+        `hazards` refuses every flight.
         """
+        ...
+
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Those of an autopilot's parameters on which the model depends, gains among them."""
         ...
 
     @property

@@ -15,7 +15,7 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.loop import AltitudeLoop, Run
 from app.core.analysis.recorded_flight import Steps
 from app.core.definition import OptionValue
-from app.core.errors import InputError
+from app.core.errors import InputError, Problem
 from app.core.experiments.base import (
     Check,
     Envelope,
@@ -26,7 +26,7 @@ from app.core.experiments.base import (
     SimplexSearch,
     informed_parameters,
 )
-from app.core.experiments.copter_steps_hazards import COPTERS, check_altitudes, check_margin
+from app.core.experiments.copter_steps_hazards import COPTERS, check_altitudes, check_margin, refuse_parameters
 from app.core.experiments.step_sequence import ALTITUDE, REFERENCE, StepSequence, step_options
 from app.core.models.copter import DISTURBANCES, FLOWN, Copter
 from app.core.policy import PolicySpace, Vector
@@ -95,17 +95,24 @@ class CopterSteps(ABC):
         sequence: StepSequence = _SEQUENCE,
         parameters: Mapping[str, float] | None = None,
         model_parameters: tuple[ModelParameter, ...] | None = None,
+        unfit: tuple[Problem, ...] = (),
     ) -> None:
+        """`unfit` are the autopilot's parameters with which the replica of its loop does not hold."""
         self.sequence: Final = sequence
         self.set_points: Final = sequence.set_points
         self.window_s: Final = sequence.ends_s
         self.measure: Final = f"{sequence}, under {self.autopilot}"
         self.parameters: Final = dict(parameters or {})
         self.model_parameters: Final = self.data_sheet if model_parameters is None else model_parameters
+        self._unfit: Final = unfit
 
     @abstractmethod
     def loop(self, gains: Vector) -> AltitudeLoop:
         """The loop with these gains, shape (g,), and the autopilot's parameters."""
+
+    @abstractmethod
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Those of an autopilot's parameters on which its loop depends, gains among them."""
 
     @abstractmethod
     def read(self, trajectory: Trajectory, gains: Vector) -> LoggedFlight:
@@ -131,18 +138,19 @@ class CopterSteps(ABC):
         return self if sequence == self.sequence else self._with(sequence=sequence)
 
     def under(self, parameters: Mapping[str, float]) -> Self:
-        """The experiment with these parameters of the autopilot; itself if the replica of its loop lacks one."""
+        """The experiment with these parameters of the autopilot. If the replica of its loop does not hold with one,
+        with its own, and `hazards` names that parameter."""
         try:
             return self.exactly_under(parameters)
-        except InputError:
-            return self
+        except InputError as error:
+            return self._with(unfit=error.problems)
 
     def exactly_under(self, parameters: Mapping[str, float]) -> Self:
         """The experiment with these parameters of the autopilot, with its own if there are none.
 
-        Raises InputError for one that the replica of its loop lacks.
+        Raises InputError for one with which the replica of its loop does not hold.
         """
-        changed = self._with(parameters=parameters or self.parameters)
+        changed = self._with(parameters=self.loop_parameters(parameters) or self.parameters)
         changed.loop(self.space.default)
         return changed
 
@@ -156,11 +164,13 @@ class CopterSteps(ABC):
         sequence: StepSequence | None = None,
         parameters: Mapping[str, float] | None = None,
         model_parameters: tuple[ModelParameter, ...] | None = None,
+        unfit: tuple[Problem, ...] = (),
     ) -> Self:
         return type(self)(
             sequence=sequence or self.sequence,
             parameters=self.parameters if parameters is None else parameters,
             model_parameters=model_parameters or self.model_parameters,
+            unfit=unfit,
         )
 
     @property
@@ -218,7 +228,10 @@ class CopterSteps(ABC):
         return self.outputs(gains, model)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
-        """Altitudes of simulated flights, and the margin from ringing, on a few copters of the distribution."""
+        """Altitudes of simulated flights, and the margin from ringing, on a few copters of the distribution; nothing is
+        simulated with parameters with which the replica does not hold."""
+        if self._unfit:
+            return refuse_parameters(self._unfit)
         models = spread.sample(self, COPTERS)
         altitudes = self.outputs(np.tile(gains, (COPTERS, 1)), models)
         return (

@@ -1,10 +1,12 @@
 """What the gate checks of altitude steps under ArduCopter and PX4, on a few copters that the flights allow."""
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
 from app.core.analysis.loop import AltitudeLoop
 from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
+from app.core.errors import Problem
 from app.core.experiments.base import Check, Matrix
 from app.core.models.copter import Copter
 from app.core.models.set_points import SetPoints
@@ -35,6 +37,21 @@ def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) 
             worst=lowest_m,
             limit=floor_m,
         ),
+    )
+
+
+def refuse_parameters(problems: Sequence[Problem]) -> tuple[Check, ...]:
+    """A refusal for each of the vehicle's parameters with which the model does not hold."""
+    return tuple(
+        Check(
+            "parameters",
+            False,
+            f"The vehicle's {each.field} {each.reason}; otherwise the model of its loop does not hold. Set it on the "
+            "vehicle, and mark the flights with the other value invalid.",
+            worst=math.inf,
+            limit=0.0,
+        )
+        for each in problems
     )
 
 

@@ -157,6 +157,10 @@ class VerticalLoop(ABC):
         """The experiment itself."""
         return self
 
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002 - as for `under`
+        """None."""
+        return {}
+
     @property
     def modelled(self) -> Self:
         """The experiment itself."""

@@ -38,6 +38,7 @@ def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> Par
 
 
 def as_flown(experiment: ModelledExperiment, flights: Sequence[Flight]) -> ModelledExperiment:
-    """The experiment with the autopilot's parameters of the last flight that recorded them."""
-    recorded = [flight.parameters for flight in flights if flight.parameters]
+    """The experiment with the autopilot's parameters of the last flight that recorded any on which its model
+    depends."""
+    recorded = [own for flight in flights if (own := experiment.loop_parameters(flight.parameters))]
     return experiment.under(recorded[-1]) if recorded else experiment

@@ -98,10 +98,10 @@ def test_the_ramp_ends_at_ninety_percent_at_the_latest(most: float, end: float) 
 @pytest.mark.parametrize(
     ("values", "problem"),
     [
-        ({"PSC_POSZ_P": 0.0}, "position_p_1_s: must be positive"),
-        ({"PSC_ACCZ_I": -1.0}, "acceleration_i_1_s: must be at least 0"),
-        ({"PSC_ACCZ_FLTE": math.nan}, "acceleration_error_filter_hz: must be at least 0"),
-        ({"PSC_JERK_Z": math.inf}, "jerk_m_s3: must be positive"),
+        ({"PSC_POSZ_P": 0.0}, "PSC_POSZ_P: must be positive"),
+        ({"PSC_ACCZ_I": -1.0}, "PSC_ACCZ_I: must be at least 0"),
+        ({"PSC_ACCZ_FLTE": math.nan}, "PSC_ACCZ_FLTE: must be at least 0"),
+        ({"PSC_JERK_Z": math.inf}, "PSC_JERK_Z: must be positive"),
         ({"PSC_ACCZ_SMAX": 50.0}, "PSC_ACCZ_SMAX: must be 0 (PSC_D_ACC_SMAX since release 4.7)"),
     ],
 )

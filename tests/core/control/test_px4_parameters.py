@@ -32,9 +32,9 @@ def test_gain_of_a_low_pass() -> None:
 @pytest.mark.parametrize(
     ("values", "problem"),
     [
-        ({"MPC_Z_VEL_P_ACC": 0.0}, "velocity_p_1_s: must be positive"),
-        ({"MPC_Z_P": -1.0}, "position_p_1_s: must be at least 0"),
-        ({"MPC_Z_P": math.inf}, "position_p_1_s: must be at least 0"),
+        ({"MPC_Z_VEL_P_ACC": 0.0}, "MPC_Z_VEL_P_ACC: must be positive"),
+        ({"MPC_Z_P": -1.0}, "MPC_Z_P: must be at least 0"),
+        ({"MPC_Z_P": math.inf}, "MPC_Z_P: must be at least 0"),
         ({"MPC_VEL_NF_FRQ": 20.0}, "MPC_VEL_NF_FRQ: must be 0"),
     ],
 )

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from app.core.definition import Definition, OptionValue, Start
+from app.core.definition import Definition, Flight, OptionValue, Start
 from app.core.errors import InputError
 from app.core.experiments import get_experiment
 from app.core.experiments.altitude_steps_copters import ArduPilotSteps, Px4Steps
@@ -15,6 +15,7 @@ from app.core.experiments.copter_steps import CopterSteps
 from app.core.policy import Gains
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.definition_checks import problems_of
+from app.core.tuning.gate import check_policy
 from tests.core.tuning.flying import compiled_only
 
 NAMES: Final = ("altitude-steps-ardupilot", "altitude-steps-px4")
@@ -133,7 +134,7 @@ def test_the_gate_refuses_gains_that_ring_with_more_lag_and_flights_above_the_ce
 
 
 @compiled_only
-def test_the_vehicles_own_filters_and_limits_count_unless_the_replica_lacks_one() -> None:
+def test_the_vehicles_own_filters_and_limits_count() -> None:
     steps = BOTH[0]
     default = steps.space.mapping(steps.space.default)
     slow = steps.under({"PSC_ACCZ_FLTE": 2.0, "WP_ACC_Z": 0.5})
@@ -141,7 +142,29 @@ def test_the_vehicles_own_filters_and_limits_count_unless_the_replica_lacks_one(
     assert (
         slow.references(np.arange(13.0, 16.0, 0.0025))[-1, 0] > steps.references(np.arange(13.0, 16.0, 0.0025))[-1, 0]
     )
-    assert steps.under({"PSC_ACCZ_NTF": 1.0}) is steps
+
+
+@pytest.mark.parametrize(
+    ("steps", "parameters", "sentence"),
+    [
+        (BOTH[0], {"PSC_D_VEL_PDMX": 1.0}, "PSC_VELZ_PDMX must be 0 (PSC_D_VEL_PDMX since release 4.7);"),
+        (BOTH[0], {"SCHED_LOOP_RATE": 0.0}, "SCHED_LOOP_RATE must be 50 to 2000, got 0;"),
+        (BOTH[1], {"MPC_VEL_NF_FRQ": 10.0}, "MPC_VEL_NF_FRQ must be 0;"),
+    ],
+)
+def test_the_gate_names_the_parameter_with_which_the_model_does_not_hold(
+    steps: CopterSteps, parameters: Mapping[str, float], sentence: str
+) -> None:
+    """Also after a later flight whose record has settings of the link alone."""
+    flights = [_flight(steps, 1, parameters), _flight(steps, 2, {"telemetry_hz": 50.0})]
+    gate = check_policy(Definition(experiment=steps.name), steps, steps.space, flights[0].gains, flights)
+    assert [(check.name, sentence in check.sentence) for check in gate.refusals] == [("parameters", True)]
+
+
+def _flight(steps: CopterSteps, number: int, parameters: Mapping[str, float]) -> Flight:
+    gains = steps.space.mapping(steps.space.default)
+    nothing = Trajectory(np.empty(0), {}, "none", "none")
+    return Flight(number=number, gains=gains, trajectory=nothing, error=None, outcome="valid", parameters=parameters)
 
 
 def test_another_vehicles_fitted_model_keeps_the_steps() -> None:
@@ -161,7 +184,7 @@ def test_another_vehicles_fitted_model_keeps_the_steps() -> None:
         (BOTH[0], {"SCHED_LOOP_RATE": 1e9}, "SCHED_LOOP_RATE: must be 50 to 2000, got 1e+09"),
         (BOTH[0], {"SCHED_LOOP_RATE": np.nan}, "SCHED_LOOP_RATE: must be 50 to 2000, got nan"),
         (BOTH[0], {"INS_ACCEL_FILTER": np.inf}, "INS_ACCEL_FILTER: must be 0 to 2000, got inf"),
-        (BOTH[0], {"PSC_VELZ_P": 1e30}, "velocity_p_1_s: must be at least 0 and at most 1e+06"),
+        (BOTH[0], {"PSC_VELZ_P": 1e30}, "PSC_VELZ_P: must be 0 to 1e+06, got 1e+30"),
         (BOTH[1], {"IMU_INTEG_RATE": 1e9, "EKF2_PREDICT_US": 0.0}, "IMU_INTEG_RATE: must be 0 to 1000, got 1e+09"),
         (BOTH[1], {"EKF2_PREDICT_US": np.nan}, "EKF2_PREDICT_US: must be 0 to 1e+06, got nan"),
         (BOTH[1], {"MPC_VEL_NF_FRQ": np.nan}, "MPC_VEL_NF_FRQ: must be 0"),

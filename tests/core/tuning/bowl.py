@@ -61,6 +61,9 @@ class QuadraticExperiment:
     def under(self, parameters: Mapping[str, float]) -> Self:
         return self
 
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        return {}
+
     @property
     def modelled(self) -> Self:
         return self
