@@ -27,6 +27,7 @@ from app.common.states import (
     TrialState,
 )
 from app.core.definition import Definition, Donor, Flight, Prediction
+from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.predictions import is_informative
@@ -121,10 +122,13 @@ def last_battery_v(trials: Sequence[TrialRow]) -> float | None:
 def history_digest(session: Session, campaign: CampaignRow, definition: Definition, trials: Sequence[TrialRow]) -> str:
     """SHA-256 over everything that a proposal is computed from, including the checksums of the trials' records.
 
-    Whether an abort counts against its gains is included only where it does not count, and a reopening only where there
-    was one, so that digests made before these were recorded stay the same.
+    Whether an abort counts against its gains is included only where it does not count, a reopening only where there
+    was one, and the autopilot's parameters only where the model depends on them, so that digests made before these were
+    recorded stay the same.
     """
     checksums = repository.checksums(session, campaign.id)
+    rows = in_history(trials)
+    parameters = _loop_parameters(session, definition, rows)
     flights = [
         [
             row.number,
@@ -135,13 +139,25 @@ def history_digest(session: Session, campaign: CampaignRow, definition: Definiti
             row.predicted_error,
             row.predicted_interval,
             *(() if _is_against_gains(row) else ("not against the gains",)),
+            *((parameters[row.id],) if parameters.get(row.id) else ()),
         ]
-        for row in in_history(trials)
+        for row in rows
     ]
     battery = [] if definition.stop.min_battery_v is None else [last_battery_v(trials)]
     reopened = [] if not campaign.open_until_flight else [["open until flight", campaign.open_until_flight]]
     content = json.dumps([definition.digest(), flights, *battery, *reopened], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _loop_parameters(
+    session: Session, definition: Definition, rows: Sequence[TrialRow]
+) -> Mapping[int, Mapping[str, float]]:
+    """The parameters of each flight on which the model depends, by trial id."""
+    modelled = experiment_of(definition).modelled
+    if modelled is None:
+        return {}
+    settings = repository.settings(session, [row.id for row in rows])
+    return {row_id: modelled.loop_parameters(_numbers(found)) for row_id, found in settings.items()}
 
 
 def flight_under_way(session: Session, campaign_id: int) -> FlightRow | None:

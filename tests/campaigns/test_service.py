@@ -8,8 +8,11 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
 from app.campaigns.definitions import definition_of
+from app.campaigns.history import history_digest, trials_of
 from app.campaigns.proposals import read_history
-from app.db.models import CampaignRow, FlightRow
+from app.common.states import TrialState
+from app.core.definition import Definition
+from app.db.models import CampaignRow, FlightRow, TrialRow
 from app.db.session import Database
 from app.flights import flight_rows
 from app.vehicles.base import FlightRecord
@@ -265,6 +268,26 @@ def test_a_low_battery_ends_a_campaign_whatever_its_last_flight_is_worth(
     after = get(client, f"{path}/proposal")["proposal"]
     assert (after["stale"], after["gains"]) == (False, before["gains"])
     assert after["history_digest"] != before["history_digest"]
+
+
+def test_a_flights_parameters_are_in_the_digest_where_the_model_depends_on_them(
+    client: TestClient, database: Database
+) -> None:
+    campaign_id = create_campaign(client)["id"]
+    stepping = Definition(experiment="altitude-steps-px4", strategy="manual")
+    digests = []
+    with database.write() as session:
+        campaign = session.get_one(CampaignRow, campaign_id)
+        flown = TrialRow(campaign_id=campaign_id, number=1, state=TrialState.VALID, kind="manual", gains={}, gate={})
+        flown.seed, flown.error = 1, 0.1
+        session.add(flown)
+        for name, value in (("log", "none"), ("telemetry_hz", 50.0), ("MPC_THR_MIN", 0.12), ("MPC_THR_MIN", 0.1)):
+            flown.settings = {name: value}
+            session.flush()
+            digests.append(history_digest(session, campaign, stepping, trials_of(session, campaign_id)))
+        session.delete(flown)
+    assert digests[0] == digests[1]
+    assert len(set(digests)) == 3
 
 
 def test_without_a_battery_limit_an_invalid_flight_leaves_the_proposal_as_it_is(
