@@ -193,7 +193,7 @@ class CopterSteps(ABC):
 
     def errors(self, outputs: Matrix) -> Vector:
         """Mean absolute distance from the reference, m, over the windows of the steps: (k, n) → (k,)."""
-        return self.sequence.errors(self.grid_s, outputs, self._reference())
+        return self.sequence.errors(self.grid_s, outputs, self.followed_m)
 
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """The same for a recorded flight, against its recorded reference; raises TrajectoryError if it does not
@@ -203,7 +203,7 @@ class CopterSteps(ABC):
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the model; before the first step, of its reference."""
         steps_s, flown = self._fly(gains, model)
-        grid_s, reference = self.grid_s, self._reference()
+        grid_s, reference = self.grid_s, self.followed_m
         channels = {name: np.interp(grid_s, steps_s, flown[:, FLOWN.index(of)]) for name, of in _SHOWN.items()}
         channels[ALTITUDE] = np.where(grid_s < steps_s[0], reference, channels[ALTITUDE])
         named = channels | {REFERENCE: reference, "set_point_m": self.set_point(grid_s)}
@@ -211,7 +211,7 @@ class CopterSteps(ABC):
 
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
         """Altitude of many policies, each on its own model or all on one: gains (k, g) → (k, n)."""
-        grid_s, reference = self.grid_s, self._reference()
+        grid_s, reference = self.grid_s, self.followed_m
         altitudes = np.tile(reference, (len(gains), 1))
         for row, (some, copter) in enumerate(zip(gains, np.broadcast_to(model, (len(gains), 4)), strict=True)):
             steps_s, flown = self._fly(some, copter)
@@ -253,8 +253,9 @@ class CopterSteps(ABC):
         )
         return steps_s, loop.fly(run)
 
-    def _reference(self) -> Samples:
-        """The altitude that the loop follows, on the grid."""
+    @property
+    def followed_m(self) -> Samples:
+        """The altitude that the loop follows, on the grid, shape (n,)."""
         grid_s = self.grid_s
         step_s = self.loop(self.space.default).step_s
         steps_s = np.arange(0.0, grid_s[-1] + step_s, step_s)

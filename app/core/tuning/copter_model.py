@@ -28,7 +28,7 @@ from app.core.analysis.prediction import FlightModel, Prediction
 from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
 from app.core.definition import Flight, best_flight
-from app.core.errors import Problem, TrajectoryError
+from app.core.errors import InputError, Problem, TrajectoryError
 from app.core.experiments.base import (
     FittedParameter,
     Matrix,
@@ -58,18 +58,20 @@ class CopterModel:
     least_improvement: Final = 0.05
 
     def __init__(self, experiment: CopterSteps, flights: Sequence[Flight]) -> None:
-        """Raises TrajectoryError if a record does not suffice, and InputError for a parameter of the autopilot that its
-        replica lacks."""
+        """Raises TrajectoryError naming the flight whose record does not suffice, or whose autopilot had a parameter
+        with which its replica does not hold."""
         used = fitted_flights(flights)
         self.base: Final = best_flight(used)
         self.numbers: Final = tuple(flight.number for flight in used)
-        self._experiment: Final = experiment.exactly_under(self.base.parameters)
         self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
+        self._experiment: Final = experiment.exactly_under(self.base.parameters)
         self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
         if (left_m_s2 := self._estimate.residual_m_s2) > LARGEST_RESIDUAL_M_S2:
+            worst = max(self.numbers, key=lambda number: fit_copter(self._logs[number]).residual_m_s2)
             raise _unlike(
+                worst,
                 f"has accelerations that throttle and climb rate do not explain, {left_m_s2:.1f} m/s² rms: gusts "
-                "too strong, oscillating rate controllers, or vibration compensation"
+                "too strong, oscillating rate controllers, or vibration compensation",
             )
         first = next(flight for flight in flights if flight.outcome == "valid")
         self._first: Final = self._loop(experiment.space.vector(first.gains))
@@ -127,8 +129,9 @@ class CopterModel:
         least_m, share = LARGEST_MISFIT
         if abs(modelled_m - flown_m) > max(least_m, share * flown_m):
             raise _unlike(
+                self.base.number,
                 f"deviates by {1e3 * flown_m:.1f} mm, where its gains make the fitted vehicle deviate by "
-                f"{1e3 * modelled_m:.1f} mm: it flew with other gains or parameters"
+                f"{1e3 * modelled_m:.1f} mm: it flew with other gains or parameters",
             )
         space, here = self._experiment.space, space_within(self._log.loop.space, self._experiment, box)
         rules = self._log.loop.rules(self._log.throttle_mean)
@@ -160,10 +163,10 @@ class CopterModel:
         experiment, loop = self._experiment, self._loop(gains)
         predicted = self._all.predict_curve(loop)
         grid_s = experiment.grid_s
-        reference = experiment.simulate(gains, experiment.nominal_model)[experiment.output]
+        followed = experiment.followed_m
         after = grid_s >= predicted.time_s[0]
         reach = float(ndtri(0.5 + CONFIDENCE / 2.0)) * predicted.elsewhen_m.std(axis=0)
-        curve, low, high = (reference.copy() for _ in range(3))
+        curve, low, high = (followed.copy() for _ in range(3))
         mean = predicted.altitudes_m.mean(axis=0)
         for whole, part in ((curve, mean), (low, mean - reach), (high, mean + reach)):
             whole[after] = np.interp(grid_s[after], predicted.time_s, part)
@@ -192,10 +195,10 @@ class CopterModel:
         return (moves, rings)
 
 
-def _unlike(reason: str) -> TrajectoryError:
+def _unlike(number: int, reason: str) -> TrajectoryError:
     return TrajectoryError(
-        "The best flight cannot be modelled.",
-        hint="Mark the flight invalid, and fly again with the gains of the campaign in weaker wind.",
+        f"Flight {number} cannot be modelled.",
+        hint=f"Mark flight {number} invalid, and fly again with the gains of the campaign in weaker wind.",
         problems=(Problem("trajectory", f"The flight {reason}."),),
     )
 
@@ -215,7 +218,14 @@ def _interval(predicted: Prediction) -> Interval:
 
 def _read(experiment: CopterSteps, flight: Flight) -> LoggedFlight:
     gains = experiment.space.vector(flight.gains)
-    return experiment.exactly_under(flight.parameters).read(flight.trajectory.as_stored(), gains)
+    try:
+        return experiment.exactly_under(flight.parameters).read(flight.trajectory.as_stored(), gains)
+    except InputError as error:
+        raise TrajectoryError(
+            f"Flight {flight.number} cannot be fitted.",
+            hint=f"{error.hint} Mark flight {flight.number} invalid, and fly again.",
+            problems=error.problems,
+        ) from error
 
 
 def space_within(space: GainSpace, experiment: CopterSteps, box: Box) -> GainSpace:

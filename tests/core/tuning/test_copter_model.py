@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.core.definition import Definition, Flight, StopRule
-from app.core.errors import InputError, TrajectoryError
+from app.core.errors import TrajectoryError
 from app.core.experiments.base import prior_distribution
 from app.core.policy import Gains
 from app.core.tuning.campaign_models import known_distribution
@@ -123,17 +123,18 @@ def test_a_flight_that_the_model_does_not_fly_is_refused() -> None:
     rig, (first, _) = RIGS["ArduCopter"], flown("ArduCopter")
     steps = rig.experiment.configured(OPTIONS)
     other = replace(first, gains={**first.gains, "PSC_ACCZ_P": 1.5, "PSC_ACCZ_I": 3.0})
-    with pytest.raises(TrajectoryError, match="cannot be modelled") as refused:
+    with pytest.raises(TrajectoryError, match="Flight 1 cannot be modelled") as refused:
         next_proposal(definition_of(rig), [other])
     assert "it flew with other gains or parameters" in refused.value.problems[0].reason
     noise = np.random.default_rng(1).normal(0.0, 0.3, len(first.trajectory.time_s))
     channels = {**first.trajectory.channels, "climb_rate_m_s": first.trajectory["climb_rate_m_s"] + noise}
     stormy = replace(first, trajectory=replace(first.trajectory, channels=channels))
     with pytest.raises(TrajectoryError) as refused:
-        CopterModel(steps, [stormy])
+        CopterModel(steps, [replace(first, number=2), replace(stormy, number=3)])
+    assert refused.value.message == "Flight 3 cannot be modelled."
     assert "that throttle and climb rate do not explain" in refused.value.problems[0].reason
     filtered = replace(first, parameters={**first.parameters, "PSC_ACCZ_NTF": 1.0})
-    with pytest.raises(InputError):
+    with pytest.raises(TrajectoryError, match=r"Flight 1 cannot be fitted\. PSC_ACCZ_NTF: must be 0"):
         CopterModel(steps, [filtered])
     assert known_distribution(steps, [filtered]) == prior_distribution(steps)
 
@@ -155,6 +156,6 @@ def test_a_record_without_the_throttle_is_refused_and_tells_nothing_of_the_vehic
     channels = {name: each for name, each in flight.trajectory.channels.items() if name != "throttle"}
     bare = replace(flight, trajectory=replace(flight.trajectory, channels=channels))
     assert known_distribution(steps, [bare]) == prior_distribution(steps)
-    with pytest.raises(TrajectoryError, match="cannot be fitted"):
+    with pytest.raises(TrajectoryError, match="Flight 1 cannot be fitted"):
         next_proposal(definition_of(rig), [bare])
     assert np.isfinite(flight.error or np.nan)
