@@ -31,8 +31,6 @@ from app.core.policy import Vector
 from app.core.records.trajectory import Samples
 from app.core.tuning.corrected_model import resample_to_grid
 
-EXPERIMENTS: Final = frozenset({"takeoff", "altitude-steps"})
-"""Experiments whose model this calibrates, on one flight or more."""
 MAX_FLIGHTS: Final = 4
 """Number of flights fitted: the best and the latest valid ones. That is enough, and it bounds the computing time."""
 

@@ -22,6 +22,11 @@ MODELS: Final[Mapping[str, Callable[[ModelledExperiment, Sequence[Flight]], Camp
 """By the name of the experiment; at least one flight must be valid."""
 
 
+def is_calibrated(experiment: ModelledExperiment) -> bool:
+    """Whether the parameters of its model are found by `app.core.tuning.calibration`."""
+    return MODELS.get(experiment.name) is fit_vertical
+
+
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:
     """Distribution of the vehicle's parameters: the data sheet's until a flight is valid, then that of the fit.
 
@@ -37,8 +42,11 @@ def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> Par
         return prior_distribution(experiment)
 
 
-def as_flown(experiment: ModelledExperiment, flights: Sequence[Flight]) -> ModelledExperiment:
-    """The experiment with the autopilot's parameters of the last flight that recorded any on which its model
-    depends."""
-    recorded = [own for flight in flights if (own := experiment.loop_parameters(flight.parameters))]
+def as_flown(
+    experiment: ModelledExperiment, flights: Sequence[Flight], donor: Flight | None = None
+) -> ModelledExperiment:
+    """The experiment with the autopilot's parameters of the last flight that recorded any on which its model depends;
+    before the first of these, with those of the donor's flight, whose vehicle is of the same kind."""
+    all_flights = flights if donor is None else (donor, *flights)
+    recorded = [own for flight in all_flights if (own := experiment.loop_parameters(flight.parameters))]
     return experiment.under(recorded[-1]) if recorded else experiment

@@ -75,9 +75,11 @@ def uncorrected_model(experiment: ModelledExperiment) -> CorrectedModel:
 
 
 def correct_by_bias(experiment: ModelledExperiment, flight: Flight) -> CorrectedModel:
-    """The nominal model with the bias of a flight: b(t) = measured(t) − model(t; flown gains)."""
-    flown = experiment.outputs(experiment.space.vector(flight.gains)[np.newaxis], experiment.nominal_model)[0]
-    return CorrectedModel(experiment, experiment.nominal_model, resample_to_grid(experiment, flight) - flown)
+    """The nominal model with the bias of a flight: b(t) = measured(t) − model(t; flown gains), the latter under the
+    parameters that the flight's autopilot had."""
+    then = experiment.under(flight.parameters)
+    flown = then.outputs(then.space.vector(flight.gains)[np.newaxis], then.nominal_model)[0]
+    return CorrectedModel(experiment, experiment.nominal_model, resample_to_grid(then, flight) - flown)
 
 
 def correct_in_loop(experiment: ModelledExperiment, flight: Flight) -> DisturbedModel | None:

@@ -63,7 +63,7 @@ def flight_predictor(
         return None
     if donor is not None:
         experiment = transfer(definition, experiment, flights, donor).experiment
-    experiment = as_flown(experiment, flights)
+    experiment = as_flown(experiment, flights, donor)
     strategy, flown = STRATEGIES[definition.strategy], has_flown(flights)
     model = strategy.predict_flight if flown else partial(_first_flight, donor)
     return FlightPredictor(

@@ -157,7 +157,7 @@ def _error_model(definition: Definition, flights: Sequence[Flight], donor: Fligh
         return None
     if donor is not None:
         experiment = transfer(definition, experiment, flights, donor).experiment
-    experiment = as_flown(experiment, flights)
+    experiment = as_flown(experiment, flights, donor)
     if all(flight.outcome != "valid" for flight in flights):
         return (uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)).errors
     return STRATEGIES[definition.strategy].predict_errors(definition, experiment, flights)

@@ -51,7 +51,7 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     warm = None if donor is None else transfer(definition, experiment, flights, donor)
     if warm is not None:
         experiment, definition = warm.experiment, replace(definition, step_fraction=warm.step_fraction)
-    experiment = as_flown(experiment, flights)
+    experiment = as_flown(experiment, flights, donor)
     if not has_flown(flights):
         return _start(definition, experiment, space, flights, donor)
     scatter = pool_scatter(groups_of(flights), experiment.scatter)

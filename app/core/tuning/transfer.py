@@ -21,7 +21,8 @@ from app.core.definition import Definition, Flight
 from app.core.experiments.base import ModelledExperiment
 from app.core.formatting import percent
 from app.core.records.trajectory import CHANNEL_UNITS
-from app.core.tuning import calibration
+from app.core.tuning.calibration import calibrate
+from app.core.tuning.campaign_models import is_calibrated
 from app.core.tuning.corrected_model import correct_by_bias
 from app.core.tuning.predictions import offset_sensitivity
 
@@ -71,7 +72,7 @@ def transfer(
         experiment=_informed(experiment, donor, agreed),
         step_fraction=definition.step_fraction * (agreed if is_first_step else 1.0),
         agreement=agreed,
-        sentence=f"{_TAKEN[experiment.name in calibration.EXPERIMENTS]}: {numbers}.{shortened}",
+        sentence=f"{_TAKEN[is_calibrated(experiment)]}: {numbers}.{shortened}",
     )
 
 
@@ -90,8 +91,8 @@ def _informed(experiment: ModelledExperiment, donor: Flight, agreed: float) -> M
 
     The experiment itself if there is no calibration for it.
     """
-    if experiment.name not in calibration.EXPERIMENTS:
+    if not is_calibrated(experiment):
         return experiment
-    fitted = calibration.calibrate(experiment, (donor,))
+    fitted = calibrate(experiment, (donor,))
     prior = np.array([parameter.prior_sd for parameter in experiment.model_parameters])
     return experiment.informed(fitted.model, np.sqrt(np.diag(fitted.covariance) + (1.0 - agreed) * prior**2))

@@ -2,10 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from app.core.definition import Definition, Donor, Flight, Start, StopRule
+from app.core.experiments import get_experiment
 from app.core.tuning.calibration import calibrate
+from app.core.tuning.campaign_models import as_flown
+from app.core.tuning.corrected_model import correct_by_bias
 from app.core.tuning.proposals import next_proposal
 from app.core.tuning.transfer import transfer
 from tests.core.tuning import bowl
@@ -98,3 +102,20 @@ def test_scatter_is_no_disagreement_and_the_opposite_is_none_of_an_agreement(
 ) -> None:
     found = transfer(WARM, bowl.QuadraticExperiment(), [bowl.fly(1, 50, 50, ours)], bowl.fly(3, 50, 50, theirs))
     assert found.agreement == pytest.approx(agreement)
+
+
+@compiled_only
+def test_each_vehicle_is_modelled_under_the_parameters_that_it_flew_with() -> None:
+    """The donor's slow filter explains how it differs; before the own first flight, the own vehicle has it too."""
+    steps = get_experiment("altitude-steps-ardupilot", {"steps": 2, "step_window_s": 3.0}).modelled
+    assert steps is not None
+    slow = {"PSC_ACCZ_FLTE": 2.0, "telemetry_hz": 50.0}
+    gains = steps.space.mapping(steps.space.default)
+    record = steps.under(slow).simulate(steps.space.default, steps.nominal_model)
+    theirs = Flight(number=5, gains=gains, trajectory=record, error=0.1, outcome="valid", parameters=slow)
+    ours = replace(theirs, trajectory=steps.simulate(steps.space.default, steps.nominal_model), parameters={})
+    assert np.abs(correct_by_bias(steps, theirs).bias).max() < 1e-6
+    assert transfer(WARM, steps, [ours], theirs).agreement == 1.0
+    firmer = steps.space.vector({**gains, "PSC_ACCZ_P": 0.8})[np.newaxis]
+    expected = steps.under(slow).outputs(firmer, steps.nominal_model)
+    assert as_flown(steps, [], theirs).outputs(firmer, steps.nominal_model).tolist() == expected.tolist()
