@@ -50,3 +50,25 @@ def as_flown(
     all_flights = flights if donor is None else (donor, *flights)
     recorded = [own for flight in all_flights if (own := experiment.loop_parameters(flight.parameters))]
     return experiment.under(recorded[-1]) if recorded else experiment
+
+
+def changed_parameters(experiment: ModelledExperiment, flights: Sequence[Flight]) -> str:
+    """A sentence that names the autopilot's parameters beside the gains that differ, in three digits, from those of the
+    first valid flight that recorded them; empty if none do."""
+    recorded = [
+        (flight.number, own)
+        for flight in flights
+        if flight.outcome == "valid" and (own := experiment.loop_parameters(flight.parameters))
+    ]
+    if not recorded:
+        return ""
+    (first, before), *later = recorded
+    changed = {
+        name: f"{name} was {before[name]:g} in flight {first} and {own[name]:g} in flight {number}"
+        for number, own in later
+        for name in before
+        if name in own and name not in experiment.space.names and f"{own[name]:.3g}" != f"{before[name]:.3g}"
+    }
+    if not changed:
+        return ""
+    return f"The errors are compared as if only the gains had changed, but {', '.join(changed.values())}."

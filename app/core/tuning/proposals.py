@@ -12,7 +12,7 @@ from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, short
 from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import Group, groups_of, pool_scatter
-from app.core.tuning.campaign_models import as_flown, known_distribution
+from app.core.tuning.campaign_models import as_flown, changed_parameters, known_distribution
 from app.core.tuning.confirmation import NO_STEP, Confirmation, compare_winner, confirm, standing_within_bounds
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
 from app.core.tuning.gate import GateResult, check_policy
@@ -60,7 +60,7 @@ def next_proposal(definition: Definition, flights: Sequence[Flight], donor: Flig
     number = proposal.explanation.base_flight if strategy.corrects_model else None
     base = next((flight for flight in flights if flight.number == number), None)
     proposal = with_interval(experiment, space, flights, proposal, scatter, base=base)
-    return _with_notes(_confirmed(definition, experiment, space, flights, proposal), flights, warm)
+    return _with_notes(_confirmed(definition, experiment, space, flights, proposal), experiment, flights, warm)
 
 
 def has_flown(flights: Sequence[Flight]) -> bool:
@@ -166,11 +166,14 @@ def _refused(group: Group, gate: GateResult) -> str:
     )
 
 
-def _with_notes(proposal: Proposal, flights: Sequence[Flight], warm: Transfer | None) -> Proposal:
+def _with_notes(
+    proposal: Proposal, experiment: ModelledExperiment, flights: Sequence[Flight], warm: Transfer | None
+) -> Proposal:
     record = track_record(flights)
     notes = (
         *proposal.explanation.notes,
         *((warm.sentence,) if warm is not None and warm.sentence else ()),
+        *filter(None, (changed_parameters(experiment, flights),)),
         *((record.sentence,) if record.of or record.agreeing or record.disagreeing else ()),
     )
     return replace(proposal, explanation=replace(proposal.explanation, notes=notes))

@@ -12,7 +12,7 @@ from app.core.definition import Definition, Flight, StopRule
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import prior_distribution
 from app.core.policy import Gains
-from app.core.tuning.campaign_models import known_distribution
+from app.core.tuning.campaign_models import changed_parameters, known_distribution
 from app.core.tuning.copter_model import CopterModel
 from app.core.tuning.flight_predictor import flight_predictor, modelled_flights
 from app.core.tuning.gate import check_policy
@@ -137,6 +137,20 @@ def test_a_flight_that_the_model_does_not_fly_is_refused() -> None:
     with pytest.raises(TrajectoryError, match=r"Flight 1 cannot be fitted\. PSC_ACCZ_NTF: must be 0"):
         CopterModel(steps, [filtered])
     assert known_distribution(steps, [filtered]) == prior_distribution(steps)
+
+
+@compiled_only
+def test_a_proposal_says_that_other_parameters_changed_between_the_flights() -> None:
+    """By the names and in the units of another release too; gains and the last digits do not count."""
+    rig, (first, _) = RIGS["ArduCopter"], flown("ArduCopter")
+    before = {**first.parameters, "MOT_THST_HOVER": 0.35, "WPNAV_SPEED_UP": 250.0}
+    after = {**before, "MOT_THST_HOVER": 0.31, "WP_SPD_UP": 2.5001, "PSC_ACCZ_P": 0.7}
+    del after["WPNAV_SPEED_UP"]
+    flights = [replace(first, parameters=before), replace(first, number=2, parameters=after)]
+    notes = next_proposal(replace(definition_of(rig), strategy="manual"), flights).explanation.notes
+    said = "The errors are compared as if only the gains had changed, but MOT_THST_HOVER was 0.35 in flight 1 and "
+    assert [note for note in notes if "gains had changed" in note] == [f"{said}0.31 in flight 2."]
+    assert changed_parameters(rig.experiment, flights[:1]) == changed_parameters(rig.experiment, []) == ""
 
 
 @compiled_only
