@@ -269,6 +269,14 @@ class ActionRefused:
 
 
 @dataclass(frozen=True, slots=True)
+class SetPointsPaused:
+    """The stream of set points, which some autopilots must receive, was not sent for so long, s."""
+
+    paused_s: float
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class GainsRestored:
     """The safe gains were written and read back; otherwise `problem` is the reason."""
 
@@ -285,6 +293,7 @@ Event = (
     | DuplicateVehicleDetected
     | ActionDone
     | ActionRefused
+    | SetPointsPaused
     | GainsRestored
 )
 
@@ -295,6 +304,11 @@ class PerformAction:
 
     action: Action
     altitude_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class WithdrawSetPoint:
+    """Send nothing more of the action in progress, and no more set points: a pilot may be flying."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,4 +343,4 @@ class RecordSample:
     reference_m: float | None = None
 
 
-Command = PerformAction | SendGain | RequestGain | RestoreGains | RecordSample
+Command = PerformAction | WithdrawSetPoint | SendGain | RequestGain | RestoreGains | RecordSample

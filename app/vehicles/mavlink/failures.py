@@ -43,6 +43,7 @@ class Failure(StrEnum):
     FALL = "F13"
     SET_POINT = "F14a"
     NOT_SETTLED = "F14b"
+    PAUSED = "F14c"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +161,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "The vehicle fell.",
         ),
         Failure.SET_POINT: Response(
-            "a new set point refused, or unconfirmed after three attempts, 0.5 s apart",
+            "a new set point refused, unconfirmed after three attempts, 0.5 s apart, or more than 1.5 s late",
             "land",
             "invalid",
             "The vehicle did not confirm a new set point.",
@@ -170,6 +171,12 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "land",
             "invalid",
             "The steps were not flown.",
+        ),
+        Failure.PAUSED: Response(
+            "no set point sent for 0.5 s to an autopilot that must receive them continuously",
+            "land",
+            "invalid",
+            "The set points paused.",
         ),
     }
 )
@@ -231,6 +238,7 @@ class Limits:
     stuck_s: float = 0.25
     lost_s: float = 0.5
     slow_s: float = 3.0
+    late_s: float = 1.5
     ceiling_m: float = ALTITUDE_LIMIT_M
     radius_m: float = 5.0
     climb_rate_m_s: float = 4.0
@@ -266,6 +274,7 @@ class Limits:
             stuck_s=self.stuck_s * factor,
             lost_s=self.lost_s * factor,
             slow_s=self.slow_s * factor,
+            late_s=self.late_s * factor,
         )
 
 

@@ -284,27 +284,42 @@ class CommandSequence:
         self._steps = list(steps)
         self._sent_s: list[float] = []
         self._replied_s: float | None = None
+        self._begun_s = radio.clock.now_s()
         self._send()
 
     def proceed(self, packets: list[PacketReceived]) -> ActionDone | ActionRefused | None:
-        """Process packets and send the next messages; return the result once the sequence has ended."""
+        """Process packets and send the next messages; return the result once the sequence has ended. Packets received
+        before the messages were sent are no replies to them."""
         for each in packets:
-            if self._steps and (accepted := self._verdict(each.measurement)) is not None:
+            if (
+                self._steps
+                and self._sent_s
+                and each.now_s >= self._begun_s
+                and (accepted := self._verdict(each.measurement)) is not None
+            ):
                 if not accepted and self._steps[0].needed:
                     return self._refused(each.measurement)
                 self._replied_s = each.now_s
-                self._next()
+                self._next(each.now_s)
         now_s = self._radio.clock.now_s()
-        while self._steps and not self._steps[0].awaits and now_s - self._sent_s[-1] >= self._steps[0].pause_s:
-            self._next()
+        while self._steps and not self._steps[0].awaits and now_s - self._begun_s >= self._steps[0].pause_s:
+            self._next(now_s)
         if not self._steps:
             return ActionDone(self._action, now_s, tuple(self._sent_s), self._replied_s)
-        if self._steps[0].awaits and now_s - self._sent_s[-1] >= self._radio.reply_timeout_s:
-            if len(self._sent_s) < self._steps[0].attempts:
+        return self._send_again(now_s)
+
+    def _send_again(self, now_s: float) -> ActionRefused | None:
+        """Send messages that were withheld until now, or that were not answered; return the result if they may not be
+        repeated."""
+        step = self._steps[0]
+        if not self._sent_s:
+            self._send()
+        elif step.awaits and now_s - self._sent_s[-1] >= self._radio.reply_timeout_s:
+            if len(self._sent_s) < step.attempts:
                 self._send()
-            elif not self._steps[0].needed:
-                self._next()
-            elif self._steps[0].attempts > 1:
+            elif not step.needed:
+                self._next(now_s)
+            elif step.attempts > 1:
                 return self._unanswered()
         return None
 
@@ -315,16 +330,30 @@ class CommandSequence:
         is_final = not step.persists or len(self._sent_s) >= step.attempts
         return accepted if accepted or is_final else None
 
-    def _next(self) -> None:
+    def _next(self, replied_s: float) -> None:
+        """Begin the next step. One that sends nothing awaits what follows the previous reply."""
         self._steps.pop(0)
         if self._steps:
             self._sent_s, self._replied_s = [], None
+            self._begun_s = replied_s
             self._send()
 
     def _send(self) -> None:
-        if self._steps:
-            self._sent_s.append(self._radio.clock.now_s())
+        if self._steps and self._may_send(self._steps[0]):
+            now_s = self._radio.clock.now_s()
+            if self._steps[0].sends and not self._sent_s:
+                self._begun_s = now_s
+            self._sent_s.append(now_s)
             self._radio.send(*self._steps[0].sends)
+
+    def _may_send(self, step: Step) -> bool:
+        """Whether the newest heartbeat reports one of the modes in which the step may be sent. After a
+        sending only a new one counts: if the reply was lost, a pilot may have taken over since."""
+        seen = self._radio.seen
+        if not step.modes:
+            return True
+        is_new = not self._sent_s or seen.heartbeat_s > self._sent_s[-1]
+        return is_new and seen.heartbeat is not None and seen.heartbeat.mode in step.modes
 
     def _refused(self, measurement: Measurement | None) -> ActionRefused:
         why = measurement.why if isinstance(measurement, CommandReply) else ""
@@ -345,7 +374,7 @@ def _verdict(step: Step, measurement: Measurement | None) -> bool | None:
             return accepted
         case Parameter(name=name) if name == step.awaits:
             return True
-        case Heartbeat(mode=mode) if step.awaits == f"mode {mode}":
+        case Heartbeat(mode=mode) if f"mode {mode}" in (step.awaits, step.shown_by):
             return True
         case TargetAltitude(altitude_m=altitude_m) if step.awaits == TARGET:
             return True if abs(altitude_m - step.altitude_m) < _SAME_TARGET_M else None

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from app.core.experiments.step_sequence import SETTLED_FOR_S, unsettled
+from app.core.formatting import count
 from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.events import Action, ActionDone, PerformAction, Position
@@ -19,6 +20,8 @@ from app.vehicles.mavlink.trial_reactions import Plan, SetPointChange, Step, Tri
 
 HELD_BEFORE_S: Final = 6.0
 """Time before the first step from which a vehicle holds the first set point by position targets."""
+_OVERDUE: Final = 1.2
+"""Share of the permitted delay after which no confirmation is awaited: a refusal, with its reason, comes before."""
 LEAD_S: Final = 0.02
 """Usual time from the command of a set point to its effect: it is commanded so much before it is due."""
 
@@ -74,17 +77,45 @@ def find_unsettled(trial: Trial) -> Finding | None:
     return None if why is None else Finding(failure=Failure.NOT_SETTLED, why=f"The vehicle {why}.")
 
 
+def find_overdue(trial: Trial, now_s: float) -> Finding | None:
+    """Find that the next step is not confirmed although it was due long ago."""
+    due_s = _next_step_s(trial)
+    if due_s is None or _elapsed_s(trial, now_s) <= due_s + _OVERDUE * trial.plan.limits.late_s:
+        return None
+    return _not_confirmed(f"The set point of {due_s:g} s was not confirmed in time.")
+
+
+def find_late(trial: Trial) -> Finding | None:
+    """Find that the newest set point took effect late, and not the first one again, which may wait for the climb."""
+    number, plan = len(trial.changes), trial.plan
+    late_s = trial.changes[-1].times_s[-1] - plan.set_points.times_s[number]
+    if number < plan.first_step or late_s <= plan.limits.late_s:
+        return None
+    return _not_confirmed(f"A set point took effect {late_s:.1f} s late.")
+
+
+def find_missing(trial: Trial) -> Finding | None:
+    """Find at the end of the record that not every set point was commanded and confirmed."""
+    missing = len(trial.plan.set_points.times_s) - 1 - len(trial.changes)
+    return _not_confirmed(f"The record ended without {count(missing, 'set point')}.") if missing else None
+
+
+def _not_confirmed(why: str) -> Finding:
+    return Finding(failure=Failure.SET_POINT, why=why)
+
+
 def command_next(trial: Trial) -> Step:
-    """Command the next set point, to which all limits refer from now on."""
+    """Command the next set point, to which all limits refer from now on. The first one again changes no limit."""
     set_point_m = trial.plan.set_points.altitudes_m[len(trial.changes) + 1] + trial.plan.datum_m
-    action = Action.HOLD if is_hold(trial) else Action.FLY_TO
+    if is_hold(trial):
+        return replace(trial, changes_set_point=True), (PerformAction(Action.HOLD, set_point_m),)
     trial = replace(
         trial,
         plan=trial.plan.with_set_point(set_point_m),
         watch=watching.change_set_point(trial.watch, set_point_m),
         changes_set_point=True,
     )
-    return trial, (PerformAction(action, set_point_m),)
+    return trial, (PerformAction(Action.FLY_TO, set_point_m),)
 
 
 def confirm(trial: Trial, done: ActionDone) -> Trial:
@@ -111,6 +142,12 @@ def _first_step_s(trial: Trial) -> float | None:
     """Time of the first step since the takeoff command; None without steps."""
     times_s = trial.plan.set_points.times_s
     return times_s[trial.plan.first_step] if len(times_s) > 1 else None
+
+
+def _next_step_s(trial: Trial) -> float | None:
+    """Time of the next step that is not confirmed, since the takeoff command; None after the last."""
+    times_s, number = trial.plan.set_points.times_s, max(len(trial.changes) + 1, trial.plan.first_step)
+    return times_s[number] if number < len(times_s) else None
 
 
 def _next_due_s(trial: Trial) -> float | None:

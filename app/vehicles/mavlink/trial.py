@@ -25,7 +25,9 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
+    SetPointsPaused,
     Tick,
+    WithdrawSetPoint,
 )
 from app.vehicles.mavlink.failures import NOT_DESCENDING, NOT_DESCENDING_AFTER_S
 from app.vehicles.mavlink.flown_set_points import Reference, at_last_times
@@ -39,6 +41,8 @@ from app.vehicles.mavlink.trial_reactions import LANDING, State
 LISTEN_S: Final = 0.01
 """Longest delay before the loop processes an abort."""
 STREAM_EVERY_S: Final = 0.05
+PAUSED_S: Final = 0.5
+"""After a longer pause of the stream, the autopilot may have left its mode, and entered it again."""
 SINKS_M: Final = 0.3
 """A vehicle that has descended by less than this in five seconds is not landing."""
 STALL_S: Final = 0.2
@@ -144,7 +148,7 @@ class TrialRunner:
             self._error = self._error or error
 
     def _listen(self) -> None:
-        self._keep_streaming()
+        paused_s = self._keep_streaming()
         packets = self._radio.receive(LISTEN_S)
         now_s = self._radio.clock.now_s()
         stalled_s = now_s - self._listened_s
@@ -160,6 +164,8 @@ class TrialRunner:
             self._advance(each)
         if why := self._radio.link.duplicate_reason:
             self._advance(DuplicateVehicleDetected(why, self._radio.clock.now_s()))
+        if paused_s and self._stream:  # a pilot who has taken over meanwhile has ended it
+            self._advance(SetPointsPaused(paused_s, self._radio.clock.now_s()))
         if self._sequence is not None and (ended := self._sequence.proceed(packets)) is not None:
             self._sequence = None
             self._advance(ended)
@@ -199,6 +205,8 @@ class TrialRunner:
             match command:
                 case PerformAction(action, altitude_m):
                     self._perform(action, altitude_m)
+                case WithdrawSetPoint():
+                    self._sequence, self._stream = None, ()
                 case SendGain(setting):
                     radio = self._radio
                     radio.send(radio.profile.set_parameter(radio.target, setting.parameter, setting.value))
@@ -215,6 +223,8 @@ class TrialRunner:
         profile, target = self._radio.profile, self._radio.target
         if altitude_m is not None:
             target = self._target = replace(self._place(action), altitude_m=altitude_m)
+            if not self._stream:
+                self._streamed_s = self._radio.clock.now_s()
             self._stream = profile.stream(target)
         self._sequence = CommandSequence(action, profile.steps(action, target), self._radio)
 
@@ -225,12 +235,18 @@ class TrialRunner:
             return self._target
         return replace(self._target, north_m=last.north_m, east_m=last.east_m)
 
-    def _keep_streaming(self) -> None:
-        """Send the set point again, if it is due: some autopilots leave the mode, and land, without a stream."""
+    def _keep_streaming(self) -> float:
+        """Send the set point again, if it is due: some autopilots leave the mode, and land, without a stream. Return
+        how long none was sent, if that was too long: then none is sent any more; otherwise 0."""
         now_s = self._radio.clock.now_s()
-        if self._stream and now_s - self._streamed_s >= STREAM_EVERY_S:
-            self._streamed_s = now_s
-            self._radio.send(*self._stream)
+        waited_s = now_s - self._streamed_s
+        if not self._stream or waited_s < STREAM_EVERY_S:
+            return 0.0
+        if waited_s > PAUSED_S * self._radio.timeout_factor:
+            return waited_s
+        self._streamed_s = now_s
+        self._radio.send(*self._stream)
+        return 0.0
 
     def _reference_m(self, position: Position) -> float | None:
         """Return the autopilot's own reference now, on the vehicle's datum; None if it is not known or needed."""

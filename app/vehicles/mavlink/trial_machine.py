@@ -26,6 +26,8 @@ from app.vehicles.mavlink.events import (
     RecordSample,
     RestoreGains,
     SecondaryAltitudeReceived,
+    SetPointsPaused,
+    WithdrawSetPoint,
     confirms_motors_off,
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, Finding, land_every_s
@@ -224,6 +226,8 @@ def _record(trial: Trial, event: Event) -> Step:
         return changed
     if not _is_whole(trial) or _may_be_by_hand(trial, now_s):
         return _overtime(trial, now_s)
+    if finding := set_point_schedule.find_missing(trial):
+        return fail(trial, finding, now_s)
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
     incomplete = limit_checks.find_incomplete_climb(trial.watch, trial.plan.climb_to_m)
@@ -232,17 +236,50 @@ def _record(trial: Trial, event: Event) -> Step:
     return land(trial, State.LAND, now_s)
 
 
+def _withdraw(trial: Trial, now_s: float) -> Step:
+    """Command no set point any more: a pilot may be flying, and would be overridden. Land once a heartbeat reports that
+    nobody is."""
+    if not trial.withdrawn:
+        return replace(trial, withdrawn=True), (WithdrawSetPoint(),)
+    if _is_by_hand(trial):
+        return trial, ()
+    why = "A heartbeat reported a manual mode, so that no further set point was commanded."
+    return land(note(trial, Finding(failure=Failure.INTERRUPTED, why=why)), State.ABORT_LAND, now_s)
+
+
 def _change_set_point(trial: Trial, event: Event) -> Step | None:
-    """Command the next set point when it is due, and note its confirmation; None if there is nothing to do."""
+    """Command the next set point when it is due, and note its confirmation; None if there is nothing to do. A flight
+    that does not count any more is ended instead."""
     now_s = event.now_s
-    if isinstance(event, ActionRefused) and event.action in _SET_POINT_ACTIONS:
-        return fail(trial, Finding(failure=Failure.SET_POINT, why=event.why), now_s)
-    if isinstance(event, ActionDone) and event.action in _SET_POINT_ACTIONS:
-        return set_point_schedule.confirm(trial, event), ()
+    if trial.has_set_point and (trial.withdrawn or _is_by_hand(trial)):
+        return _withdraw(trial, now_s)
+    is_confirmed = isinstance(event, ActionDone) and event.action in _SET_POINT_ACTIONS
+    if isinstance(event, ActionDone) and is_confirmed:
+        trial = set_point_schedule.confirm(trial, event)
+    if finding := _find_set_point_failure(trial, event):
+        return fail(trial, finding, now_s)
     if not set_point_schedule.is_due(trial, now_s) or _may_be_by_hand(trial, now_s):
-        return None
+        return (trial, ()) if is_confirmed else None
+    if trial.failure is not None:
+        return land(trial, State.ABORT_LAND, now_s)
     finding = set_point_schedule.find_unsettled(trial)
     return set_point_schedule.command_next(trial) if finding is None else fail(trial, finding, now_s)
+
+
+def _find_set_point_failure(trial: Trial, event: Event) -> Finding | None:
+    """Find that a set point was refused or confirmed late, or that their stream paused."""
+    match event:
+        case ActionRefused(action=action, why=why) if action in _SET_POINT_ACTIONS:
+            return Finding(failure=Failure.SET_POINT, why=why)
+        case SetPointsPaused(paused_s=paused_s):
+            why = f"Gainline stalled, and sent no set point for {paused_s:.1f} s."
+            return Finding(failure=Failure.PAUSED, why=why)
+        case ActionDone(action=action) if action in _SET_POINT_ACTIONS:
+            return set_point_schedule.find_late(trial)
+        case _ if _may_be_by_hand(trial, event.now_s):
+            return None
+        case _:
+            return set_point_schedule.find_overdue(trial, event.now_s)
 
 
 def _is_whole(trial: Trial) -> bool:
@@ -289,9 +326,13 @@ def _is_land_due(trial: Trial, now_s: float) -> bool:
 
 def _may_be_by_hand(trial: Trial, now_s: float) -> bool:
     """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
-    watch, limits = trial.watch, trial.plan.limits
-    is_pilots = bool(_modes(trial)) and watch.armed and limits.is_manual(watch.mode)
-    return is_pilots and now_s - watch.heartbeat_s < limits.confirmation_s
+    return _is_by_hand(trial) and now_s - trial.watch.heartbeat_s < trial.plan.limits.confirmation_s
+
+
+def _is_by_hand(trial: Trial) -> bool:
+    """Whether the newest heartbeat shows a manual mode."""
+    watch = trial.watch
+    return bool(_modes(trial)) and watch.armed and trial.plan.limits.is_manual(watch.mode)
 
 
 def _doubting(trial: Trial) -> Trial:
@@ -469,8 +510,18 @@ def _modes(trial: Trial) -> frozenset[str]:
         return frozenset()
     if has_stayed or watch.heartbeat_s - command_s < _MODE_KNOWN_S:
         return frozenset()
-    follows = trial.plan.holds_first and trial.changes and trial.state is State.RECORD
-    return (trial.plan.following_modes if follows else limits.flying_modes) | limits.landing_modes
+    return _flying_modes(trial) | limits.landing_modes
+
+
+def _flying_modes(trial: Trial) -> frozenset[str]:
+    """Return the modes that it may fly in: those in which it follows set points only from the first on, and no others
+    once it has confirmed that, until it is commanded to land."""
+    plan = trial.plan
+    if not (plan.holds_first and trial.has_set_point):
+        return plan.limits.flying_modes
+    if trial.changes and trial.state is State.RECORD:
+        return plan.following_modes
+    return plan.limits.flying_modes | plan.following_modes
 
 
 def _blocks(trial: Trial) -> frozenset[str]:

@@ -195,7 +195,8 @@ class Trial:
     and the takeoff command, `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is
     the reason why it will be quarantined at the end, however it lands. `changes` are the set points after the
     takeoff's that it has confirmed; `changes_set_point`: it has not confirmed the newest; `settling` are the positions
-    that show whether it is at rest before the first of them.
+    that show whether it is at rest before the first of them. `withdrawn`: a heartbeat has reported a manual mode since
+    the first of them was commanded, after which none is commanded any more.
     """
 
     plan: Plan
@@ -226,10 +227,16 @@ class Trial:
     changes: tuple[SetPointChange, ...] = ()
     changes_set_point: bool = False
     settling: tuple[Position, ...] = ()
+    withdrawn: bool = False
 
     @property
     def is_over(self) -> bool:
         return self.state in OVER
+
+    @property
+    def has_set_point(self) -> bool:
+        """Whether a set point after the takeoff's has been commanded."""
+        return bool(self.changes) or self.changes_set_point
 
     @property
     def may_take_off(self) -> bool:

@@ -624,13 +624,11 @@ class MavlinkVehicle:
         plan = replace(self._plan(ground), record_s=order.record_s, set_points=order.set_points)
         if not _flies_steps(order) or not profile.holds_first:
             return plan
-        modes = plan.limits.flying_modes | profile.following_modes
         return replace(
             plan,
             set_points=with_hold(order.set_points),
             holds_first=True,
             following_modes=profile.following_modes,
-            limits=replace(plan.limits, flying_modes=modes),
         )
 
     def _plan(self, ground: Ground) -> Plan:

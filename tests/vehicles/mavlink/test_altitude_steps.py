@@ -247,6 +247,22 @@ def test_a_px4_that_refuses_to_follow_set_points_at_first_is_asked_again() -> No
 
 
 @compiled_only
+@pytest.mark.parametrize("faults", [["taken-over:20@9.3"], ["ack-lost:0.3@10.1", "taken-over:20@10.25"]])
+def test_a_pilot_who_takes_a_px4_over_before_or_as_it_follows_set_points_keeps_it(faults: list[str]) -> None:
+    with LockstepRig("px4", faults=faults) as rig:
+        rig.switch_on_failsafes()
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE["px4"])
+        record = vehicle.fly(order_of("px4"), on_sample=unwatched, should_stop=never)
+        assert rig.drone.autopilot.mode.name == "POSCTL"  # type: ignore[attr-defined]
+        requests = [message for message in rig.heard if message[1].get_type() == "COMMAND_LONG"]
+        modes = [number(message, "param2") for _, message in requests if number(message, "command") == 176]
+        vehicle.close()
+    assert modes == [4.0, 6.0][: len(faults)], "takeoff, and the offboard mode once"
+    assert "A pilot took manual control" in record.reason
+
+
+@compiled_only
 def test_an_abort_during_a_px4s_step_ends_the_stream_and_lands() -> None:
     watcher = Watcher(abort_at_s=15.5)
     with copter("px4") as rig:

@@ -13,8 +13,11 @@ from app.vehicles.mavlink.events import (
     ActionRefused,
     BlockEntered,
     Command,
+    Heartbeat,
     MotorsOffRequested,
     PerformAction,
+    SetPointsPaused,
+    WithdrawSetPoint,
 )
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_reactions import State
@@ -206,9 +209,63 @@ def test_a_set_point_that_is_refused_or_never_confirmed_lands_the_vehicle() -> N
         assert walk.pass_s(8.0).altitudes == [2.0]
 
 
-def test_while_a_set_point_is_not_confirmed_no_other_is_commanded() -> None:
-    walk = hovering(10.0, unheard=True)
+def test_a_set_point_that_is_not_confirmed_in_time_ends_the_flight_and_no_other_is_commanded() -> None:
+    walk = hovering(7.7, unheard=True)
     assert (walk.altitudes, walk.state) == ([2.0], State.RECORD)
+    walk.until_s(10.0)
+    assert (walk.state, walk.trial.failure, walk.altitudes) == (State.ABORT_LAND, Failure.SET_POINT, [2.0])
+    assert walk.trial.why == "The set point of 6 s was not confirmed in time."
+
+
+def test_a_set_point_that_took_effect_late_ends_the_flight() -> None:
+    for late_s, why in ((1.4, ""), (1.6, "A set point took effect 1.6 s late.")):
+        walk = hovering(7.6, unheard=True)
+        sent_s = walk.when(Action.FLY_TO)[0]
+        walk.give(ActionDone(Action.FLY_TO, walk.now_s, (sent_s,), sent_s + late_s))
+        assert (walk.trial.failure, walk.trial.why) == (Failure.SET_POINT if why else None, why)
+
+
+def test_a_record_that_ends_without_all_its_steps_does_not_count() -> None:
+    walk = Stepping(plan=replace(STEPS, record_s=12.5))
+    walk.lift_off()
+    walk.until_s(11.0)
+    walk.unheard = True
+    walk.until_s(12.6)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.SET_POINT)
+    assert walk.trial.why == "The record ended without 1 set point."
+
+
+def test_a_flight_that_a_pilot_interrupted_gets_no_further_set_point() -> None:
+    """Before the first step, one heartbeat reports a manual mode, and the next that it flies by itself."""
+    walk = hovering(4.0)
+    walk.mode = "64"
+    walk.until_s(4.5)
+    walk.mode = "4"
+    walk.until_s(5.9)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
+    walk.until_s(8.0)
+    assert (walk.state, walk.altitudes, walk.actions[-1]) == (State.ABORT_LAND, [], Action.LAND)
+    assert walk.gains_sent == []
+
+
+def test_a_manual_mode_between_two_set_points_ends_them_at_once() -> None:
+    walk = hovering(7.0)
+    walk.hear(Heartbeat(9, armed=True, mode="64"))
+    assert walk.told[-1][1] == WithdrawSetPoint()
+    assert (walk.state, walk.actions[-1]) == (State.RECORD, Action.FLY_TO), "a pilot may be flying"
+    walk.until_s(13.0)
+    assert (walk.state, walk.trial.failure, walk.altitudes) == (State.ABORT_LAND, Failure.INTERRUPTED, [2.0])
+
+
+def test_a_stream_that_paused_lands_the_vehicle_unless_a_pilot_may_be_flying() -> None:
+    walk = hovering(7.0)
+    walk.give(SetPointsPaused(0.8, walk.now_s))
+    assert (walk.state, walk.trial.failure, walk.trial.outcome) == (State.ABORT_LAND, Failure.PAUSED, "invalid")
+    assert walk.trial.why == "Gainline stalled, and sent no set point for 0.8 s."
+    walk = hovering(7.0)
+    walk.hear(Heartbeat(9, armed=True, mode="64"))
+    walk.give(SetPointsPaused(0.8, walk.now_s))
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
 
 
 def test_a_set_point_whose_message_was_repeated_may_have_taken_effect_at_each_sending() -> None:
@@ -253,10 +310,10 @@ HOLDS_FIRST = replace(
     following_modes=frozenset({OFFBOARD}),
     limits=replace(
         PLAN.limits,
-        flying_modes=frozenset({"4.2", LOITER, OFFBOARD}),
+        flying_modes=frozenset({"4.2", LOITER}),
         hovering_modes=frozenset({LOITER}),
         landing_modes=frozenset({"4.6"}),
-        automatic_modes=frozenset({"4.2", LOITER, OFFBOARD, "4.6"}),
+        automatic_modes=frozenset({"0", "4.2", LOITER, OFFBOARD, "4.6"}),
     ),
 )
 
@@ -286,6 +343,65 @@ def test_a_vehicle_holds_its_first_set_point_once_it_hovers_and_before_it_steps(
     assert [change.altitude_m for change in walk.trial.changes] == [3.0]
     walk.until_s(14.0)
     assert (walk.state, walk.altitudes) == (State.RECORD, [2.0, 3.0])
+
+
+def asked() -> Stepping:
+    """A vehicle that hovers, and has been commanded to hold its first set point."""
+    walk = climbed()
+    walk.mode, walk.unheard = LOITER, True
+    return walk.until_s(6.0)
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.3, 0.7, 1.2, 1.9])
+@pytest.mark.parametrize("gives_back", [False, True])
+def test_a_pilot_who_takes_over_while_it_is_commanded_to_hold_is_not_overridden(
+    after_s: float, gives_back: bool
+) -> None:
+    walk = asked()
+    walk.pass_s(after_s)
+    walk.mode = "3.0"
+    while WithdrawSetPoint() not in [command for _, command in walk.told]:
+        walk.pass_s(STEP_S)
+    assert walk.state is State.RECORD
+    walk.mode = LOITER if gives_back else "3.0"
+    walk.pass_s(1.1)
+    given_up = (State.ABORT_LAND, Failure.INTERRUPTED) if gives_back else (State.QUARANTINE, Failure.TAKEN_OVER)
+    assert (walk.state, walk.trial.failure) == given_up
+    walk.give(ActionDone(Action.HOLD, walk.now_s, (walk.now_s - 0.1,), walk.now_s))
+    walk.pass_s(6.0)
+    commanded = [action for action in walk.actions if action in {Action.HOLD, Action.FLY_TO}]
+    assert commanded == [Action.HOLD]
+
+
+def test_holding_the_first_set_point_again_permits_no_crossing() -> None:
+    walk = asked()
+    assert not walk.trial.watch.may_overshoot
+
+
+def test_the_mode_in_which_it_follows_set_points_is_unexpected_before_the_first() -> None:
+    walk = climbed()
+    walk.mode = OFFBOARD
+    walk.until_s(6.0)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
+    walk = following()
+    walk.give(ActionRefused(Action.FLY_TO, "The vehicle refused it.", walk.now_s))
+    walk.pass_s(2.0)
+    assert (walk.state, walk.trial.doubt) == (State.ABORT_LAND, ""), "it lands out of that mode"
+
+
+@pytest.mark.parametrize("begin", [asked, lambda: following().until_s(9.3)], ids=["asked to hold", "during a step"])
+def test_every_failure_of_one_that_holds_first_leads_where_it_must_too(begin: Callable[[], Stepping]) -> None:
+    begun = begin()
+    for happens, then, failure in FAILURES:
+        if happens is land_by_itself:
+            continue
+        walk = deepcopy(begun)
+        walk.moves = False
+        happens(walk)
+        assert (walk.state, walk.trial.failure) == (then, failure), happens
+        flown = len(walk.actions)
+        walk.pass_s(3.2)
+        assert not {Action.HOLD, Action.FLY_TO} & set(walk.actions[flown:]), happens
 
 
 def test_a_vehicle_that_leaves_the_mode_in_which_it_follows_set_points_is_landed() -> None:

@@ -161,16 +161,19 @@ class Outgoing:
 class Step:
     """Messages sent together, up to `attempts` times, and the reply that ends the step: see `CommandReply.to`, or
     `TARGET` with its `altitude_m`, or "mode " and the mode of a heartbeat; if it awaits none, the step ends after
-    `pause_s`. A step that is not `needed` may be refused, or have no reply; one that `persists` is sent again after a
-    refusal, up to `attempts` times."""
+    `pause_s`. `shown_by`: the "mode " of a heartbeat that ends it too, for replies get lost. A step that is not
+    `needed` may be refused, or have no reply; one that `persists` is sent again after a refusal, up to `attempts`
+    times. If there are `modes`, it is sent only while the newest heartbeat reports one of them."""
 
     sends: tuple[Outgoing, ...]
     awaits: str = ""
+    shown_by: str = ""
     attempts: int = 5
     pause_s: float = 0.0
     needed: bool = True
     persists: bool = False
     altitude_m: float = math.nan
+    modes: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

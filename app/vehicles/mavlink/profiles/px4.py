@@ -133,11 +133,11 @@ class Px4:
                 mode = base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _TAKE_OFF)
                 return (Step((mode,), awaits="command 176", attempts=1),)
             case Action.HOLD:
-                mode = base.command(target, _SET_MODE, _CUSTOM_MODE, _OFFBOARD)
+                mode, entered = base.command(target, _SET_MODE, _CUSTOM_MODE, _OFFBOARD), f"mode {_OFFBOARD}.0"
                 return (
                     Step((base.position_target(target),), pause_s=_STREAMED_FOR_S),
-                    Step((mode,), awaits="command 176", persists=True),
-                    Step((), awaits=f"mode {_OFFBOARD}.0"),
+                    Step((mode,), awaits="command 176", shown_by=entered, persists=True, modes=self.hovering_modes),
+                    Step((), awaits=entered),
                     base.follow_target(target),
                 )
             case Action.FLY_TO:
