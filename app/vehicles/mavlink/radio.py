@@ -48,6 +48,43 @@ _SAME_TARGET_M: Final = 0.01
 
 
 @dataclass(slots=True)
+class LoopReports:
+    """Latest reports of a vehicle's vertical loop, with their times of receipt."""
+
+    throttle: float | None = None
+    throttle_s: float = float("-inf")
+    exact_throttle_s: float = float("-inf")
+    altitude_error_m: float = 0.0
+    altitude_error_s: float = float("-inf")
+    target_m: float = 0.0
+    target_s: float = float("-inf")
+
+    def throttle_at(self, now_s: float) -> float | None:
+        """Return the throttle last reported, as a share of full; None without a recent report."""
+        return self.throttle if now_s - self.throttle_s <= THROTTLE_HOLDS_S else None
+
+    def reference_at(self, source: ReferenceSource, altitude_m: float, now_s: float) -> float | None:
+        """Return the autopilot's own reference of a vehicle at this altitude; None without a recent report."""
+        if source == "error" and now_s - self.altitude_error_s <= _REFERENCE_HOLDS_S:
+            return altitude_m + self.altitude_error_m
+        return self.target_m if source == "target" and now_s - self.target_s <= _REFERENCE_HOLDS_S else None
+
+    def note(self, measurement: Measurement | None, now_s: float) -> None:
+        """Note what is reported of the vertical loop: a less exact throttle only while no exact one arrives."""
+        match measurement:
+            case Throttle(share=share, exact=exact):
+                self.exact_throttle_s = now_s if exact else self.exact_throttle_s
+                if exact or now_s - self.exact_throttle_s > THROTTLE_HOLDS_S:
+                    self.throttle, self.throttle_s = share, now_s
+            case AltitudeError(error_m=error_m):
+                self.altitude_error_m, self.altitude_error_s = error_m, now_s
+            case TargetAltitude(altitude_m=altitude_m):
+                self.target_m, self.target_s = altitude_m, now_s
+            case _:
+                pass
+
+
+@dataclass(slots=True)
 class VehicleMemory:
     """Latest measurements of a vehicle; positions with their time of receipt. `block` is the number of the current
     block of its flight plan."""
@@ -61,13 +98,7 @@ class VehicleMemory:
     block: int | None = None
     block_s: float = float("-inf")
     battery_v: float | None = None
-    throttle: float | None = None
-    throttle_s: float = float("-inf")
-    exact_throttle_s: float = float("-inf")
-    altitude_error_m: float = 0.0
-    altitude_error_s: float = float("-inf")
-    target_m: float = 0.0
-    target_s: float = float("-inf")
+    loop: LoopReports = field(default_factory=LoopReports)
     may_arm: bool | None = None
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
@@ -81,28 +112,6 @@ class VehicleMemory:
     def restarts(self) -> int:
         """Number of times that the vehicle has restarted since it was connected."""
         return self.restart_counter.restarts
-
-    def throttle_at(self, now_s: float) -> float | None:
-        """Return the throttle last reported, as a share of full; None without a recent report."""
-        return self.throttle if now_s - self.throttle_s <= THROTTLE_HOLDS_S else None
-
-    def reference_at(self, source: ReferenceSource, altitude_m: float, now_s: float) -> float | None:
-        """Return the autopilot's own reference of a vehicle at this altitude; None without a recent report."""
-        if source == "error" and now_s - self.altitude_error_s <= _REFERENCE_HOLDS_S:
-            return altitude_m + self.altitude_error_m
-        return self.target_m if source == "target" and now_s - self.target_s <= _REFERENCE_HOLDS_S else None
-
-    def _note_loop(self, measurement: Throttle | AltitudeError | TargetAltitude, now_s: float) -> None:
-        """Note what is reported of the vertical loop: a less exact throttle only while no exact one arrives."""
-        match measurement:
-            case Throttle(share=share, exact=exact):
-                self.exact_throttle_s = now_s if exact else self.exact_throttle_s
-                if exact or now_s - self.exact_throttle_s > THROTTLE_HOLDS_S:
-                    self.throttle, self.throttle_s = share, now_s
-            case AltitudeError(error_m=error_m):
-                self.altitude_error_m, self.altitude_error_s = error_m, now_s
-            case TargetAltitude(altitude_m=altitude_m):
-                self.target_m, self.target_s = altitude_m, now_s
 
     def forget_vehicle(self) -> None:
         """Discard its identity and the results of its arming checks."""
@@ -123,7 +132,7 @@ class VehicleMemory:
                 self.battery_v = volts if volts is not None else self.battery_v
                 self.may_arm = may_arm
             case Throttle() | AltitudeError() | TargetAltitude():
-                self._note_loop(measurement, now_s)
+                self.loop.note(measurement, now_s)
             case VehicleEvent():
                 self.arming_checks.take(measurement)
             case Position():

@@ -93,6 +93,7 @@ class TrialRunner:
     ) -> None:
         self._reference = reference
         self._radio, self._restore, self._channels, self._look = radio, restore, channels, look
+        self._loop = replace(radio.seen.loop)
         self._offset_s = float("inf")
         self._on_sample, self._should_stop = on_sample, should_stop
         self._samples: list[RecordSample] = []
@@ -133,7 +134,7 @@ class TrialRunner:
 
     def fly(self) -> TrialResult:
         """Run until the trial is over. Any exception, even one that would end the program, first lands the vehicle."""
-        self._guarded(lambda: self._carry_out(self._begin_with))
+        self._guarded(lambda: self._carry_out(self._begin_with, self._radio.clock.now_s()))
         while not self._trial.is_over:
             self._guarded(self._listen)
             self._guarded(self._evaluate)
@@ -159,8 +160,8 @@ class TrialRunner:
             why = f"Gainline stalled for {stalled_s:.0f} s, so the takeoff was not commanded."
             self._advance(ActionRefused(Action.ARM, why, now_s))
         for each in in_order(packets, self._look()):
-            if isinstance(each, PacketReceived) and isinstance(each.measurement, Position):
-                self._offset_s = min(self._offset_s, each.now_s - each.measurement.time_boot_s)
+            if isinstance(each, PacketReceived):
+                self._note(each)
             self._advance(each)
         if why := self._radio.link.duplicate_reason:
             self._advance(DuplicateVehicleDetected(why, self._radio.clock.now_s()))
@@ -169,6 +170,13 @@ class TrialRunner:
         if self._sequence is not None and (ended := self._sequence.proceed(packets)) is not None:
             self._sequence = None
             self._advance(ended)
+
+    def _note(self, packet: PacketReceived) -> None:
+        """Note what is reported of the loop, in the order of receipt, so that each position gets the newest before it:
+        after a stall of this program many packets are received at once."""
+        self._loop.note(packet.measurement, packet.now_s)
+        if isinstance(packet.measurement, Position):
+            self._offset_s = min(self._offset_s, packet.now_s - packet.measurement.time_boot_s)
 
     def _evaluate(self) -> None:
         if self._trial.state is State.RESTORE:  # an interruption ended the restoring, and no other event continues it
@@ -198,9 +206,9 @@ class TrialRunner:
         self._trial, commands = advance(self._trial, event)
         if self._trial.state is not before:
             self._sequence, self._stream = None, ()  # the commands of the previous state are obsolete
-        self._carry_out(commands)
+        self._carry_out(commands, event.now_s)
 
-    def _carry_out(self, commands: tuple[Command, ...]) -> None:
+    def _carry_out(self, commands: tuple[Command, ...], now_s: float) -> None:
         for command in commands:
             match command:
                 case PerformAction(action, altitude_m):
@@ -215,8 +223,7 @@ class TrialRunner:
                 case RestoreGains():
                     self._advance(GainsRestored(self._radio.clock.now_s(), self._restored()))
                 case RecordSample():
-                    throttle = self._radio.seen.throttle_at(self._radio.clock.now_s())
-                    reference_m = self._reference_m(command.position)
+                    throttle, reference_m = self._loop.throttle_at(now_s), self._reference_m(command.position, now_s)
                     self._record_sample(replace(command, throttle=throttle, reference_m=reference_m))
 
     def _perform(self, action: Action, altitude_m: float | None) -> None:
@@ -248,14 +255,15 @@ class TrialRunner:
         self._radio.send(*self._stream)
         return 0.0
 
-    def _reference_m(self, position: Position) -> float | None:
-        """Return the autopilot's own reference now, on the vehicle's datum; None if it is not known or needed."""
-        trial, now_s = self._trial, self._radio.clock.now_s()
+    def _reference_m(self, position: Position, now_s: float) -> float | None:
+        """Return the autopilot's own reference at the time of receipt of a position, on the vehicle's datum; None if it
+        is not known or needed."""
+        trial = self._trial
         if len(trial.plan.set_points.times_s) == 1 or trial.commanded_boot_s is None:
             return None
         if self._reference is None:
             source = self._radio.profile.reference
-            return self._radio.seen.reference_at(source, position.altitude_m, now_s)
+            return self._loop.reference_at(source, position.altitude_m, now_s)
         time_s = np.array([position.time_boot_s - trial.commanded_boot_s])
         flown = at_last_times(trial.plan.takeoff, trial.changes)
         return float(self._reference(flown, time_s)[0]) + trial.plan.datum_m

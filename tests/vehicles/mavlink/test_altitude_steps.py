@@ -262,6 +262,37 @@ def test_a_pilot_who_takes_a_px4_over_before_or_as_it_follows_set_points_keeps_i
     assert "A pilot took manual control" in record.reason
 
 
+def fly_with_a_stall(name: str, at_s: float, stall_s: float) -> FlightRecord:
+    """A flight during which this program stalls once."""
+    watcher, pending = Watcher(), [stall_s]
+    with copter(name) as rig:
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE[name])
+
+        def stall() -> None:
+            if watcher.samples and watcher.samples[-1].time_s > at_s and pending:
+                rig.wait_s(pending.pop())
+
+        record = vehicle.fly(order_of(name), on_sample=watcher.see, should_stop=stall)
+        vehicle.close()
+    return record
+
+
+@compiled_only
+def test_after_a_stall_each_position_has_the_reference_and_the_throttle_received_before_it() -> None:
+    flight = fly_with_a_stall("ardupilot", 15.3, 0.4).trajectory
+    stalled = (flight.time_s > 15.35) & (flight.time_s < 15.65)
+    assert len(np.unique(flight["reference_m"][stalled] - flight["altitude_m"][stalled])) > 10
+    assert len(np.unique(flight["throttle"][stalled])) > 10
+
+
+@compiled_only
+def test_a_stall_that_interrupts_the_stream_of_set_points_ends_the_flight_as_invalid() -> None:
+    record = fly_with_a_stall("px4", 15.3, 0.7)
+    assert record.ending == "invalid"
+    assert record.reason.startswith("The set points paused. Gainline stalled, and sent no set point for 0.")
+
+
 @compiled_only
 def test_an_abort_during_a_px4s_step_ends_the_stream_and_lands() -> None:
     watcher = Watcher(abort_at_s=15.5)
