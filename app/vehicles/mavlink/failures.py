@@ -168,7 +168,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.NOT_SETTLED: Response(
             "not at rest within 0.2 m in the 2 s before the first step",
-            "land",
+            "land, gains first",
             "invalid",
             "The steps were not flown.",
         ),
@@ -198,8 +198,10 @@ class Finding:
 GAIN_FAILURES: Final = frozenset(
     {failure for failure, known in RESPONSES.items() if known.reaction == "land, gains first"}
 )
-"""Failures that count against the gains: the safe gains are sent before Land. A vehicle that lifts off late, with its
-integrator wound up, is treated in the same way."""
+"""Failures in which the gains are suspect: the safe gains are sent before Land. A vehicle that lifts off late, with its
+integrator wound up, is treated in the same way. One that has not settled may ring, and would land for seconds on these
+gains, but may also drift, or be moved by its estimator or the wind: the flight is invalid, and does not count against
+the gains, unless it exceeds a limit."""
 
 
 CONFIRMATION_PERIODS: Final = 1.05

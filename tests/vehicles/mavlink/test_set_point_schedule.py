@@ -283,6 +283,7 @@ def test_a_vehicle_that_is_not_at_rest_before_the_first_step_is_landed_and_told_
     walk.until_s(6.1)
     assert (walk.state, walk.trial.failure, walk.altitudes) == (State.ABORT_LAND, Failure.NOT_SETTLED, [])
     assert walk.trial.why.startswith("The vehicle had not settled before the first step, at 6 s: it changed by 0.3")
+    assert (walk.gains_sent[0], walk.trial.outcome) == (SAFE_GAINS[0], "invalid")
     low = climbing()
     low.until_s(6.1)
     assert low.trial.failure is Failure.NOT_SETTLED
