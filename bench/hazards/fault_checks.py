@@ -316,6 +316,7 @@ class _Checker:
             return
         may_be_suspect = any(each.kind in GAIN_FAILURES and each.begun_s <= max(left) for each in self.result.injected)
         may_be_suspect |= self.states.first_s(State.RECORD) is None and self._may_have_stayed_down()
+        may_be_suspect |= "The steps were not flown." in self.result.reason
         if first is Command.GAIN and not may_be_suspect:
             yield "the safe gains were sent before Land, though the gains were not suspect"
         is_refused = self.result.outcome == "refused" and self.began_in(ABORT, *AIR)

@@ -5,7 +5,7 @@
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,8 +21,6 @@ from app.vehicles.mavlink.profiles.base import GainParameter, GainSet, Outgoing,
 from app.vehicles.mavlink.radio import ATTEMPTS, REPLY_TIMEOUT_S, AutopilotLink
 
 LIST_ATTEMPTS: Final = 3
-_KNOWN_ATTEMPTS: Final = 2
-"""Attempts for a parameter that the vehicle may lack."""
 LIST_ENDS_S: Final = 2.0
 """The list has ended if no parameter has arrived for this long."""
 
@@ -72,9 +70,15 @@ def write_parameter(radio: AutopilotLink, parameter: str, value: float) -> float
     return _request_parameter(radio, radio.profile.set_parameter(radio.target, parameter, value), parameter)
 
 
-def read_known(radio: AutopilotLink, names: Iterable[str]) -> dict[str, float]:
-    """Return those of these parameters that the vehicle has."""
-    read = {name: read_parameter(radio, name, attempts=_KNOWN_ATTEMPTS) for name in names}
+def read_loop(radio: AutopilotLink, names: Iterable[str], may_lack: Collection[str]) -> dict[str, float]:
+    """Return those of these parameters that the vehicle has. Raises VehicleError that names those it does not report
+    although every release has them: only some releases lack the others, `may_lack`."""
+    read = {name: read_parameter(radio, name) for name in names}
+    if missing := [name for name, value in read.items() if value is None and name not in may_lack]:
+        raise VehicleError(
+            f"The vehicle did not report {', '.join(missing)}, of the loop that is tuned.",
+            hint="Check the link, then try again.",
+        )
     return {name: value for name, value in read.items() if value is not None}
 
 

@@ -562,7 +562,7 @@ def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
     return CheckItem(
         name=f"failsafe {requirement.parameter}",
         title=f"{'Failsafe' if is_failsafe else 'Setting'} {parameter}",
-        passed=value is not None and requirement.is_met(value),
+        passed=requirement.may_lack if value is None else requirement.is_met(value),
         found="not reported" if value is None else f"{value:g}" if value else "off",
         needed=requirement.what,
         hint="Set this in the autopilot: if the link is lost, only its own failsafe lands the vehicle."

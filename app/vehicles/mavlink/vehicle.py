@@ -511,13 +511,12 @@ class MavlinkVehicle:
 
     def _observe_ground(self, watched_s: float, order: FlightOptions) -> Ground:
         """Return where it stands. Raises VehicleError if it is not ready to fly, SafeGainsError if it is armed."""
+        needed = preflight.evaluate_set_point_requirements(self._radio) if _flies_steps(order) else ()
         watched, items = self._check(watched_s)
         if self._radio.profile.flying_blocks:
             plan_time_s = float(self._options["plan_time_s"])
             items = (*items, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
-        if _flies_steps(order):
-            items = (*items, *preflight.evaluate_set_point_requirements(self._radio))
-        items = (*items, preflight.evaluate_set_points(order.set_points))
+        items = (*items, *needed, preflight.evaluate_set_points(order.set_points))
         self._require_not_quarantined()
         preflight.require(items)
         return watched.ground
@@ -551,15 +550,18 @@ class MavlinkVehicle:
         return (*settings, *profile.set_point_settings(target)) if _flies_steps(order) else settings
 
     def _prepare_set_points(self, order: FlightOptions) -> None:
-        """Request the telemetry that a flight with several set points needs, and read the parameters of its loop. The
-        first computation of a reference may take seconds, which must not pass after the ground was observed."""
+        """Request the telemetry that a flight with several set points needs, and read the parameters of its loop, which
+        the replica would otherwise replace by defaults. The first computation of a reference may take seconds, which
+        must not pass after the ground was observed."""
         if self._radio.profile.reference == "replica":
             simulate_reference(order.set_points, 0.0, np.zeros(1), order.record_s)
         self._identify()
         self._require_not_quarantined()
         preflight.prepare_set_points(self._radio)
-        names = self._radio.profile.loop_parameters
-        self._loop = parameters.read_known(self._radio, names[self._gains.release]) if names else {}
+        profile = self._radio.profile
+        if profile.loop_parameters:
+            names = profile.loop_parameters[self._gains.release]
+            self._loop = parameters.read_loop(self._radio, names, profile.may_lack)
 
     def _reference(self, order: FlightOptions, ground: Ground) -> Reference | None:
         """Return the function that computes the autopilot's own reference; None if it sends that, or if it is not

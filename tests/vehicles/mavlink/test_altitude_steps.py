@@ -9,6 +9,8 @@ import pytest
 from app.core.experiments import get_experiment
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints
+from app.simdrone.copter import Copter
+from app.simdrone.copter_parameters import Parameters
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, StopRequest, VehicleError
 from app.vehicles.mavlink.dialects import number
 from app.vehicles.registry import open_vehicle
@@ -312,7 +314,10 @@ def test_an_abort_during_a_px4s_step_ends_the_stream_and_lands() -> None:
 
 @pytest.mark.parametrize(
     ("autopilot", "parameter", "value", "needed"),
-    [("px4", "COM_OF_LOSS_T", 5.0, "2 s or less"), ("ardupilot", "GUID_OPTIONS", 64.0, "without bit 6")],
+    [
+        ("px4", "COM_OF_LOSS_T", 5.0, "0.5 to 2 s"),
+        ("ardupilot", "GUID_OPTIONS", 64.0, "without bit 6"),
+    ],
 )
 def test_what_steps_require_of_a_copter_is_checked_before_they_are_flown_and_not_for_takeoffs(
     autopilot: str, parameter: str, value: float, needed: str
@@ -324,5 +329,23 @@ def test_what_steps_require_of_a_copter_is_checked_before_they_are_flown_and_not
         vehicle.stage(OWN_SAFE[autopilot])
         with pytest.raises(VehicleError, match=f"{parameter}: {value:g}, needed: {needed}") as refusal:
             vehicle.fly(order_of(autopilot), on_sample=unwatched, should_stop=never)
+        assert refusal.value.not_flown
+        vehicle.close()
+
+
+def test_no_steps_are_flown_if_a_parameter_of_the_loop_that_every_release_has_is_not_reported() -> None:
+    """PSC_ACCZ_D_FF is one that older releases lack."""
+    lacked = {"PSC_ACCZ_D_FF", "PSC_VELZ_FLTD"}
+    with LockstepRig("ardupilot") as rig:
+        autopilot = rig.drone.autopilot
+        assert isinstance(autopilot, Copter)
+        autopilot.parameters = Parameters(
+            tuple(each for each in autopilot.firmware.parameters if each.name not in lacked)
+        )
+        rig.switch_on_failsafes()
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE["ardupilot"])
+        with pytest.raises(VehicleError, match=r"did not report PSC_VELZ_FLTD, of the loop that is tuned") as refusal:
+            vehicle.fly(order_of("ardupilot"), on_sample=unwatched, should_stop=never)
         assert refusal.value.not_flown
         vehicle.close()

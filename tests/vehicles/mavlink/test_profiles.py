@@ -455,7 +455,8 @@ def test_paparazzi_tells_every_change_of_block() -> None:
         (PX4, "GF_ACTION", {2.0, 5.0}, {0.0, 1.0, 3.0, 4.0}),
         (PX4, "GF_MAX_VER_DIST", {5.0, 10.0}, {0.0, 120.0}),
         (ARDUPILOT, "GUID_OPTIONS", {0.0, 1.0, 191.0}, {64.0, 65.0}),
-        (PX4, "COM_OF_LOSS_T", {0.5, 2.0}, {0.0, 5.0}),
+        (PX4, "COM_OF_LOSS_T", {0.5, 2.0}, {0.0, 0.4, 5.0}),
+        (PX4, "COM_FAIL_ACT_T", {0.0, 5.0}, {5.1, 25.0}),
         (PX4, "COM_OBL_RC_ACT", {4.0}, {0.0, 3.0, 5.0}),
     ],
 )

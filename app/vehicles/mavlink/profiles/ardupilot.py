@@ -33,6 +33,12 @@ _AUTOPILOT_VERSION: Final = 148
 _CUSTOM_MODE: Final = 1.0
 _LOOP: Final = (*FIRMWARE_NAMES, *UNSUPPORTED, "INS_ACCEL_FILTER", "SCHED_LOOP_RATE")
 _RENAMED: Final = frozenset(older for older, _ in NEWER_NAMES.values())
+_LATER: Final = frozenset({*UNSUPPORTED, "PSC_ACCZ_D_FF", "TKOFF_SLEW_TIME", "TKOFF_THR_MAX"})
+"""Parameters that were added after the first releases with these gains."""
+_MAY_LACK: Final = _LATER | {
+    newer for newer, (older, _) in NEWER_NAMES.items() if older in _LATER or older == "PSC_JERK_Z"
+}
+"""Releases have one of two names for PSC_JERK_Z."""
 
 
 class ArduPilot:
@@ -103,6 +109,7 @@ class ArduPilot:
     set_point_requirements: Final = (
         Requirement("GUID_OPTIONS", "without bit 6 (targets flown by the position controller)", clear_bits=1 << 6),
     )
+    may_lack: Final = _MAY_LACK
     loop_parameters: Final = (_LOOP, (*(name for name in _LOOP if name not in _RENAMED), *NEWER_NAMES))
 
     def measure(self, message: Message) -> Measurement | None:

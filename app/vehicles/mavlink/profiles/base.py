@@ -129,24 +129,27 @@ def check_gains(gains: Gains, gain_set: GainSet) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """Part of a failsafe that must be enabled before a flight: a parameter with one of these values, or else above
-    zero, at most `most`, and with all of these `bits`; or, if there are any `clear_bits`, without these. `what`: these
-    values, with their effect in brackets. `newer_name`: the parameter's name in newer releases."""
+    """Part of a failsafe that must be enabled before a flight: a parameter with one of these values, or else at least
+    `least`, by default above zero, at most `most`, and with all of these `bits`; or, if there are any `clear_bits`,
+    without these. `what`: these values, with their effect in brackets. `newer_name`: the parameter's name in newer
+    releases. `may_lack`: older releases lack it, and what it sets."""
 
     parameter: str
     what: str
     values: frozenset[float] = frozenset()
     bits: int = 0
     clear_bits: int = 0
+    least: float = math.ulp(0.0)
     most: float = math.inf
     newer_name: str = ""
+    may_lack: bool = False
 
     def is_met(self, value: float) -> bool:
         if self.values:
             return value in self.values
         if self.clear_bits:
             return not int(value) & self.clear_bits
-        return 0.0 < value <= self.most and int(value) & self.bits == self.bits
+        return self.least <= value <= self.most and int(value) & self.bits == self.bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,7 +314,12 @@ class Profile(Protocol):
     @property
     def loop_parameters(self) -> tuple[tuple[str, ...], ...]:
         """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set
-        points; it may lack some. None if the replica of its loop has no parameters but its gains."""
+        points. None if the replica of its loop has no parameters but its gains."""
+        ...
+
+    @property
+    def may_lack(self) -> frozenset[str]:
+        """Those of them that some releases lack, whose replica then has their default."""
         ...
 
     def measure(self, message: Message) -> Measurement | None: ...

@@ -76,6 +76,7 @@ class Paparazzi:
     stop_settings: Final = ("kil_thr", "aut_kil_thr")
     requirements: Final[tuple[Requirement, ...]] = ()
     set_point_requirements: Final[tuple[Requirement, ...]] = ()
+    may_lack: Final[frozenset[str]] = frozenset()
     loop_parameters: Final[tuple[tuple[str, ...], ...]] = ()
 
     def measure(self, message: Message) -> Measurement | None:

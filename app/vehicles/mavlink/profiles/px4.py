@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from app.core.control.px4_parameters import FIRMWARE_NAMES, UNSUPPORTED
+from app.core.control.px4_parameters import ESTIMATOR_NAMES, FIRMWARE_NAMES, UNSUPPORTED
 from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
@@ -84,10 +84,14 @@ class Px4:
     )
 
     set_point_requirements: Final = (
-        Requirement("COM_OF_LOSS_T", "2 s or less (until it lands without set points)", most=2.0),
+        Requirement("COM_OF_LOSS_T", "0.5 to 2 s (until it reacts to missing set points)", least=0.5, most=2.0),
         Requirement("COM_OBL_RC_ACT", "4 (land without set points)", frozenset({4.0})),
+        Requirement(
+            "COM_FAIL_ACT_T", "5 s or less (in which it holds before it lands)", least=0.0, most=5.0, may_lack=True
+        ),
     )
-    loop_parameters: Final = ((*FIRMWARE_NAMES, *UNSUPPORTED, "EKF2_PREDICT_US", "IMU_INTEG_RATE", "HTE_THR_RANGE"),)
+    may_lack: Final = frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, "HTE_THR_RANGE"})
+    loop_parameters: Final = ((*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES, "HTE_THR_RANGE"),)
 
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
