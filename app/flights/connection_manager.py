@@ -99,13 +99,16 @@ class VehicleConnectionManager:
                 commands.request_reconnections(transaction)
 
     def close(self) -> None:
-        """Close all connections once nothing is being carried out; every vehicle is left with its safe gains."""
+        """Close all connections once nothing is being carried out; every vehicle is left with its safe gains. The
+        process of a vehicle that may be in the air first repeats its command, which the worker's end then waits for."""
         slots = tuple(self._slots.values())
         for session in [each for slot in slots for each in (slot.session, slot.reconnecting) if each is not None]:
             session.request_close()
         self._reconnect_executor.shutdown()
         for session in [slot.session for slot in slots if slot.session is not None]:
             session.close()
+            if session.is_running:
+                _log.warning("still commanding a vehicle that may be in the air", vehicle_id=session.call.vehicle_id)
         self._record_executor.shutdown()
 
     # ---- from any thread

@@ -130,7 +130,7 @@ class VehicleProcess(FlightLoop):
 
     def _finish_order(self) -> None:
         """Repeat a land or motors off command after the worker's end until telemetry confirms it, for at most
-        STANDING_ORDER_TIMEOUT_S."""
+        STANDING_ORDER_TIMEOUT_S; not at all if it was already repeated that long without a packet from the vehicle."""
         until_s = self._clock.now_s() + STANDING_ORDER_TIMEOUT_S
         while self._vehicle.has_standing_order and self._clock.now_s() < until_s:
             self._vehicle.attend(POLL_INTERVAL_S * self._speed)

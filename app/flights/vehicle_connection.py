@@ -2,8 +2,8 @@
 
 This is the worker's side; the process itself is in `connection_process`. It never touches the database. When the worker
 dies, the pipe between them breaks. A flight is then aborted: the vehicle lands and is left with its safe gains. A land
-or motors off command outside a flight is repeated until the vehicle obeys, for at most 60 s. Then the process ends; the
-next worker's connection waits for that.
+or motors off command outside a flight is repeated until the vehicle obeys, for at most 60 s, but not if it was already
+repeated for 60 s without a packet from the vehicle. Then the process ends; the next worker's connection waits for that.
 """
 
 import datetime as dt
@@ -81,6 +81,11 @@ class VehicleConnection(FlightProcess):
     @property
     def alive(self) -> bool:
         return not self._ended.is_set()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the process has not ended, which after a close means that it still commands its vehicle."""
+        return self._child.alive
 
     def wait_until_open(self) -> ConnectionOpened:
         """Wait until the link is open.

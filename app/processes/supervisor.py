@@ -18,8 +18,9 @@ FIRST_PAUSE_S: Final = 0.2
 LONGEST_PAUSE_S: Final = 10.0
 HEALTHY_AFTER_S: Final = 20.0
 """A child that lived this long is restarted after the shortest pause."""
-STOP_TIMEOUT_S: Final = 60.0
-"""How long a stopping child may take to land its vehicles and record the flights; landing alone may take 40 s."""
+STOP_TIMEOUT_S: Final = 70.0
+"""How long a stopping child may take to land its vehicles and record the flights: landing alone may take 40 s, and Land
+is repeated for 60 s to a vehicle that may be in the air."""
 STACK_DUMP_TIMEOUT_S: Final = 0.5
 
 _log = structlog.get_logger(__name__)

@@ -234,7 +234,8 @@ class ConnectedVehicle(Vehicle, Protocol):
 
     @property
     def has_standing_order(self) -> bool:
-        """Whether a command of `land` or `motors_off` is still being repeated because telemetry does not confirm it."""
+        """Whether a command of `land` or `motors_off` is still being repeated because telemetry does not confirm it;
+        False once it was repeated for a minute without a packet from the vehicle."""
         ...
 
     def condition(self) -> Condition:

@@ -411,6 +411,19 @@ def test_a_vehicle_in_the_air_that_does_not_respond_gets_the_command_for_a_minut
     assert left_alone(process, line, rig, LAND) == pytest.approx(60.0, abs=0.1)
 
 
+def test_a_vehicle_that_got_land_unheard_for_a_minute_keeps_no_process_waiting(
+    rig: AnsweringRig, tmp_path: Path
+) -> None:
+    """Seen: two drones were gone, and the server took a minute to stop."""
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+    in_the_air(rig, process)
+    process._vehicle.land("the link was lost")
+    rig.muted = True
+    process._vehicle.attend(60.5)
+    assert left_alone(process, line, rig) < 0.1
+
+
 def test_one_heartbeat_that_reports_it_disarmed_does_not_end_land_after_the_worker_died(
     rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,6 +14,8 @@ SINKING_S: Final = 1.0
 """Time of descent after which the vehicle counts as landing, longer than a gust."""
 LANDED_WITHIN_S: Final = 20.0
 """Longer than a landing takes: a flight after a landing of this length was begun by somebody else."""
+UNHEARD_S: Final = 60.0
+"""Time for which a command is repeated to a vehicle of which nothing is received, after the worker's end."""
 
 
 class RepeatedCommand:
@@ -41,6 +43,13 @@ class RepeatedCommand:
         """Message that the vehicle does not land although commanded to; otherwise empty."""
         waits = self._action is Action.LAND and self._radio.clock.now_s() - self._requested_s > NOT_DESCENDING_AFTER_S
         return NOT_DESCENDING if waits and not self.is_over and self._landing_since_s is None else ""
+
+    @property
+    def is_unheard(self) -> bool:
+        """Whether it was repeated for UNHEARD_S, of the vehicle's time, without a packet from the vehicle."""
+        heard_s = self._radio.link.health.last_packet_s
+        since_s = self._requested_s if heard_s is None else max(self._requested_s, heard_s)
+        return self._radio.clock.now_s() - since_s >= UNHEARD_S
 
     def proceed(self, packets: list[PacketReceived]) -> None:
         """Process packets, and send the command again if it is due."""

@@ -218,8 +218,10 @@ class MavlinkVehicle:
 
     @property
     def has_standing_order(self) -> bool:
-        """Whether a command of `land` or `motors_off` is still being repeated to a vehicle that may be armed."""
-        return self._repeated is not None and not self._repeated.is_over and not self._radio.is_disarmed
+        """Whether a command of `land` or `motors_off` is still being repeated to a vehicle that may be armed, and was
+        not repeated for a minute without a packet from it."""
+        repeated = self._repeated
+        return repeated is not None and not (repeated.is_over or repeated.is_unheard or self._radio.is_disarmed)
 
     def condition(self) -> Condition:
         """Return the state last received, without waiting. Altitude counts as in a record."""
