@@ -8,7 +8,7 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from multiprocessing.connection import Connection
 from typing import Final, Literal
 
@@ -195,7 +195,7 @@ class VehicleProcess(FlightLoop):
                 self._line.send(StagingLost(str(error)))
 
     def _is_silent(self, status: Condition) -> bool:
-        return status.packet_age_s is None or status.packet_age_s > SILENT_AFTER_S * self._speed
+        return status.packet_age_s is None or status.packet_age_s > SILENT_AFTER_S
 
     def _poll_commands(self) -> ToVehicleProcess | None:
         """Forward a command at once; return any other message."""
@@ -257,13 +257,23 @@ class VehicleProcess(FlightLoop):
         self._line.send_if_ready(status)
         return status
 
+    def _condition(self) -> Condition:
+        """The vehicle's condition, its ages in the time of the ground."""
+        known = self._vehicle.condition()
+        return replace(
+            known,
+            packet_age_s=_in_ground_time(known.packet_age_s, self._speed),
+            heartbeat_age_s=_in_ground_time(known.heartbeat_age_s, self._speed),
+            said_age_s=_in_ground_time(known.said_age_s, self._speed),
+        )
+
     def _status(self) -> VehicleStatus:
-        condition = self._vehicle.condition()
+        condition = self._condition()
         known = {each.name: getattr(condition, each.name) for each in fields(condition)}
         age_s = condition.heartbeat_age_s
         return VehicleStatus(
             vehicle_id=self._call.vehicle_id,
-            state="gone" if age_s is None or age_s > LOST_AFTER_S * self._speed else "connected",
+            state="gone" if age_s is None or age_s > LOST_AFTER_S else "connected",
             at=status_time(),
             concern=self._vehicle.concern,
             unready=self._unready(condition),
@@ -376,6 +386,11 @@ class VehicleProcess(FlightLoop):
                 self._line.send(CommandForwarded(number, order, reason))
             case _:
                 super()._note(message)
+
+
+def _in_ground_time(age_s: float | None, speed: float) -> float | None:
+    """An age by the vehicle's clock, which runs at this speed, in the time of the ground."""
+    return None if age_s is None else age_s / speed
 
 
 def _has_expired(ordered: VehicleCommand) -> bool:
