@@ -387,7 +387,7 @@ def require(items: Sequence[CheckItem]) -> None:
     if any(item.name == _DISARMED for item in failed):
         raise SafeGainsError(ARMED, hint=_LAND_FIRST)
     if failed:
-        found = "; ".join(f"{item.title}: {item.found}, needed: {item.needed}" for item in failed)
+        found = "; ".join(f"{item.title}: {item.found}, required: {item.needed}" for item in failed)
         hints = " ".join(dict.fromkeys(item.hint for item in failed if item.hint))
         raise VehicleError(f"The vehicle is not ready to fly. {found}.", hint=hints or "Correct this, then try again.")
 
@@ -558,14 +558,22 @@ def _flight_plan(problem: str) -> CheckItem:
 def _failsafe(radio: AutopilotLink, requirement: Requirement) -> CheckItem:
     parameter = radio.target.newer_names.get(requirement.parameter, requirement.parameter)
     value = read_parameter(radio, parameter)
-    is_failsafe = not requirement.clear_bits
+    off = " (off)" if value == 0.0 and not requirement.values else ""
     return CheckItem(
         name=f"failsafe {requirement.parameter}",
-        title=f"{'Failsafe' if is_failsafe else 'Setting'} {parameter}",
+        title=f"{'Setting' if requirement.clear_bits else 'Failsafe'} {parameter}",
         passed=requirement.may_lack if value is None else requirement.is_met(value),
-        found="not reported" if value is None else f"{value:g}" if value else "off",
+        found="not reported" if value is None else f"{value:g}{off}",
         needed=requirement.what,
-        hint="Set this in the autopilot: if the link is lost, only its own failsafe lands the vehicle."
-        if is_failsafe
-        else "Set this in the autopilot: it must fly the steps by its position controller.",
+        hint=f"{_correction(requirement, parameter, value)} in the autopilot; Gainline does not change it.",
     )
+
+
+def _correction(requirement: Requirement, parameter: str, value: float | None) -> str:
+    """How to correct a parameter that holds this value: what to subtract or add where only some of its bits count."""
+    held = 0 if value is None else int(value)
+    if surplus := held & requirement.clear_bits:
+        return f"Subtract {surplus} from {parameter}"
+    if held > 0 and (missing := requirement.bits & ~held):
+        return f"Add {missing} to {parameter}"
+    return f"Set {parameter}"

@@ -163,7 +163,7 @@ def test_set_points_too_near_the_altitude_limit_or_the_ground_are_refused_on_the
         with LockstepRig() as rig:
             vehicle = rig.vehicle()
             vehicle.stage(TUNED)
-            with pytest.raises(VehicleError, match=r"needed: above 1.5 m, half of the first, and at most 3.5 m") as why:
+            with pytest.raises(VehicleError, match=r"required: above 1.5 m, half of the first, and at most 3.5 m") as why:
                 vehicle.fly(order, on_sample=unwatched, should_stop=never)
             assert why.value.not_flown
             assert waypoints(rig) == []
@@ -313,22 +313,24 @@ def test_an_abort_during_a_px4s_step_ends_the_stream_and_lands() -> None:
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "parameter", "value", "needed"),
+    ("autopilot", "parameter", "value", "needed", "correction"),
     [
-        ("px4", "COM_OF_LOSS_T", 5.0, "0.5 to 2 s"),
-        ("ardupilot", "GUID_OPTIONS", 64.0, "without bit 6"),
+        ("px4", "COM_OF_LOSS_T", 5.0, "0.5 to 2 s", "Set COM_OF_LOSS_T"),
+        ("px4", "COM_OBL_RC_ACT", 0.0, "4 ", "Set COM_OBL_RC_ACT"),
+        ("ardupilot", "GUID_OPTIONS", 65.0, "without bit 6", "Subtract 64 from GUID_OPTIONS"),
     ],
 )
 def test_what_steps_require_of_a_copter_is_checked_before_they_are_flown_and_not_for_takeoffs(
-    autopilot: str, parameter: str, value: float, needed: str
+    autopilot: str, parameter: str, value: float, needed: str, correction: str
 ) -> None:
     with copter(autopilot) as rig:
         rig.drone.autopilot.parameters[parameter] = value  # type: ignore[attr-defined]
         vehicle = rig.vehicle()
         assert all(item.passed for item in vehicle.check())
         vehicle.stage(OWN_SAFE[autopilot])
-        with pytest.raises(VehicleError, match=f"{parameter}: {value:g}, needed: {needed}") as refusal:
+        with pytest.raises(VehicleError, match=f"{parameter}: {value:g}, required: {needed}") as refusal:
             vehicle.fly(order_of(autopilot), on_sample=unwatched, should_stop=never)
+        assert f"{correction} in the autopilot" in str(refusal.value)
         assert refusal.value.not_flown
         vehicle.close()
 

@@ -243,7 +243,7 @@ def test_a_vehicle_that_was_away_and_whose_answers_are_lost_is_not_flown() -> No
             vehicle.attend(3.0)
             written = list(rig.writes)
             rig.lost_until_s = math.inf
-            with pytest.raises(VehicleError, match="Hardware id: not reported, needed: ") as refusal:
+            with pytest.raises(VehicleError, match="Hardware id: not reported, required: ") as refusal:
                 vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
             assert refusal.value.not_flown
             assert "It did not report its hardware id" in vehicle.concern
@@ -360,7 +360,7 @@ def test_a_check_judges_everything_and_raises_nothing() -> None:
         assert items["gains"].found == items["gains"].needed
         assert items["battery"].needed == "20 V or more"
         vehicle.stage(OWN_SAFE["px4"])
-        with pytest.raises(VehicleError, match=r"Battery: .* needed: 20 V or more"):
+        with pytest.raises(VehicleError, match=r"Battery: .* required: 20 V or more"):
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
 
 
@@ -368,7 +368,7 @@ def test_gains_that_changed_after_they_were_staged_are_not_flown() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)
         rig.change_last_parameter()
-        with pytest.raises(VehicleError, match=r"Gains: kp .* needed: kp 1600"):
+        with pytest.raises(VehicleError, match=r"Gains: kp .* required: kp 1600"):
             vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
         assert vehicle.restore() == SAFE
 

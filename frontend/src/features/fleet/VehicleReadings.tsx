@@ -17,13 +17,15 @@ const OUTDATED: Partial<Record<Vehicle["state"], string>> = {
   disconnected: ", before the vehicle was disconnected: outdated",
 };
 
+const STEPS_REQUIRE = "Altitude steps require more, which is checked before each such flight.";
+
 /** All items of the last preflight check; outdated ones are grey. */
 export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle: Vehicle }) {
   if (checks === null) {
     return (
       <Note>
         {state === "disconnected" ? "Not checked yet." : "Not checked since it was connected, restarted or released."}{" "}
-        All items are checked again before every flight.
+        All items are checked again before every flight. {STEPS_REQUIRE}
       </Note>
     );
   }
@@ -70,7 +72,7 @@ export function CheckList({ vehicle: { checks, checked_at, state } }: { vehicle:
       </div>
       <Note>
         Checked <Time at={checked_at} />
-        {OUTDATED[state] ?? ""}.
+        {OUTDATED[state] ?? ""}. {STEPS_REQUIRE}
       </Note>
     </>
   );
