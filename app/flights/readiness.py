@@ -241,12 +241,13 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
 
 
 def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessStep:
-    """The step of a trial that flies, by the vehicle's own: it still arms, is in the air, or gets its safe gains."""
+    """The step of a trial that flies, by the vehicle's own: it still arms, is in the air, or gets its safe gains. With a
+    lost link it is not known to have landed."""
     step = "" if report.status is None or not standing.has_link else report.status.step
     is_starting = step == "idle" and standing.flown_for_s < _BEGINS_WITHIN_S
     if step in _BEFORE_TAKEOFF or is_starting:
         return "held"
-    return "landed" if step in _ON_THE_GROUND else "in flight"
+    return "landed" if step in _ON_THE_GROUND and _link_loss(standing, report) is None else "in flight"
 
 
 def require_ready(readiness: Readiness) -> None:

@@ -169,6 +169,14 @@ def test_a_vehicle_on_the_ground_has_not_taken_off_yet_and_later_has_landed() ->
     assert readiness_of(over, restoring).steps == up_to("landed")
 
 
+def test_a_vehicle_whose_link_is_lost_is_not_said_to_have_landed() -> None:
+    """Observed defect: “Landed” was ticked beside “Land is repeated until the vehicle descends”."""
+    state, flags, _ = REACHED["in flight"]
+    over = replace(standing(state, flags), flown_for_s=20.0)
+    for lost in (status(step="idle", unready="link silent"), status("gone", step="restore")):
+        assert readiness_of(over, VehicleReport(worker=True, status=lost)).steps == up_to("in flight")
+
+
 @pytest.mark.parametrize("loss", REPORTS)
 @pytest.mark.parametrize("name", list(REACHED)[list(REACHED).index("lost") :])
 def test_once_the_flight_is_over_a_loss_changes_nothing(name: str, loss: str) -> None:

@@ -104,7 +104,7 @@ class MavlinkVehicle:
         self._datum_m = 0.0
         self._flight: TrialRunner | None = None
         self._repeated: RepeatedCommand | None = None
-        self._is_restoring = False
+        self._is_restoring = self._is_starting = False
         self._loop: dict[str, float] = {}
         self._secondary = None if source is None else AlignedAltitudeSource(source)
         on_message = None if source is None else source.on_message
@@ -167,6 +167,7 @@ class MavlinkVehicle:
         or no longer holds the staged gains, or could not be commanded to take off. An exception from `on_sample` or
         `should_stop` lands the vehicle, and is raised again once it is on the ground.
         """
+        self._is_starting = True
         try:
             self._require_not_quarantined()
             self._require_staged()
@@ -184,6 +185,8 @@ class MavlinkVehicle:
                 error.not_flown = True
             self._restore_or_quarantine()
             raise
+        finally:
+            self._is_starting = False
         if stop is not None:
             self._restore_or_quarantine()
             return self._not_begun(ground, stop.reason, has_flown=False)
@@ -245,7 +248,7 @@ class MavlinkVehicle:
         """The step of a trial: what comes before arming is one step, and none without a trial."""
         if state not in _ON_THE_GROUND:
             return state.value
-        return (State.IDLE if self._flight is None else State.PREFLIGHT).value
+        return (State.PREFLIGHT if self._is_starting or self._flight is not None else State.IDLE).value
 
     def attend(self, timeout_s: float) -> None:
         """Receive for `timeout_s` while sending the ground station's heartbeats. A command of `land` or `motors_off` is
