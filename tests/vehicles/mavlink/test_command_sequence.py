@@ -1,0 +1,59 @@
+"""Steps in progress: which replies count, and when the mode that follows set points is requested."""
+
+from typing import cast
+
+from app.vehicles.mavlink.events import Action, ActionDone, CommandReply, Heartbeat, Measurement, PacketReceived
+from app.vehicles.mavlink.link import Link
+from app.vehicles.mavlink.profiles import PROFILES
+from app.vehicles.mavlink.profiles.base import Target
+from app.vehicles.mavlink.radio import AutopilotLink, CommandSequence
+from tests.clocks import SimulatedClock
+from tests.vehicles.mavlink.test_repeated_command import Sent
+
+HOLD, POSITION, OFFBOARD = "4.3", "3.0", "6.0"
+
+
+class Commanded:
+    """A vehicle with an action in progress; each `second` it reports this mode, if any."""
+
+    def __init__(self, autopilot: str, action: Action) -> None:
+        self.clock, self.sent = SimulatedClock(), Sent()
+        link = cast("Link", self.sent)
+        self.radio = AutopilotLink(link, PROFILES[autopilot], self.clock, Target(system=1, aircraft=1))
+        self.clock.wait_s(10.0)
+        self.sequence = CommandSequence(action, self.radio.profile.steps(action, self.radio.target), self.radio)
+
+    @property
+    def requests(self) -> int:
+        return self.sent.count("COMMAND_LONG")
+
+    def hear(self, measurement: Measurement, age_s: float = 0.0) -> ActionDone | None:
+        self.radio.seen.note(measurement, self.clock.now_s() - age_s)
+        ended = self.sequence.proceed([PacketReceived(measurement, self.clock.now_s() - age_s)])
+        assert ended is None or isinstance(ended, ActionDone)
+        return ended
+
+    def second(self, mode: str = "") -> int:
+        """How many requests for a mode are sent in it."""
+        before = self.requests
+        if mode:
+            self.hear(Heartbeat(12, armed=True, mode=mode))
+        for _ in range(10):
+            self.clock.wait_s(0.1)
+            self.sequence.proceed([])
+        return self.requests - before
+
+
+def test_a_reply_received_before_the_message_was_sent_confirms_nothing() -> None:
+    commanded = Commanded("paparazzi", Action.FLY_TO)
+    reply = CommandReply(PROFILES["paparazzi"].steps(Action.FLY_TO, commanded.radio.target)[0].awaits, accepted=True)
+    assert commanded.hear(reply, age_s=0.1) is None
+    assert commanded.hear(reply) is not None
+
+
+def test_offboard_is_requested_only_while_the_newest_heartbeat_reports_hold_and_again_only_after_another() -> None:
+    commanded = Commanded("px4", Action.HOLD)
+    assert [commanded.second(HOLD), commanded.second(POSITION), commanded.second(POSITION)] == [0, 0, 0]
+    assert [commanded.second(HOLD), commanded.second(), commanded.second(HOLD)] == [1, 0, 1]
+    assert [commanded.second(OFFBOARD), commanded.second(OFFBOARD)] == [0, 0], "though the reply was lost"
+    assert commanded.sent[-1] == "SET_POSITION_TARGET_LOCAL_NED"
