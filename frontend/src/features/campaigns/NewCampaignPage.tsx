@@ -62,6 +62,7 @@ export function NewCampaignPage() {
 }
 
 const ENTER_NAME = "Enter a name.";
+const CHOOSE_VEHICLE = "Choose a vehicle.";
 const CHOOSE_CAMPAIGN = "Choose a campaign.";
 
 const STARTS: Record<StartKind, string> = {
@@ -101,7 +102,12 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
   const unread = unreadable(form, catalogue);
   const isNamed = form.name.trim() !== "";
   const lacksDonor = form.start === "campaign" && form.donor === null;
-  const missing = [...(isNamed ? [] : [ENTER_NAME]), ...(lacksDonor ? [CHOOSE_CAMPAIGN] : [])];
+  const lacksVehicle = form.vehicle === "";
+  const missing = [
+    ...(isNamed ? [] : [ENTER_NAME]),
+    ...(lacksVehicle ? [CHOOSE_VEHICLE] : []),
+    ...(lacksDonor ? [CHOOSE_CAMPAIGN] : []),
+  ];
   const isUnreadBelow = unread.some((label) => !(label in form.startGains));
   const isReal = vehicles.some(({ id, is_real }) => id === form.registered?.id && is_real);
   return (
@@ -128,7 +134,7 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         others={flyingOther(vehicles, form.experiment)}
         kind={form.vehicle}
         vehicleId={form.registered?.id ?? null}
-        error={reasons["vehicle.kind"] ?? reasons["vehicle.id"]}
+        error={lacksVehicle ? CHOOSE_VEHICLE : (reasons["vehicle.kind"] ?? reasons["vehicle.id"])}
         onKind={(kind) => setForm(withVehicle(form, catalogue, kind))}
         onVehicle={(vehicle) => setForm(withRegistered(form, catalogue, vehicle))}
       />

@@ -242,6 +242,19 @@ test("a vehicle that flies another experiment brings it along, with its gains; a
   expect(requestFrom(form, catalogue).vehicle).toEqual({ kind: "mavlink", id: 8 });
 });
 
+test("a vehicle stays where it flies the selected experiment; otherwise one must be chosen", () => {
+  const hornet = { ...wasp, name: "Hornet", experiments: ["takeoff-px4", "altitude-steps-px4"] };
+  const steps = { ...catalogue.experiments[1], name: "altitude-steps-px4", title: "Steps under PX4" };
+  const wider = { ...catalogue, experiments: [...catalogue.experiments, steps] } as Catalogue;
+  const form = withExperiment(withRegistered(startingForm(wider), wider, hornet), wider, "altitude-steps-px4");
+  expect(form).toMatchObject({ registered: hornet, vehicle: "mavlink", name: "Steps under PX4, Hornet" });
+  expect(withExperiment(form, wider, "takeoff")).toMatchObject({ registered: null, vehicle: "jsbsim" });
+  const other = withExperiment(withRegistered(startingForm(wider), wider, bee), wider, "altitude-steps-px4");
+  expect(other).toMatchObject({ registered: null, vehicle: "", name: "Steps under PX4" });
+  const twin = { ...withVehicle(startingForm(wider), wider, "twin"), vehicleOptions: { mass_kg: 0.5 } };
+  expect(withExperiment(twin, wider, "takeoff")).toMatchObject({ vehicle: "twin", vehicleOptions: { mass_kg: 0.5 } });
+});
+
 test("a reason about bounds is given at the wrong one, or at both", () => {
   const kp = gain("kp", 4000, 283);
   expect(boundReasons(kp, [4001, 4000], "wrong")).toEqual(["wrong", undefined]);

@@ -96,6 +96,7 @@ function presetFor(catalogue: Catalogue, experiment: string, vehicle: string): P
 
 function nameFor(catalogue: Catalogue, experiment: string, vehicle: string): string {
   const title = catalogue.experiments.find(({ name }) => name === experiment)?.title ?? experiment;
+  if (vehicle === "") return title;
   const kind = catalogue.vehicle_kinds.find(({ name }) => name === vehicle);
   const by = kind === undefined ? vehicle : kind.can_fly ? kind.title : kind.title.toLowerCase();
   return presetFor(catalogue, experiment, vehicle)?.title ?? `${title}, ${by}`;
@@ -167,12 +168,31 @@ export function withRegistered(form: CampaignForm, catalogue: Catalogue, registe
   return { ...suited, vehicle: registered.kind, registered, vehicleOptions: {}, name };
 }
 
-/** Select an experiment: resets everything except the stop rule, the seed and an edited name. */
+/** Select an experiment: resets everything except a vehicle that flies it, the stop rule, the seed and an edited name. */
 export function withExperiment(form: CampaignForm, catalogue: Catalogue, experiment: string): CampaignForm {
   const { stop, maxFlights, improvementPercent, confidencePercent, seed } = form;
   const fresh = startingForm(catalogue, experiment);
-  const name = isNamedByHand(form, catalogue) ? form.name : fresh.name;
-  return { ...fresh, name, stop, maxFlights, improvementPercent, confidencePercent, seed };
+  const { vehicle, registered, vehicleOptions } = flies(form, catalogue, experiment) ? form : fresh;
+  const name = isNamedByHand(form, catalogue) ? form.name : nameFor(catalogue, experiment, registered?.name ?? vehicle);
+  return {
+    ...fresh,
+    name,
+    vehicle,
+    registered,
+    vehicleOptions,
+    stop,
+    maxFlights,
+    improvementPercent,
+    confidencePercent,
+    seed,
+  };
+}
+
+/** Whether the form's vehicle flies this experiment itself. */
+function flies({ vehicle, registered }: CampaignForm, catalogue: Catalogue, experiment: string): boolean {
+  return registered === null
+    ? kindsFor(catalogue, experiment).some(({ name, can_fly }) => can_fly && name === vehicle)
+    : fits(registered.experiments, experiment);
 }
 
 function number(entry: NumberEntry, fallback: number): number {
