@@ -127,8 +127,8 @@ def _mismatch(definition: Definition, kind: str, options: Mapping[str, OptionVal
     elif (excess_m := highest_set_point_m(definition) - described.highest_set_point_m) > 0.0:
         yield Problem(
             "definition.experiment_options.height_m",
-            f"must be lower by {excess_m:g} m, or the steps smaller: the highest set point of {kind} is "
-            f"{described.highest_set_point_m:g} m",
+            f"must be lower by {excess_m:g} m, or the steps smaller: a vehicle of this kind flies "
+            f"to at most {described.highest_set_point_m:g} m",
         )
 
 

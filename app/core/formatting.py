@@ -28,9 +28,10 @@ def decimals(uncertainty: float | None) -> int:
 
 
 def plus_minus(value: float, standard_error: float, unit: str, *, sign: Literal["-", "+"] = "-") -> str:
-    """`0.105 ± 0.012 m`, with as many digits as the uncertainty justifies; `sign="+"` always prints the sign."""
+    """`0.105 ± 0.012 m`, with as many digits as the uncertainty justifies; `sign="+"` always prints the sign. The unit
+    of a dimensionless quantity is empty."""
     digits = decimals(standard_error)
-    return _true_minus(f"{value:{sign}z.{digits}f} ± {standard_error:.{digits}f} {unit}")
+    return _true_minus(f"{value:{sign}z.{digits}f} ± {standard_error:.{digits}f} {unit}".rstrip())
 
 
 def short(value: float | None) -> str:

@@ -258,13 +258,13 @@ class LandscapeFigure:
         held = ", ".join(f"{name} {value:g}" for name, value in self.landscape.centre.items())
         parts = [
             f"The error that the model predicts, {pairs}.",
-            f"The other gains are fixed at {held}; flights with other values of them are drawn too.",
+            f"The slices are through {held}; flights with other values of them are drawn too.",
             f"Contours every {scale.step:g} {self.history.error_unit}; values above {scale.high:g} are shaded.",
         ]
         if self.landscape.still:
-            parts.append(
-                f"The gains with the largest gradient are varied; {', '.join(self.landscape.still)} are fixed."
-            )
+            still = self.landscape.still
+            fixed = f"{', '.join(still)} {'is' if len(still) == 1 else 'are'} fixed"
+            parts.append(f"The gains with the largest gradient are varied; {fixed}.")
         return " ".join(parts)
 
     def _table(self) -> Table:

@@ -106,7 +106,7 @@ class CalibrationFigure:
     def _title(self, palette: Palette, index: int, name: str, panels: int) -> dict[str, object]:
         fitted = next(point.fitted[name] for point in self.points if name in point.fitted)
         place = theme.stacked(index, panels, _GAP)
-        return theme.note(palette, f"<b>{fitted.title}</b> ({fitted.unit})", y=place[1])
+        return theme.note(palette, f"<b>{fitted.title}</b>{f' ({fitted.unit})' if fitted.unit else ''}", y=place[1])
 
     def _tuned(self, palette: Palette, panels: int) -> list[dict[str, object]]:
         if self.since is None:

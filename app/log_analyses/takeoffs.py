@@ -150,8 +150,7 @@ def _vehicle(analysis: TakeoffAnalysis) -> list[str]:
 
 
 def _fitted(each: FittedParameter) -> str:
-    unit = "" if each.unit == "1" else each.unit
-    return f"{each.title.lower()} {plus_minus(each.value, each.standard_error, unit)}".rstrip()
+    return f"{each.title.lower()} {plus_minus(each.value, each.standard_error, each.unit)}"
 
 
 def _table(analysis: TakeoffAnalysis) -> GainsTable:

@@ -138,7 +138,9 @@ def describe_vehicle(
         hardware = f", hardware id {identity.uid}" if identity.uid else ""
         facts.append(Fact("Autopilot", f"{known}, system {identity.system_id}{hardware}"))
     titled = () if kind is None else [replace(each, title=each.label or each.title) for each in kind.options]
-    facts += _options(vehicle.options, titled)
+    autopilot = vehicle.options.get("autopilot")
+    foreign = {each.name for each in titled if each.autopilots and autopilot not in each.autopilots}
+    facts += _options({name: value for name, value in vehicle.options.items() if name not in foreign}, titled)
     if vehicle.can_fly:
         facts.append(Fact("Safe gains", safe_gains))
     facts.append(Fact("Experiment", experiment.title))

@@ -149,8 +149,8 @@ def test_flights_flown_elsewhere_are_refused_with_a_plain_sentence(client: TestC
 def test_a_vehicle_with_a_link_flies_to_no_set_point_near_its_altitude_limit(client: TestClient) -> None:
     high = {**SHORT, "experiment_options": {**OPTIONS, "order": "up first"}}
     assert refused(client, {"kind": "mavlink"}, high) == {
-        "definition.experiment_options.height_m": "must be lower by 0.5 m, or the steps smaller: the highest set point "
-        "of mavlink is 3.5 m"
+        "definition.experiment_options.height_m": "must be lower by 0.5 m, or the steps smaller: a vehicle of this "
+        "kind flies to at most 3.5 m"
     }
 
 

@@ -42,6 +42,10 @@ def test_a_drift_has_its_sign() -> None:
     assert plus_minus(-0.0312, 0.012, "m", sign="+") == "−0.031 ± 0.012 m"
 
 
+def test_a_dimensionless_quantity_has_no_unit() -> None:
+    assert plus_minus(1.0049, 0.0091, "") == "1.005 ± 0.009"
+
+
 def test_without_an_uncertainty_three_digits_are_enough() -> None:
     assert [short(value) for value in (0.41154, 0.0933, 3.3818, 152.3, 0.0, 2.1e-6, None)] == [
         "0.412", "0.093", "3.382", "152.300", "0.000", "0.000002", "–"]  # fmt: skip

@@ -47,7 +47,7 @@ def copter_parameters(hover: tuple[float, float], slope: tuple[float, float]) ->
     over vehicles."""
     return (
         _parameter("hover_throttle", "Hover throttle", "of full", *hover, 0.05, 0.9),
-        _parameter("thrust_slope", "Thrust slope", "1", *slope, 0.2, 3.0),
+        _parameter("thrust_slope", "Thrust slope", "", *slope, 0.2, 3.0),
         _parameter("motor_lag_s", "Motor lag", "s", 0.05, 0.05, 0.0, 0.25),
         _parameter("drag_1_s", "Drag", "1/s", 0.3, 0.3, 0.0, 2.0),
     )

@@ -117,7 +117,7 @@ PX4_GAINS: Final = (
     _copter_gain("MPC_Z_P", "Climb rate per altitude error", "1/s", 0.1, 1.5, 1.0),
     _copter_gain("MPC_Z_VEL_P_ACC", "Acceleration per climb rate error", "1/s", 2.0, 15.0, 4.0),
     _copter_gain("MPC_Z_VEL_I_ACC", "Acceleration per integrated climb rate error", "1/s²", 0.2, 3.0, 2.0),
-    _copter_gain("MPC_Z_VEL_D_ACC", "Acceleration per measured acceleration", "1", 0.0, 2.0, 0.0),
+    _copter_gain("MPC_Z_VEL_D_ACC", "Acceleration per measured acceleration", "", 0.0, 2.0, 0.0),
 )
 
 

@@ -62,7 +62,7 @@ MODEL_PARAMETERS: Final = (
     _known("start_latency_s", "Start latency", "s", 1.0, 0.15, 0.3, expected=0.2, flight_sd=0.06),
     _known("motor_lag_s", "Motor lag", "s", 0.3, 0.04, 0.05, expected=0.05),
     _known("drag_1_s", "Drag", "1/s", 1.0, 0.15, 0.2, expected=0.15),
-    _known("quadratic_share", "Quadratic share of thrust", "1", 1.0, 0.5, 0.3),
+    _known("quadratic_share", "Quadratic share of thrust", "", 1.0, 0.5, 0.3),
     _known("ground_effect", "Ground effect", "of weight", 0.5, 0.12, 0.1),
     _known("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
     _known("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),

@@ -170,8 +170,8 @@ def _steps(definition: Definition) -> Iterator[Problem]:
     if altitudes_m and min(altitudes_m) <= 0.5 * max(altitudes_m):
         yield Problem(
             "experiment_options.step_m",
-            f"must leave every set point above half of the highest, {0.5 * max(altitudes_m):g} m, got "
-            f"{min(altitudes_m):g} m",
+            f"must be below {0.5 * max(altitudes_m):g} m, half of the highest set point, got "
+            f"{max(altitudes_m) - min(altitudes_m):g} m",
         )
 
 

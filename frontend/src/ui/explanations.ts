@@ -13,7 +13,7 @@ export const EXPLANATIONS = explained({
   error: {
     question: "What is the error?",
     answer: [
-      "How far the flight was from its set point. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. Altitude steps: the mean of |reference − altitude| after the steps. F-16: the integral of |reference − pitch|.",
+      "How far the flight was from its target. Takeoff: the mean of |3 m − altitude| over the scored window, 32.6 s unless set otherwise. Altitude steps: the mean of |reference − altitude| after the steps. F-16: the integral of |reference − pitch|.",
       "Lower is better. A takeoff cannot reach zero: Paparazzi's reference scores 0.091 m over 32.6 s.",
     ],
   },
@@ -26,7 +26,7 @@ export const EXPLANATIONS = explained({
   errorSoFar: {
     question: "What is the error so far?",
     answer: [
-      "The error of the samples received so far. A takeoff starts 3 m below its set point, so this value starts high and falls. At the end of the scored window it is the error of the flight.",
+      "The error of the samples received so far. A takeoff starts at the ground, so its value starts high and falls; altitude steps are scored from the first step on. At the end of the scored window it is the error of the flight.",
     ],
   },
   predicted: {
@@ -82,7 +82,7 @@ export const EXPLANATIONS = explained({
   curves: {
     question: "What do the lines mean?",
     answer: [
-      "Dotted: the set point. Dash-dotted: the reference trajectory, which the autopilot's filter generates and its control loop follows.",
+      "Dotted: the set point. Dash-dotted: the reference trajectory, which the autopilot's control loop follows; under PX4 it is the set point itself.",
       "Thick: the best flight. Dark: the latest flight. Dashed, with its band: the prediction for the next gains. Nine out of ten flights should stay inside the band.",
     ],
   },

@@ -72,7 +72,7 @@ def test_px4_is_scored_against_the_set_point_and_arducopter_against_the_target_t
     [
         ({"step_m": 2.0, "height_m": 5.0}, None),
         ({"step_m": 2.0, "order": "up first"}, None),
-        ({"step_m": 1.5}, "must leave every set point above half of the highest, 1.5 m, got 1.5 m"),
+        ({"step_m": 1.5}, "must be below 1.5 m, half of the highest set point, got 1.5 m"),
         ({"step_m": 2.5}, "must be between 0.25 and 2 m, got 2.5"),
     ],
 )

@@ -165,7 +165,7 @@ function Groups({ groups, error_unit: unit }: CampaignStatistics) {
       <thead>
         <tr>
           <th scope="col">[{names.join(" ")}]</th>
-          <th scope="col">Flights</th>
+          <th scope="col">Flight no.</th>
           <th scope="col">
             Mean error ± standard error <HelpTip topic="standardError" />
           </th>
