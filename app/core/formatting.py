@@ -13,6 +13,8 @@ EXACT_DIGITS: Final = 7
 """Digits of a gain that is compared with another: those of a single-precision number."""
 _MAX_DIGITS: Final = 6
 _SHORT_DECIMALS: Final = 3
+_MORE_DIGITS_BELOW: Final = 0.0095
+"""An error below this would have a single digit with three decimals."""
 _LISTED_RUNS: Final = 5
 _TWO_DIGITS_BELOW: Final = 3.55
 """An uncertainty with leading digits below this is given a second digit: 0.012 as 0.01 would lose too much."""
@@ -35,12 +37,20 @@ def plus_minus(value: float, standard_error: float, unit: str, *, sign: Literal[
 
 
 def short(value: float | None) -> str:
-    """An error without a stated uncertainty: three decimals as on the pages, but at least one digit above zero; a dash
-    for None."""
-    if value is None:
-        return NOTHING
-    power = math.floor(math.log10(abs(value))) if value else 0
-    return _true_minus(f"{value:.{max(_SHORT_DECIMALS, -power)}f}")
+    """An error without a stated uncertainty, as on the pages; a dash for None."""
+    return NOTHING if value is None else number(value, error_digits(value))
+
+
+def error_digits(*errors: float) -> int:
+    """Decimals of an error: three, but at least two significant digits, of the smallest one that is not zero."""
+    least = min((abs(error) for error in errors if error), default=1.0)
+    return min(_MAX_DIGITS, 1 - math.floor(math.log10(least))) if least < _MORE_DIGITS_BELOW else _SHORT_DECIMALS
+
+
+def interval_text(lower: float, upper: float) -> str:
+    """`0.093 … 0.118`, or `0.0036 … 0.0042`: both ends with the digits of the smaller one."""
+    digits = error_digits(lower, upper)
+    return f"{number(lower, digits)} … {number(upper, digits)}"
 
 
 def percent(share: float, digits: int = 0) -> str:

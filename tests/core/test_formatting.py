@@ -7,6 +7,7 @@ from app.core.formatting import (
     format_gains,
     gain,
     grouped,
+    interval_text,
     measured,
     named_flights,
     number,
@@ -49,6 +50,11 @@ def test_a_dimensionless_quantity_has_no_unit() -> None:
 def test_without_an_uncertainty_three_digits_are_enough() -> None:
     assert [short(value) for value in (0.41154, 0.0933, 3.3818, 152.3, 0.0, 2.1e-6, None)] == [
         "0.412", "0.093", "3.382", "152.300", "0.000", "0.000002", "–"]  # fmt: skip
+
+
+def test_an_error_of_a_few_millimetres_has_two_significant_digits() -> None:
+    assert [short(value) for value in (0.0096, 0.0094, 0.00391, 0.00041)] == ["0.010", "0.0094", "0.0039", "0.00041"]
+    assert interval_text(0.00361, 0.00424) == "0.0036 … 0.0042"
 
 
 def test_a_share_is_held_together_by_a_space_that_does_not_break() -> None:

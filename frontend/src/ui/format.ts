@@ -2,8 +2,14 @@
 
 export const NOTHING = "–";
 
-/** Errors are known to about a millimetre: three digits after the point. */
-export function withUnit(value: number | null | undefined, unit: string, digits = 3): string {
+/** Decimals of an error: three, but at least two significant digits, of the smallest one that is not zero. */
+export function errorDigits(...errors: readonly number[]): number {
+  const least = Math.min(...errors.map(Math.abs).filter((error) => error > 0));
+  return least < 0.0095 ? Math.min(6, 1 - Math.floor(Math.log10(least))) : 3;
+}
+
+/** With the digits of an error unless stated otherwise. */
+export function withUnit(value: number | null | undefined, unit: string, digits = errorDigits(value ?? 0)): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
   return `${trueMinus(value.toFixed(digits))}${unitAfter(unit)}`;
 }

@@ -16,6 +16,11 @@ describe("a number with its uncertainty", () => {
   test("without an uncertainty it keeps three digits after the point", () => {
     expect(plusMinus(0.13189, null, "m")).toBe("0.132 m");
     expect(plusMinus(0.13189, 0, "")).toBe("0.132");
+    expect([0.00391, 0.0096, 0.000041].map((error) => plusMinus(error, null, "m"))).toEqual([
+      "0.0039 m",
+      "0.010 m",
+      "0.000041 m",
+    ]);
     expect(plusMinus(null, 0.1, "m")).toBe("–");
     expect(plusMinus(Number.NaN, 0.1, "m")).toBe("–");
   });
@@ -30,6 +35,7 @@ describe("a number with its uncertainty", () => {
 test("an interval shows both ends, in the digits of an error, and its confidence", () => {
   expect(intervalText({ lower: 0.093, upper: 0.1174, confidence: 0.9 }, "m")).toBe("0.093 … 0.117 m (90\u00a0%)");
   expect(rangeText({ lower: 0, upper: 2.2, confidence: 0.9 }, "m")).toBe("0.000 … 2.200 m");
+  expect(rangeText({ lower: 0.0036, upper: 0.0042, confidence: 0.9 }, "m")).toBe("0.0036 … 0.0042 m");
 });
 
 test("a share is a percentage, and certainty is not claimed", () => {

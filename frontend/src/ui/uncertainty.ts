@@ -1,7 +1,7 @@
 /** Numbers with their uncertainty, rounded to it: 0.105 ± 0.012 m, not 0.10537 ± 0.0123. */
 
 import type { Interval } from "../api/types";
-import { NOTHING, percentText, unitAfter, withUnit } from "./format";
+import { errorDigits, NOTHING, percentText, unitAfter, withUnit } from "./format";
 
 const MOST_DIGITS = 6;
 /** An uncertainty with a smaller leading digit keeps two digits: rounding 0.012 to 0.01 would lose too much. */
@@ -27,15 +27,15 @@ export function plusMinus(
   unit: string,
 ): string {
   if (!isNumber(value)) return NOTHING;
-  const after = unitAfter(unit);
-  if (!isNumber(uncertainty) || uncertainty <= 0) return `${value.toFixed(3)}${after}`;
+  if (!isNumber(uncertainty) || uncertainty <= 0) return withUnit(value, unit);
   const digits = decimalsOf(uncertainty);
-  return `${value.toFixed(digits)} ± ${uncertainty.toFixed(digits)}${after}`;
+  return `${value.toFixed(digits)} ± ${uncertainty.toFixed(digits)}${unitAfter(unit)}`;
 }
 
-/** `0.093 … 0.118 m`: printed like the errors it is compared with, to three digits. */
+/** `0.093 … 0.118 m`: printed like the errors it is compared with. */
 export function rangeText({ lower, upper }: Interval, unit: string): string {
-  return `${lower.toFixed(3)} … ${withUnit(upper, unit)}`;
+  const digits = errorDigits(lower, upper);
+  return `${lower.toFixed(digits)} … ${withUnit(upper, unit, digits)}`;
 }
 
 /** `0.093 … 0.118 m (90 %)`: both ends and the confidence, because ± denotes a standard error. */

@@ -14,6 +14,7 @@ import {
   vehicleRequest,
   vehicleStateLabel,
   withAutopilot,
+  withSimulation,
 } from "./fleet";
 
 const catalogue = {
@@ -49,6 +50,14 @@ test("another autopilot brings its own gains and usual address, and nobody has l
   expect(form.safeGains).toEqual({ MPC_Z_P: 1 });
   expect(form.confirmed).toBe(false);
   expect(gainsFor(catalogue, "px4").map(({ name }) => name)).toEqual(["MPC_Z_P"]);
+});
+
+test("a simulated vehicle has its autopilot's usual address too, whichever was chosen first", () => {
+  const simulated = withSimulation(startingVehicle(catalogue), true);
+  expect(simulated.options["address"]).toBe("udp:127.0.0.1:4245@4244");
+  const px4 = withAutopilot(simulated, catalogue, "px4");
+  expect(px4.options["address"]).toBe("udpin:127.0.0.1:14550");
+  expect(withSimulation(px4, false).options["address"]).toBe("udpin:127.0.0.1:14550");
 });
 
 test("an address that somebody has typed stays with another autopilot", () => {

@@ -98,12 +98,15 @@ export function purposeOf({ purpose, asked }: Pick<GivenGains, "purpose" | "aske
   return Object.keys(asked).length === 0 ? "Found at connection, nothing sent" : PURPOSES[purpose];
 }
 
-/** Usual address of each autopilot. */
-const ADDRESSES: Readonly<Record<string, string>> = {
-  paparazzi: "udp:192.168.1.1:4245@4244",
-  ardupilot: "udpin:127.0.0.1:14550",
-  px4: "udpin:127.0.0.1:14550",
-};
+const PAPARAZZI_ADDRESS = "udp:192.168.1.1:4245@4244";
+const SIMULATED_ADDRESS = "udp:127.0.0.1:4245@4244";
+/** Of ArduCopter and PX4, simulated ones too. */
+const LISTENED_ADDRESS = "udpin:127.0.0.1:14550";
+
+function usualAddress(autopilot: string, simulated: boolean): string {
+  if (autopilot !== "paparazzi") return LISTENED_ADDRESS;
+  return simulated ? SIMULATED_ADDRESS : PAPARAZZI_ADDRESS;
+}
 
 export const AUTOPILOTS = [
   { value: "paparazzi", label: "Paparazzi (AR.Drone 2)" },
@@ -144,7 +147,7 @@ function defaultGains(catalogue: Catalogue, autopilot: string): Record<string, N
 export function startingVehicle(catalogue: Catalogue): VehicleForm {
   return {
     name: "",
-    options: { autopilot: "paparazzi", address: ADDRESSES["paparazzi"] ?? "", simulated: false },
+    options: { autopilot: "paparazzi", address: PAPARAZZI_ADDRESS, simulated: false },
     safeGains: defaultGains(catalogue, "paparazzi"),
     confirmed: false,
     statement: "",
@@ -153,24 +156,25 @@ export function startingVehicle(catalogue: Catalogue): VehicleForm {
 
 /** Select an autopilot: resets the gains and updates an unedited address. */
 export function withAutopilot(form: VehicleForm, catalogue: Catalogue, autopilot: string): VehicleForm {
-  const isUsual = Object.values(ADDRESSES).includes(String(form.options["address"]));
-  const address = isUsual ? (ADDRESSES[autopilot] ?? "") : (form.options["address"] ?? "");
   return {
     ...form,
-    options: { ...form.options, autopilot, address },
+    options: withUsualAddress({ ...form.options, autopilot }),
     safeGains: defaultGains(catalogue, autopilot),
     confirmed: false,
   };
 }
 
-const SIMULATED_ADDRESS = "udp:127.0.0.1:4245@4244";
+/** The options with the usual address of their vehicle, unless the address was edited. */
+function withUsualAddress(options: VehicleForm["options"]): VehicleForm["options"] {
+  const isUsual = [PAPARAZZI_ADDRESS, SIMULATED_ADDRESS, LISTENED_ADDRESS].includes(String(options["address"]));
+  return isUsual
+    ? { ...options, address: usualAddress(autopilotOf({ options }), options["simulated"] === true) }
+    : options;
+}
 
 /** Register a simulation or a real vehicle: updates an unedited address. */
 export function withSimulation(form: VehicleForm, simulated: boolean): VehicleForm {
-  const [from, to] = [ADDRESSES["paparazzi"], SIMULATED_ADDRESS];
-  const [usual, wanted] = simulated ? [from, to] : [to, from];
-  const address = form.options["address"] === usual ? (wanted ?? "") : (form.options["address"] ?? "");
-  return { ...form, options: { ...form.options, simulated, address } };
+  return { ...form, options: withUsualAddress({ ...form.options, simulated }) };
 }
 
 /** The local port that an address needs for itself; the whole address if it names none. */
