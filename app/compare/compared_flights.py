@@ -18,7 +18,7 @@ from app.compare.schemas import FlightDifference, FlightSetting
 from app.core.definition import Option, with_defaults
 from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Experiment
-from app.core.formatting import count, format_gains, plus_minus
+from app.core.formatting import count, format_gains, plus_minus, short
 from app.core.statistics.comparisons import Group, PooledScatter, groups_of, pool_scatter
 from app.core.tuning.strategies import STRATEGIES
 from app.db.models import CampaignRow, TrialRow
@@ -34,7 +34,7 @@ def trials_by_id(session: Session, trial_ids: Collection[int]) -> Mapping[int, T
 
 def measured(value: float, standard_error: float | None, unit: str) -> str:
     """`0.105 ± 0.012 m`, with as many digits as the uncertainty justifies; the value alone if it has none."""
-    return plus_minus(value, standard_error, unit) if standard_error else f"{value:.3f} {unit}"
+    return plus_minus(value, standard_error, unit) if standard_error else f"{short(value)} {unit}"
 
 
 def named(group: Group, name: str) -> str:

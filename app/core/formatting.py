@@ -158,9 +158,10 @@ def measured(value: float | None, uncertainty: float | None, unit: str) -> str:
     """`0.132 ± 0.007 m`, for tables; the value alone if its uncertainty is not known, and a dash for None."""
     if value is None:
         return NOTHING
+    if uncertainty is None or uncertainty <= 0:
+        return f"{short(value)} {unit}".rstrip()
     digits = decimals(uncertainty)
-    margin = f" ± {number(uncertainty, digits)}" if uncertainty is not None and uncertainty > 0 else ""
-    return f"{number(value, digits)}{margin} {unit}".rstrip()
+    return f"{number(value, digits)} ± {number(uncertainty, digits)} {unit}".rstrip()
 
 
 def gain(value: float, digits: int = GAIN_DIGITS) -> str:

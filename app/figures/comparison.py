@@ -5,6 +5,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from app.core.formatting import short
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, literal, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve
@@ -125,7 +126,7 @@ class ComparisonFigure:
         )
 
     def _flight(self, palette: Palette, index: int, flight: ComparedCurve, curve: Curve) -> Trace:
-        error = "" if flight.error is None else f"<br>error {flight.error:.3f} {self.data.error_unit}"
+        error = "" if flight.error is None else f"<br>error {short(flight.error)} {self.data.error_unit}"
         return scatter(
             literal(_shortened(f"{flight.label} · {flight.name}")),
             thinned(curve.time_s, curve.values, POINTS),
@@ -154,7 +155,7 @@ class ComparisonFigure:
         data = self.data
         listed = "; ".join(
             f"{flight.label}, {flight.name}, "
-            + ("no error" if flight.error is None else f"error {flight.error:.3f} {data.error_unit}")
+            + ("no error" if flight.error is None else f"error {short(flight.error)} {data.error_unit}")
             for flight in data.flights
         )
         off = f" {outside} off scale, marked at the edge." if outside else ""

@@ -12,6 +12,8 @@ from app.figures.data import Curve, FlightData, Range
 from app.figures.overlays import Side, leaves_upward, off_scale, part_off_scale, signed
 from app.figures.theme import Palette
 
+FINEST: Final = 0.005
+"""The smallest range of the panel for steps, as a share of the set point."""
 NEAR: Final = 0.05
 """Deviation at which the climb has ended, as a share of the set point; the range of the panel is not smaller."""
 MOST: Final = 0.5
@@ -34,6 +36,16 @@ def is_step(set_point: Curve) -> bool:
 def changes_of(set_point: Curve) -> list[float]:
     """Times at which the set point changes, s; empty for a single step."""
     return [float(time_s) for time_s in set_point.time_s[1:][np.diff(set_point.values) != 0.0]]
+
+
+def scored_part(curve: Curve, set_point: Curve) -> Curve:
+    """The part of a curve from the first change of the set point on: steps are not scored before it. All of the curve
+    for a single step."""
+    changes_s = changes_of(set_point)
+    if not changes_s:
+        return curve
+    scored = curve.time_s >= changes_s[0]
+    return Curve(curve.time_s[scored], curve.values[scored])
 
 
 def deviation_of(curve: Curve, set_point: Curve) -> Curve:
@@ -63,6 +75,16 @@ def deviation_limit(curves: Sequence[Curve], set_point: Curve) -> float:
     deviations = [after_climb(deviation_of(curve, set_point), set_point).values for curve in curves]
     peaks = [float(np.abs(values).max()) for values in deviations if len(values)]
     return min(MOST * target, max(NEAR * target, *peaks) * ROOM) if peaks else OPEN * target
+
+
+def scored_deviation_limit(curve: Curve, target: Curve, set_point: Curve) -> float:
+    """The same for a flight that is scored from the first change of the set point on: for what is scored."""
+    if not changes_of(set_point):
+        return deviation_limit([curve], set_point)
+    highest, lasts = float(set_point.values.max()), curve.time_s <= set_point.time_s[-1]
+    scored = scored_part(deviation_of(Curve(curve.time_s[lasts], curve.values[lasts]), target), set_point).values
+    peak = float(np.abs(scored).max()) if len(scored) else OPEN * highest
+    return min(MOST * highest, max(FINEST * highest, peak) * ROOM)
 
 
 def off_scale_deviations(

@@ -238,7 +238,7 @@ class ErrorsFigure:
             {
                 "x": flight.number,
                 "y": flight.error,
-                "text": f"{flight.error:.3f}",
+                "text": formatting.short(flight.error),
                 "showarrow": False,
                 "xanchor": "left",
                 "xshift": 6,
@@ -308,7 +308,7 @@ class ErrorsFigure:
         value = round(best.error * (1 - improvement), 6)
         return [
             scatter(
-                f"To beat: {value:.3f}",
+                f"To beat: {formatting.short(value)}",
                 ([0.5, last + 0.95], [value, value]),
                 role="threshold",
                 line=theme.line(palette.dim, 1.25, "dot"),
@@ -356,7 +356,7 @@ class ErrorsFigure:
         first = valid[0].error
         assert first is not None
         share = "" if best is valid[0] else f", {100 * (1 - best.error / first):.0f} % below flight {valid[0].number}"
-        return f"Best error {best.error:.3f} {self.history.error_unit} in flight {best.number}{share}."
+        return f"Best error {formatting.short(best.error)} {self.history.error_unit} in flight {best.number}{share}."
 
     def _table(self) -> Table:
         unit, noise, proposal = self.history.error_unit, self.history.noise, self.history.proposal

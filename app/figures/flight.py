@@ -12,7 +12,7 @@ from app.core.records.flight_events import FlightEvent
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, literal, ready, scatter, table_of_curves
 from app.figures.data import Band, Curve, Range, target_of
-from app.figures.deviations import deviation_axis, deviation_limit, deviation_of, is_step
+from app.figures.deviations import deviation_axis, deviation_of, is_step, scored_deviation_limit, scored_part
 from app.figures.overlays import band_traces, glitch_traces
 from app.figures.scale import robust_span, thin_by_bends, thinned
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -120,7 +120,7 @@ class FlightFigure:
         record = self.record
         if not self._has_deviation:
             return []
-        deviation = deviation_of(curve, record.target)
+        deviation = scored_part(deviation_of(curve, record.target), record.set_point)
         drawn = _line("Deviation", deviation, palette.ink, 1.75, "deviation", record.output_unit)
         return [{**drawn, "yaxis": "y2", "showlegend": False}]
 
@@ -149,7 +149,7 @@ class FlightFigure:
         axes: dict[str, object] = {"yaxis": theme.titled(palette, output, domain=places[0], range=[low, high])}
         if self._has_deviation:
             axes["yaxis2"] = deviation_axis(
-                palette, deviation_limit([curve], goal), record.output_unit, domain=places[1]
+                palette, scored_deviation_limit(curve, record.target, goal), record.output_unit, domain=places[1]
             )
         for place, panel in enumerate(record.panels, start=2 + self._has_deviation):
             axes[f"yaxis{place}"] = theme.titled(palette, panel.title, domain=places[place - 1], nticks=4)
@@ -191,7 +191,17 @@ class FlightFigure:
         record, unit = self.record, self.record.output_unit
         drawn = [_line("Set point", record.set_point, palette.dim, 1.5, "set point", None, "dot")]
         if record.reference is not None:
-            drawn.append(_line("Reference", record.reference, palette.dim, 1.5, "reference", None, "dashdot"))
+            drawn.append(
+                _line(
+                    "Reference",
+                    scored_part(record.reference, record.set_point),
+                    palette.dim,
+                    1.5,
+                    "reference",
+                    None,
+                    "dashdot",
+                )
+            )
         if record.best is not None:
             drawn.append(_line(f"Flight {record.best_number} · best", record.best, palette.best, 2, "best", unit))
         if record.predicted is not None:

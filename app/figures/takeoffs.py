@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, cast
 
-from app.core.formatting import count
+from app.core.formatting import count, short
 from app.figures import theme
 from app.figures.base import Card, Column, Table, Trace, reading, ready, scatter, table_of_curves
 from app.figures.data import Curve, FlightData, History, Range
@@ -270,7 +270,7 @@ class TrajectoriesFigure:
             "invalid": f"{flight.number} · {flight.outcome}",
             "unjudged": f"{flight.number} · {flight.outcome}",
         }[standing]
-        error = "" if flight.error is None else f"<br>error {flight.error:.3f} {self.history.error_unit}"
+        error = "" if flight.error is None else f"<br>error {short(flight.error)} {self.history.error_unit}"
         return self._trace(
             f"Flight {label}",
             flight.curve,
@@ -384,7 +384,7 @@ class TrajectoriesFigure:
         if not history.flights:
             return f"{history.output_title} over time: no flight yet, set point and reference only."
         best = history.best
-        found = "" if best is None else f" Best: flight {best.number}, error {best.error:.3f} {history.error_unit}."
+        found = "" if best is None else f" Best: flight {best.number}, error {short(best.error)} {history.error_unit}."
         off = f" {outside} off scale, marked at the top." if outside else ""
         off += f" Deviation of {leaving} off scale, marked at the edge." if leaving else ""
         return f"{history.output_title} over time: {count(len(history.flights), 'flight')}.{found}{off}"

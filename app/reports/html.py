@@ -149,6 +149,7 @@ def _environment() -> "Environment":
         "trial_state": state_label,
         "plus_minus": formatting.measured,
         "number": formatting.number,
+        "short": formatting.short,
         "settling_time": _settling_time,
         "interval": _interval,
         "gain": formatting.gain,
@@ -166,7 +167,7 @@ def _environment() -> "Environment":
 
 
 def _interval(span: Interval | None) -> str:
-    return formatting.NOTHING if span is None else f"{formatting.number(span.lower)} … {formatting.number(span.upper)}"
+    return formatting.NOTHING if span is None else formatting.interval_text(span.lower, span.upper)
 
 
 def _settling_time(trial: Trial) -> str:

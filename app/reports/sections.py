@@ -17,7 +17,7 @@ from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
 from app.core.experiments import EXPERIMENTS
 from app.core.experiments.base import Experiment
-from app.core.formatting import EXACT_DIGITS, format_gains, gain, number, setting_text, short_percent, without_word
+from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, short, short_percent, without_word
 from app.core.policy import Gain, Gains
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
@@ -243,7 +243,7 @@ def of_flights(trials: Iterable[Trial], error_unit: str) -> Iterator[Anomaly]:
         for glitch in trial.glitches:
             yield Anomaly(trial.number, "Glitch in the record", glitch.sentence)
         if trial.glitches and trial.repaired_error is not None:
-            repaired = f"Without the glitches the error would be {number(trial.repaired_error)} {error_unit}."
+            repaired = f"Without the glitches the error would be {short(trial.repaired_error)} {error_unit}."
             yield Anomaly(trial.number, "Glitch in the record", repaired)
         if trial.flight is not None and trial.flight.problem and not (kind and trial.flight.problem == trial.reason):
             kind = _ENDINGS.get(trial.flight.state, "Vehicle problem")

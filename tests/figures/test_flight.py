@@ -46,6 +46,18 @@ def test_a_flight_scored_against_the_reference_has_its_deviation_from_that() -> 
     assert set(trace(card, "deviation")["y"]) == {0.0}
 
 
+def test_steps_have_reference_and_deviation_from_the_first_step_on_in_a_panel_of_their_size() -> None:
+    steps = Curve(TIME_S, np.where(TIME_S < 10.0, 3.0, 2.0))
+    flown = Curve(TIME_S, np.where(TIME_S < 8.0, 0.0, steps.values + 0.03))
+    record = replace(RECORD, set_point=steps, reference=steps, curve=flown, by_reference=True)
+    card = FlightFigure(record).compute()
+    assert min(trace(card, "reference")["x"]) == min(trace(card, "deviation")["x"]) == pytest.approx(10.0, abs=0.05)
+    assert layout(card)["yaxis2"]["range"] == pytest.approx([-0.033, 0.033])
+    aborted = Curve(TIME_S[TIME_S < 5.0], flown.values[TIME_S < 5.0])
+    ended = FlightFigure(replace(record, curve=aborted, reference=aborted)).compute()
+    assert (trace(ended, "deviation")["x"], layout(ended)["yaxis2"]["range"][1]) == ([], pytest.approx(0.66))
+
+
 def test_an_imported_flight_without_commands_has_only_its_deviation_below() -> None:
     card = FlightFigure(replace(RECORD, panels=())).compute()
     assert [name for name in layout(card) if name.startswith("yaxis")] == ["yaxis", "yaxis2"]

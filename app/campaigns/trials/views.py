@@ -20,7 +20,7 @@ from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTI
 from app.core.definition import Flight
 from app.core.experiments import get_experiment
 from app.core.experiments.base import Scatter
-from app.core.formatting import named_flights, percent, without_word
+from app.core.formatting import named_flights, percent, short, without_word
 from app.core.policy import Gains
 from app.core.records.metrics import MAX_GAP_S
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory, select_samples
@@ -222,7 +222,7 @@ def verdict(row: TrialRow, field: ReferenceFlights, unit: str, again: Sequence[i
         case TrialState.VALID if row.error is not None:
             compared = _compared(row.error, field.best_before(row.number), unit)
             outcome = f", {_once_more(again)}" if again else f": {compared}"
-            return f"{row.error:.3f} {unit}{outcome}{_against_prediction(row, field, unit)}."
+            return f"{short(row.error)} {unit}{outcome}{_against_prediction(row, field, unit)}."
         case TrialState.ABORTED:
             return _ended("Aborted", row.reason)
         case TrialState.INVALID:
@@ -257,18 +257,18 @@ def _compared(error: float, before: tuple[float, int] | None, unit: str) -> str:
     if before is None:
         return "the first valid flight"
     best, number = before
-    than = f"the best before it (flight {number}, {best:.3f} {unit})"
-    if f"{error:.3f}" == f"{best:.3f}":
+    than = f"the best before it (flight {number}, {short(best)} {unit})"
+    if short(error) == short(best):
         return f"the same as {than}"
     gain = best - error
     relation = "lower than" if gain > 0 else "higher than"
     share = f" ({percent(abs(gain) / best)})" if best else ""
-    return f"{abs(gain):.3f} {unit}{share} {relation} {than}"
+    return f"{short(abs(gain))} {unit}{share} {relation} {than}"
 
 
 def _against_prediction(row: TrialRow, field: ReferenceFlights, unit: str) -> str:
     predicted_error, _ = _prediction(row, field)
-    return "" if predicted_error is None else f"; {predicted_error:.3f} {unit} was predicted"
+    return "" if predicted_error is None else f"; {short(predicted_error)} {unit} was predicted"
 
 
 def _record(trial: TrialRow) -> RecordBrief | None:

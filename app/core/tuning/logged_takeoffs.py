@@ -15,6 +15,7 @@ from app.core.definition import Definition, Flight, StopRule, best_flight
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
+from app.core.formatting import interval_text, short
 from app.core.policy import Gains
 from app.core.records.step_response import StepResponse, step_response
 from app.core.records.trajectory import Trajectory
@@ -85,8 +86,8 @@ class TakeoffAnalysis:
         error_m, interval = self.proposed.predicted_error_m, self.proposed.interval
         refused = " The gate refuses the gains flown." if self.assessments[0].refusal else ""
         return (
-            f"Mean distance from 3 m: {self.best.error or 0.0:.3f} m measured. The model predicts {error_m:.3f} m "
-            f"({interval.lower:.3f} … {interval.upper:.3f} m) for the proposed gains.{refused}"
+            f"Mean distance from 3 m: {short(self.best.error or 0.0)} m measured. The model predicts "
+            f"{short(error_m)} m ({interval_text(interval.lower, interval.upper)} m) for the proposed gains.{refused}"
         )
 
 

@@ -48,13 +48,13 @@ def phase(flights: list[Flight], proposal: Proposal, definition: Definition = NO
 def test_a_step_with_a_resolvable_improvement_is_flown() -> None:
     found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.3))
     assert found.phase == "step"
-    assert "is predicted to reduce the error by 0.200 m, more than the 0.008 m that 11 flights" in found.why
+    assert "is predicted to reduce the error by 0.200 m, more than the 0.0078 m that 11 flights" in found.why
 
 
 def test_a_step_without_a_resolvable_improvement_ends_a_campaign_without_a_winner() -> None:
     found = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5)), proposed(error=0.499))
     assert found.phase == "decided"
-    assert "would reduce the error by 0.001 m, less than the 0.008 m that 11 flights" in found.why
+    assert "would reduce the error by 0.0010 m, less than the 0.0078 m that 11 flights" in found.why
     assert "No other gains were flown." in found.why
     tried = confirm(NOISE, QuadraticExperiment(), flown((1, 0.5), (2, 0.6)), proposed("none", 0.5))
     assert tried.phase == "decided"
@@ -237,7 +237,7 @@ def test_a_flight_that_is_no_step_says_why_there_is_none() -> None:
     once, twice = flown((1, 0.5), (2, 0.2)), flown((1, 0.5), (2, 0.2), (2, 0.2))
     decided = flown((1, 0.5), (2, 0.2), (2, 0.2), (1, 0.5))
     assert why(once, proposed("none")).endswith("No further step is flown: the strategy proposes none.")
-    assert "No further step is flown: it would reduce the error by 0.001 m, less" in why(once, proposed(error=0.199))
+    assert "No further step is flown: it would reduce the error by 0.0010 m, less" in why(once, proposed(error=0.199))
     assert why(once, proposed(error=0.3)).endswith("it is not predicted to reduce the error.")
     assert why(once, proposed(), 4).endswith("the last 2 flights are reserved for the best and the first gains.")
     assert why(twice, proposed()).endswith("steps end with the first repeat of the best gains.")
