@@ -8,6 +8,7 @@ from app.core.analysis.loop import AltitudeLoop
 from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
 from app.core.errors import Problem
 from app.core.experiments.base import Check, Matrix
+from app.core.formatting import number
 from app.core.models.copter import Copter
 from app.core.models.set_points import SetPoints
 
@@ -33,7 +34,7 @@ def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) 
         Check(
             "lowest altitude",
             lowest_m >= floor_m,
-            f"The lowest of {len(altitudes)} simulated flights {falls} {lowest_m:.2f} m; {floor_m:g} m is allowed.",
+            f"The lowest of {len(altitudes)} simulated flights {falls} {number(lowest_m, 2)} m; {floor_m:g} m is allowed.",
             worst=lowest_m,
             limit=floor_m,
         ),

@@ -1,12 +1,12 @@
 import type { FigureTable } from "../api/types";
-import { gainText, NOTHING } from "./format";
+import { gainText, NOTHING, trueMinus } from "./format";
 import { useLastRows } from "./paging";
 import classes from "./ScrollTable.module.css";
 
 function cell(value: string | number | null, digits: number | null): string {
   if (value === null) return NOTHING;
   if (typeof value === "string") return value;
-  return digits === null ? gainText(value) : value.toFixed(digits);
+  return digits === null ? gainText(value) : trueMinus(value.toFixed(digits));
 }
 
 /** The data of a figure as a table. */

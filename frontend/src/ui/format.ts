@@ -15,7 +15,7 @@ export function withUnit(value: number | null | undefined, unit: string, digits 
 }
 
 /** A number as text with a true minus, which a zero does not have. */
-function trueMinus(text: string): string {
+export function trueMinus(text: string): string {
   return /^-0(\.0*)?$/.test(text) ? text.slice(1) : text.replace(/^-/, "−");
 }
 

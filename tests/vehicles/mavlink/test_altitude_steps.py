@@ -163,7 +163,9 @@ def test_set_points_too_near_the_altitude_limit_or_the_ground_are_refused_on_the
         with LockstepRig() as rig:
             vehicle = rig.vehicle()
             vehicle.stage(TUNED)
-            with pytest.raises(VehicleError, match=r"required: above 1.5 m, half of the first, and at most 3.5 m") as why:
+            with pytest.raises(
+                VehicleError, match=r"required: above 1.5 m, half of the first, and at most 3.5 m"
+            ) as why:
                 vehicle.fly(order, on_sample=unwatched, should_stop=never)
             assert why.value.not_flown
             assert waypoints(rig) == []
