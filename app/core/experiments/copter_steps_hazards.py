@@ -34,7 +34,8 @@ def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) 
         Check(
             "lowest altitude",
             lowest_m >= floor_m,
-            f"The lowest of {len(altitudes)} simulated flights {falls} {number(lowest_m, 2)} m; {floor_m:g} m is allowed.",
+            f"The lowest of {len(altitudes)} simulated flights {falls} {number(lowest_m, 2)} m; "
+            f"{floor_m:g} m is allowed.",
             worst=lowest_m,
             limit=floor_m,
         ),
