@@ -241,8 +241,8 @@ def _readiness_of(standing: Standing, report: VehicleReport) -> Readiness:
 
 
 def _reached_in_flight(standing: Standing, report: VehicleReport) -> ReadinessStep:
-    """The step of a trial that flies, by the vehicle's own: it still arms, is in the air, or gets its safe gains. With a
-    lost link it is not known to have landed."""
+    """The step of a trial that flies, by the vehicle's own: it still arms, is in the air, or gets its safe gains. With
+    a lost link it is not known to have landed."""
     step = "" if report.status is None or not standing.has_link else report.status.step
     is_starting = step == "idle" and standing.flown_for_s < _BEGINS_WITHIN_S
     if step in _BEFORE_TAKEOFF or is_starting:
