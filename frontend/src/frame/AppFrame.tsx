@@ -56,6 +56,7 @@ function useEventStream(flying: boolean): void {
   useEffect(() => followEvents(queries, () => flies.current), [queries]);
 }
 
+/** Vehicle of the campaign that is open, while it does not fly: then its name is beside its readings. */
 function CampaignVehicle({ campaignId }: { campaignId: number }) {
   const vehicle = useCampaign(campaignId).data?.vehicle;
   const state = useVehicle(vehicle?.id ?? null)?.state;
@@ -91,6 +92,7 @@ export function AppFrame() {
   const unlocked = useUnlocked();
   const [parameters] = useSearchParams();
   useSpaceAborts(flying, campaignId, abort.press);
+  const isOwnInAir = flying.some((one) => one.campaignId === campaignId);
   return (
     <div className={classes["frame"]} data-whole={onFlyScreen || undefined}>
       <a href="#main" className={classes["skip"]}>
@@ -104,7 +106,9 @@ export function AppFrame() {
           </Link>
           <MainNav />
           <div className={classes["vehicle"]}>
-            {campaignId !== null && Number.isInteger(campaignId) && <CampaignVehicle campaignId={campaignId} />}
+            {campaignId !== null && Number.isInteger(campaignId) && !isOwnInAir && (
+              <CampaignVehicle campaignId={campaignId} />
+            )}
           </div>
           <div className={classes["spacer"]} />
           <div className={classes["flights"]}>

@@ -19,6 +19,7 @@ import {
 } from "../live/store";
 import { outputNow, readingOf } from "../live/telemetry";
 import { isAfterRecord, isDown } from "../live/vehicleStatus";
+import { VehicleBadge } from "../ui/Badges";
 import { withUnit } from "../ui/format";
 import { Time } from "../ui/Time";
 import classes from "./Frame.module.css";
@@ -87,6 +88,9 @@ export function FlyingBar({ flying, abort }: { flying: FlyingCampaign; abort: Ab
   const reading = readingOf(live?.channel ?? "");
   return (
     <section className={classes["flight"]} aria-label={`Flight in progress: ${flying.name}`}>
+      <span className={classes["flightVehicle"]}>
+        <VehicleBadge isReal={flying.isReal} title={flying.vehicleName} />
+      </span>
       <span className={classes["flightName"]} title={flying.name}>
         {flying.name} · flight {flying.trialNumber}
       </span>

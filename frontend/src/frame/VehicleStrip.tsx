@@ -22,7 +22,7 @@ export function VehicleStrip() {
   );
   return connected
     .filter(({ id, state }) => own === null || id === own || ALWAYS_SHOWN.has(state))
-    .map((vehicle) => <VehicleLine key={vehicle.id} vehicle={vehicle} />);
+    .map((vehicle) => <VehicleLine key={vehicle.id} vehicle={vehicle} isBrief={own !== null && vehicle.id !== own} />);
 }
 
 /** The vehicle of the fly screen that is open; null on other pages, and until it is known. */
@@ -32,13 +32,18 @@ function useFlownVehicle(): number | null {
   return useCampaign(trial?.campaign_id ?? null).data?.vehicle.id ?? null;
 }
 
-function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
+/** `isBrief`: on one line, with the link only. */
+function VehicleLine({ vehicle, isBrief }: { vehicle: Vehicle; isBrief: boolean }) {
   const aged = useVehicleStatus(vehicle.id);
   const stale = aged === null || !aged.isCurrent;
   const low = lowBattery(vehicle, aged?.status.batteryV);
   const LinkIcon = stale ? IconAntennaBarsOff : IconAntennaBars5;
   return (
-    <section className={`${classes["line"]} numbers`} aria-label={`Vehicle ${vehicle.name}`}>
+    <section
+      className={`${classes["line"]} numbers`}
+      data-brief={isBrief || undefined}
+      aria-label={`Vehicle ${vehicle.name}`}
+    >
       <Link to={`/vehicles/${vehicle.id}`} className={classes["name"]}>
         <VehicleBadge isReal={vehicle.is_real} title={vehicle.name} />
       </Link>
@@ -49,7 +54,7 @@ function VehicleLine({ vehicle }: { vehicle: Vehicle }) {
         </span>
       )}
       {aged?.status.trouble && (
-        <span className={classes["trouble"]} role="alert">
+        <span className={classes["trouble"]} role="alert" title={aged.status.trouble}>
           {aged.status.trouble}
         </span>
       )}

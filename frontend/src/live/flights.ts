@@ -16,6 +16,7 @@ export interface FlyingCampaign {
   trialNumber: number;
   name: string;
   vehicleId: number;
+  vehicleName: string;
   isReal: boolean;
   /** Whether the vehicle is registered, with a process that keeps its link. */
   hasLink: boolean;
@@ -34,6 +35,7 @@ async function readFlying(): Promise<FlyingCampaign[]> {
             trialNumber: flying.trial_number,
             name,
             vehicleId: vehicle.id,
+            vehicleName: vehicle.registered ? vehicle.name : vehicle.title,
             isReal: vehicle.is_real,
             hasLink: vehicle.registered,
           },
