@@ -39,7 +39,8 @@ export default defineConfig({
   // The name that the browser asked for is passed on: the API refuses acts from pages of another origin.
   server: { host: "127.0.0.1", proxy: { "/api": { target: api, changeOrigin: false } } },
   build: {
-    target: "es2023",
+    target: "es2023", // whose browsers need no polyfill for preloading
+    modulePreload: { polyfill: false },
     sourcemap: false,
     rolldownOptions: { output: { postBanner: compiledWhole } },
   },
