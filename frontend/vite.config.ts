@@ -38,6 +38,7 @@ export default defineConfig({
   plugins: [react(), chartsForReports, chartsEarly],
   // The name that the browser asked for is passed on: the API refuses acts from pages of another origin.
   server: { host: "127.0.0.1", proxy: { "/api": { target: api, changeOrigin: false } } },
+  css: { modules: { generateScopedName: "_[hash:base64:5]" } }, // short names for what is loaded
   build: {
     target: "es2023", // whose browsers need no polyfill for preloading
     modulePreload: { polyfill: false },
