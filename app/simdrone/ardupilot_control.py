@@ -82,6 +82,15 @@ class ArduPilotController(AltitudeController):
         self._target_m = 0.0
         self._takes_targets = False
         self.tune(Parameters(), accelerometer_hz=0.0, spool_s=0.0, land_m_s=1.0)
+        self._compile()
+
+    def _compile(self) -> None:
+        """Compile now what is compiled on first use: in flight the drone would be silent meanwhile."""
+        state, outputs = self._state.copy(), self.outputs.copy()
+        loop.start_takeoff(state, self._packed, 0.0)
+        loop.enter_position_mode(state, self._packed, 0.0, 0.0, 0.0)
+        loop.rollout(state, self._packed, self.inputs, outputs, self._followed, outputs)
+        inverse_square_root(1.0, 1.0, 1.0)
 
     def tune(self, parameters: Parameters, *, accelerometer_hz: float, spool_s: float, land_m_s: float) -> None:
         """Use these parameters from the next tick on; `spool_s` is MOT_SPOOL_TIME, `land_m_s` positive."""

@@ -56,6 +56,14 @@ class Px4Controller(AltitudeController):
         self.tune(values)
         self._estimate = self._hover.start()
         self._estimates = False
+        self._compile()
+
+    def _compile(self) -> None:
+        """Compile now what is compiled on first use: in flight the drone would be silent meanwhile."""
+        state = self._state.copy()
+        loop.start(state, self._packed)
+        loop.rollout(state, self._packed, self.inputs, self.outputs.copy())
+        px4_hover.update(self._hover.start(), self._hover_packed, 0.0, self.demand, 0.0, LOOP_S)
 
     def tune(self, values: Mapping[str, float]) -> None:
         """Use these parameters, by the firmware's names, from the next run on. Raises InputError if the loop is not

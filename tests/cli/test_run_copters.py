@@ -204,7 +204,7 @@ def test_a_copter_as_it_comes_is_not_flown_because_its_failsafes_are_off() -> No
         named = ("--vehicle", f"mavlink:{address}")
         result = CliRunner().invoke(app, ["run", "px4-takeoff", *named])
     assert result.exit_code == 1
-    assert "Failsafe NAV_DLL_ACT: off" in " ".join(result.stderr.split())
+    assert "Failsafe NAV_DLL_ACT: 0, required: 3" in " ".join(result.stderr.split())
     assert "NAV_DLL_ACT" in result.stderr
 
 
