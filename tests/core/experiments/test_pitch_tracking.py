@@ -129,3 +129,9 @@ def test_without_the_commands_a_record_tells_nothing_about_single_steps() -> Non
 
 def test_no_hazard_is_known_beside_the_bounds() -> None:
     assert TRUTH.hazards(HAND, prior_distribution(TRUTH), Envelope(ceiling_m=4.5, safe_gains={})) == ()
+
+
+def test_its_model_depends_on_no_parameters_of_an_autopilot() -> None:
+    experiment, parameters = PitchTracking(), {"MOT_THST_HOVER": 0.3}
+    assert experiment.loop_parameters(parameters) == {}
+    assert experiment.under(parameters) is experiment
