@@ -316,6 +316,31 @@ class Experiment(Protocol):
         ...
 
 
+class OwnModel:
+    """What experiments share that are their own modelled experiment, see `ModelledExperiment`: its model depends on no
+    parameters of an autopilot, unless they say otherwise."""
+
+    model_parameters: tuple[ModelParameter, ...]
+
+    @property
+    def modelled(self) -> Self:
+        """The experiment itself."""
+        return self
+
+    @property
+    def nominal_model(self) -> Vector:
+        """Parameters before the first flight, shape (m,)."""
+        return np.array([parameter.nominal for parameter in self.model_parameters])
+
+    def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
+        """The experiment itself."""
+        return self
+
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002 - as for `under`
+        """None."""
+        return {}
+
+
 class ModelledExperiment(Experiment, Protocol):
     """An experiment with a simple model of its vehicle."""
 

@@ -21,6 +21,7 @@ from app.core.experiments.base import (
     Envelope,
     Matrix,
     ModelParameter,
+    OwnModel,
     ParameterDistribution,
     Scatter,
     SimplexSearch,
@@ -68,7 +69,7 @@ def vector_of(copter: Copter) -> Vector:
     return np.array([copter.hover_throttle, copter.thrust_slope, copter.motor_lag_s, copter.drag_1_s])
 
 
-class CopterSteps(ABC):
+class CopterSteps(OwnModel, ABC):
     """Steps of the altitude set point under an autopilot, with the model of a copter."""
 
     name: ClassVar[str]
@@ -103,7 +104,7 @@ class CopterSteps(ABC):
         self.window_s: Final = sequence.ends_s
         self.measure: Final = f"{sequence}, under {self.autopilot}"
         self.parameters: Final = dict(parameters or {})
-        self.model_parameters: Final = self.data_sheet if model_parameters is None else model_parameters
+        self.model_parameters = self.data_sheet if model_parameters is None else model_parameters
         self._unfit: Final = unfit
 
     @abstractmethod
@@ -172,15 +173,6 @@ class CopterSteps(ABC):
             model_parameters=model_parameters or self.model_parameters,
             unfit=unfit,
         )
-
-    @property
-    def modelled(self) -> Self:
-        """The experiment itself."""
-        return self
-
-    @property
-    def nominal_model(self) -> Vector:
-        return np.array([parameter.nominal for parameter in self.model_parameters])
 
     @property
     def grid_s(self) -> Samples:

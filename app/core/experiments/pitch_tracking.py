@@ -11,6 +11,7 @@ from app.core.experiments.base import (
     Envelope,
     Matrix,
     ModelParameter,
+    OwnModel,
     ParameterDistribution,
     Scatter,
     SimplexSearch,
@@ -82,7 +83,7 @@ def _parameters(perturbation: float) -> tuple[ModelParameter, ...]:
     )
 
 
-class PitchTracking:
+class PitchTracking(OwnModel):
     """Pitch tracking on an inaccurate model.
 
     The model is the true system with every element of A and B off by up to `perturbation`, drawn with `model_seed`; its
@@ -138,7 +139,7 @@ class PitchTracking:
         self._options: Final = with_defaults(options or {}, self.options)
         perturbation = float(self._options["perturbation"])
         self._system: Final = perturbed(perturbation, int(self._options["model_seed"]))
-        self.model_parameters: Final = _parameters(perturbation) if parameters is None else parameters
+        self.model_parameters = _parameters(perturbation) if parameters is None else parameters
         self._kept: tuple[bytes, Matrix] | None = None
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
@@ -148,24 +149,6 @@ class PitchTracking:
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The experiment with another aircraft's fitted model: mean and standard deviation, shape (19,)."""
         return type(self)(self._options, informed_parameters(self.model_parameters, mean, sd))
-
-    def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - its only parameters are the gains
-        """The experiment itself."""
-        return self
-
-    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002 - as for `under`
-        """None."""
-        return {}
-
-    @property
-    def modelled(self) -> Self:
-        """The experiment itself."""
-        return self
-
-    @property
-    def nominal_model(self) -> Vector:
-        """Shape (19,): zeros (all factors 1), unless another aircraft's fit is used."""
-        return np.array([parameter.nominal for parameter in self.model_parameters])
 
     @property
     def grid_s(self) -> Samples:

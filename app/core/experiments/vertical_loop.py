@@ -17,6 +17,7 @@ from app.core.experiments.base import (
     Envelope,
     Matrix,
     ModelParameter,
+    OwnModel,
     ParameterDistribution,
     Scatter,
     SimplexSearch,
@@ -83,7 +84,7 @@ class Sketches:
     lowest_m: Matrix
 
 
-class VerticalLoop(ABC):
+class VerticalLoop(OwnModel, ABC):
     """An experiment under Paparazzi's vertical loop, with its simple model; a run has n samples.
 
     Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits.
@@ -116,7 +117,7 @@ class VerticalLoop(ABC):
     """Time that the gate simulates beyond the window, at the last set point."""
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...], set_points: SetPoints, window_s: float) -> None:
-        self.model_parameters: Final = model_parameters
+        self.model_parameters = model_parameters
         self.set_points: Final = set_points
         self.window_s: Final = window_s
         self._samples: Final = int(np.ceil(window_s * RATE_HZ)) + 1
@@ -152,24 +153,6 @@ class VerticalLoop(ABC):
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The experiment with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
         return self.with_parameters(informed_parameters(self.model_parameters, mean, sd))
-
-    def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - its only parameters are the gains
-        """The experiment itself."""
-        return self
-
-    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002 - as for `under`
-        """None."""
-        return {}
-
-    @property
-    def modelled(self) -> Self:
-        """The experiment itself."""
-        return self
-
-    @property
-    def nominal_model(self) -> Vector:
-        """Parameters before the first flight. From the data sheet, only mass and thrust are known."""
-        return np.array([parameter.nominal for parameter in self.model_parameters])
 
     @property
     def grid_s(self) -> Samples:

@@ -11,6 +11,7 @@ from app.core.experiments.base import (
     Envelope,
     Matrix,
     ModelParameter,
+    OwnModel,
     ParameterDistribution,
     Scatter,
     SimplexSearch,
@@ -22,7 +23,7 @@ from app.core.records.trajectory import Samples, Trajectory
 OFFSET: Final = ModelParameter("offset", "Offset", "m", 0.0, -1.0, 1.0, prior_sd=0.1, known_within=0.5)
 
 
-class QuadraticExperiment:
+class QuadraticExperiment(OwnModel):
     """Real gain `a` and whole gain `b` in 0 … 100, of scale 10 and 5; the lowest error is at a = 30, b = 40."""
 
     name: Final = "bowl"
@@ -50,27 +51,13 @@ class QuadraticExperiment:
     grid_s: Final = np.linspace(0.0, 1.0, 11)
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:
-        self.model_parameters: Final = model_parameters
+        self.model_parameters = model_parameters
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         return self
 
     def informed(self, mean: Vector, sd: Vector) -> Self:
         return type(self)(informed_parameters(self.model_parameters, mean, sd))
-
-    def under(self, parameters: Mapping[str, float]) -> Self:
-        return self
-
-    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
-        return {}
-
-    @property
-    def modelled(self) -> Self:
-        return self
-
-    @property
-    def nominal_model(self) -> Vector:
-        return np.array([parameter.nominal for parameter in self.model_parameters])
 
     def set_point(self, time_s: Samples) -> Samples:
         return np.zeros_like(time_s)
