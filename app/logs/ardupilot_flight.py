@@ -13,10 +13,11 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.segment import Segment
 from app.core.control.ardupilot_parameters import (
     ACCELEROMETER_FILTER,
-    FIRMWARE_NAMES,
+    ACCELEROMETER_FILTER_HZ,
+    LOOP_NAMES,
     LOOP_RATE,
+    LOOP_RATE_HZ,
     LOOP_RATES_HZ,
-    UNSUPPORTED,
     in_newer_names,
     in_older_names,
     parameters_from,
@@ -53,11 +54,9 @@ _JUMP_M: Final = 0.1
 _JUMP_M_S: Final = 1.0
 _LARGEST_ACCELERATION_M_S2: Final = 50.0
 _RESTART_S: Final = 1.0
-_RATE_HZ: Final = 400.0
-_FILTER_HZ: Final = 20.0
 _LEARNED: Final = "MOT_THST_HOVER"
 _THRUST_CURVE: Final = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX")
-_USED: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, *_THRUST_CURVE, LOOP_RATE, ACCELEROMETER_FILTER} - {_LEARNED})
+_USED: Final = frozenset({*LOOP_NAMES, *_THRUST_CURVE} - {_LEARNED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,13 +138,13 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         )
     hover = float(np.median(np.concatenate([logged.throttle["ThH"][slice(*part)] for part in chosen])))
     _require_gains(given, name)
-    rate_hz = given.get(LOOP_RATE, _RATE_HZ)
+    rate_hz = given.get(LOOP_RATE, LOOP_RATE_HZ)
     if not LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1]:
         raise _refused(name, LOOP_RATE, f"must be {LOOP_RATES_HZ[0]:g} to {LOOP_RATES_HZ[1]:g} Hz, got {rate_hz:g}")
     return LoggedFlight(
         loop=ArduPilotLoop(
             parameters=parameters_from({**given, _LEARNED: hover}),
-            filter_hz=given.get(ACCELEROMETER_FILTER, _FILTER_HZ),
+            filter_hz=given.get(ACCELEROMETER_FILTER, ACCELEROMETER_FILTER_HZ),
             step_s=1.0 / rate_hz,
             has_newer_names=_has_newer_names(tables),
         ),

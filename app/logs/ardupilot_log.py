@@ -11,6 +11,7 @@ from app.core.control.ardupilot_log import LoopLog
 from app.core.control.ardupilot_parameters import (
     FIRMWARE_NAMES,
     LOOP_RATE,
+    LOOP_RATE_HZ,
     LOOP_RATES_HZ,
     UNSUPPORTED,
     in_older_names,
@@ -29,7 +30,6 @@ _GUIDED: Final = 4
 _LIMITED: Final = 1
 _WAYPOINT_NAVIGATION: Final = 1 << 6
 _SAME_LOOP_S: Final = 0.0012
-_RATE_HZ: Final = 400.0
 
 
 def read_ardupilot_log(stream: BinaryIO, *, name: str) -> LoopLog:
@@ -52,11 +52,11 @@ def read_ardupilot_log(stream: BinaryIO, *, name: str) -> LoopLog:
     values = _values(tables, float(time_s[0]))
     if "PSC_POSZ_P" not in values:
         raise _refused(name, "PSC_POSZ_P", "is missing, and PSC_D_POS_P of release 4.7 too")
-    rate_hz = values.get(LOOP_RATE, _RATE_HZ)
+    rate_hz = values.get(LOOP_RATE, LOOP_RATE_HZ)
     control, tuning = (_beside(tables.get(each, {}), time_s) for each in ("PIDA", "CTUN"))
     return LoopLog(
         parameters=parameters_from(values),
-        rate_hz=rate_hz if LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1] else _RATE_HZ,
+        rate_hz=rate_hz if LOOP_RATES_HZ[0] <= rate_hz <= LOOP_RATES_HZ[1] else LOOP_RATE_HZ,
         time_s=time_s,
         z_m=up["PD"][rows],
         z_d_m=up["DPD"][rows],

@@ -17,9 +17,7 @@ from app.core.analysis.px4_loop import SPACE, Px4Loop
 from app.core.analysis.segment import FinerSegment, Segment
 from app.core.control.px4 import FLIGHT, GRAVITY
 from app.core.control.px4_parameters import (
-    ESTIMATOR_NAMES,
-    FIRMWARE_NAMES,
-    UNSUPPORTED,
+    LOOP_NAMES,
     estimator_step_s,
     parameters_from,
 )
@@ -63,7 +61,7 @@ _NEAR_LIMIT: Final = 1e-3
 _LEAST_SHARE: Final = 0.2
 """Of hover thrust: below it, the assumed hover thrust cannot be told from thrust and acceleration."""
 _VEHICLE: Final = "MAV_SYS_ID"
-_USED: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES, _VEHICLE})
+_USED: Final = frozenset({*LOOP_NAMES, _VEHICLE})
 
 
 @dataclass(frozen=True, slots=True)

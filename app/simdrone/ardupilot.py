@@ -53,10 +53,10 @@ _COMMON: Final = (
     real("FENCE_ALT_MAX", 100.0),
     Parameter("LAND_SPEED", Kind.INT16, 50),
     Parameter("GUID_OPTIONS", Kind.INT32, 0),
-    Parameter("SCHED_LOOP_RATE", Kind.INT16, LOOP_HZ),
+    Parameter(loop.LOOP_RATE, Kind.INT16, LOOP_HZ),
     Parameter("MOT_HOVER_LEARN", Kind.INT8, 2),
     real("MOT_SPOOL_TIME", 0.5),
-    real("INS_ACCEL_FILTER", 20.0),
+    real(loop.ACCELEROMETER_FILTER, loop.ACCELEROMETER_FILTER_HZ),
 )
 
 
@@ -140,7 +140,7 @@ class ArduPilot(Copter):
         with contextlib.suppress(InputError):
             self.controller.tune(
                 loop.parameters_from(values),
-                accelerometer_hz=values["INS_ACCEL_FILTER"],
+                accelerometer_hz=values[loop.ACCELEROMETER_FILTER],
                 spool_s=values["MOT_SPOOL_TIME"],
                 land_m_s=max(values["LAND_SPEED"], _SLOWEST_LANDING_CM_S) / 100.0,
             )

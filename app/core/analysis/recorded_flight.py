@@ -33,8 +33,6 @@ _LATENESS_S: Final = (np.arange(-0.2, 1.2, 0.05), np.arange(-0.05, 0.051, 0.01))
 """How late a set point may take effect, coarsely, then beside the best of these."""
 _LARGEST_MISFIT_M: Final = 0.1
 _LEAST_VARIATION: Final = 1e-6
-_RATE_HZ: Final = 400.0
-_FILTER_HZ: Final = 20.0
 _RANGES: Final = {
     **dict.fromkeys(ardupilot_parameters.FIRMWARE_NAMES, PLAUSIBLE),
     ardupilot_parameters.LOOP_RATE: ardupilot_parameters.LOOP_RATES_HZ,
@@ -66,10 +64,10 @@ def ardupilot_loop(parameters: Mapping[str, float]) -> ArduPilotLoop:
     """
     given = dict(ardupilot_parameters.in_older_names(*each) for each in parameters.items())
     require_within(given, _RANGES)
-    step_s = 1.0 / given.get(ardupilot_parameters.LOOP_RATE, _RATE_HZ)
+    step_s = 1.0 / given.get(ardupilot_parameters.LOOP_RATE, ardupilot_parameters.LOOP_RATE_HZ)
     return ArduPilotLoop(
         parameters=ardupilot_parameters.parameters_from(given),
-        filter_hz=given.get(ardupilot_parameters.ACCELEROMETER_FILTER, _FILTER_HZ),
+        filter_hz=given.get(ardupilot_parameters.ACCELEROMETER_FILTER, ardupilot_parameters.ACCELEROMETER_FILTER_HZ),
         step_s=step_s,
         row_s=_whole_steps(step_s),
     )
@@ -212,10 +210,10 @@ def _require_channels(trajectory: Trajectory, steps: Steps) -> None:
     for name in CHANNELS:
         if name not in trajectory.channels:
             raise _unanswered(name, f"is not among the recorded channels ({', '.join(trajectory.channels)})")
-    within = trajectory.time_s[(trajectory.time_s >= steps.begin_s - LEAD_S) & (trajectory.time_s <= steps.end_s)]
-    if np.ptp(np.interp(within, trajectory.time_s, trajectory["throttle"])) < _LEAST_VARIATION:
+    within = (trajectory.time_s >= steps.begin_s - LEAD_S) & (trajectory.time_s <= steps.end_s)
+    if np.ptp(trajectory["throttle"][within]) < _LEAST_VARIATION:
         raise _unanswered("throttle", "is constant: nothing can be learned from it")
-    interval_s = float(np.median(np.diff(within)))
+    interval_s = float(np.median(np.diff(trajectory.time_s[within])))
     if interval_s > _LARGEST_INTERVAL_S:
         raise _unanswered("time_s", f"has a sample every {interval_s:.2f} s; {_LARGEST_INTERVAL_S:g} s are needed")
 

@@ -211,10 +211,13 @@ acceleration in m/s² instead of cm/s², throttle as a share instead of per mill
 
 LOOP_RATE: Final = "SCHED_LOOP_RATE"
 ACCELEROMETER_FILTER: Final = "INS_ACCEL_FILTER"
+LOOP_RATE_HZ: Final = 400.0
+ACCELEROMETER_FILTER_HZ: Final = 20.0
+"""The firmware's defaults."""
 LOOP_RATES_HZ: Final = (50.0, 2000.0)
 """Rates of the loop that the firmware allows, with room on both sides."""
 
-LOOP_NAMES: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, LOOP_RATE, ACCELEROMETER_FILTER})
+LOOP_NAMES: Final = (*FIRMWARE_NAMES, *UNSUPPORTED, ACCELEROMETER_FILTER, LOOP_RATE)
 """All that the loop depends on, by the older names."""
 
 _SINGLE_PRECISION_DIGITS: Final = 7

@@ -139,7 +139,7 @@ _RANGES: Final = {_PREDICTION: (0.0, 1e6), _IMU_RATE: (0.0, 1000.0)}
 """With these no step is shorter than 1 ms."""
 ESTIMATOR_NAMES: Final = (_PREDICTION, _IMU_RATE)
 """Parameters on which the interval of the estimates depends."""
-LOOP_NAMES: Final = frozenset({*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES})
+LOOP_NAMES: Final = (*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES)
 """All that the loop depends on."""
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, NEWER_NAMES, UNSUPPORTED
+from app.core.control.ardupilot_parameters import LOOP_NAMES, NEWER_NAMES, UNSUPPORTED
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
 from app.vehicles.mavlink.profiles import base
@@ -31,7 +31,6 @@ REFERENCE_HZ: Final = 50.0
 """Rate of what is compared with the altitude, sample by sample."""
 _AUTOPILOT_VERSION: Final = 148
 _CUSTOM_MODE: Final = 1.0
-_LOOP: Final = (*FIRMWARE_NAMES, *UNSUPPORTED, "INS_ACCEL_FILTER", "SCHED_LOOP_RATE")
 _RENAMED: Final = frozenset(older for older, _ in NEWER_NAMES.values())
 _LATER: Final = frozenset({*UNSUPPORTED, "PSC_ACCZ_D_FF", "TKOFF_SLEW_TIME", "TKOFF_THR_MAX"})
 """Parameters that were added after the first releases with these gains."""
@@ -110,7 +109,7 @@ class ArduPilot:
         Requirement("GUID_OPTIONS", "without bit 6 (targets flown by the position controller)", clear_bits=1 << 6),
     )
     may_lack: Final = _MAY_LACK
-    loop_parameters: Final = (_LOOP, (*(name for name in _LOOP if name not in _RENAMED), *NEWER_NAMES))
+    loop_parameters: Final = (LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in _RENAMED), *NEWER_NAMES))
 
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)

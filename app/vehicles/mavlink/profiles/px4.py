@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from app.core.control.px4_parameters import ESTIMATOR_NAMES, FIRMWARE_NAMES, UNSUPPORTED
+from app.core.control.px4_parameters import ESTIMATOR_NAMES, LOOP_NAMES, UNSUPPORTED
 from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
@@ -91,7 +91,7 @@ class Px4:
         ),
     )
     may_lack: Final = frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, "HTE_THR_RANGE"})
-    loop_parameters: Final = ((*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES, "HTE_THR_RANGE"),)
+    loop_parameters: Final = ((*LOOP_NAMES, "HTE_THR_RANGE"),)
 
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
