@@ -22,8 +22,8 @@ _LEAST_CHANGE_M: Final = 0.3
 _LARGEST_SATURATION: Final = 0.05
 _LEAST_VARIATION: Final = 1e-6
 _OTHER_CONTROLLER_SHARE: Final = 0.05
-LARGEST_RESIDUAL_M_S2: Final = 1.5
-LARGEST_MISFIT: Final = (0.005, 0.25)
+_LARGEST_RESIDUAL_M_S2: Final = 1.5
+_LARGEST_MISFIT: Final = (0.005, 0.25)
 _LARGEST_SLOPE_DEVIATION: Final = 0.15
 
 
@@ -235,16 +235,26 @@ def _require_own_controller(flight: LoggedFlight) -> None:
         )
 
 
+def find_unexplained(estimate: CopterEstimate) -> str | None:
+    """Why no copter of the model flies so, or None if one may: accelerations that it does not explain."""
+    if estimate.residual_m_s2 <= _LARGEST_RESIDUAL_M_S2:
+        return None
+    return (
+        f"has accelerations that throttle and climb rate do not explain, {estimate.residual_m_s2:.1f} m/s² rms: gusts "
+        "too strong, oscillating rate controllers, or vibration compensation"
+    )
+
+
+def is_alike(flown_m: float, modelled_m: float) -> bool:
+    """Whether the model with the gains of a flight deviates about as much as the flight did, m."""
+    least_m, share = _LARGEST_MISFIT
+    return abs(modelled_m - flown_m) <= max(least_m, share * flown_m)
+
+
 def _require_likeness(loop: AltitudeLoop, behaviour: Behaviour, estimate: CopterEstimate, present: Assessment) -> None:
-    if estimate.residual_m_s2 > LARGEST_RESIDUAL_M_S2:
-        raise _unanswered(
-            loop,
-            f"has accelerations that throttle and climb rate do not explain, {estimate.residual_m_s2:.1f} m/s² rms: "
-            "gusts too strong, oscillating rate controllers, or vibration compensation",
-        )
-    least, share = LARGEST_MISFIT
-    misfit_m = abs(present.prediction.error_m - behaviour.error_m)
-    if misfit_m > max(least, share * behaviour.error_m):
+    if (why := find_unexplained(estimate)) is not None:
+        raise _unanswered(loop, why)
+    if not is_alike(behaviour.error_m, present.prediction.error_m):
         raise _unanswered(
             loop,
             f"has a deviation of {1e3 * behaviour.error_m:.1f} mm, where the gains in the log make the fitted vehicle "

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from app.core.analysis.analysis import LARGEST_MISFIT, LARGEST_RESIDUAL_M_S2
+from app.core.analysis.analysis import find_unexplained, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.loop import AltitudeLoop, GainSpace
 from app.core.analysis.margin import (
@@ -38,11 +38,12 @@ from app.core.experiments.base import (
 )
 from app.core.experiments.copter_steps import CopterSteps, copter_of, vector_of
 from app.core.experiments.copter_steps_hazards import COPTERS
+from app.core.formatting import count
 from app.core.models.copter import Copter
 from app.core.policy import Vector
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import fitted_flights
-from app.core.tuning.predictions import CONFIDENCE, FlightPrediction
+from app.core.tuning.predictions import CONFIDENCE, FlightPrediction, interval_reach
 from app.core.tuning.strategy import Interval, band_channels
 from app.core.tuning.trust_region import Box
 
@@ -66,13 +67,9 @@ class CopterModel:
         self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
         self._experiment: Final = experiment.exactly_under(self.base.parameters)
         self._estimate: Final[CopterEstimate] = fit_copter(*self._logs.values())
-        if (left_m_s2 := self._estimate.residual_m_s2) > LARGEST_RESIDUAL_M_S2:
+        if (why := find_unexplained(self._estimate)) is not None:
             worst = max(self.numbers, key=lambda number: fit_copter(self._logs[number]).residual_m_s2)
-            raise _unlike(
-                worst,
-                f"has accelerations that throttle and climb rate do not explain, {left_m_s2:.1f} m/s² rms: gusts "
-                "too strong, oscillating rate controllers, or vibration compensation",
-            )
+            raise _unlike(worst, why)
         first = next(flight for flight in flights if flight.outcome == "valid")
         self._first: Final = self._loop(experiment.space.vector(first.gains))
 
@@ -96,11 +93,10 @@ class CopterModel:
     def spread(self) -> ParameterDistribution:
         beyond = vector_of(self._estimate.deviation) ** 2 - self._values.var(axis=0)
         covariance = np.cov(self._values.T, bias=True) + np.diag(np.maximum(beyond, 0.0))
-        flights = f"{len(self.numbers)} flight{'s' if len(self.numbers) > 1 else ''}"
         return ParameterDistribution(
             mean=tuple(self._values.mean(axis=0).tolist()),
             covariance=tuple(tuple(row) for row in covariance.tolist()),
-            origin=f"the fit to {flights}",
+            origin=f"the fit to {count(len(self.numbers), 'flight')}",
         )
 
     @cached_property
@@ -126,8 +122,7 @@ class CopterModel:
     def optimum(self, box: Box) -> Vector | None:
         """As in the interface. Raises TrajectoryError if the model does not fly as the best flight did."""
         flown_m, modelled_m = self._log.error_m, self._likeliest.fly(self._log.loop)[0]
-        least_m, share = LARGEST_MISFIT
-        if abs(modelled_m - flown_m) > max(least_m, share * flown_m):
+        if not is_alike(flown_m, modelled_m):
             raise _unlike(
                 self.base.number,
                 f"deviates by {1e3 * flown_m:.1f} mm, where its gains make the fitted vehicle deviate by "
@@ -158,14 +153,12 @@ class CopterModel:
         return np.array([float(f"{value:.{_DIGITS}g}") for value in gains])
 
     def predict(self, gains: Vector) -> FlightPrediction:
-        from scipy.special import ndtri
-
         experiment, loop = self._experiment, self._loop(gains)
         predicted = self._all.predict_curve(loop)
         grid_s = experiment.grid_s
         followed = experiment.followed_m
         after = grid_s >= predicted.time_s[0]
-        reach = float(ndtri(0.5 + CONFIDENCE / 2.0)) * predicted.elsewhen_m.std(axis=0)
+        reach = interval_reach() * predicted.elsewhen_m.std(axis=0)
         curve, low, high = (followed.copy() for _ in range(3))
         mean = predicted.altitudes_m.mean(axis=0)
         for whole, part in ((curve, mean), (low, mean - reach), (high, mean + reach)):
@@ -205,9 +198,7 @@ def _unlike(number: int, reason: str) -> TrajectoryError:
 
 def _interval(predicted: Prediction) -> Interval:
     """The interval of a flight in other weather, wider by the model's own error."""
-    from scipy.special import ndtri
-
-    reach = float(ndtri(0.5 + CONFIDENCE / 2.0)) * _MODEL_ERROR * predicted.error_m
+    reach = interval_reach() * _MODEL_ERROR * predicted.error_m
     below, above = (np.hypot(end - predicted.error_m, reach) for end in (predicted.low_m, predicted.high_m))
     return Interval(
         lower=max(predicted.error_m - float(below), 0.0),

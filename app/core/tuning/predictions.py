@@ -191,11 +191,16 @@ def repeat_proposal(
     )
 
 
-def interval_scale(flights: Sequence[Flight]) -> float:
-    """The factor f: above 1 if earlier prediction errors exceeded their intervals, below 1 if they were smaller."""
+def interval_reach() -> float:
+    """Half-width of the interval of a prediction, in standard deviations of a normal error."""
     from scipy.special import ndtri
 
-    half_width = float(ndtri(0.5 + CONFIDENCE / 2))
+    return float(ndtri(0.5 + CONFIDENCE / 2.0))
+
+
+def interval_scale(flights: Sequence[Flight]) -> float:
+    """The factor f: above 1 if earlier prediction errors exceeded their intervals, below 1 if they were smaller."""
+    half_width = interval_reach()
     squares = [
         (
             (2.0 * flight.error - interval.lower - interval.upper)
@@ -291,8 +296,6 @@ class FlightPrediction:
 
 def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> FlightPrediction:
     """Predict a flight with `gains`, shape (n,); `base` is the best of the calibrated flights."""
-    from scipy.special import ndtri
-
     experiment = calibration.experiment
     bias = remaining_bias(calibration, base, gains)
     models = calibration.plausible(runs=MODELS, next_flight=True)
@@ -305,7 +308,7 @@ def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> Fli
     sd = float(np.sqrt(np.var(errors) + weather**2 + model_error**2))
     curve = outputs.mean(axis=0)
     noise = float(np.sqrt(np.mean(bias**2)))
-    reach = float(ndtri(0.5 + CONFIDENCE / 2.0))
+    reach = interval_reach()
     half = reach * np.sqrt(outputs.var(axis=0) + noise**2)
     lower, upper = band_channels(experiment.output)
     channels = {experiment.output: curve, lower: curve - half, upper: curve + half}
