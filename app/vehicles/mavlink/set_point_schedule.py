@@ -140,19 +140,22 @@ def _climbs(trial: Trial) -> bool:
 
 def _first_step_s(trial: Trial) -> float | None:
     """Time of the first step since the takeoff command; None without steps."""
-    times_s = trial.plan.set_points.times_s
-    return times_s[trial.plan.first_step] if len(times_s) > 1 else None
+    return _time_s(trial, trial.plan.first_step)
 
 
 def _next_step_s(trial: Trial) -> float | None:
     """Time of the next step that is not confirmed, since the takeoff command; None after the last."""
-    times_s, number = trial.plan.set_points.times_s, max(len(trial.changes) + 1, trial.plan.first_step)
-    return times_s[number] if number < len(times_s) else None
+    return _time_s(trial, max(len(trial.changes) + 1, trial.plan.first_step))
 
 
 def _next_due_s(trial: Trial) -> float | None:
     """Time of the next set point since the takeoff command; None after the last."""
-    times_s, number = trial.plan.set_points.times_s, len(trial.changes) + 1
+    return _time_s(trial, len(trial.changes) + 1)
+
+
+def _time_s(trial: Trial, number: int) -> float | None:
+    """Time of a set point since the takeoff command, counted from the takeoff's, 0; None if there is none."""
+    times_s = trial.plan.set_points.times_s
     return times_s[number] if number < len(times_s) else None
 
 

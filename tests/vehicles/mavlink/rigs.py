@@ -19,7 +19,8 @@ import pytest
 
 from app.core.policy import Gains
 from app.simdrone.body import TICK_S
-from app.simdrone.drone import Lockstep
+from app.simdrone.copter import Copter
+from app.simdrone.drone import Drone, Lockstep
 from app.simdrone.motion_capture import open_outlet
 from app.simdrone.registry import Make
 from app.vehicles import registry as open_module
@@ -74,6 +75,12 @@ class _Heard:
     def writes(self) -> list[str]:
         """Parameters in the order in which they were written."""
         return [text(message, "param_id") for message in self.told("PARAM_SET")]
+
+
+def copter_of(drone: Drone) -> Copter:
+    """The drone's autopilot, which must be ArduPilot's or PX4's."""
+    assert isinstance(drone.autopilot, Copter)
+    return drone.autopilot
 
 
 class LockstepRig(Lockstep, _Heard):
@@ -239,7 +246,7 @@ class UdpRig(_Heard):
     def switch_on_failsafes(self) -> None:
         """Before its thread starts."""
         for name, _, value in _FAILSAFES[self.autopilot]:
-            self.drone.autopilot.parameters[name] = float(value)  # type: ignore[attr-defined]  # a copter's
+            copter_of(self.drone).parameters[name] = float(value)
 
     # ---- the drone's thread
 

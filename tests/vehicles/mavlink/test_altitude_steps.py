@@ -9,7 +9,6 @@ import pytest
 from app.core.experiments import get_experiment
 from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.models.set_points import SetPoints
-from app.simdrone.copter import Copter
 from app.simdrone.copter_parameters import Parameters
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, StopRequest, VehicleError
 from app.vehicles.mavlink.dialects import number
@@ -17,7 +16,7 @@ from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import compiled_only
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
-from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig
+from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig, copter_of
 
 STEPS = AltitudeSteps().configured({"steps": 2, "step_window_s": 3.0})
 """At 10 s from 3 m to 2 m, at 13 s back; scored until 16 s."""
@@ -258,7 +257,7 @@ def test_a_pilot_who_takes_a_px4_over_before_or_as_it_follows_set_points_keeps_i
         vehicle = rig.vehicle()
         vehicle.stage(OWN_SAFE["px4"])
         record = vehicle.fly(order_of("px4"), on_sample=unwatched, should_stop=never)
-        assert rig.drone.autopilot.mode.name == "POSCTL"  # type: ignore[attr-defined]
+        assert copter_of(rig.drone).mode.name == "POSCTL"
         requests = [message for message in rig.heard if message[1].get_type() == "COMMAND_LONG"]
         modes = [number(message, "param2") for _, message in requests if number(message, "command") == 176]
         vehicle.close()
@@ -326,7 +325,7 @@ def test_what_steps_require_of_a_copter_is_checked_before_they_are_flown_and_not
     autopilot: str, parameter: str, value: float, needed: str, correction: str
 ) -> None:
     with copter(autopilot) as rig:
-        rig.drone.autopilot.parameters[parameter] = value  # type: ignore[attr-defined]
+        copter_of(rig.drone).parameters[parameter] = value
         vehicle = rig.vehicle()
         assert all(item.passed for item in vehicle.check())
         vehicle.stage(OWN_SAFE[autopilot])
@@ -341,8 +340,7 @@ def test_no_steps_are_flown_if_a_parameter_of_the_loop_that_every_release_has_is
     """PSC_ACCZ_D_FF is one that older releases lack."""
     lacked = {"PSC_ACCZ_D_FF", "PSC_VELZ_FLTD"}
     with LockstepRig("ardupilot") as rig:
-        autopilot = rig.drone.autopilot
-        assert isinstance(autopilot, Copter)
+        autopilot = copter_of(rig.drone)
         autopilot.parameters = Parameters(
             tuple(each for each in autopilot.firmware.parameters if each.name not in lacked)
         )
