@@ -14,7 +14,7 @@ from app.logs.paparazzi import is_paparazzi
 from app.logs.px4_flight import read_px4_flight
 from app.logs.readers import HEAD_BYTES, READERS, read_takeoffs
 from app.logs.takeoffs import Takeoff
-from app.logs.tlog import is_tlog
+from app.logs.tlog_frames import is_tlog
 from app.logs.ulog_tables import is_ulog
 
 TAKEOFFS: Final = "Paparazzi's .data or .tlog log of a takeoff"

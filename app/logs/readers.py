@@ -11,7 +11,8 @@ from app.logs.dataflash import is_dataflash, read_dataflash
 from app.logs.paparazzi import is_paparazzi, read_paparazzi
 from app.logs.takeoff_csv import read_takeoff_csv
 from app.logs.takeoffs import FlightLog, Takeoff, choose, find_takeoffs
-from app.logs.tlog import is_tlog, read_tlog
+from app.logs.tlog import read_tlog
+from app.logs.tlog_frames import is_tlog
 from app.logs.ulog import read_ulog
 from app.logs.ulog_tables import is_ulog
 

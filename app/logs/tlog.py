@@ -5,7 +5,6 @@ command (a block with such a name, NAV_TAKEOFF, the takeoff mode), the gains fro
 """
 
 import importlib
-import re
 import struct
 from array import array
 from collections.abc import Callable, Iterator, Mapping
@@ -28,13 +27,8 @@ from app.logs.base import (
     refused,
 )
 from app.logs.takeoffs import FlightLog, LogEvent, Setting
+from app.logs.tlog_frames import frames, is_whole, payload_of
 
-_STAMP_BYTES: Final = 8
-_MAGICS: Final = (0xFE, 0xFD)
-_MAGIC: Final = re.compile(rb"[\xfe\xfd]")
-_SIGNED: Final = 0x01
-_FIRST_US, _LAST_US = 631_152_000_000_000, 4_102_444_800_000_000
-"""Time stamps of the years 1990 … 2100."""
 _POSITION: Final = struct.Struct("<I6f")
 _RESTART_S: Final = 1.0
 _ARMED: Final = 128
@@ -96,29 +90,6 @@ Paparazzi's altitude is above its local origin, that of the others above the gro
 """
 
 
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """Location of a frame: its first byte and the one past its last; its message number, sender and payload."""
-
-    start: int
-    end: int
-    message: int
-    system: int
-    payload: int
-
-    def stamp_s(self, data: Contents) -> float:
-        return int.from_bytes(data[self.start - _STAMP_BYTES : self.start], "big") / 1e6
-
-
-def is_tlog(head: bytes) -> bool:
-    """Whether a file with this head is a telemetry log: a plausible time stamp, then the first byte of a frame."""
-    return (
-        len(head) > _STAMP_BYTES
-        and head[_STAMP_BYTES] in _MAGICS
-        and _FIRST_US <= int.from_bytes(head[:_STAMP_BYTES], "big") <= _LAST_US
-    )
-
-
 def read_tlog(stream: BinaryIO) -> FlightLog:
     """Read a whole log. Raises TrajectoryError if it contains no flight of a known vehicle."""
     data = contents(stream)
@@ -127,10 +98,10 @@ def read_tlog(stream: BinaryIO) -> FlightLog:
     dialect = autopilot.dialect
     decoder = dialect.MAVLink(None)
     extra = bytes([dialect.MAVLink_local_position_ned_message.crc_extra])
-    for frame in _frames(data):
+    for frame in frames(data):
         if frame.message == dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
-            if frame.system == system and _is_whole(dialect, data, frame, extra):
-                conversation.position(_payload(data, frame, _POSITION.size), frame.stamp_s(data))
+            if frame.system == system and is_whole(dialect, data, frame, extra):
+                conversation.position(payload_of(data, frame, _POSITION.size), frame.stamp_s(data))
         elif frame.message in conversation.handlers:
             try:
                 message: _Message = decoder.decode(bytearray(data[frame.start : frame.end]))
@@ -140,60 +111,15 @@ def read_tlog(stream: BinaryIO) -> FlightLog:
     return conversation.log()
 
 
-def _frames(data: Contents) -> Iterator[_Frame]:
-    """Every frame that is followed by another one, or by the log's end; damaged parts are skipped."""
-    position, size = _STAMP_BYTES, len(data)
-    while position + 12 <= size:
-        frame = _frame_at(data, position, size)
-        if frame is None:
-            found = _MAGIC.search(data, position + 1)
-            position = found.start() if found else size
-        else:
-            yield frame
-            position = frame.end + _STAMP_BYTES
-
-
-def _frame_at(data: Contents, start: int, size: int) -> _Frame | None:
-    magic, length = data[start], data[start + 1]
-    if magic == 0xFE:
-        end, payload, system, message = start + 8 + length, start + 6, data[start + 3], data[start + 5]
-    elif magic == 0xFD:
-        end, payload, system = start + 12 + length, start + 10, data[start + 5]
-        end += 13 if data[start + 2] & _SIGNED else 0
-        message = int.from_bytes(data[start + 7 : start + 10], "little")
-    else:
-        return None
-    following = end + _STAMP_BYTES
-    if end > size or (following < size and data[following] not in _MAGICS):
-        return None
-    return _Frame(start, end, message, system, payload)
-
-
 def _vehicle(data: Contents) -> tuple[int, _Autopilot]:
     """The system that sends the first heartbeat of a known autopilot."""
-    for frame in _frames(data):
+    for frame in frames(data):
         if frame.message == 0 and frame.end - frame.payload >= 9:
             autopilot = _AUTOPILOTS.get(data[frame.payload + 5])
             if autopilot is not None:
                 return frame.system, autopilot
     known = ", ".join(autopilot.title for autopilot in _AUTOPILOTS.values())
     raise refused(f"contains no MAVLink heartbeat of {known}", _HINT)
-
-
-def _is_whole(dialect: ModuleType, data: Contents, frame: _Frame, extra: bytes) -> bool:
-    """Whether the checksum is correct; pymavlink's own decoding takes ten times as long."""
-    past = _past_payload(data, frame)
-    checksum = int.from_bytes(data[past : past + 2], "little")
-    return bool(dialect.x25crc(data[frame.start + 1 : past] + extra).crc == checksum)
-
-
-def _past_payload(data: Contents, frame: _Frame) -> int:
-    return frame.payload + data[frame.start + 1]
-
-
-def _payload(data: Contents, frame: _Frame, size: int) -> bytes:
-    """The payload, zero-padded: MAVLink 2 truncates trailing zeros."""
-    return data[frame.payload : _past_payload(data, frame)][:size].ljust(size, b"\0")
 
 
 @dataclass(slots=True)
