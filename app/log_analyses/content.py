@@ -9,6 +9,7 @@ from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.log_analyses.manoeuvres import AnalysedManoeuvres
 from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
 from app.logs.ardupilot_flight import read_ardupilot_flight
+from app.logs.copter_tlog import is_copter_tlog, read_copter_tlog
 from app.logs.dataflash import is_dataflash
 from app.logs.paparazzi import is_paparazzi
 from app.logs.px4_flight import read_px4_flight
@@ -18,7 +19,12 @@ from app.logs.tlog_frames import is_tlog
 from app.logs.ulog_tables import is_ulog
 
 TAKEOFFS: Final = "Paparazzi's .data or .tlog log of a takeoff"
-ANALYSED: Final = f"ArduCopter's .bin log, PX4's .ulg log, or {TAKEOFFS}"
+ANALYSED: Final = f"ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or {TAKEOFFS}"
+_FLIGHTS: Final = (
+    (is_dataflash, read_ardupilot_flight),
+    (is_ulog, read_px4_flight),
+    (is_copter_tlog, read_copter_tlog),
+)
 
 
 def read_content(content: bytes, companion: bytes | None, name: str, *, usable: str) -> list[Takeoff]:
@@ -34,9 +40,9 @@ def read_content(content: bytes, companion: bytes | None, name: str, *, usable: 
 
 def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
     """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
-    head = content[:HEAD_BYTES]
-    for recognises, read in ((is_dataflash, read_ardupilot_flight), (is_ulog, read_px4_flight)):
-        if recognises(head):
-            return AnalysedManoeuvres(analyze(read(io.BytesIO(content), name=name)), name)
+    for recognises, read in _FLIGHTS:
+        if recognises(content):
+            flight = read(io.BytesIO(content), name=name)
+            return AnalysedManoeuvres(analyze(flight), name, flight.assumed)
     found = read_content(content, companion, name, usable=ANALYSED)
     return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)

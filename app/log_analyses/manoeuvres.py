@@ -1,5 +1,6 @@
 """The answer of an ArduCopter's or PX4's log, for a person: its facts, table, notes, parameter file and figure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
@@ -28,10 +29,12 @@ _FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 
 @dataclass(frozen=True, slots=True)
 class AnalysedManoeuvres:
-    """An analysis, and the log's file name."""
+    """An analysis, the log's file name, and the parameters that it lacks, for which the firmware's defaults were
+    assumed."""
 
     analysis: Analysis
     file_name: str
+    assumed: Sequence[str] = ()
 
     @property
     def answer(self) -> LogAnswer:
@@ -47,7 +50,7 @@ class AnalysedManoeuvres:
             flight=_flight(analysis),
             vehicle=self._vehicle(),
             gains=_table(analysis),
-            notes=_notes(analysis),
+            notes=[*_notes(analysis), *_assumptions(self.assumed)],
             parameter_file=None if content is None else ParameterFile(name=name, content=content),
             numbers=self._numbers(),
         )
@@ -163,6 +166,10 @@ def _notes(analysis: Analysis) -> list[str]:
         ),
         *([_LOAD] if analysis.proposed else []),
     ]
+
+
+def _assumptions(assumed: Sequence[str]) -> list[str]:
+    return [f"Not in the log, and assumed to have the firmware's default: {', '.join(assumed)}."] if assumed else []
 
 
 _LOAD: Final = "Load the gains on the ground. Fly them first at a safe height, ready to take over."

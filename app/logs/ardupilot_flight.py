@@ -32,6 +32,7 @@ from app.logs.flight_parts import (
     ParameterHistory,
     Parameters,
     Rows,
+    beside,
     choose_parts,
     jumps,
     thinned,
@@ -190,15 +191,10 @@ def _increasing(at_s: Samples) -> NDArray[np.int64]:
 
 
 def _beside(table: Table, column: str, time_s: Samples) -> Samples:
-    """A column at other times, linear between its rows; NaN outside them, and between two that are too far apart."""
+    """A column at other times, of the last time that the clock started."""
     at_s = numbers(table["TimeUS"]) / 1e6
     rows = _increasing(at_s)
-    at_s = at_s[rows]
-    after = np.clip(np.searchsorted(at_s, time_s), 1, max(len(at_s) - 1, 1))
-    values = np.interp(time_s, at_s, numbers(table[column])[rows], left=np.nan, right=np.nan)
-    if len(at_s) > 1:
-        values[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
-    return values
+    return beside(at_s[rows], numbers(table[column])[rows], time_s)
 
 
 def _holding_altitude(tables: Mapping[str, Table], time_s: Samples) -> Rows:

@@ -55,6 +55,31 @@ def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> R
     return np.append(False, np.abs(np.diff(values) - followed) > largest)
 
 
+def increasing(at_s: Samples) -> NDArray[np.int64]:
+    """Rows, shape (k,), each later than all before it."""
+    return np.flatnonzero(np.diff(np.maximum.accumulate(at_s), prepend=-np.inf) > 0.0)
+
+
+def beside(at_s: Samples, values: Samples, time_s: Samples) -> Samples:
+    """Values known at `at_s`, shape (k,) each, which increases, at other times, shape (n,), linear between its rows;
+    NaN outside them, and between two that are too far apart."""
+    if len(at_s) < 2:
+        return np.full(len(time_s), np.nan)
+    after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
+    found = np.interp(time_s, at_s, values, left=np.nan, right=np.nan)
+    found[at_s[after] - at_s[after - 1] > LONGEST_INTERVAL_S] = np.nan
+    return found
+
+
+def held(at_s: Samples, values: Samples, time_s: Samples, *, longest_s: float = np.inf) -> Samples:
+    """The value last reported at each time, shape (n,), of those at `at_s`, shape (k,), which increases; NaN before the
+    first, and where the last is older than `longest_s`."""
+    last = np.searchsorted(at_s, time_s, side="right") - 1
+    if not len(at_s):
+        return np.full(len(time_s), np.nan)
+    return np.where((last >= 0) & (time_s - at_s[last] <= longest_s), values[last], np.nan)
+
+
 def find_parts(time_s: Samples, usable: Rows, begins: Rows, cuts_s: Sequence[float]) -> list[Part]:
     """Parts of usable rows that last long enough; a part also ends before a row of `begins` and at each of `cuts_s`.
 

@@ -31,6 +31,7 @@ from app.logs.flight_parts import (
     Parameters,
     Rows,
     choose_parts,
+    increasing,
     jumps,
     thinned,
 )
@@ -213,9 +214,9 @@ def _step_s(position: Table, given: Parameters) -> float:
 
 def _logged(topics: Mapping[str, Table]) -> _Logged:
     target, position = topics[_TARGET], topics[_POSITION]
-    kept = _increasing(seconds(target))
+    kept = increasing(seconds(target))
     time_s, thrust = seconds(target)[kept], -numbers(target["thrust[2]"])[kept]
-    known = _increasing(seconds(position))
+    known = increasing(seconds(position))
     position_s = seconds(position)[known]
 
     def estimate(name: str) -> Samples:
@@ -258,7 +259,7 @@ def _feed_forward(table: Table, time_s: Samples) -> tuple[Samples, Samples]:
     none, NaN where no set-point is near."""
     from scipy.interpolate import CubicHermiteSpline
 
-    kept = _increasing(seconds(table))
+    kept = increasing(seconds(table))
     at_s = seconds(table)[kept]
     v, a = (-numbers(table[name])[kept] for name in ("velocity[2]", "acceleration[2]"))
     rates = np.where(np.isfinite(v) & np.isfinite(a), a, 0.0)
@@ -275,13 +276,8 @@ def _finer_thrust(table: Table) -> tuple[Samples, Samples]:
     """Thrust of the body and its times, shape (k,) each; none if it was not logged."""
     if not has_rows(table, "xyz[2]"):
         return np.empty(0), np.empty(0)
-    kept = _increasing(seconds(table))
+    kept = increasing(seconds(table))
     return seconds(table)[kept], -numbers(table["xyz[2]"])[kept]
-
-
-def _increasing(at_s: Samples) -> NDArray[np.int64]:
-    """Rows, shape (k,), each later than all before it."""
-    return np.flatnonzero(np.diff(np.maximum.accumulate(at_s), prepend=-np.inf) > 0.0)
 
 
 def _require_topics(tables: ULogTables, name: str) -> None:

@@ -26,6 +26,7 @@ from app.logs.base import (
     names_in,
     refused,
 )
+from app.logs.flight_parts import held
 from app.logs.takeoffs import FlightLog, LogEvent, Setting
 from app.logs.tlog_frames import frames, is_whole, payload_of
 
@@ -217,7 +218,7 @@ class _Telemetry:
             channels["battery_v"] = np.interp(np.array(self._time_s), times, volts)
         if self._throttle:
             times, shares = np.array(self._throttle).T
-            channels["throttle"] = _held(np.array(self._time_s), times, shares)
+            channels["throttle"] = held(times, shares, np.array(self._time_s), longest_s=THROTTLE_HOLDS_S)
         return channels
 
     def _notes(self) -> Iterator[str]:
@@ -306,10 +307,3 @@ class _Telemetry:
 
 def _command_name(command: int) -> str:
     return {_TAKEOFF: "NAV_TAKEOFF", _LAND: "NAV_LAND", _SET_MODE: "DO_SET_MODE", _MOTORS: "motors off"}[command]
-
-
-def _held(time_s: Samples, reported_s: Samples, values: Samples) -> Samples:
-    """The value last reported at each time; NaN before the first report, and where that is too long ago."""
-    last = np.searchsorted(reported_s, time_s, side="right") - 1
-    is_known = (last >= 0) & (time_s - reported_s[last] <= THROTTLE_HOLDS_S)
-    return np.where(is_known, values[last], np.nan)

@@ -15,6 +15,7 @@ import numpy as np
 from app.core.formatting import count, times
 from app.core.records.trajectory import Samples
 from app.logs.base import Contents, Table, contents, numbers, refused
+from app.logs.flight_parts import held
 from app.logs.takeoffs import Setting
 
 _MAGIC: Final = b"ULog\x01\x12\x35"
@@ -88,8 +89,7 @@ def latest(table: Table, name: str, time_s: Samples) -> Samples:
     """A column as it was last published at each time, shape (n,); NaN before, and if it is missing."""
     if not has_rows(table, name):
         return np.full(len(time_s), np.nan)
-    last = np.searchsorted(seconds(table), time_s, side="right") - 1
-    return np.where(last >= 0, numbers(table[name])[last], np.nan)
+    return held(seconds(table), numbers(table[name]), time_s)
 
 
 @dataclass(slots=True)

@@ -14,12 +14,14 @@ class LoggedFlight:
     """Segments of one flight with the same parameters, and the loop with these.
 
     `activity` is the standard deviation of the demanded throttle about its own 2 Hz low-pass, share of full, if it was
-    recorded: the noise of an accelerometer that is not in the log follows from it.
+    recorded: the noise of an accelerometer that is not in the log follows from it. `assumed` names parameters that the
+    record lacks, so that the loop has the firmware's defaults.
     """
 
     loop: AltitudeLoop
     segments: Sequence[Segment]
     activity: float | None = None
+    assumed: Sequence[str] = ()
 
     @property
     def error_m(self) -> float:

@@ -27,7 +27,7 @@ from app.core.records.trajectory import Samples, Trajectory
 
 _ROW_S: Final = 0.1
 CHANNELS: Final = ("altitude_m", "climb_rate_m_s", "throttle", "reference_m")
-_LARGEST_INTERVAL_S: Final = 0.06
+LARGEST_INTERVAL_S: Final = 0.06
 _THROTTLE_HZ: Final = 2.0
 _LATENESS_S: Final = (np.arange(-0.2, 1.2, 0.05), np.arange(-0.05, 0.051, 0.01))
 """How late a set point may take effect, coarsely, then beside the best of these."""
@@ -214,8 +214,8 @@ def _require_channels(trajectory: Trajectory, steps: Steps) -> None:
     if np.ptp(trajectory["throttle"][within]) < _LEAST_VARIATION:
         raise _unanswered("throttle", "is constant: nothing can be learned from it")
     interval_s = float(np.median(np.diff(trajectory.time_s[within])))
-    if interval_s > _LARGEST_INTERVAL_S:
-        raise _unanswered("time_s", f"has a sample every {interval_s:.2f} s; {_LARGEST_INTERVAL_S:g} s are needed")
+    if interval_s > LARGEST_INTERVAL_S:
+        raise _unanswered("time_s", f"has a sample every {interval_s:.2f} s; {LARGEST_INTERVAL_S:g} s are needed")
 
 
 def _unanswered(field: str, reason: str) -> TrajectoryError:

@@ -1,0 +1,228 @@
+"""Reader of the altitude steps in a telemetry log (.tlog) of an ArduCopter or PX4.
+
+It takes the same of them as our own link records: position, demanded throttle and the autopilot's reference, of a
+flight whose set points the vehicle reports: in GUIDED, or Offboard. ArduCopter's reference is shaped again from these.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import BinaryIO, Final
+
+import numpy as np
+
+from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.recorded_flight import (
+    LARGEST_INTERVAL_S,
+    Steps,
+    ardupilot_loop,
+    px4_loop,
+    read_ardupilot,
+    read_px4,
+)
+from app.core.analysis.segment import LEAD_S
+from app.core.control.ardupilot_parameters import NEWER_NAMES, in_older_names
+from app.core.errors import Problem, TrajectoryError
+from app.core.models.set_points import SetPoints, on_step
+from app.core.records.trajectory import Samples, Trajectory
+from app.logs.base import Contents, contents
+from app.logs.copter_autopilots import AUTOPILOTS, MESSAGE_NAMES, CopterAutopilot
+from app.logs.copter_rows import OFF_GROUND_M, CopterRows, follows, steps_in
+from app.logs.copter_telemetry import (
+    ATTITUDE_TARGET,
+    LOCAL_POSITION_NED,
+    NAV_CONTROLLER_OUTPUT,
+    POSITION_TARGET_LOCAL_NED,
+    Sender,
+    Telemetry,
+    find_vehicle,
+)
+from app.logs.flight_parts import (
+    LONGEST_INTERVAL_S,
+    SHORTEST_PART_S,
+    ParameterHistory,
+    Parameters,
+    Rows,
+    choose_parts,
+)
+from app.logs.tlog_frames import is_tlog
+
+_COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
+"""Kinds of vehicles with several rotors, in a heartbeat."""
+_OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
+    {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
+)
+_LARGEST_LEAN: Final = 0.866
+"""Cosine of the lean beyond which rows are left out: 30°."""
+_STEPS_APART_S: Final = 1.0
+_SETTLED_S: Final = 6.5
+"""Hover after the last step that is analysed."""
+_INTERRUPTED_S: Final = 1.0
+"""Longer intervals between two messages do not count for their rate."""
+
+
+def is_copter_tlog(content: Contents) -> bool:
+    """Whether this is a telemetry log of an ArduPilot or PX4."""
+    vehicle = find_vehicle(content) if is_tlog(content[:16]) else None
+    return vehicle is not None and vehicle.autopilot in AUTOPILOTS
+
+
+def read_copter_tlog(stream: BinaryIO, *, name: str) -> LoggedFlight:
+    """Read the part with the largest altitude changes, at most 120 s under the same parameters, of the vehicle that
+    reports its position most often; the log must be one of these (`is_copter_tlog`).
+
+    Raises TrajectoryError naming every message, mode and parameter that is missing, or InputError for a parameter that
+    is not supported.
+    """
+    data = contents(stream)
+    vehicle = find_vehicle(data)
+    assert vehicle is not None
+    return _Reader(name, vehicle, AUTOPILOTS[vehicle.autopilot], Telemetry.of(data, vehicle)).read()
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    name: str
+    vehicle: Sender
+    autopilot: CopterAutopilot
+    heard: Telemetry
+
+    def read(self) -> LoggedFlight:
+        if self.vehicle.kind not in _COPTERS:
+            kind = _OTHER_KINDS.get(self.vehicle.kind, f"a vehicle of MAVLink's type {self.vehicle.kind}")
+            raise self._refused(Problem("file", f"is the log of {kind}, not of a copter with several rotors"))
+        if problems := (*self._sparse_messages(), *self._missing_mode(), *self._missing_parameters()):
+            raise self._refused(*problems)
+        rows = CopterRows.of(self.heard, self.autopilot)
+        history = ParameterHistory.of(each for each in self._settings() if each[1] != self.autopilot.learned)
+        given, parts = choose_parts(rows.time_s, self._usable(rows), rows.is_reset, history, rows.target_rate_m_s)
+        if not parts:
+            raise self._refused(
+                Problem(
+                    MESSAGE_NAMES[LOCAL_POSITION_NED],
+                    f"has no {SHORTEST_PART_S:g} s of flight in {self._mode} without a gap of {LONGEST_INTERVAL_S:g} s "
+                    "in one of the messages, a jump in altitude or a parameter change",
+                )
+            )
+        part = max(parts, key=lambda each: float(np.ptp(rows.target_m[slice(*each)])))
+        self._require_gains(given)
+        learned = self._learned(float(rows.time_s[part[0]]))
+        flight = self._flight(rows.trajectory(part), {**given, **learned})
+        return replace(flight, assumed=() if self.heard.has_all_parameters else self._assumed(given))
+
+    def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
+        if self.autopilot.shapes_reference:
+            newer = any(name in NEWER_NAMES for _, name, _ in self.heard.settings)
+            loop = replace(ardupilot_loop(given), has_newer_names=newer)
+            return read_ardupilot(loop, trajectory, self._steps(trajectory))
+        hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
+        whole = Steps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
+        return read_px4(replace(px4_loop(given), vehicle=self.vehicle.system), trajectory, whole)
+
+    def _steps(self, trajectory: Trajectory) -> Steps:
+        """The steps from the first one before which the vehicle was at rest, to some time after the last."""
+        time_s, target_m, rows = trajectory.time_s, trajectory["set_point_m"], steps_in(trajectory)
+        field = MESSAGE_NAMES[POSITION_TARGET_LOCAL_NED]
+        if not rows:
+            raise self._refused(
+                Problem(field, f"has no altitude step in {self._mode} in flight after {LEAD_S:g} s at rest")
+            )
+        times_s = time_s[rows]
+        if np.any(np.diff(times_s) < _STEPS_APART_S):
+            raise self._refused(
+                Problem(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
+            )
+        return Steps(
+            set_points=SetPoints(
+                times_s=(0.0, *map(on_step, times_s.tolist())),
+                altitudes_m=(float(target_m[rows[0] - 1]), *target_m[rows].tolist()),
+            ),
+            begin_s=float(times_s[0]),
+            end_s=min(float(times_s[-1]) + _SETTLED_S, float(time_s[-1])),
+        )
+
+    def _usable(self, rows: CopterRows) -> Rows:
+        conditions = (
+            (rows.is_following, "HEARTBEAT", f"has no flight in {self._mode}"),
+            (rows.is_known, MESSAGE_NAMES[LOCAL_POSITION_NED], "has no rows beside all the other messages"),
+            (rows.is_off_ground, MESSAGE_NAMES[LOCAL_POSITION_NED], f"never is {OFF_GROUND_M:g} m above the ground"),
+            (
+                rows.lean >= _LARGEST_LEAN,
+                MESSAGE_NAMES[ATTITUDE_TARGET],
+                "leans by more than 30° throughout the flight",
+            ),
+        )
+        usable = np.ones(len(rows.time_s), dtype=np.bool_)
+        for condition, field, reason in conditions:
+            usable &= condition
+            if not usable.any():
+                raise self._refused(Problem(field, reason))
+        return usable
+
+    def _sparse_messages(self) -> Iterator[Problem]:
+        """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""
+        reports = {
+            LOCAL_POSITION_NED: self.heard.positions,
+            NAV_CONTROLLER_OUTPUT: self.heard.errors,
+            ATTITUDE_TARGET: self.heard.throttles,
+            POSITION_TARGET_LOCAL_NED: self.heard.targets,
+        }
+        for number in self.autopilot.messages:
+            at_s = reports[number][:, 0]
+            rate_hz = self._rate_hz(at_s)
+            if not len(at_s):
+                yield Problem(MESSAGE_NAMES[number], "is missing")
+            elif rate_hz * LARGEST_INTERVAL_S < 1.0:
+                rate = f"{rate_hz:.1f} times" if rate_hz else "less than once"
+                yield Problem(
+                    MESSAGE_NAMES[number], f"arrives {rate} a second; {1.0 / LARGEST_INTERVAL_S:.0f} times are needed"
+                )
+
+    def _rate_hz(self, at_s: Samples) -> float:
+        following = follows(self.heard, self.autopilot, at_s)
+        intervals_s = np.diff(at_s[following] if following.any() else at_s)
+        counted = intervals_s[intervals_s <= _INTERRUPTED_S]
+        return 1.0 / float(counted.mean()) if counted.size else 0.0
+
+    def _missing_mode(self) -> Iterator[Problem]:
+        flown = [self.autopilot.number_of_mode(int(mode)) for _, armed, mode in self.heard.states.tolist() if armed]
+        if not flown:
+            yield Problem("HEARTBEAT", "never reports armed motors")
+        elif self.autopilot.mode not in flown:
+            modes = ", ".join(self.autopilot.mode_name(each) for each in dict.fromkeys(flown))
+            yield Problem("HEARTBEAT", f"has no flight in {self._mode}, but in {modes}, whose set points it lacks")
+
+    def _missing_parameters(self) -> Iterator[Problem]:
+        known = {name for _, name, _ in self._settings()}
+        for each in self.autopilot.required:
+            if each not in known:
+                yield Problem(each, "is not in the log: read the vehicle's parameters while it is recorded")
+
+    def _require_gains(self, given: Parameters) -> None:
+        for each, (least, _) in self.autopilot.bounds.items():
+            if each not in given:
+                raise self._refused(Problem(each, "was changed after the flight, and was not read before"))
+            if given[each] < 0.0 or (least and not given[each]):
+                raise self._refused(Problem(each, f"must be positive, got {given[each]:g}"))
+
+    def _settings(self) -> Iterator[tuple[float, str, float]]:
+        for time_s, name, value in self.heard.settings:
+            older, number = in_older_names(name, value)
+            if older in self.autopilot.kept:
+                yield time_s, older, number
+
+    def _learned(self, time_s: float) -> Parameters:
+        """What the vehicle learns by itself, as last reported at this time, or reported first."""
+        reports = [(at_s, value) for at_s, name, value in self._settings() if name == self.autopilot.learned]
+        before = [value for at_s, value in reports if at_s <= time_s] or [value for _, value in reports[:1]]
+        return {self.autopilot.learned: before[-1]} if before else {}
+
+    def _assumed(self, given: Parameters) -> tuple[str, ...]:
+        return tuple(each for each in self.autopilot.usual if each not in {*given, self.autopilot.learned})
+
+    @property
+    def _mode(self) -> str:
+        return self.autopilot.mode_name(self.autopilot.mode)
+
+    def _refused(self, *problems: Problem) -> TrajectoryError:
+        return TrajectoryError(f"{self.name} cannot be analysed.", hint=self.autopilot.hint, problems=problems)
