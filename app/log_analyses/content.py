@@ -20,6 +20,12 @@ from app.logs.ulog_tables import is_ulog
 
 TAKEOFFS: Final = "Paparazzi's .data or .tlog log of a takeoff"
 ANALYSED: Final = f"ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or {TAKEOFFS}"
+_OTHER_FILES: Final = (
+    (b"\x1f\x8b", "is compressed (gzip): unpack it first"),
+    (b"PK\x03\x04", "is an archive (zip): unpack it first"),
+    (b"FMT, ", "is a .bin log converted to text: use the .bin itself"),
+)
+"""First bytes of files that are no log, but contain one."""
 _FLIGHTS: Final = (
     (is_dataflash, read_ardupilot_flight),
     (is_ulog, read_px4_flight),
@@ -33,9 +39,17 @@ def read_content(content: bytes, companion: bytes | None, name: str, *, usable: 
     if is_tlog(head) or is_paparazzi(head):
         beside = None if companion is None else io.BytesIO(companion)
         return list(read_takeoffs(io.BytesIO(content), name=name, companion=beside))
-    kind = next((f" ({reader.title})" for reader in READERS if reader.recognises(head)), "")
-    other = f"is another kind of log{kind}" if kind else "is not a log" if head else "is empty"
-    raise TrajectoryError(f"{name} cannot be used.", hint=f"Use {usable}.", problems=(Problem("file", other),))
+    raise TrajectoryError(
+        f"{name} cannot be used.", hint=f"Use {usable}.", problems=(Problem("file", _what_else(head)),)
+    )
+
+
+def _what_else(head: bytes) -> str:
+    """What a file with these first bytes is, if it is no log that can be used."""
+    if not head:
+        return "is empty"
+    kinds = [f"is another kind of log ({reader.title})" for reader in READERS if reader.recognises(head)]
+    return [*kinds, *(what for begin, what in _OTHER_FILES if head.startswith(begin)), "is not a log"][0]
 
 
 def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:

@@ -1,5 +1,6 @@
 """Reader of a whole flight's altitude control in ArduPilot's on-board log (.bin), in every mode that holds altitude."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -38,13 +39,14 @@ from app.logs.flight_parts import (
     thinned,
 )
 
-_WANTED: Final = frozenset({"PSCD", "PSCZ", "CTUN", "ATT", "MODE", "EV", "ERR", "PARM"})
+_WANTED: Final = frozenset({"PSCD", "PSCZ", "CTUN", "ATT", "MODE", "EV", "ERR", "PARM", "MSG"})
 _LOOP: Final = ("PD", "VD", "AD", "DVD", "DAD", "TVD")
 _REFERENCES: Final = ("DPD", "TPD")
 """The shaped altitude: releases before 4.6 log it as the target."""
 _TUNING: Final = ("ThI", "ThO", "ThH")
 _HOLDS_ALTITUDE: Final = frozenset({2, 3, 4, 5, 6, 7, 16, 17})
 """ALT_HOLD, AUTO, GUIDED, LOITER, RTL, CIRCLE, POSHOLD, BRAKE."""
+_OTHER_FIRMWARE: Final = re.compile(rb"(ArduPlane|ArduRover|Rover|ArduSub|Blimp|AntennaTracker) V\d")
 _NOT_LANDED, _LANDED = 28, 18
 _VIBRATION_FAILSAFE: Final = 29
 _AFTER_TAKEOFF_S: Final = 2.0
@@ -114,6 +116,9 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
     Raises TrajectoryError naming the message or parameter that is missing, or InputError for one not supported.
     """
     tables = read_tables(contents(stream), _WANTED)
+    if not any(map(len, tables.values())):
+        raise _refused(name, "file", "has no data: copy the whole log")
+    _require_copter(tables, name)
     logged = _logged(tables, name)
     history = _parameter_history(tables)
     time_s = logged.time_s
@@ -151,6 +156,14 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         ),
         segments=[logged.segment(thinned(time_s, part)) for part in chosen],
     )
+
+
+def _require_copter(tables: Mapping[str, Table], name: str) -> None:
+    """Require that no message is the one in which another vehicle's firmware tells its version."""
+    for message in tables.get("MSG", {}).get("Message", np.empty(0, "S64")).tolist():
+        firmware = _OTHER_FIRMWARE.match(message) if isinstance(message, bytes) else None
+        if firmware is not None:
+            raise _refused(name, "MSG", f"is of {firmware[1].decode()}, not of ArduCopter")
 
 
 def _logged(tables: Mapping[str, Table], name: str) -> _Logged:

@@ -98,7 +98,7 @@ AUTOPILOTS: Final[Mapping[int, CopterAutopilot]] = MappingProxyType(
         PX4: CopterAutopilot(
             number_of_mode=lambda mode: mode >> 16 & 0xFF,
             mode=6,
-            modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "an automatic mode", 6: "Offboard"}),
+            modes=MappingProxyType({1: "Manual", 2: "Altitude", 3: "Position", 4: "Automatic", 6: "Offboard"}),
             messages=(LOCAL_POSITION_NED, ATTITUDE_TARGET, POSITION_TARGET_LOCAL_NED),
             bounds=px4_loop.SPACE.bounds,
             required=tuple(px4_loop.SPACE.bounds),

@@ -5,6 +5,7 @@ be lost, late or repeated, and the vehicle may restart.
 """
 
 import struct
+from array import array
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -49,8 +50,6 @@ _IGNORES_ATTITUDE: Final = 128
 _INTEGERS: Final = range(1, 9)
 _BACK_S: Final = 20.0
 """If the clock goes back by less than this, the message was late."""
-
-Fields = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,9 +146,13 @@ def _unpacked(data: Contents, frame: Frame) -> tuple[int, ...]:
     return layout.unpack(payload_of(data, frame, layout.size))
 
 
-def _rows(reports: list[Fields], columns: int) -> Samples:
+def _numbers() -> "array[float]":
+    return array("d")
+
+
+def _rows(reports: "array[float]", columns: int) -> Samples:
     """Reports in order of time, without those that are late or repeated, shape (n, columns)."""
-    rows = np.array(reports, dtype=np.float64).reshape(-1, columns)
+    rows = np.array(reports).reshape(-1, columns)
     return rows[increasing(rows[:, 0])]
 
 
@@ -159,11 +162,11 @@ class _Heard:
 
     encodes_integers: bool
     """Whether integer parameters are sent byte by byte in place of a float."""
-    positions: list[Fields] = field(default_factory=list)
-    throttles: list[Fields] = field(default_factory=list)
-    targets: list[Fields] = field(default_factory=list)
-    errors: list[Fields] = field(default_factory=list)
-    states: list[Fields] = field(default_factory=list)
+    positions: "array[float]" = field(default_factory=_numbers)
+    throttles: "array[float]" = field(default_factory=_numbers)
+    targets: "array[float]" = field(default_factory=_numbers)
+    errors: "array[float]" = field(default_factory=_numbers)
+    states: "array[float]" = field(default_factory=_numbers)
     settings: list[tuple[float, str, float]] = field(default_factory=list)
     known: set[str] = field(default_factory=set)
     parameters: int = 0
@@ -186,22 +189,22 @@ class _Heard:
         self._takes[message](*fields)
 
     def _state(self, mode: int, _kind: int, _autopilot: int, base_mode: int, *_: int) -> None:
-        self.states.append((self._clock.now_s, float(bool(base_mode & _ARMED)), float(mode)))
+        self.states.extend((self._clock.now_s, float(bool(base_mode & _ARMED)), float(mode)))
 
     def _position(self, boot_ms: int, _x: float, _y: float, z: float, _vx: float, _vy: float, vz: float) -> None:
-        self.positions.append((self._clock.at(boot_ms), -z, -vz))
+        self.positions.extend((self._clock.at(boot_ms), -z, -vz))
 
     def _throttle(self, boot_ms: int, _w: float, x: float, y: float, *rest: float) -> None:
         *_, thrust, ignored = rest
         lean = 1.0 if int(ignored) & _IGNORES_ATTITUDE else 1.0 - 2.0 * (x * x + y * y)
-        self.throttles.append((self._clock.at(boot_ms), thrust if 0.0 <= thrust <= 1.0 else np.nan, lean))
+        self.throttles.extend((self._clock.at(boot_ms), thrust if 0.0 <= thrust <= 1.0 else np.nan, lean))
 
     def _target(self, boot_ms: int, _x: float, _y: float, z: float, *rest: float) -> None:
         ignored = int(rest[-2])
-        self.targets.append((self._clock.at(boot_ms), np.nan if ignored & _IGNORES_Z else -z))
+        self.targets.extend((self._clock.at(boot_ms), np.nan if ignored & _IGNORES_Z else -z))
 
     def _error(self, _roll: float, _pitch: float, altitude: float, *_: float) -> None:
-        self.errors.append((self._clock.now_s, altitude))
+        self.errors.extend((self._clock.now_s, altitude))
 
     def _parameter(self, value: bytes, count: int, _index: int, name: bytes, kind: int) -> None:
         bytewise = self.encodes_integers and kind in _INTEGERS

@@ -21,7 +21,7 @@ from app.core.analysis.recorded_flight import (
     read_px4,
 )
 from app.core.analysis.segment import LEAD_S
-from app.core.control.ardupilot_parameters import NEWER_NAMES, in_older_names
+from app.core.control.ardupilot_parameters import NEWER_NAMES, in_newer_names, in_older_names
 from app.core.errors import Problem, TrajectoryError
 from app.core.models.set_points import SetPoints, on_step
 from app.core.records.trajectory import Samples, Trajectory
@@ -112,8 +112,7 @@ class _Reader:
 
     def _flight(self, trajectory: Trajectory, given: Parameters) -> LoggedFlight:
         if self.autopilot.shapes_reference:
-            newer = any(name in NEWER_NAMES for _, name, _ in self.heard.settings)
-            loop = replace(ardupilot_loop(given), has_newer_names=newer)
+            loop = replace(ardupilot_loop(given), has_newer_names=self._has_newer_names)
             return read_ardupilot(loop, trajectory, self._steps(trajectory))
         hovers = SetPoints(times_s=(0.0,), altitudes_m=(float(trajectory["set_point_m"][0]),))
         whole = Steps(set_points=hovers, begin_s=LEAD_S, end_s=float(trajectory.time_s[-1]))
@@ -190,13 +189,18 @@ class _Reader:
             yield Problem("HEARTBEAT", "never reports armed motors")
         elif self.autopilot.mode not in flown:
             modes = ", ".join(self.autopilot.mode_name(each) for each in dict.fromkeys(flown))
-            yield Problem("HEARTBEAT", f"has no flight in {self._mode}, but in {modes}, whose set points it lacks")
+            yield Problem(
+                "HEARTBEAT",
+                f"has no flight in {self._mode}, only in {modes}, where the messages do not determine the reference",
+            )
 
     def _missing_parameters(self) -> Iterator[Problem]:
         known = {name for _, name, _ in self._settings()}
         for each in self.autopilot.required:
             if each not in known:
-                yield Problem(each, "is not in the log: read the vehicle's parameters while it is recorded")
+                newer = next(iter(in_newer_names({each: 0.0})))
+                renamed = f", nor {newer} of release 4.7" if newer != each else ""
+                yield Problem(each, f"is not in the log{renamed}: read the vehicle's parameters while it is recorded")
 
     def _require_gains(self, given: Parameters) -> None:
         for each, (least, _) in self.autopilot.bounds.items():
@@ -218,7 +222,13 @@ class _Reader:
         return {self.autopilot.learned: before[-1]} if before else {}
 
     def _assumed(self, given: Parameters) -> tuple[str, ...]:
-        return tuple(each for each in self.autopilot.usual if each not in {*given, self.autopilot.learned})
+        """By the names of the vehicle's release."""
+        absent = [each for each in self.autopilot.usual if each not in {*given, self.autopilot.learned}]
+        return tuple(in_newer_names(dict.fromkeys(absent, 0.0))) if self._has_newer_names else tuple(absent)
+
+    @property
+    def _has_newer_names(self) -> bool:
+        return any(name in NEWER_NAMES for _, name, _ in self.heard.settings)
 
     @property
     def _mode(self) -> str:

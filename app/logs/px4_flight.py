@@ -49,6 +49,9 @@ _NEEDED: Final[Mapping[str, Sequence[str]]] = {
     _TAKEOFF: ("takeoff_state",),
     _STATUS: ("nav_state",),
 }
+_KIND: Final = "vehicle_type"
+_OTHER_KINDS: Final = 2
+"""The first kind of vehicle that does not fly on rotors; a VTOL changes from one to the other."""
 _LEFT_OUT: Final = (12.0, 17.0, 18.0, 20.0)
 """Modes: descend, takeoff, land, precision landing."""
 _LARGEST_LEAN: Final = 0.866
@@ -147,11 +150,15 @@ def read_px4_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
     Raises TrajectoryError naming the topic or parameter that is missing, or InputError for one not supported.
     """
     tables = read_ulog_tables(stream, topics={*_NEEDED, _LANDED, _LIMITS, _THRUST}, parameters=_USED)
+    if not any(map(has_rows, tables.topics.values())):
+        raise _refused(tables, name, "file", "has no data: copy the whole log")
+    _require_rotors(tables, name)
     _require_topics(tables, name)
     logged = _logged(tables.topics)
     conditions = (
         (logged.is_sound, _TARGET, "has no rows of numbers beside positions"),
         (logged.is_flying, _TAKEOFF, "never reports a flight: the log has no takeoff whose ramp was finished"),
+        (~(logged.state[_KIND] >= _OTHER_KINDS), f"{_STATUS}.{_KIND}", "is never that of a copter in flight"),
         (
             ~np.isin(logged.state["nav_state"], _LEFT_OUT),
             _STATUS,
@@ -244,6 +251,7 @@ def _logged(topics: Mapping[str, Table]) -> _Logged:
         state={
             "takeoff_state": state(_TAKEOFF, "takeoff_state"),
             "nav_state": state(_STATUS, "nav_state"),
+            _KIND: state(_STATUS, _KIND),
             "landed": state(_LANDED, "landed"),
             "ground_contact": state(_LANDED, "ground_contact"),
             "speed_down": state(_LIMITS, "speed_down"),
@@ -278,6 +286,13 @@ def _finer_thrust(table: Table) -> tuple[Samples, Samples]:
         return np.empty(0), np.empty(0)
     kept = increasing(seconds(table))
     return seconds(table)[kept], -numbers(table["xyz[2]"])[kept]
+
+
+def _require_rotors(tables: ULogTables, name: str) -> None:
+    """Require that the vehicle flew on rotors at some time, if the log tells."""
+    kinds = tables.topics.get(_STATUS, {}).get(_KIND, np.zeros(1))
+    if len(kinds) and np.all(numbers(kinds) >= _OTHER_KINDS):
+        raise _refused(tables, name, f"{_STATUS}.{_KIND}", "is never that of a copter: fixed wing, or on the ground")
 
 
 def _require_topics(tables: ULogTables, name: str) -> None:

@@ -116,7 +116,6 @@ class _LogFilter:
             if self._appended and end > self._appended[0]:
                 position = max(self._appended.pop(0), position)
             elif end > size:
-                self.is_cut_off = True
                 break
             elif kind not in _TYPES or not 0 < length <= _LARGEST_MESSAGE:
                 self.damages += 1
@@ -126,6 +125,7 @@ class _LogFilter:
                 if self._is_wanted(kind, data, position + 3, end):
                     self.kept += data[position:end]
                 position = end
+        self.is_cut_off = position < size
 
     def _is_wanted(self, kind: int, data: Contents, start: int, end: int) -> bool:
         if kind == ord("D"):

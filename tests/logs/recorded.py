@@ -95,6 +95,7 @@ class Telemetry:
         self._dialect = dialect
         self._autopilot = autopilot
         self._vehicle = dialect.MAVLink(None, srcSystem=system, srcComponent=1)
+        self._component = dialect.MAVLink(None, srcSystem=system, srcComponent=154)
         self._ground = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
         self._content = io.BytesIO()
         self.now_s = 100.0
@@ -107,6 +108,10 @@ class Telemetry:
 
     def vehicle(self, kind: str, *fields: object) -> None:
         self._add(self._vehicle, kind, fields)
+
+    def component(self, kind: str, *fields: object) -> None:
+        """A message of another component of the vehicle."""
+        self._add(self._component, kind, fields)
 
     def ground(self, kind: str, *fields: object) -> None:
         self._add(self._ground, kind, fields)

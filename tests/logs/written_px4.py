@@ -28,7 +28,7 @@ _TOPICS: Final = (
     ("vehicle_thrust_setpoint", "float[3] xyz;", "3f"),
     ("trajectory_setpoint", "float[3] position;float[3] velocity;float[3] acceleration;", "9f"),
     ("takeoff_status", "uint8_t takeoff_state;", "B"),
-    ("vehicle_status", "uint8_t nav_state;", "B"),
+    ("vehicle_status", "uint8_t nav_state;uint8_t vehicle_type;", "BB"),
     ("vehicle_land_detected", "bool landed;bool ground_contact;", "??"),
     ("vehicle_constraints", "float speed_up;float speed_down;", "ff"),
 )
@@ -52,13 +52,14 @@ def px4_log(
     feed_forward: bool = True,
     finer_thrust: Callable[[float], float] | None = None,
     set_points: int = 100_000,
+    kind: int = 1,
 ) -> bytes:
     """The first segment of the flight, which begins at 20 s of the vehicle's clock; all times count from there.
 
     `without` names topics that were not logged, `renamed` has a part of their fields and what is in its place. `tilt`
     is the share of the thrust that is horizontal; manual modes give no altitude to follow, offboard control no rates.
     `finer_thrust` is the thrust as a function of time, logged half-way between the rows, too; only the first
-    `set_points` of the trajectory are logged.
+    `set_points` of the trajectory are logged. `kind` is 1 for vehicles with rotors.
     """
     log = _defined(without, renamed)
     for name, value in parameters.items():
@@ -83,9 +84,10 @@ def px4_log(
             log.add("trajectory_setpoint", at_s, *others, z_d, *others, rates[0], *others, rates[1])
         if row % 10 == 0:
             log.add("vehicle_constraints", at_s, 3.0, 1.8)
-    for topic, states in (("takeoff_status", takeoff), ("vehicle_status", modes)):
-        for since_s, state in states:
-            log.add(topic, _BEGIN_S + since_s, state)
+    for since_s, state in takeoff:
+        log.add("takeoff_status", _BEGIN_S + since_s, state)
+    for since_s, mode in modes:
+        log.add("vehicle_status", _BEGIN_S + since_s, mode, kind)
     for since_s, is_landed in landed:
         log.add("vehicle_land_detected", _BEGIN_S + since_s, is_landed, is_landed)
     return log.content

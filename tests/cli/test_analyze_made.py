@@ -1,0 +1,198 @@
+"""`gainline analyze` on logs made of simulated flights: each is answered, or refused for what it lacks."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from app.cli.commands import app
+from app.core.analysis.flight import LoggedFlight
+from app.core.records.trajectory import Samples
+from tests.core.analysis.flights import QUIET, simulated_flight
+from tests.core.analysis.px4_flights import simulated_px4
+from tests.logs.recorded import OnBoardLog
+from tests.logs.written import STABILIZE, ardupilot_log
+from tests.logs.written_px4 import POSITION, px4_log
+from tests.logs.written_tlog import (
+    ATTITUDE,
+    CONTROLLER,
+    HOLD,
+    LOITER,
+    PX4_RECORDING,
+    TARGET,
+    Recording,
+)
+
+copter = cache(simulated_flight)
+px4 = cache(simulated_px4)
+TLOG: Final = Recording()
+FIXED_WING: Final = 1
+NEVER_ASKED: Final = "is not in the log, nor PSC_D_POS_P of release 4.7: read the vehicle's parameters"
+
+
+def differing(flight: LoggedFlight, **signals: Samples) -> LoggedFlight:
+    """The flight with other values of its signals."""
+    (segment,) = flight.segments
+    return replace(flight, segments=[replace(segment, **signals)])
+
+
+def hovering(flight: LoggedFlight) -> LoggedFlight:
+    """The reference stays where it is."""
+    still = np.zeros_like(flight.segments[0].z_m)
+    return differing(flight, z_m=5.0 + still, z_d_m=5.0 + still, v_d_m_s=still, a_d_m_s2=still, v_t_m_s=still)
+
+
+def saturated(flight: LoggedFlight) -> LoggedFlight:
+    """Every fifth row has full throttle."""
+    throttle = flight.segments[0].throttle
+    return differing(flight, throttle=np.where(np.arange(len(throttle)) % 5 == 0, 1.0, throttle))
+
+
+def cut(content: bytes, share: float = 0.6) -> bytes:
+    """The log up to the middle of a record."""
+    return content[: int(share * len(content)) + 4]
+
+
+def of_a_plane() -> bytes:
+    log = OnBoardLog()
+    log.define(1, "MSG", "QZ", "TimeUS,Message")
+    log.add(1, "<Q64s", 0, b"ArduPlane V4.5.7 (0358a9c2)")
+    return log.content
+
+
+@dataclass(frozen=True)
+class Refused:
+    name: str
+    made: Callable[[], bytes]
+    said: str
+
+
+REFUSED: Final = (
+    Refused("empty.bin", lambda: b"", "file: is empty"),
+    Refused("packed.bin", lambda: b"\x1f\x8b\x08", "file: is compressed (gzip): unpack it first"),
+    Refused("definitions.bin", lambda: cut(ardupilot_log(copter()), 0.01), "file: has no data: copy the whole log"),
+    Refused("plane.bin", of_a_plane, "MSG: is of ArduPlane, not of ArduCopter"),
+    Refused("hover.bin", lambda: ardupilot_log(hovering(copter())), "file: has no altitude changes"),
+    Refused("saturated.bin", lambda: ardupilot_log(saturated(copter())), "file: has the throttle at a limit in 20% of"),
+    Refused("short.bin", lambda: ardupilot_log(copter(), rows=slice(45)), "file: holds altitude for 4.4 s only; 6 s"),
+    Refused("short.bin", lambda: cut(ardupilot_log(copter()), 0.3), "s only; 6 s are needed"),
+    Refused(
+        "manual.bin",
+        lambda: ardupilot_log(copter(), modes=((0.0, STABILIZE),)),
+        "MODE: has no mode that holds altitude in flight",
+    ),
+    Refused("unset.bin", lambda: ardupilot_log(copter(), parameters={}), "PSC_POSZ_P: is missing"),
+    Refused(
+        "sideways.bin",
+        lambda: ardupilot_log(hovering(copter()), attitude=[(0.1 * row, 0.0, 40.0) for row in range(400)]),
+        "ATT: leans by more than 30° throughout the flight",
+    ),
+    Refused("header.ulg", lambda: px4_log(px4())[:16], "file: has no data: copy the whole log"),
+    Refused(
+        "plane.ulg",
+        lambda: px4_log(px4(), without=("takeoff_status",), kind=2),
+        "vehicle_status.vehicle_type: is never that of a copter",
+    ),
+    Refused("hover.ulg", lambda: px4_log(hovering(px4())), "file: has no altitude changes"),
+    Refused("saturated.ulg", lambda: px4_log(saturated(px4())), "file: has the throttle at a limit in 20% of its rows"),
+    Refused(
+        "manual.ulg",
+        lambda: px4_log(px4(), has_altitude=False, modes=((0.0, POSITION),)),
+        "setpoint.z: has no altitude to follow in flight, as in manual modes",
+    ),
+    Refused("unset.ulg", lambda: px4_log(px4(), parameters={}), "MPC_Z_P: is missing"),
+    Refused("cut.ulg", lambda: cut(px4_log(px4()), 0.2), "the file ends in the middle of a message"),
+    Refused("plane.tlog", lambda: replace(TLOG, kind=FIXED_WING).content, "file: is the log of a fixed-wing aircraft"),
+    Refused(
+        "hover.tlog",
+        lambda: replace(TLOG, set_points=((0.0, 5.0),)).content,
+        "POSITION_TARGET_LOCAL_NED: has no altitude step in GUIDED in flight",
+    ),
+    Refused(
+        "hover.tlog",
+        lambda: replace(PX4_RECORDING, set_points=((0.0, 5.0),)).content,
+        "file: has no altitude changes: the reference moves by 0.00 m",
+    ),
+    Refused("saturated.tlog", lambda: replace(TLOG, full_from=0.4).content, "file: has the throttle at a limit"),
+    Refused("short.tlog", lambda: replace(TLOG, lasts_s=8.5).content, "file: holds altitude for 5.5 s only; 6 s"),
+    Refused(
+        "loiter.tlog",
+        lambda: replace(TLOG, mode=LOITER).content,
+        "HEARTBEAT: has no flight in GUIDED, only in LOITER, where the messages do not determine the reference",
+    ),
+    Refused("hold.tlog", lambda: replace(PX4_RECORDING, mode=HOLD).content, "no flight in Offboard, only in Automatic"),
+    Refused("unread.tlog", lambda: replace(TLOG, parameters={}).content, f"PSC_POSZ_P: {NEVER_ASKED}"),
+    Refused(
+        "slow.tlog",
+        lambda: replace(TLOG, every=12).content,
+        "NAV_CONTROLLER_OUTPUT: arrives 4.2 times a second; 17 times are needed",
+    ),
+    Refused("silent.tlog", lambda: replace(TLOG, without=(ATTITUDE,)).content, "ATTITUDE_TARGET: is missing"),
+    Refused("silent.tlog", lambda: replace(TLOG, without=(CONTROLLER, TARGET)).content, "LOCAL_NED: is missing"),
+    Refused(
+        "sideways.tlog",
+        lambda: replace(TLOG, lean_rad=0.7).content,
+        "ATTITUDE_TARGET: leans by more than 30° throughout the flight",
+    ),
+)
+
+
+def analyze(tmp_path: Path, name: str, content: bytes, *options: str) -> tuple[int, str]:
+    path = tmp_path / name
+    path.write_bytes(content)
+    result = CliRunner().invoke(app, ["analyze", str(path), *options])
+    return result.exit_code, result.output
+
+
+@pytest.mark.parametrize("log", REFUSED, ids=lambda log: log.name)
+def test_a_log_that_lacks_something_is_refused_by_naming_it(log: Refused, tmp_path: Path) -> None:
+    code, output = analyze(tmp_path, log.name, log.made())
+    assert (code, "Traceback" in output) == (1, False)
+    assert log.said in " ".join(output.split())
+
+
+@dataclass(frozen=True)
+class Answered:
+    """`hover_throttle` and `motor_lag_s` are those of the simulated vehicle."""
+
+    name: str
+    made: Callable[[], bytes]
+    hover_throttle: float
+    motor_lag_s: float
+    gains: Mapping[str, float]
+
+
+ANSWERED: Final = (
+    Answered("steps.tlog", lambda: TLOG.content, 0.4, 0.05, {"PSC_POSZ_P": 3.0, "PSC_VELZ_P": 8.0}),
+    Answered("steps.tlog", lambda: PX4_RECORDING.content, 0.4, 0.05, {"MPC_Z_P": 1.5}),
+    pytest.param(
+        Answered("cut.tlog", lambda: cut(TLOG.content), 0.4, 0.05, {"PSC_POSZ_P": 3.0}), marks=pytest.mark.complete
+    ),
+    pytest.param(
+        Answered("cut.bin", lambda: cut(ardupilot_log(copter(QUIET))), 0.4, 0.05, {"PSC_POSZ_P": 3.0}),
+        marks=pytest.mark.complete,
+    ),
+    pytest.param(
+        Answered("cut.ulg", lambda: cut(px4_log(px4())), 0.4, 0.05, {"MPC_Z_P": 1.5}), marks=pytest.mark.complete
+    ),
+)
+
+
+@pytest.mark.parametrize("log", ANSWERED, ids=lambda log: log.name)
+def test_a_log_that_suffices_gives_the_vehicle_and_gains_for_it(log: Answered, tmp_path: Path) -> None:
+    out = tmp_path / "answer.json"
+    code, output = analyze(tmp_path, log.name, log.made(), "--json", str(out))
+    assert code == 0, output
+    numbers = json.loads(out.read_text())["numbers"]
+    vehicle, proposed = numbers["vehicle"], numbers["proposed"]
+    assert vehicle["hover_throttle"]["mean"] == pytest.approx(log.hover_throttle, abs=0.005)
+    assert vehicle["motor_lag_s"]["mean"] == pytest.approx(log.motor_lag_s, abs=0.03)
+    assert {name: proposed["gains"][name] for name in log.gains} == pytest.approx(dict(log.gains))
+    assert proposed["error_m"] < 0.75 * numbers["assessments"][0]["error_m"]
+    assert proposed["margin"] >= 2.0
