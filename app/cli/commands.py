@@ -352,8 +352,8 @@ def analyze(
         typer.Argument(
             metavar="LOG",
             show_default=False,
-            help="ArduCopter's .bin log, PX4's .ulg log, or Paparazzi's .data (a .log next to it is read too) or .tlog "
-            "of takeoffs.",
+            help="ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data "
+            "(a .log next to it is read too) or .tlog of takeoffs.",
         ),
     ],
     params: Annotated[

@@ -14,8 +14,9 @@ router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 def analyze_log(record: Record) -> LogAnalysis:
     """Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains.
 
-    ArduCopter's .bin or PX4's .ulg log of a flight with altitude changes, or Paparazzi's .data log (with its .log as
-    the form field `companion`) or .tlog of takeoffs to 3 m. Takes some seconds; nothing is stored.
+    ArduCopter's .bin or PX4's .ulg log of a flight with altitude changes, a .tlog of altitude steps under either, or
+    Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m. Takes some seconds;
+    nothing is stored.
     """
     return service.analyze_upload(record.content(), record.read_companion(), name=record.name)
 

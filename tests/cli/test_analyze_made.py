@@ -67,75 +67,85 @@ def of_a_plane() -> bytes:
 
 
 @dataclass(frozen=True)
-class Refused:
+class RefusedLog:
     name: str
     made: Callable[[], bytes]
     said: str
 
 
 REFUSED: Final = (
-    Refused("empty.bin", lambda: b"", "file: is empty"),
-    Refused("packed.bin", lambda: b"\x1f\x8b\x08", "file: is compressed (gzip): unpack it first"),
-    Refused("definitions.bin", lambda: cut(ardupilot_log(copter()), 0.01), "file: has no data: copy the whole log"),
-    Refused("plane.bin", of_a_plane, "MSG: is of ArduPlane, not of ArduCopter"),
-    Refused("hover.bin", lambda: ardupilot_log(hovering(copter())), "file: has no altitude changes"),
-    Refused("saturated.bin", lambda: ardupilot_log(saturated(copter())), "file: has the throttle at a limit in 20% of"),
-    Refused("short.bin", lambda: ardupilot_log(copter(), rows=slice(45)), "file: holds altitude for 4.4 s only; 6 s"),
-    Refused("short.bin", lambda: cut(ardupilot_log(copter()), 0.3), "s only; 6 s are needed"),
-    Refused(
+    RefusedLog("empty.bin", lambda: b"", "file: is empty"),
+    RefusedLog("packed.bin", lambda: b"\x1f\x8b\x08", "file: is compressed (gzip): unpack it first"),
+    RefusedLog("definitions.bin", lambda: cut(ardupilot_log(copter()), 0.01), "file: has no data: copy the whole log"),
+    RefusedLog("plane.bin", of_a_plane, "MSG: is of ArduPlane, not of ArduCopter"),
+    RefusedLog("hover.bin", lambda: ardupilot_log(hovering(copter())), "file: has no altitude changes"),
+    RefusedLog(
+        "saturated.bin", lambda: ardupilot_log(saturated(copter())), "file: has the throttle at a limit in 20% of"
+    ),
+    RefusedLog(
+        "short.bin", lambda: ardupilot_log(copter(), rows=slice(45)), "file: holds altitude for 4.4 s only; 6 s"
+    ),
+    RefusedLog("short.bin", lambda: cut(ardupilot_log(copter()), 0.3), "s only; 6 s are needed"),
+    RefusedLog(
         "manual.bin",
         lambda: ardupilot_log(copter(), modes=((0.0, STABILIZE),)),
         "MODE: has no mode that holds altitude in flight",
     ),
-    Refused("unset.bin", lambda: ardupilot_log(copter(), parameters={}), "PSC_POSZ_P: is missing"),
-    Refused(
+    RefusedLog("unset.bin", lambda: ardupilot_log(copter(), parameters={}), "PSC_POSZ_P: is missing"),
+    RefusedLog(
         "sideways.bin",
         lambda: ardupilot_log(hovering(copter()), attitude=[(0.1 * row, 0.0, 40.0) for row in range(400)]),
         "ATT: leans by more than 30° throughout the flight",
     ),
-    Refused("header.ulg", lambda: px4_log(px4())[:16], "file: has no data: copy the whole log"),
-    Refused(
+    RefusedLog("header.ulg", lambda: px4_log(px4())[:16], "file: has no data: copy the whole log"),
+    RefusedLog(
         "plane.ulg",
         lambda: px4_log(px4(), without=("takeoff_status",), kind=2),
         "vehicle_status.vehicle_type: is never that of a copter",
     ),
-    Refused("hover.ulg", lambda: px4_log(hovering(px4())), "file: has no altitude changes"),
-    Refused("saturated.ulg", lambda: px4_log(saturated(px4())), "file: has the throttle at a limit in 20% of its rows"),
-    Refused(
+    RefusedLog("hover.ulg", lambda: px4_log(hovering(px4())), "file: has no altitude changes"),
+    RefusedLog(
+        "saturated.ulg", lambda: px4_log(saturated(px4())), "file: has the throttle at a limit in 20% of its rows"
+    ),
+    RefusedLog(
         "manual.ulg",
         lambda: px4_log(px4(), has_altitude=False, modes=((0.0, POSITION),)),
         "setpoint.z: has no altitude to follow in flight, as in manual modes",
     ),
-    Refused("unset.ulg", lambda: px4_log(px4(), parameters={}), "MPC_Z_P: is missing"),
-    Refused("cut.ulg", lambda: cut(px4_log(px4()), 0.2), "the file ends in the middle of a message"),
-    Refused("plane.tlog", lambda: replace(TLOG, kind=FIXED_WING).content, "file: is the log of a fixed-wing aircraft"),
-    Refused(
+    RefusedLog("unset.ulg", lambda: px4_log(px4(), parameters={}), "MPC_Z_P: is missing"),
+    RefusedLog("cut.ulg", lambda: cut(px4_log(px4()), 0.2), "the file ends in the middle of a message"),
+    RefusedLog(
+        "plane.tlog", lambda: replace(TLOG, kind=FIXED_WING).content, "file: is the log of a fixed-wing aircraft"
+    ),
+    RefusedLog(
         "hover.tlog",
         lambda: replace(TLOG, set_points=((0.0, 5.0),)).content,
         "POSITION_TARGET_LOCAL_NED: has no altitude step in GUIDED in flight",
     ),
-    Refused(
+    RefusedLog(
         "hover.tlog",
         lambda: replace(PX4_RECORDING, set_points=((0.0, 5.0),)).content,
         "file: has no altitude changes: the reference moves by 0.00 m",
     ),
-    Refused("saturated.tlog", lambda: replace(TLOG, full_from=0.4).content, "file: has the throttle at a limit"),
-    Refused("short.tlog", lambda: replace(TLOG, lasts_s=8.5).content, "file: holds altitude for 5.5 s only; 6 s"),
-    Refused(
+    RefusedLog("saturated.tlog", lambda: replace(TLOG, full_from=0.4).content, "file: has the throttle at a limit"),
+    RefusedLog("short.tlog", lambda: replace(TLOG, lasts_s=8.5).content, "file: holds altitude for 5.5 s only; 6 s"),
+    RefusedLog(
         "loiter.tlog",
         lambda: replace(TLOG, mode=LOITER).content,
         "HEARTBEAT: has no flight in GUIDED, only in LOITER, where the messages do not determine the reference",
     ),
-    Refused("hold.tlog", lambda: replace(PX4_RECORDING, mode=HOLD).content, "no flight in Offboard, only in Automatic"),
-    Refused("unread.tlog", lambda: replace(TLOG, parameters={}).content, f"PSC_POSZ_P: {NEVER_ASKED}"),
-    Refused(
+    RefusedLog(
+        "hold.tlog", lambda: replace(PX4_RECORDING, mode=HOLD).content, "no flight in Offboard, only in Automatic"
+    ),
+    RefusedLog("unread.tlog", lambda: replace(TLOG, parameters={}).content, f"PSC_POSZ_P: {NEVER_ASKED}"),
+    RefusedLog(
         "slow.tlog",
         lambda: replace(TLOG, every=12).content,
         "NAV_CONTROLLER_OUTPUT: arrives 4.2 times a second; 17 times are needed",
     ),
-    Refused("silent.tlog", lambda: replace(TLOG, without=(ATTITUDE,)).content, "ATTITUDE_TARGET: is missing"),
-    Refused("silent.tlog", lambda: replace(TLOG, without=(CONTROLLER, TARGET)).content, "LOCAL_NED: is missing"),
-    Refused(
+    RefusedLog("silent.tlog", lambda: replace(TLOG, without=(ATTITUDE,)).content, "ATTITUDE_TARGET: is missing"),
+    RefusedLog("silent.tlog", lambda: replace(TLOG, without=(CONTROLLER, TARGET)).content, "LOCAL_NED: is missing"),
+    RefusedLog(
         "sideways.tlog",
         lambda: replace(TLOG, lean_rad=0.7).content,
         "ATTITUDE_TARGET: leans by more than 30° throughout the flight",
@@ -151,14 +161,14 @@ def analyze(tmp_path: Path, name: str, content: bytes, *options: str) -> tuple[i
 
 
 @pytest.mark.parametrize("log", REFUSED, ids=lambda log: log.name)
-def test_a_log_that_lacks_something_is_refused_by_naming_it(log: Refused, tmp_path: Path) -> None:
+def test_a_log_that_lacks_something_is_refused_by_naming_it(log: RefusedLog, tmp_path: Path) -> None:
     code, output = analyze(tmp_path, log.name, log.made())
     assert (code, "Traceback" in output) == (1, False)
     assert log.said in " ".join(output.split())
 
 
 @dataclass(frozen=True)
-class Answered:
+class UsedLog:
     """`hover_throttle` and `motor_lag_s` are those of the simulated vehicle."""
 
     name: str
@@ -168,24 +178,24 @@ class Answered:
     gains: Mapping[str, float]
 
 
-ANSWERED: Final = (
-    Answered("steps.tlog", lambda: TLOG.content, 0.4, 0.05, {"PSC_POSZ_P": 3.0, "PSC_VELZ_P": 8.0}),
-    Answered("steps.tlog", lambda: PX4_RECORDING.content, 0.4, 0.05, {"MPC_Z_P": 1.5}),
+USED: Final = (
+    UsedLog("steps.tlog", lambda: TLOG.content, 0.4, 0.05, {"PSC_POSZ_P": 3.0, "PSC_VELZ_P": 8.0}),
+    UsedLog("steps.tlog", lambda: PX4_RECORDING.content, 0.4, 0.05, {"MPC_Z_P": 1.5}),
     pytest.param(
-        Answered("cut.tlog", lambda: cut(TLOG.content), 0.4, 0.05, {"PSC_POSZ_P": 3.0}), marks=pytest.mark.complete
+        UsedLog("cut.tlog", lambda: cut(TLOG.content), 0.4, 0.05, {"PSC_POSZ_P": 3.0}), marks=pytest.mark.complete
     ),
     pytest.param(
-        Answered("cut.bin", lambda: cut(ardupilot_log(copter(QUIET))), 0.4, 0.05, {"PSC_POSZ_P": 3.0}),
+        UsedLog("cut.bin", lambda: cut(ardupilot_log(copter(QUIET))), 0.4, 0.05, {"PSC_POSZ_P": 3.0}),
         marks=pytest.mark.complete,
     ),
     pytest.param(
-        Answered("cut.ulg", lambda: cut(px4_log(px4())), 0.4, 0.05, {"MPC_Z_P": 1.5}), marks=pytest.mark.complete
+        UsedLog("cut.ulg", lambda: cut(px4_log(px4())), 0.4, 0.05, {"MPC_Z_P": 1.5}), marks=pytest.mark.complete
     ),
 )
 
 
-@pytest.mark.parametrize("log", ANSWERED, ids=lambda log: log.name)
-def test_a_log_that_suffices_gives_the_vehicle_and_gains_for_it(log: Answered, tmp_path: Path) -> None:
+@pytest.mark.parametrize("log", USED, ids=lambda log: log.name)
+def test_a_log_that_suffices_gives_the_vehicle_and_gains_for_it(log: UsedLog, tmp_path: Path) -> None:
     out = tmp_path / "answer.json"
     code, output = analyze(tmp_path, log.name, log.made(), "--json", str(out))
     assert code == 0, output

@@ -117,7 +117,7 @@ def test_a_file_that_is_no_log_is_refused(client: TestClient) -> None:
     assert problems_of(answer) == {"file": "is not a log"}
     assert problems_of(send(client, "empty.bin", b"")) == {"file": "is empty"}
     assert answer.json()["hint"].startswith(
-        "Use ArduCopter's .bin log, PX4's .ulg log, or Paparazzi's .data or .tlog log of a takeoff."
+        "Use ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data or "
     )
 
 
@@ -153,14 +153,23 @@ def test_a_ground_log_needs_its_companion_for_the_gains(client: TestClient) -> N
     assert answer.json()["gains"]["rows"][0][:4] == ["As flown", "283", "13", "82"]
 
 
-def test_a_telemetry_log_of_another_autopilot_is_refused(client: TestClient) -> None:
+def test_a_telemetry_log_of_a_copter_without_steps_is_refused_for_what_it_lacks(client: TestClient) -> None:
     log = Telemetry(ardupilotmega, autopilot=3, system=1)
     log.parameter("PSC_POSZ_P", 1.0)
     log.heartbeat()
     log.fly(20.0, to_m=3.0)
     answer = send(client, "copter.tlog", log.content)
     assert answer.status_code == 422
-    assert problems_of(answer)["file"].startswith("is a telemetry log of an autopilot with the gains PSC_")
+    problems = problems_of(answer)
+    assert [name for name, reason in problems.items() if reason == "is missing"] == [
+        "NAV_CONTROLLER_OUTPUT",
+        "ATTITUDE_TARGET",
+        "POSITION_TARGET_LOCAL_NED",
+    ]
+    assert "PSC_VELZ_P" in problems
+    assert problems_of(start(client, "copter.tlog", log.content))["file"].startswith(
+        "is a telemetry log of an autopilot"
+    )
 
 
 def start(client: TestClient, name: str, content: bytes) -> httpx2.Response:

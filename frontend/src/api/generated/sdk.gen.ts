@@ -744,8 +744,9 @@ export const getControllerCheckFigure = <ThrowOnError extends boolean = false>(o
  *
  * Analyse a log: how the altitude was controlled, the fitted vehicle, and better gains.
  *
- * ArduCopter's .bin or PX4's .ulg log of a flight with altitude changes, or Paparazzi's .data log (with its .log as
- * the form field `companion`) or .tlog of takeoffs to 3 m. Takes some seconds; nothing is stored.
+ * ArduCopter's .bin or PX4's .ulg log of a flight with altitude changes, a .tlog of altitude steps under either, or
+ * Paparazzi's .data log (with its .log as the form field `companion`) or .tlog of takeoffs to 3 m. Takes some seconds;
+ * nothing is stored.
  */
 export const analyzeLog = <ThrowOnError extends boolean = false>(options: Options<AnalyzeLogData, ThrowOnError>): RequestResult<AnalyzeLogResponses, AnalyzeLogErrors, ThrowOnError> => (options.client ?? client).post<AnalyzeLogResponses, AnalyzeLogErrors, ThrowOnError>({
     ...formDataBodySerializer,
