@@ -18,7 +18,7 @@ from app.common.errors import NotFoundError
 from app.common.states import TrialState
 from app.core.definition import Definition, problems_of_options
 from app.core.errors import InputError, Problem
-from app.core.experiments import get_experiment
+from app.core.experiments import experiment_of, get_experiment
 from app.core.experiments.base import Experiment
 from app.core.tuning.confirmation import compare_winner
 from app.core.tuning.definition_checks import check_definition, highest_set_point_m
@@ -50,7 +50,7 @@ def definition_of(row: CampaignRow) -> Definition:
 
 def experiment_of_campaign(row: CampaignRow) -> Experiment:
     """The experiment of a stored campaign, configured as defined there."""
-    return get_experiment(row.experiment, row.definition["experiment_options"])
+    return experiment_of(_ADAPTER.validate_python(row.definition))
 
 
 def frozen_digest(row: CampaignRow) -> str:

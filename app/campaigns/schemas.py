@@ -64,13 +64,28 @@ class Donor(Request):
     checksum: Annotated[str, Field(max_length=64)] = ""
 
 
+class LogEvidence(Request):
+    """What the log of another flight tells of the vehicle before the first flight, as found by its analysis."""
+
+    file_name: Name
+    error_m: Annotated[Number, Field(description="mean distance between reference and altitude in its own manoeuvre")]
+    vehicle: Annotated[
+        dict[Key, tuple[Number, Number]],
+        Field(max_length=10, description="mean and standard deviation of the parameters of the vehicle's model"),
+    ]
+    parameters: Annotated[
+        dict[Key, Number], Field(max_length=100, description="of the autopilot, by the firmware's names")
+    ]
+
+
 class Start(Request):
     """Source of the first flight's gains. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
-    gains are filled in."""
+    gains are filled in; `log` with gains that were proposed from it, for altitude steps under ArduCopter and PX4."""
 
     kind: Literal["default", "simplex", "given", "campaign"] = "default"
     gains: dict[str, Number] | None = None
     donor: Donor | None = None
+    log: LogEvidence | None = None
 
 
 class StopRule(Request):

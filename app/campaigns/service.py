@@ -166,6 +166,8 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     vehicle = clone.vehicle or _choice_of(origin)
     name = clone.name or _name_of_clone(session, origin.name)
     definition = Definition.model_validate(origin.definition)
+    if vehicle != _choice_of(origin):  # a log tells only of the vehicle that flew it
+        definition = definition.model_copy(update={"start": definition.start.model_copy(update={"log": None})})
     if clone.warm_start:
         definition = definition.model_copy(update={"start": Start(kind="campaign", donor=Donor(campaign_id=origin.id))})
     row = add_campaign(session, name, definition, vehicle, parent_id=origin.id)

@@ -28,16 +28,30 @@ class Donor:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LogEvidence:
+    """What the log of another flight tells before the first flight: the mean distance between reference and altitude
+    in its own manoeuvre, m, mean and standard deviation of the parameters of the vehicle's model, and the autopilot's
+    parameters in that flight, each by name."""
+
+    file_name: str
+    error_m: float
+    vehicle: dict[str, tuple[float, float]]
+    parameters: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
     """Source of the first flight's gains.
 
     `gains` is set only with the kinds `given` and `campaign`. `donor` is set only with `campaign`: the gains are then
-    the best of another campaign, copied when this one was defined.
+    the best of another campaign, copied when this one was defined. `log` may be set with `given`: the gains are those
+    proposed from it.
     """
 
     kind: Literal["default", "simplex", "given", "campaign"] = "default"
     gains: dict[str, float] | None = None
     donor: Donor | None = None
+    log: LogEvidence | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,10 +98,13 @@ class Definition:
     safe_gains: dict[str, float] | None = None
 
     def digest(self) -> str:
-        """SHA-256 of the canonical JSON, hex; safe gains are included only if the vehicle has its own."""
+        """SHA-256 of the canonical JSON, hex; safe gains are included only if the vehicle has its own, a log only if
+        there is one."""
         fields = asdict(self)
         if self.safe_gains is None:
             del fields["safe_gains"]
+        if self.start.log is None:
+            del fields["start"]["log"]
         return hashlib.sha256(json.dumps(fields, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 

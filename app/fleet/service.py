@@ -43,6 +43,7 @@ __all__ = [
     "list_vehicles",
     "needs_staging",
     "options_of",
+    "registered_for",
     "require_idle",
     "require_ready",
     "safe_gains_changes",
@@ -110,6 +111,17 @@ def simulation_for(session: Session, experiment: str, gains: Gains) -> VehicleCh
     ]
     found = min(simulated, key=lambda row: (row.state == VehicleState.DISCONNECTED, row.id), default=None)
     return None if found is None else VehicleChoice(kind=found.kind, id=found.id)
+
+
+def registered_for(session: Session, experiment: str, vehicle_id: int | None) -> VehicleChoice:
+    """The registered vehicle with that id; without one, the last registered one that flies an experiment. Raises
+    InputError when there is none."""
+    if vehicle_id is not None and (row := repository.one_or_none(session, vehicle_id)) is not None:
+        return VehicleChoice(kind=row.kind, id=row.id)
+    flying = [row for row in repository.registered_in(session, *VehicleState) if experiment in experiments_of(row)]
+    if vehicle_id is not None or not flying:
+        raise _no_choice("id", f"there is no registered vehicle {vehicle_id or f'that flies {experiment!r}'}")
+    return VehicleChoice(kind=flying[-1].kind, id=flying[-1].id)
 
 
 def _no_choice(field: str, reason: str) -> InputError:

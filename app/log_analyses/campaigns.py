@@ -1,6 +1,7 @@
-"""A campaign that begins with the takeoffs of a log."""
+"""A campaign that begins with the takeoffs of a log, or with the gains proposed from one."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import PurePath
 from typing import Final
 
@@ -8,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.accounts.permissions import RequestContext
 from app.campaigns import service as campaigns
-from app.campaigns.schemas import Campaign, Definition, NewCampaign, StopRule
+from app.campaigns.schemas import Campaign, Definition, LogEvidence, NewCampaign, Start, StopRule
 from app.campaigns.trials.records import plan_and_import
 from app.campaigns.trials.schemas import TrialPlan
 from app.campaigns.trials.service import evaluate_gate
@@ -16,7 +17,9 @@ from app.common.schemas import uploaded_name
 from app.core.experiments.takeoff import Takeoff as Experiment
 from app.core.policy import Gains
 from app.core.tuning.logged_takeoffs import comparable_takeoffs
+from app.fleet import service as fleet
 from app.fleet.schemas import VehicleChoice
+from app.log_analyses.copter_start import CopterStart
 from app.log_analyses.takeoffs import logged_takeoffs
 from app.logs.takeoffs import Takeoff
 
@@ -24,13 +27,36 @@ _UNNAMED: Final = "Log"
 _FURTHER_FLIGHTS: Final = 6
 
 
-def start_campaign(session: Session, found: Sequence[Takeoff], context: RequestContext, *, name: str) -> Campaign:
-    """Create a campaign of a vehicle flown elsewhere with the takeoffs that an analysis of the log uses, scored over
-    the same window. `name` is the log's file name, as uploaded.
+def start_campaign(
+    session: Session,
+    found: Sequence[Takeoff] | CopterStart,
+    context: RequestContext,
+    *,
+    name: str,
+    vehicle_id: int | None = None,
+) -> Campaign:
+    """Create the campaign of a log. `name` is its file name, as uploaded; `vehicle_id` names a registered copter.
 
-    Raises TrajectoryError if no takeoff can be used, InputError that names what a record lacks.
+    Raises TrajectoryError if no takeoff can be used, InputError that names what a record or the vehicle lacks.
     """
     name = uploaded_name(name, unnamed=_UNNAMED)
+    if isinstance(found, CopterStart):
+        return _start_steps(session, found, name=name, vehicle_id=vehicle_id)
+    return _start_takeoffs(session, found, context, name=name)
+
+
+def _start_steps(session: Session, found: CopterStart, *, name: str, vehicle_id: int | None) -> Campaign:
+    """A draft for a registered vehicle, by default the last registered one that flies the steps."""
+    choice = fleet.registered_for(session, found.experiment, vehicle_id)
+    log = LogEvidence(**{**asdict(found.log), "file_name": name})
+    definition = Definition(experiment=found.experiment, start=Start(kind="given", gains=dict(found.gains), log=log))
+    return campaigns.create_campaign(
+        session, NewCampaign(name=PurePath(name).stem.strip() or _UNNAMED, vehicle=choice, definition=definition)
+    )
+
+
+def _start_takeoffs(session: Session, found: Sequence[Takeoff], context: RequestContext, *, name: str) -> Campaign:
+    """A campaign of a vehicle flown elsewhere with the takeoffs that an analysis uses, scored over the same window."""
     used, window_s = comparable_takeoffs(logged_takeoffs(found, name=name))
     records = {each.number: each for each in found}
     campaign_id = campaigns.create_ready_campaign(

@@ -6,6 +6,7 @@ from typing import Final
 from app.core.analysis.analysis import analyze
 from app.core.errors import Problem, TrajectoryError
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
+from app.log_analyses.copter_start import CopterStart, start_of
 from app.log_analyses.manoeuvres import AnalysedManoeuvres
 from app.log_analyses.takeoffs import AnalysedTakeoffs, logged_takeoffs
 from app.logs.ardupilot_flight import read_ardupilot_flight
@@ -13,13 +14,15 @@ from app.logs.copter_tlog import is_copter_tlog, read_copter_tlog
 from app.logs.dataflash import is_dataflash
 from app.logs.paparazzi import is_paparazzi
 from app.logs.px4_flight import read_px4_flight
-from app.logs.readers import HEAD_BYTES, READERS, read_takeoffs
+from app.logs.readers import HEAD_BYTES, read_takeoffs
 from app.logs.takeoffs import Takeoff
 from app.logs.tlog_frames import is_tlog
 from app.logs.ulog_tables import is_ulog
 
-TAKEOFFS: Final = "Paparazzi's .data or .tlog log of a takeoff"
-ANALYSED: Final = f"ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or {TAKEOFFS}"
+ANALYSED: Final = (
+    "ArduCopter's .bin log, PX4's .ulg log, a .tlog of altitude steps under either, or Paparazzi's .data or .tlog log "
+    "of a takeoff"
+)
 _OTHER_FILES: Final = (
     (b"\x1f\x8b", "is compressed (gzip): unpack it first"),
     (b"PK\x03\x04", "is an archive (zip): unpack it first"),
@@ -33,23 +36,30 @@ _FLIGHTS: Final = (
 )
 
 
-def read_content(content: bytes, companion: bytes | None, name: str, *, usable: str) -> list[Takeoff]:
-    """Read every takeoff of a Paparazzi log in memory. Raises TrajectoryError, which asks for a `usable` log."""
+def _read_takeoffs(content: bytes, companion: bytes | None, name: str) -> list[Takeoff]:
+    """Every takeoff of a Paparazzi log."""
     head = content[:HEAD_BYTES]
     if is_tlog(head) or is_paparazzi(head):
         beside = None if companion is None else io.BytesIO(companion)
         return list(read_takeoffs(io.BytesIO(content), name=name, companion=beside))
     raise TrajectoryError(
-        f"{name} cannot be used.", hint=f"Use {usable}.", problems=(Problem("file", _what_else(head)),)
+        f"{name} cannot be used.", hint=f"Use {ANALYSED}.", problems=(Problem("file", _what_else(head)),)
     )
 
 
 def _what_else(head: bytes) -> str:
-    """What a file with these first bytes is, if it is no log that can be used."""
-    if not head:
-        return "is empty"
-    kinds = [f"is another kind of log ({reader.title})" for reader in READERS if reader.recognises(head)]
-    return [*kinds, *(what for begin, what in _OTHER_FILES if head.startswith(begin)), "is not a log"][0]
+    """What a file with these first bytes is, if it is no log."""
+    found = (what for begin, what in _OTHER_FILES if head.startswith(begin))
+    return next(found, "is not a log") if head else "is empty"
+
+
+def read_start(content: bytes, companion: bytes | None, name: str) -> list[Takeoff] | CopterStart:
+    """Read what a campaign starts with: the takeoffs of a Paparazzi log, or the gains proposed from a copter's, which
+    takes some seconds. Raises InputError that names what is missing or wrong."""
+    for recognises, read in _FLIGHTS:
+        if recognises(content):
+            return start_of(analyze(read(io.BytesIO(content), name=name)), name)
+    return _read_takeoffs(content, companion, name)
 
 
 def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
@@ -58,5 +68,5 @@ def analyze_content(content: bytes, companion: bytes | None, name: str) -> Analy
         if recognises(content):
             flight = read(io.BytesIO(content), name=name)
             return AnalysedManoeuvres(analyze(flight), name, flight.assumed)
-    found = read_content(content, companion, name, usable=ANALYSED)
+    found = _read_takeoffs(content, companion, name)
     return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)

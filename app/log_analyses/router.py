@@ -1,12 +1,15 @@
 """Log analyses over HTTP."""
 
-from fastapi import APIRouter, status
+from typing import Annotated
+
+from fastapi import APIRouter, Query, status
 
 from app.campaigns.schemas import Campaign
 from app.log_analyses import service
 from app.log_analyses.schemas import LogAnalysis
 from app.web.dependencies import REQUEST_BODY, Record, RequestContextDep
 
+VehicleId = Annotated[int | None, Query(ge=1, le=2**63 - 1)]
 router = APIRouter(prefix="/api/log-analyses", tags=["log analyses"])
 
 
@@ -22,10 +25,18 @@ def analyze_log(record: Record) -> LogAnalysis:
 
 
 @router.post("/campaign", status_code=status.HTTP_201_CREATED, openapi_extra=REQUEST_BODY)
-def start_campaign(record: Record, asking: RequestContextDep) -> Campaign:
-    """Create a campaign of a vehicle that is flown elsewhere, with the takeoffs of a Paparazzi log as its first
-    flights."""
+def start_campaign(record: Record, asking: RequestContextDep, vehicle: VehicleId = None) -> Campaign:
+    """Create the campaign of a log.
+
+    From a Paparazzi log: of a vehicle that is flown elsewhere, with the takeoffs as its first flights. From a log of an
+    ArduCopter or PX4: a draft of altitude steps with a registered `vehicle`, by default the last registered one that
+    flies them, with the gains proposed from the log for the first flight. The fitted vehicle replaces the data sheet
+    until then.
+    """
     from app.log_analyses import campaigns  # noqa: PLC0415 - imports the models of an analysis
 
     found = service.read_upload(record.content(), record.read_companion(), name=record.name)
-    return record.once(Campaign, lambda session: campaigns.start_campaign(session, found, asking, name=record.name))
+    return record.once(
+        Campaign,
+        lambda session: campaigns.start_campaign(session, found, asking, name=record.name, vehicle_id=vehicle),
+    )

@@ -1,4 +1,4 @@
-"""Operations on logs: analyse one of any autopilot, which stores nothing, and read the takeoffs of one."""
+"""Operations on logs: analyse one of any autopilot, which stores nothing, and read what a campaign takes of one."""
 
 from typing import TYPE_CHECKING, get_args
 
@@ -10,6 +10,7 @@ from app.log_analyses.schemas import LogAnalysis
 from app.processes.sandbox import FILE, run_limited
 
 if TYPE_CHECKING:
+    from app.log_analyses.copter_start import CopterStart
     from app.logs.takeoffs import Takeoff
 
 
@@ -25,9 +26,9 @@ def analyze_upload(content: bytes, companion: bytes | None, *, name: str) -> Log
     return LogAnalysis(**dict(analysed.answer), figures=figures)
 
 
-def read_upload(content: bytes, companion: bytes | None, *, name: str) -> "list[Takeoff]":
-    """Read every takeoff of an uploaded log of Paparazzi's, in a process with limits. Raises InputError that names what
-    is missing or wrong."""
-    from app.log_analyses.content import TAKEOFFS, read_content  # noqa: PLC0415 - imports every reader and model
+def read_upload(content: bytes, companion: bytes | None, *, name: str) -> "list[Takeoff] | CopterStart":
+    """Read what a campaign starts with from an uploaded log, in a process with limits. Raises InputError that names
+    what is missing or wrong."""
+    from app.log_analyses.content import read_start  # noqa: PLC0415 - imports every reader and model
 
-    return run_limited(FILE, read_content, content, companion, name, usable=TAKEOFFS)
+    return run_limited(FILE, read_start, content, companion, name)

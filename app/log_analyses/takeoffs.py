@@ -31,16 +31,7 @@ _POINTS: Final = 1500
 
 
 def logged_takeoffs(found: Sequence[Takeoff], *, name: str) -> list[LoggedTakeoff]:
-    """The takeoffs whose gains the log contains. Raises TrajectoryError if it is of another autopilot, or none does."""
-    names = set(Experiment.space.names)
-    if other := next((each for each in found if each.gain_names and set(each.gain_names) != names), None):
-        raise TrajectoryError(
-            f"{name} cannot be analysed.",
-            hint="Use the vehicle's own log: the .bin file of an ArduCopter, the .ulg file of a PX4.",
-            problems=(
-                Problem("file", f"is a telemetry log of an autopilot with the gains {', '.join(other.gain_names)}"),
-            ),
-        )
+    """The takeoffs whose gains the log contains. Raises TrajectoryError if there is none."""
     known = [
         LoggedTakeoff(number=each.number, gains=each.gains, trajectory=each.trajectory) for each in found if each.gains
     ]

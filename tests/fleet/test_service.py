@@ -1,9 +1,13 @@
 """Vehicles: registered when first wanted, with safe gains, and a ledger of every gain set that they were given."""
 
+import pytest
 from fastapi.testclient import TestClient
 
+from app.core.errors import InputError
 from app.db.session import Database
+from app.fleet.service import registered_for
 from tests.builders import create_campaign, create_flown_trial, create_ready_campaign, get
+from tests.fleet.vehicles import register
 
 DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
 
@@ -45,3 +49,17 @@ def test_the_ledger_lists_what_was_asked_and_what_was_read_back(client: TestClie
     assert [line["trial_id"] for line in lines] == [trial["id"] for trial in flown[::-1]]
     assert [line["asked"] for line in lines] == [trial["gains"] for trial in flown[::-1]]
     assert all(line["asked"] == line["read_back"] and line["outcome"] == "landed" for line in lines)
+
+
+def test_an_experiment_is_flown_by_the_named_vehicle_or_the_last_registered_one(
+    client: TestClient, database: Database
+) -> None:
+    options = {"autopilot": "px4", "simulated": True}
+    first, second = (register(client, name, options=options)["id"] for name in ("First", "Second"))
+    register(client, "Paparazzi")
+    with database.read() as session:
+        assert registered_for(session, "altitude-steps-px4", None).id == second
+        assert registered_for(session, "altitude-steps-px4", first).id == first
+        for experiment, vehicle_id in (("altitude-steps-ardupilot", None), ("altitude-steps-px4", 99)):
+            with pytest.raises(InputError, match=r"Invalid vehicle"):
+                registered_for(session, experiment, vehicle_id)

@@ -10,7 +10,15 @@ import numpy as np
 from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps
 from app.core.control import ardupilot as loop
-from app.core.control.ardupilot_parameters import FIRMWARE_NAMES, HOVER, Packed, Parameters, in_newer_names
+from app.core.control.ardupilot_parameters import (
+    ACCELEROMETER_FILTER,
+    FIRMWARE_NAMES,
+    HOVER,
+    LOOP_RATE,
+    Packed,
+    Parameters,
+    in_newer_names,
+)
 from app.core.control.ardupilot_shaping import square_root
 from app.core.models.ardupilot_copter import fly, step
 from app.core.models.copter import (
@@ -92,6 +100,11 @@ class ArduPilotLoop:
     @property
     def gains(self) -> dict[str, float]:
         return {name: value for name, value in self.parameters.gains.items() if name in SPACE.bounds}
+
+    @property
+    def firmware_parameters(self) -> dict[str, float]:
+        values = {name: getattr(self.parameters, field) / factor for name, (field, factor) in FIRMWARE_NAMES.items()}
+        return values | {LOOP_RATE: 1.0 / self.step_s, ACCELEROMETER_FILTER: self.filter_hz}
 
     @property
     def assumed_hover_throttle(self) -> float:

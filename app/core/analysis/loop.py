@@ -105,6 +105,11 @@ class AltitudeLoop(Protocol):
         ...
 
     @property
+    def firmware_parameters(self) -> dict[str, float]:
+        """All that it depends on, by the names of the firmware; ArduCopter's by those until release 4.6."""
+        ...
+
+    @property
     def assumed_hover_throttle(self) -> float:
         """The parameter for the throttle in hover."""
         ...

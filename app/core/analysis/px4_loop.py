@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps, interpolated
 from app.core.control import px4 as loop
-from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, Parameters, low_pass_gain
+from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, Parameters, low_pass_gain, step_parameters
 from app.core.models.copter import (
     DISTURBANCES,
     FLOWN,
@@ -92,6 +92,11 @@ class Px4Loop:
     @property
     def gains(self) -> dict[str, float]:
         return self.parameters.gains
+
+    @property
+    def firmware_parameters(self) -> dict[str, float]:
+        values = {name: getattr(self.parameters, field) for name, field in FIRMWARE_NAMES.items()}
+        return values | step_parameters(self.step_s)
 
     @property
     def assumed_hover_throttle(self) -> float:

@@ -154,6 +154,11 @@ def estimator_step_s(values: Mapping[str, float]) -> float:
     return min(max(imu_s * max(math.floor(period_s / imu_s + 1e-6), 1.0), imu_s), _LONGEST_STEP_S)
 
 
+def step_parameters(step_s: float) -> dict[str, float]:
+    """Parameters with which this is the interval of the estimates, s, of at least 1 ms."""
+    return {_PREDICTION: 1e6 * step_s, _IMU_RATE: 1.0 / step_s}
+
+
 def parameters_from(values: Mapping[str, float]) -> Parameters:
     """Parameters from the firmware's values by name; those missing have their default, other names are ignored.
 

@@ -5,6 +5,8 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
+import numpy as np
+
 from app.core.definition import Definition, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.altitude_steps import AltitudeSteps
@@ -46,5 +48,11 @@ def _configured(name: str, options: tuple[tuple[str, OptionValue], ...]) -> Expe
 
 
 def experiment_of(definition: Definition) -> Experiment:
-    """Return the experiment of a definition, configured as defined there."""
-    return get_experiment(definition.experiment, definition.experiment_options)
+    """Return the experiment of a definition, configured as defined there; with the vehicle and the autopilot's
+    parameters of the log that it starts from, if it does."""
+    experiment = get_experiment(definition.experiment, definition.experiment_options)
+    log, modelled = definition.start.log, experiment.modelled
+    if log is None or modelled is None:
+        return experiment
+    mean, deviation = np.array([log.vehicle[each.name] for each in modelled.model_parameters]).T
+    return modelled.informed(mean, deviation).under(log.parameters)

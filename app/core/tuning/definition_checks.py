@@ -4,9 +4,10 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from app.core.definition import Definition, StopRule, problems_of_options
+from app.core.definition import Definition, LogEvidence, StopRule, problems_of_options
 from app.core.errors import InputError, Problem
 from app.core.experiments import EXPERIMENTS
+from app.core.experiments.copter_steps import CopterSteps
 from app.core.policy import PolicySpace
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.simplex import SIMPLEX
@@ -111,11 +112,36 @@ def _check_start(definition: Definition, space: PolicySpace) -> None:
     if (start.kind == "campaign") != (start.donor is not None):
         reason = "is required with start.kind 'campaign', and not allowed with any other"
         raise InputError("Invalid start.", hint="", problems=(Problem("start.donor", reason),))
+    if start.log is not None:
+        _check_log(definition, start.log)
     if start.kind == "given" and start.gains is not None:
         space.check(start.gains, field="start.gains")
     elif start.kind != "simplex":
         given = start.gains or space.mapping(space.default)
         _check_bounds_hold(space, space.complete(given, field="start.gains"))
+
+
+def _check_log(definition: Definition, log: LogEvidence) -> None:
+    modelled = EXPERIMENTS[definition.experiment].modelled
+    if definition.start.kind != "given" or not isinstance(modelled, CopterSteps):
+        reason = "is allowed only with start.kind 'given', for altitude steps under ArduCopter or PX4"
+        raise InputError("Invalid start.", hint="", problems=(Problem("start.log", reason),))
+    known = {each.name: (each.lower, each.upper) for each in modelled.model_parameters}
+    if log.vehicle.keys() != known.keys():
+        reason = f"must have {', '.join(known)}"
+        raise InputError("Invalid start.", hint="", problems=(Problem("start.log.vehicle", reason),))
+    wrong = tuple(
+        Problem(f"start.log.vehicle.{name}", f"must be {low:g} … {high:g}, with a standard deviation of at least 0")
+        for name, (low, high) in known.items()
+        if not (low <= log.vehicle[name][0] <= high and 0.0 <= log.vehicle[name][1] < math.inf)
+    )
+    if wrong:
+        raise InputError("Invalid start.", hint="", problems=wrong)
+    try:
+        modelled.exactly_under(log.parameters)
+    except InputError as error:
+        problems = tuple(Problem(f"start.log.parameters.{each.field}", each.reason) for each in error.problems)
+        raise InputError("Invalid start.", hint="", problems=problems) from error
 
 
 def _check_bounds_hold(space: PolicySpace, gains: Mapping[str, float]) -> None:

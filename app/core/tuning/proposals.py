@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from app.core.definition import Definition, Flight, aborted_by_gains
+from app.core.definition import Definition, Flight, LogEvidence, aborted_by_gains
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, ModelledExperiment
 from app.core.formatting import count, format_gains, named_flights, short
@@ -93,7 +93,9 @@ def _start(
     gains = start_gains(definition, experiment, space)
     model = uncorrected_model(experiment) if donor is None else correct_by_bias(experiment, donor)
     trajectory, error = model.predict(space.vector(gains))
-    source = "the nominal model, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
+    log = definition.start.log
+    uncorrected = "the nominal model" if log is None else "the model of the vehicle in that log"
+    source = f"{uncorrected}, not yet corrected by any flight," if donor is None else "the other vehicle's flight"
     lesson = (
         "How much this vehicle deviates from the model." if donor is None else "Whether the two vehicles are similar."
     )
@@ -111,12 +113,23 @@ def _start(
         else "is too uncertain to predict its error"
     )
     summary = f"{_describe_start(definition, gains, flights)}; {source} {outlook}."
-    return replace(start, explanation=replace(start.explanation, summary=summary))
+    notes = () if log is None else (_describe_log(log),)
+    return replace(start, explanation=replace(start.explanation, summary=summary, notes=notes))
+
+
+def _describe_log(log: LogEvidence) -> str:
+    return (
+        f"In {log.file_name} the altitude deviated by {1e3 * log.error_m:.1f} mm from its reference on average, in "
+        "another manoeuvre: the errors of this campaign are not compared with it. Fly these gains only if the log is "
+        "of this vehicle as it is now."
+    )
 
 
 def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flight]) -> str:
     """Source of the start gains, without a full stop; first the flights with these gains that were aborted."""
-    source = f"{_ORIGIN[definition.start.kind]} ({format_gains(gains)})"
+    log = definition.start.log
+    origin = _ORIGIN[definition.start.kind] if log is None else f"the gains proposed from {log.file_name}"
+    source = f"{origin} ({format_gains(gains)})"
     numbers = [flight.number for flight in aborted_by_gains(flights, gains)]
     if numbers:
         aborted = f"{named_flights(numbers).capitalize()} {'was' if len(numbers) == 1 else 'were'} aborted"

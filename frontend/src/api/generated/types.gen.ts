@@ -2405,6 +2405,43 @@ export type LogAnalysis = {
 };
 
 /**
+ * LogEvidence
+ *
+ * What the log of another flight tells of the vehicle before the first flight, as found by its analysis.
+ */
+export type LogEvidence = {
+    /**
+     * File Name
+     */
+    file_name: string;
+    /**
+     * Error M
+     *
+     * mean distance between reference and altitude in its own manoeuvre
+     */
+    error_m: number;
+    /**
+     * Vehicle
+     *
+     * mean and standard deviation of the parameters of the vehicle's model
+     */
+    vehicle: {
+        [key: string]: [
+            number,
+            number
+        ];
+    };
+    /**
+     * Parameters
+     *
+     * of the autopilot, by the firmware's names
+     */
+    parameters: {
+        [key: string]: number;
+    };
+};
+
+/**
  * LoggedBehaviour
  *
  * How the altitude loop behaved in the flight.
@@ -3317,7 +3354,7 @@ export type SparkCurve = {
  * Start
  *
  * Source of the first flight's gains. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
- * gains are filled in.
+ * gains are filled in; `log` with gains that were proposed from it, for altitude steps under ArduCopter and PX4.
  */
 export type StartInput = {
     /**
@@ -3331,13 +3368,14 @@ export type StartInput = {
         [key: string]: number;
     } | null;
     donor?: DonorInput | null;
+    log?: LogEvidence | null;
 };
 
 /**
  * Start
  *
  * Source of the first flight's gains. `gains` goes with kind `given`; `donor` with kind `campaign`, whose
- * gains are filled in.
+ * gains are filled in; `log` with gains that were proposed from it, for altitude steps under ArduCopter and PX4.
  */
 export type StartOutput = {
     /**
@@ -3351,6 +3389,7 @@ export type StartOutput = {
         [key: string]: number;
     } | null;
     donor: DonorOutput | null;
+    log: LogEvidence | null;
 };
 
 /**
@@ -7474,7 +7513,12 @@ export type StartCampaignData = {
         'X-Gainline-Control'?: string | null;
     };
     path?: never;
-    query?: never;
+    query?: {
+        /**
+         * Vehicle
+         */
+        vehicle?: number | null;
+    };
     url: '/api/log-analyses/campaign';
 };
 

@@ -114,7 +114,7 @@ function Result({ analysis, files }: ResultProps) {
           ))}
         </ul>
         <Group gap={10} mt="sm">
-          {autopilot === "Paparazzi" && <StartCampaign key={file_name} files={files} />}
+          {(autopilot === "Paparazzi" || proposes) && <StartCampaign key={file_name} files={files} />}
           {parameter_file !== null && (
             <Button
               component="a"
@@ -133,7 +133,7 @@ function Result({ analysis, files }: ResultProps) {
   );
 }
 
-/** Starts a campaign with the takeoffs of the log as its first flights. */
+/** Starts a campaign with the takeoffs of the log as its first flights, or with the gains proposed from it. */
 function StartCampaign({ files }: { files: RecordFiles }) {
   const { mutate, error, isPending } = useStartCampaign();
   const navigate = useNavigate();
