@@ -203,6 +203,8 @@ def _start(start: Start) -> str:
     origin = _STARTS[start.kind]
     if start.donor is not None:
         origin = f"flight {start.donor.trial_number} of campaign {start.donor.campaign_id}"
+    if start.log is not None:
+        origin = f"the gains proposed from {start.log.file_name}"
     return origin if start.gains is None else f"{origin}: {format_gains(start.gains)}"
 
 

@@ -58,6 +58,7 @@ def test_a_log_that_is_dropped_gives_gains_to_load(page_of_analysis: Dashboard, 
     assert [line.split(",")[0] for line in lines] == ["PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I"]
     proposed = rows.nth(1).locator("td").all_inner_texts()
     assert [line.split(",")[1] for line in lines] == proposed[1:5]
+    expect(dashboard.button("Start campaign")).to_be_visible()
 
 
 def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(page_of_analysis: Dashboard) -> None:

@@ -64,6 +64,7 @@ test("a warm start and a stop on noise are said in words", () => {
       kind: "campaign" as const,
       gains: { kp: 900, ki: 200, kd: 200 },
       donor: { campaign_id: 4, trial_number: 2, checksum: "ab" },
+      log: null,
     },
     stop: { kind: "noise" as const, max_flights: 12, improvement: 0.05, confidence: 0.95, min_battery_v: 10.8 },
   };

@@ -60,8 +60,8 @@ export function LogAnalysisPage() {
       >
         <Text maw="90ch" lh={1.45} mb={10}>
           Drop or choose a log. ArduCopter's .bin or PX4's .ulg: a flight in a mode that holds altitude, with climbs and
-          descents of about 2 m and 5 s of hover in between; or a .tlog of it in GUIDED or Offboard. Paparazzi: .data and
-          .log, or .tlog, of takeoffs to 3 m. Nothing is stored.
+          descents of about 2 m and 5 s of hover in between; or a .tlog of it in GUIDED or Offboard. Paparazzi: .data
+          and .log, or .tlog, of takeoffs to 3 m. Nothing is stored.
         </Text>
         <Group gap={10} mt={12} mb={10}>
           <FileButton multiple accept={ANALYSED_FILES} onChange={analyze} resetRef={resetFile}>
