@@ -119,8 +119,11 @@ class _Reader:
         return read_px4(replace(px4_loop(given), vehicle=self.vehicle.system), trajectory, whole)
 
     def _steps(self, trajectory: Trajectory) -> Steps:
-        """The steps from the first one before which the vehicle was at rest, to some time after the last."""
-        time_s, target_m, rows = trajectory.time_s, trajectory["set_point_m"], steps_in(trajectory)
+        """The steps from the first one before which the vehicle was at rest, to some time after the last; a step right
+        before the end is left out."""
+        time_s, target_m = trajectory.time_s, trajectory["set_point_m"]
+        found = steps_in(trajectory)
+        rows = [row for row in found if time_s[row] + _STEPS_APART_S <= time_s[-1]]
         field = MESSAGE_NAMES[POSITION_TARGET_LOCAL_NED]
         if not rows:
             raise self._refused(
@@ -131,13 +134,14 @@ class _Reader:
             raise self._refused(
                 Problem(field, f"moves again within {_STEPS_APART_S:g} s: fly steps, and wait after each")
             )
+        end_s = time_s[found[len(rows)]] if len(found) > len(rows) else time_s[-1]
         return Steps(
             set_points=SetPoints(
                 times_s=(0.0, *map(on_step, times_s.tolist())),
                 altitudes_m=(float(target_m[rows[0] - 1]), *target_m[rows].tolist()),
             ),
             begin_s=float(times_s[0]),
-            end_s=min(float(times_s[-1]) + _SETTLED_S, float(time_s[-1])),
+            end_s=min(float(times_s[-1]) + _SETTLED_S, float(end_s)),
         )
 
     def _usable(self, rows: CopterRows) -> Rows:

@@ -60,9 +60,18 @@ def test_the_flight_is_the_one_that_the_vehicle_flew(flight: LoggedFlight) -> No
         replace(STEPS, parameters_after=True).content,
         replace(STEPS, boots_at_s=2.0).content,
         replace(STEPS, changes=((2.0, "PSC_POSZ_P", 1.0),)).content,
+        replace(STEPS, set_points=(*CLIMB_AND_DESCENT, (17.9, 7.0))).content,
         b"".join((STEPS.content, replace(STEPS, set_points=((0.0, 5.0),), lasts_s=6.0).content)),
     ],
-    ids=["repeated and late", "cut off", "parameters read later", "restarted", "written again", "two flights"],
+    ids=[
+        "repeated and late",
+        "cut off",
+        "parameters read later",
+        "restarted",
+        "written again",
+        "a step at the end",
+        "two flights",
+    ],
 )
 def test_how_the_log_was_recorded_makes_no_difference(log: bytes, flight: LoggedFlight) -> None:
     found = read(log)

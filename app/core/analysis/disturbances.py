@@ -32,7 +32,7 @@ def disturbances_of(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: 
         """Rate at which `values`, at the rows, changed beyond the integral of `rates`, constant between two rows."""
         integral = np.append(0.0, np.cumsum(rates) * loop.step_s)
         at_rows = np.interp(segment.time_s, np.append(steps.time_s, steps.time_s[-1] + loop.step_s), integral)
-        row = np.searchsorted(segment.time_s, steps.time_s, side="right") - 1
+        row = np.minimum(np.searchsorted(segment.time_s, steps.time_s, side="right") - 1, len(segment.time_s) - 2)
         rate: Samples = ((np.diff(values) - np.diff(at_rows)) / np.diff(segment.time_s))[row]
         return rate
 

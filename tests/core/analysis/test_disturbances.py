@@ -51,3 +51,14 @@ def test_other_weather_is_as_strong_on_average_and_has_the_same_mean() -> None:
     strengths = np.mean([each.var(axis=0) for each in others], axis=0)
     assert strengths == pytest.approx(disturbances.var(axis=0), rel=0.2)
     assert np.corrcoef(others[0][:, 0], others[1][:, 0])[0, 1] < 0.5
+
+
+def test_a_step_of_the_loop_at_the_time_of_the_last_row_is_one_of_the_last_interval() -> None:
+    """Seen: with this offset, rounding puts the last step right behind the last row."""
+    flight = simulated_flight(QUIET)
+    (segment,) = flight.segments
+    moved = replace(segment, time_s=segment.time_s + 16.002)
+    steps = interpolated(moved, flight.loop.step_s)
+    assert steps.time_s[-1] >= moved.time_s[-1]
+    moving = disturbances_of(flight.loop, moved, steps, QUIET.linear)
+    assert np.abs(moving[:, 0]).max() < 0.2
