@@ -17,6 +17,7 @@ from tests.builders import (
     run_jobs,
     upload,
 )
+from tests.fleet.vehicles import register
 
 PX4: Json = {"experiment": "takeoff-px4", "strategy": "manual", "step_fraction": 0.25}
 DEFAULT: Json = {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_I_ACC": 2.0, "MPC_Z_VEL_D_ACC": 0.0}
@@ -139,3 +140,28 @@ def test_the_catalogue_says_which_experiments_have_no_model_and_what_they_can_be
     usable = [each["name"] for each in catalogue["strategies"] if "takeoff-px4" in each["experiments"]]
     assert usable == ["manual"]
     assert create_campaign(client, vehicle="import", definition=PX4)["state"] == "draft"
+
+
+def test_a_clone_keeps_what_a_log_tells_of_the_vehicle_unless_it_is_for_another(client: TestClient) -> None:
+    one, other = (
+        {"kind": "mavlink", "id": register(client, name, options={"autopilot": "px4", "simulated": True})["id"]}
+        for name in ("One", "Other")
+    )
+    vehicle = {
+        "hover_throttle": [0.6, 0.01],
+        "thrust_slope": [1.0, 0.02],
+        "motor_lag_s": [0.05, 0.01],
+        "drag_1_s": [0.3, 0.1],
+    }
+    log = {"file_name": "day.ulg", "error_m": 0.19, "vehicle": vehicle, "parameters": {"MPC_THR_HOVER": 0.5}}
+    definition = {"experiment": "altitude-steps-px4", "start": {"kind": "given", "gains": FIRMER, "log": log}}
+    new = {"name": "From a log", "vehicle": one, "definition": definition}
+    campaign = client.post("/api/campaigns", json=new)
+    assert campaign.status_code == 201, campaign.text
+    path = f"/api/campaigns/{campaign.json()['id']}/clone"
+    starts = [client.post(path, json=json).json()["definition"]["start"] for json in ({}, {"vehicle": other})]
+    assert [start["gains"] for start in starts] == [FIRMER, FIRMER]
+    assert [start["log"] for start in starts] == [log, None]
+    del vehicle["drag_1_s"]
+    refused = client.post("/api/campaigns", json=new)
+    assert "must have hover_throttle" in problems_of(refused)["definition.start.log.vehicle"]
