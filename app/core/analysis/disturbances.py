@@ -26,7 +26,7 @@ def disturbances_of(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: 
     sensed = np.interp(segment.time_s, steps.time_s, filtered(modelled, accelerometer))
     unmodelled = segment.a_m_s2 - sensed
     gust_at_rows, noise_m_s2 = _separated(unmodelled)
-    gust = np.interp(steps.time_s, segment.time_s, gust_at_rows)
+    gust = _at_steps(loop, segment, steps, gust_at_rows)
 
     def beyond(values: Samples, rates: Samples) -> Samples:
         """Rate at which `values`, at the rows, changed beyond the integral of `rates`, constant between two rows."""
@@ -42,6 +42,15 @@ def disturbances_of(loop: AltitudeLoop, segment: Segment, steps: Steps, copter: 
     disturbances[:, 2] = beyond(segment.z_m, steps.v_m_s)
     disturbances[:, 3] = sensor_noise(loop, len(gust), noise_m_s2)
     return disturbances
+
+
+def _at_steps(loop: AltitudeLoop, segment: Segment, steps: Steps, rows: Samples) -> Samples:
+    """Acceleration at each step, shape (m,), by that of the rows, (n,): if a row has the mean over the time before it,
+    interpolation would take that mean a second time, and half a row late."""
+    if loop.row_s is None:
+        return np.interp(steps.time_s, segment.time_s, rows)
+    following = np.searchsorted(segment.time_s, steps.time_s, side="right")
+    return np.asarray(rows[np.minimum(following, len(rows) - 1)])
 
 
 def sensor_noise(loop: AltitudeLoop, steps: int, deviation_m_s2: float) -> Samples:

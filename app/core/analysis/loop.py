@@ -136,6 +136,11 @@ class AltitudeLoop(Protocol):
         ...
 
     @property
+    def row_s(self) -> float | None:
+        """Time before a row over which its acceleration is a mean; None if it was sensed."""
+        ...
+
+    @property
     def accelerometer(self) -> Filter:
         """The filter between the vehicle's acceleration and that in the log."""
         ...

@@ -8,8 +8,8 @@ import pytest
 from app.core.analysis.disturbances import disturbances_of, in_other_weather
 from app.core.analysis.segment import interpolated
 from app.core.records.trajectory import Samples
-from bench.copters.simulation import SimulatedCopter
-from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
+from bench.copters.simulation import SimulatedCopter, loop_of
+from tests.core.analysis.flights import GUSTY, QUIET, parameters_of, simulated_flight
 from tests.core.tuning.flying import compiled_only
 
 pytestmark = compiled_only
@@ -30,6 +30,19 @@ def test_a_gust_is_told_from_noise() -> None:
     disturbances = found(replace(GUSTY, wander_m=0.0, wander_m_s=0.0))
     assert disturbances[:, 0].std() == pytest.approx(0.2, rel=0.25)
     assert disturbances[:, 3].std() == pytest.approx(0.1, rel=0.25)
+
+
+def test_a_gust_known_as_means_over_rows_explains_the_climb_rate_by_itself() -> None:
+    """The change of the climb rate is a mean over its row: taken as a sample at the end of it, a third of the gusts
+    would be left to the estimator."""
+    flight = simulated_flight(replace(GUSTY, noise_m_s2=0.0, wander_m=0.0, wander_m_s=0.0))
+    (sensed,) = flight.segments
+    changes = np.diff(sensed.v_m_s) / np.diff(sensed.time_s)
+    segment = replace(sensed, a_m_s2=np.append(changes[0], changes))
+    loop = replace(loop_of(parameters_of(flight)), row_s=0.1)
+    disturbances = disturbances_of(loop, segment, interpolated(segment, loop.step_s), GUSTY.linear)
+    assert disturbances[:, 0].std() == pytest.approx(0.2, rel=0.15)
+    assert disturbances[:, 1].std() < 0.1 * disturbances[:, 0].std()
 
 
 def test_noise_alone_is_no_gust() -> None:
