@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -22,8 +23,8 @@ _FIRST_STEP, _LAST_STEP = 0.3, 0.01
 _PRICE_OF_ACTIVITY: Final = 0.05
 """Relative error that is as good as a relative throttle activity: 1 % of one for 20 % of the other."""
 _AS_GOOD: Final = math.log(1.05)
-_ACTIVITY_SOUGHT: Final = 0.97 * LARGEST_ACTIVITY
-"""The likeliest copter differs from the mean of all by up to 3 %."""
+_LATTICE: Final = 4
+"""Values of each gain from which the search takes its start."""
 _DIGITS: Final = 3
 _DECIMALS: Final = 2
 _ROUNDING: Final = 0.005
@@ -41,8 +42,8 @@ def propose(
     usual: Mapping[str, float] | None = None,
 ) -> dict[str, float] | None:
     """Gains of the loop's space, or of a narrower one, with three digits, searched for from the best allowed one of
-    `starts` and its gentle set; None if none is allowed. Of what is found and the starts, those within 5 % of the best
-    error, the one with the largest margin.
+    `starts`, its gentle set and a lattice; None if none is allowed. Of what is found and these starts, those within 5 %
+    of the best error, the one with the largest margin.
 
     The first of `copters` is the likeliest: error, throttle activity and margin are its. Allowed are gains within the
     space with which no copter rings (`robust_damping`), and that move the throttle at most `LARGEST_ACTIVITY` times as
@@ -73,25 +74,37 @@ def propose(
         positive."""
         return (
             RINGING_DAMPING - robust_damping(loop_at(point), copters),
-            flown(point)[1] - math.log(_ACTIVITY_SOUGHT),
+            flown(point)[1] - math.log(LARGEST_ACTIVITY),
             *space.disorder(np.array(point)),
         )
+
+    def is_allowed(point: _Point) -> bool:
+        """The damping, which takes longest, is looked at last."""
+        return flown(point)[1] <= math.log(LARGEST_ACTIVITY) and max(excess(point)) <= 0.0
 
     def margin(point: _Point) -> float:
         return gain_margin(loop_at(point), likeliest)
 
     low, high = (space.coordinates({name: ends[end] for name, ends in space.bounds.items()}) for end in (0, 1))
     points = [tuple(space.coordinates(start).tolist()) for start in (*starts, space.gentle)]
-    allowed = [point for point in points if max(excess(point)) <= 0.0]
-    if not allowed:
+    allowed = list(filter(is_allowed, points))
+    start = next(filter(is_allowed, sorted([*allowed, *_lattice(low, high)], key=cost)), None)
+    if start is None:
         return None
 
-    found = _minimum(cost, excess, min(allowed, key=cost), low, high)
+    found = _minimum(cost, excess, start, low, high)
     rounded = tuple(space.coordinates(_rounded(space, space.gains_at(np.array(found)))).tolist())
-    candidates = [point for point in (rounded, *allowed) if max(excess(point)) <= 0.0]
+    candidates = [point for point in (rounded, start, *allowed) if is_allowed(point)]
     least = min(map(cost, candidates))
     best = max((point for point in candidates if cost(point) <= least + _AS_GOOD), key=margin)
     return _rounded(space, space.gains_at(np.array(best)))
+
+
+def _lattice(low: Samples, high: Samples) -> list[_Point]:
+    """Points at equal distances between the ends, shape (k,) each, which may be equal."""
+    ends = zip(low.tolist(), high.tolist(), strict=True)
+    values = [sorted(set(np.linspace(*each, _LATTICE).tolist())) for each in ends]
+    return list(product(*values))
 
 
 def _minimum(
