@@ -35,7 +35,7 @@ from bench.copters.campaign_flights import RIGS, CampaignRig
 from bench.copters.rigs import RIGS as GRIDS
 from bench.copters.simulation import SimulatedCopter
 
-SEED: Final = 20261128
+SEED: Final = 20261129
 QUICK_VEHICLES: Final = 4
 FLIGHTS: Final = 4
 FLIGHTS_OF_THE_GRID: Final = 2
@@ -106,14 +106,16 @@ class Vehicle:
     def activity(self, gains: Gains, seeds: Sequence[int], records: Sequence[Trajectory]) -> float:
         """Throttle activity of flights as in the analysis, from the first step on."""
         calm = replace(self.copter, gust_m_s2=0.0, noise_m_s2=0.0, wander_m_s=0.0, wander_m=0.0)
+        step_s = self._rig.experiment.loop(self._rig.experiment.space.default).step_s
+        steps_s = np.arange(0.0, records[0].time_s[-1], step_s)
+        low_pass = motor_filter(_SLOW_S, step_s)
         found = []
         for seed, record in zip(seeds, records, strict=True):
             moved = record["throttle"]
             if not self._rig.counts_reference:
                 still = self._rig.fly(self._rig.experiment, calm, {**self.parameters, **gains}, seed)
                 moved = moved - still["throttle"]
-            step_s = float(np.median(np.diff(record.time_s)))
-            slow = filtered(moved, motor_filter(_SLOW_S, step_s))
+            slow = np.interp(record.time_s, steps_s, filtered(np.interp(steps_s, record.time_s, moved), low_pass))
             found.append(float(np.std((moved - slow)[record.time_s >= self._rig.experiment.scored_from_s])))
         return float(np.mean(found))
 
