@@ -42,7 +42,7 @@ def _print(out: Console, answer: LogAnswer) -> None:
 def _write_parameters(target: Path, answer: LogAnswer) -> None:
     if answer.parameter_file is None:
         raise InputError(
-            "No parameter file was written, because no gains are proposed.",
+            "No parameter file was written, because nothing is proposed.",
             hint=answer.answer,
             problems=(Problem("--params", "has nothing to write"),),
         )

@@ -16,13 +16,13 @@ from app.log_analyses.schemas import (
     EstimatedVehicle,
     GainsInManoeuvre,
     GainsTable,
+    HoverSetting,
     LogAnswer,
     LoggedBehaviour,
     ManoeuvreNumbers,
     ParameterFile,
 )
 
-_HOVER_DIFFERENCE: Final = 0.1
 _LEAST_SPREAD: Final = 0.01
 _FITTED: Final = ("hover_throttle", "thrust_slope", "motor_lag_s", "drag_1_s")
 
@@ -87,9 +87,9 @@ class AnalysedManoeuvres:
         estimate, loop = self.analysis.estimate, self.analysis.loop
         assumed, parameter = loop.assumed_hover_throttle, loop.texts.hover_parameter
         mean, deviation = estimate.mean, estimate.deviation
-        is_off = abs(mean.hover_throttle / assumed - 1.0) > _HOVER_DIFFERENCE
         return [
-            f"hover throttle {mean.hover_throttle:.3f}" + (f", but {parameter} was {assumed:.3f}" if is_off else ""),
+            f"hover throttle {mean.hover_throttle:.3f}"
+            + (f", but {parameter} was {assumed:.3f}" if self.analysis.hover else ""),
             f"thrust slope {mean.thrust_slope:.2f} ± {max(deviation.thrust_slope, _LEAST_SPREAD):.2f}",
             f"motor lag {1e3 * mean.motor_lag_s:.0f} ± {1e3 * deviation.motor_lag_s:.0f} ms",
             f"drag {mean.drag_1_s:.2f} ± {max(deviation.drag_1_s, _LEAST_SPREAD):.2f} 1/s",
@@ -97,7 +97,7 @@ class AnalysedManoeuvres:
         ]
 
     def _numbers(self) -> ManoeuvreNumbers:
-        analysis = self.analysis
+        analysis, hover = self.analysis, self.analysis.hover
         mean, deviation = analysis.estimate.mean, analysis.estimate.deviation
         values = {
             each: EstimatedValue(mean=getattr(mean, each), deviation=getattr(deviation, each)) for each in _FITTED
@@ -112,6 +112,7 @@ class AnalysedManoeuvres:
             assessments=[_assessed(each) for each in analysis.assessments],
             proposed=None if analysis.proposed is None else _assessed(analysis.proposed),
             at_limit=list(analysis.at_limit),
+            hover=None if hover is None else HoverSetting.model_validate(hover, from_attributes=True),
         )
 
 
@@ -155,8 +156,11 @@ def _row(each: Assessment) -> list[str]:
 def _notes(analysis: Analysis) -> list[str]:
     texts = analysis.loop.texts
     late = f", with {1e3 * EXTRA_LAG_S:.0f} ms of extra {texts.lateness}; a proposal has at least {REQUIRED_MARGIN:g}."
+    hover = analysis.hover
+    but_hover = f" but {hover.parameter}" if hover is not None and hover.is_outside else ""
     return [
-        "Errors are predicted for the same manoeuvre in the same weather, with all other parameters as flown.",
+        *([] if hover is None else [hover.reason]),
+        f"Errors are predicted for the same manoeuvre and weather, with all other parameters{but_hover} as flown.",
         f"Throttle activity is relative to the gains flown; a proposal has at most {LARGEST_ACTIVITY:g}.",
         f"The margin is the factor by which {texts.fast_gains} can be raised before the loop rings{late}",
         *(

@@ -69,6 +69,22 @@ class GainsInTakeoff(AssessedGains):
     refusal: Annotated[str, Field(description="why the gate refuses these gains; empty: it does not")]
 
 
+class HoverSetting(Schema):
+    """A better value of the parameter for the hover throttle."""
+
+    parameter: str
+    present: float
+    proposed: float
+    is_outside: Annotated[
+        bool,
+        Field(
+            description="whether the vehicle hovers outside MPC_THR_HOVER ± HTE_THR_RANGE, where PX4's estimate stops; "
+            "the gain sets but the first are then assessed with the proposed value"
+        ),
+    ]
+    reason: str
+
+
 class ManoeuvreNumbers(Schema):
     """The analysis of an ArduCopter's or PX4's log. `assessments` begins with the gains flown."""
 
@@ -77,6 +93,7 @@ class ManoeuvreNumbers(Schema):
     assessments: list[GainsInManoeuvre]
     proposed: GainsInManoeuvre | None
     at_limit: Annotated[list[str], Field(description="proposed gains at an end of the range that was searched")]
+    hover: Annotated[HoverSetting | None, Field(description="none if the present value suits")]
 
 
 class FittedValue(Schema):
@@ -114,7 +131,7 @@ class GainsTable(Schema):
 
 
 class ParameterFile(Schema):
-    """The proposed gains as a ground station or an airframe takes them."""
+    """The proposed gains and hover throttle as a ground station or an airframe takes them."""
 
     name: str
     content: str

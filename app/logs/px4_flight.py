@@ -19,6 +19,7 @@ from app.core.control.px4 import FLIGHT, GRAVITY
 from app.core.control.px4_parameters import (
     LOOP_NAMES,
     estimator_step_s,
+    hover_deviation,
     parameters_from,
 )
 from app.core.errors import Problem, TrajectoryError
@@ -198,6 +199,7 @@ def read_px4_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
             step_s=step_s,
             row_s=float(np.median(np.concatenate([np.diff(logged.time_s[each]) for each in rows]))),
             descent_m_s=float(np.median(down)) if np.isfinite(down).all() else parameters.descent_m_s,
+            hover_deviation=hover_deviation(given),
             vehicle=int(given.get(_VEHICLE, 1.0)),
         ),
         segments=[logged.segment(each, hover) for each in rows],

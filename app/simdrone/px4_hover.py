@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from app.core.control.px4_parameters import hover_limits
 from app.core.kernels import kernel
 from app.core.models.copter import GRAVITY_M_S2
 from app.core.records.trajectory import Samples
@@ -49,8 +50,8 @@ class HoverSettings:
 
     def packed(self) -> Samples:
         """Return the constants for `update`, shape (5,)."""
-        lowest = max(min(max(self.hover_thrust - self.range, 0.0), 0.8), _LEAST_THRUST)
-        highest = min(max(self.hover_thrust + self.range, 0.2), 0.9)
+        low, highest = hover_limits(self.hover_thrust, self.range)
+        lowest = max(low, _LEAST_THRUST)
         return np.array([self.noise_1_s, self.gate, lowest, highest, self.fast_m_s])
 
 

@@ -63,8 +63,8 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
     assert "2, 7, 0.1, 0.2" in outputs[1]
     values = [[float(line.split(",")[1]) for line in lines_of(file)] for file in files]
     names = [line.split(",")[0] for line in lines_of(files[1])]
-    assert names == ["PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I"]
-    assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3]])
+    assert names == ["PSC_D_POS_P", "PSC_D_VEL_P", "PSC_D_ACC_P", "PSC_D_ACC_I", "MOT_THST_HOVER"]
+    assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3], values[0][4]])
 
 
 def test_the_log_of_px4_gives_a_file_for_its_ground_station(tmp_path: Path) -> None:
@@ -76,7 +76,8 @@ def test_the_log_of_px4_gives_a_file_for_its_ground_station(tmp_path: Path) -> N
     assert "PX4's default gains" in result.output
     assert "# MPC_Z_VEL_P_ACC was 4\n" in parameters.read_text()
     rows = [line.split("\t") for line in lines_of(parameters)]
-    assert [row[2] for row in rows] == ["MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC"]
+    gains = ["MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC"]
+    assert [row[2] for row in rows] == [*gains, "MPC_THR_HOVER"]
     assert {len(row) for row in rows} == {5}
 
 
@@ -108,7 +109,9 @@ def test_a_wrong_hover_throttle_is_told(tmp_path: Path) -> None:
     path.write_bytes(ardupilot_log(flight, parameters={**PARAMETERS, "MOT_THST_HOVER": 0.3}))
     result = analyze(path)
     assert result.exit_code == 0, result.output
-    assert "hover throttle 0.400, but MOT_THST_HOVER was 0.300" in " ".join(result.output.split())
+    said = " ".join(result.output.split())
+    assert "hover throttle 0.400, but MOT_THST_HOVER was 0.300" in said
+    assert "Set MOT_THST_HOVER to 0.4." in said
 
 
 @pytest.mark.complete
@@ -122,7 +125,8 @@ def test_a_flight_with_the_throttle_at_its_limit_for_a_moment_says_so(tmp_path: 
 
 def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> None:
     path, parameters = tmp_path / "gusty.bin", tmp_path / "gains.param"
-    path.write_bytes(ardupilot_log(simulated_flight(replace(GUSTY, gust_m_s2=0.6, quadratic=0.4), seed=3)))
+    told = replace(GUSTY, gust_m_s2=0.6, quadratic=0.4, assumed_hover_throttle=0.4)
+    path.write_bytes(ardupilot_log(simulated_flight(told, seed=3), parameters={**PARAMETERS, "MOT_THST_HOVER": 0.4}))
     result = analyze(path)
     assert result.exit_code == 0
     assert "is not sufficient to propose gains" in " ".join(result.output.split())

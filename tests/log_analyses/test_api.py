@@ -88,6 +88,9 @@ def test_the_log_of_px4_gives_gains_for_its_ground_station(client: TestClient) -
     assert vehicle["hover_throttle"]["mean"] == pytest.approx(0.40, abs=0.01)
     assert vehicle["assumed_hover_throttle"] == pytest.approx(0.35)
     assert any("but MPC_THR_HOVER was 0.350" in fact for fact in found["vehicle"])
+    hover = found["numbers"]["hover"]
+    assert (hover["parameter"], hover["present"], hover["is_outside"]) == ("MPC_THR_HOVER", pytest.approx(0.35), False)
+    assert hover["reason"] in found["notes"]
     assert found["gains"]["columns"][:5] == ["Gains", "Z_P", "Z_VEL_P_ACC", "Z_VEL_I_ACC", "Z_VEL_D_ACC"]
     assert [row[0] for row in found["gains"]["rows"]] == [
         "As flown",
@@ -103,8 +106,9 @@ def test_the_log_of_px4_gives_gains_for_its_ground_station(client: TestClient) -
     assert any("30 ms of extra dead time" in note for note in found["notes"])
     assert found["parameter_file"]["name"] == "flight.params"
     lines = [line.split("\t") for line in found["parameter_file"]["content"].splitlines() if not line.startswith("#")]
-    assert [(vehicle, component, kind) for vehicle, component, _, _, kind in lines] == [("7", "1", "9")] * 4
-    assert {name: float(value) for _, _, name, value, _ in lines} == pytest.approx(proposed["gains"])
+    assert [(vehicle, component, kind) for vehicle, component, _, _, kind in lines] == [("7", "1", "9")] * 5
+    values = {name: float(value) for _, _, name, value, _ in lines}
+    assert values == pytest.approx({**proposed["gains"], "MPC_THR_HOVER": hover["proposed"]})
     drawn = found["figures"]["light"]["figure"]["data"]
     assert [(one["meta"]["panel"], one["meta"]["line"]) for one in drawn][:3] == [
         (1, "Reference"),

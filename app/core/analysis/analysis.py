@@ -1,6 +1,6 @@
 """The answer to a log: how the altitude loop behaves, the vehicle behind it, and gains for it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.hover import HoverAdvice, advise_hover
 from app.core.analysis.loop import AltitudeLoop
 from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
@@ -71,7 +72,9 @@ class Response:
 class Analysis:
     """Everything that a log answers. `loop` is that of the flight. `assessments` begins with the gains of the flight;
     `proposed` is None if the log does not suffice, no gains do, or none are better, which `insufficient` then says.
-    `at_limit` names proposed gains at an end of the range that was searched."""
+    `at_limit` names proposed gains at an end of the range that was searched. `hover` is a better value of the parameter
+    for the hover throttle, if the present one does not suit; if the vehicle is outside what the loop finds in flight,
+    all assessments but the first, and `response`, are with this value."""
 
     loop: AltitudeLoop
     behaviour: Behaviour
@@ -81,10 +84,16 @@ class Analysis:
     insufficient: str | None
     at_limit: Sequence[str]
     response: Response
+    hover: HoverAdvice | None
 
     @property
     def answer(self) -> str:
-        """The answer in a sentence or two."""
+        """The answer in a few sentences."""
+        hover = self.hover
+        return f"{self._about_gains} {hover.reason}" if hover is not None and hover.is_outside else self._about_gains
+
+    @property
+    def _about_gains(self) -> str:
         flown, proposed = self.assessments[0], self.proposed
         if proposed is None:
             return self.insufficient or ""
@@ -101,13 +110,17 @@ class Analysis:
         )
 
     def parameter_file(self, file_name: str) -> str | None:
-        """The proposed gains as a ground station loads them, with those flown as comments; None without a proposal."""
-        if self.proposed is None:
+        """The proposed gains and hover throttle as a ground station loads them, with those flown as comments; None if
+        neither is proposed."""
+        proposed, hover = self.proposed, self.hover
+        if proposed is None and hover is None:
             return None
-        flown = self.assessments[0].gains
+        gains = ({}, {}) if proposed is None else (self.assessments[0].gains, proposed.gains)
+        setting = ({}, {}) if hover is None else ({hover.parameter: hover.present}, {hover.parameter: hover.proposed})
         lines = [
             f"# Gainline, from {file_name}. Load on the ground; fly first at a safe height, ready to take over.",
-            *self.loop.parameter_lines(flown, self.proposed.gains),
+            *([] if hover is None else [f"# {hover.reason}"]),
+            *self.loop.parameter_lines(*({**some, **other} for some, other in zip(gains, setting, strict=True))),
         ]
         return "\n".join((*lines, ""))
 
@@ -126,11 +139,13 @@ def analyze(flight: LoggedFlight) -> Analysis:
     _require_signals(flight)
     _require_own_controller(flight)
     estimate = fit_copter(flight)
-    assess = partial(
-        _assess, flight, FlightModel(flight, estimate.draws), FlightModel(flight, [estimate.mean]), estimate
-    )
+    assess = _assessor(flight, estimate)
     present = assess("As flown", loop.gains)
     _require_likeness(loop, behaviour, estimate, present)
+    hover = advise_hover(loop, estimate.mean.hover_throttle)
+    if hover is not None and hover.is_outside:
+        flight = flight.with_hover(hover.proposed)
+        assess = _assessor(flight, estimate)
     usual = loop.rules(flight.throttle_mean)
     compared = [present, *(assess(name, gains) for name, gains in usual.items())]
     insufficient = _insufficient(loop, estimate)
@@ -149,7 +164,13 @@ def analyze(flight: LoggedFlight) -> Analysis:
         insufficient=insufficient,
         at_limit=[*loop.named({name: gains[name] for name in loop.space.at_limit(gains)})] if gains else [],
         response=_response(flight, estimate, gains or loop.gains),
+        hover=hover,
     )
+
+
+def _assessor(flight: LoggedFlight, estimate: CopterEstimate) -> Callable[[str, Mapping[str, float]], Assessment]:
+    """What assesses a named gain set."""
+    return partial(_assess, flight, FlightModel(flight, estimate.draws), FlightModel(flight, [estimate.mean]), estimate)
 
 
 def _is_better(proposed: Assessment, present: Assessment) -> bool:

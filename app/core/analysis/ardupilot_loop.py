@@ -51,6 +51,11 @@ _TEXTS: Final = LoopTexts(
     autopilot="ArduCopter",
     prefix="PSC_",
     hover_parameter="MOT_THST_HOVER",
+    hover_range=(0.125, 0.6875),
+    hover_use=(
+        "the integral has to make up for the difference after every takeoff, and with MOT_HOVER_LEARN at 0, as in a "
+        "campaign, the parameter stays as it is"
+    ),
     fast_gains="P and I of the acceleration controller",
     lateness="lag",
     what_to_fly=(
@@ -96,6 +101,7 @@ class ArduPilotLoop:
     usual_slope = (1.0, 0.25)
     slope_error = 0.0
     target_tolerance_m_s = 0.02
+    hover_limits = None
 
     @property
     def gains(self) -> dict[str, float]:
@@ -140,6 +146,9 @@ class ArduPilotLoop:
 
     def with_gains(self, gains: Mapping[str, float]) -> Self:
         return self._with(**{FIRMWARE_NAMES[name][0]: value for name, value in gains.items()})
+
+    def with_hover(self, hover_throttle: float) -> Self:
+        return self._with(hover_throttle=hover_throttle)
 
     def with_fast_gains(self, factor: float) -> Self:
         """All feedback passes through the acceleration controller."""

@@ -1,7 +1,8 @@
 """A flight as a log holds it: its parts, and the loop that flew them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -27,6 +28,13 @@ class LoggedFlight:
     def error_m(self) -> float:
         """Mean distance between reference and altitude, over the scored rows of all segments."""
         return float(np.mean(np.concatenate([np.abs(each.z_d_m - each.z_m)[each.scored] for each in self.segments])))
+
+    def with_hover(self, hover_throttle: float) -> Self:
+        """The flight under a loop with another value of its parameter for the throttle in hover, which it keeps."""
+        segments = [
+            replace(each, assumed_hover=np.full_like(each.assumed_hover, hover_throttle)) for each in self.segments
+        ]
+        return replace(self, loop=self.loop.with_hover(hover_throttle), segments=segments)
 
     @property
     def throttle_mean(self) -> float:

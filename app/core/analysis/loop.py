@@ -54,20 +54,25 @@ class GainSpace:
 class LoopTexts:
     """Names and sentences about a loop.
 
-    `prefix` is that of its parameters, `hover_parameter` holds the hover throttle that it assumes, `fast_gains` are
-    those that a margin scales, and `lateness` is what it adds to the vehicle. `what_to_fly` answers a log that does not
-    suffice, `lags` say what to reduce if no gains do, `other_controller` what may have flown instead of this loop.
+    `prefix` is that of its parameters. `hover_parameter` holds the hover throttle that it assumes, within
+    `hover_range`; `hover_use` says what for, and `hover_deviation` names the parameter of how far an estimate may be
+    from it, if there is one. `fast_gains` are those that a margin scales, and `lateness` is what it adds to the
+    vehicle. `what_to_fly` answers a log that does not suffice, `lags` say what to reduce if no gains do,
+    `other_controller` what may have flown instead of this loop.
     """
 
     autopilot: Literal["ArduCopter", "PX4"]
     prefix: str
     hover_parameter: str
+    hover_range: tuple[float, float]
+    hover_use: str
     fast_gains: str
     lateness: str
     what_to_fly: str
     lags: str
     other_controller: str
     parameter_suffix: str
+    hover_deviation: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +117,11 @@ class AltitudeLoop(Protocol):
     @property
     def assumed_hover_throttle(self) -> float:
         """The parameter for the throttle in hover."""
+        ...
+
+    @property
+    def hover_limits(self) -> tuple[float, float] | None:
+        """Least and largest hover throttle that the loop finds in flight; None if it keeps to its parameter."""
         ...
 
     @property
@@ -164,6 +174,10 @@ class AltitudeLoop(Protocol):
 
     def with_gains(self, gains: Mapping[str, float]) -> Self:
         """The loop with other values of these gains."""
+        ...
+
+    def with_hover(self, hover_throttle: float) -> Self:
+        """The loop with another value of the parameter for the throttle in hover."""
         ...
 
     def with_fast_gains(self, factor: float) -> Self:

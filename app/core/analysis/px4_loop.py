@@ -8,10 +8,20 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core.analysis.hover import found_hover
 from app.core.analysis.loop import GainSpace, LoopTexts, Run, in_order, mean_over, transition_of
 from app.core.analysis.segment import Segment, Steps, interpolated
 from app.core.control import px4 as loop
-from app.core.control.px4_parameters import FIRMWARE_NAMES, GAINS, Parameters, low_pass_gain, step_parameters
+from app.core.control.px4_parameters import (
+    FIRMWARE_NAMES,
+    GAINS,
+    HOVER_RANGE,
+    HOVER_RANGE_NAME,
+    Parameters,
+    hover_limits,
+    low_pass_gain,
+    step_parameters,
+)
 from app.core.models.copter import (
     DISTURBANCES,
     FLOWN,
@@ -42,6 +52,8 @@ _TEXTS: Final = LoopTexts(
     autopilot="PX4",
     prefix="MPC_",
     hover_parameter="MPC_THR_HOVER",
+    hover_range=(0.1, 0.8),
+    hover_use="PX4 estimates the hover throttle in flight, but takes off with the parameter",
     fast_gains="P, I and D of the velocity controller",
     lateness="dead time",
     what_to_fly=(
@@ -52,6 +64,7 @@ _TEXTS: Final = LoopTexts(
     lags="motors, filters of the velocity (MPC_VEL_LP, MPC_VELD_LP)",
     other_controller="a release with another position controller, or set-points that were not logged",
     parameter_suffix=".params",
+    hover_deviation=HOVER_RANGE_NAME,
 )
 
 _DYNAMIC: Final = [loop.THRUST, loop.DERIVATIVE, loop.VELOCITY, loop.INTEGRAL, loop.ACCELERATION_TARGET]
@@ -73,14 +86,15 @@ _AT_LIMIT: Final = 1e-4
 class Px4Loop:
     """The loop (`AltitudeLoop`), with the limits of its mode.
 
-    The acceleration in the log is the change of the climb rate over `row_s`, a whole number of steps. `vehicle` is the
-    number of the vehicle in MAVLink.
+    The acceleration in the log is the change of the climb rate over `row_s`, a whole number of steps. The estimated
+    hover throttle is within `hover_deviation` of the parameter. `vehicle` is the number of the vehicle in MAVLink.
     """
 
     parameters: Parameters
     step_s: float
     row_s: float
     descent_m_s: float
+    hover_deviation: float = HOVER_RANGE
     vehicle: int = 1
 
     texts = _TEXTS
@@ -101,6 +115,10 @@ class Px4Loop:
     @property
     def assumed_hover_throttle(self) -> float:
         return self.parameters.hover_thrust
+
+    @property
+    def hover_limits(self) -> tuple[float, float]:
+        return hover_limits(self.parameters.hover_thrust, self.hover_deviation)
 
     @property
     def throttle_limits(self) -> tuple[float, float]:
@@ -136,6 +154,9 @@ class Px4Loop:
 
     def with_gains(self, gains: Mapping[str, float]) -> Self:
         return self._with(**{FIRMWARE_NAMES[name]: value for name, value in gains.items()})
+
+    def with_hover(self, hover_throttle: float) -> Self:
+        return self._with(hover_thrust=hover_throttle)
 
     def with_fast_gains(self, factor: float) -> Self:
         """All feedback passes through the velocity controller."""
@@ -198,16 +219,17 @@ class Px4Loop:
         return flown
 
     def transition(self, copter: Copter, *, late_s: float = 0.0) -> Samples:
-        """With the hover throttle of the vehicle, which PX4 estimates in flight. The copter is late by dead time, in
+        """With the hover throttle of the vehicle as PX4 estimates it in flight. The copter is late by dead time, in
         whole steps: with more lag alone, a loop without a filter of its throttle hardly ever rings."""
         packed, p = self.packed(copter), self.parameters.packed(self.step_s)
         hover = float(packed[HOVER_THROTTLE])
-        reference, still = np.array([[0.0, 0.0, 0.0, hover]]), np.zeros((1, len(DISTURBANCES)))
+        estimate = found_hover(self, hover)
+        reference, still = np.array([[0.0, 0.0, 0.0, estimate]]), np.zeros((1, len(DISTURBANCES)))
         inputs, outputs = self._inputs(), np.empty((1, len(loop.OUTPUTS)), dtype=np.float32)
 
         def after_step(nudge: Samples) -> Samples:
             state, flown = np.empty(loop.STATE_SIZE, dtype=np.float32), np.empty((1, len(FLOWN)))
-            loop.start_hover(state, p, hover, hover, 0.0)
+            loop.start_hover(state, p, estimate, hover, 0.0)
             state[_DYNAMIC] += nudge[: len(_DYNAMIC)].astype(np.float32)
             body = start_body(hover, 0.0, 0.0, 0.0, packed) + nudge[len(_DYNAMIC) :]
             fly(state, body, p, packed, self.step_s, 1.0, inputs, outputs, reference, still, flown)

@@ -15,6 +15,7 @@ import numpy as np
 
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.hover import found_hover
 from app.core.analysis.px4_loop import Px4Loop
 from app.core.analysis.segment import LEAD_S, FinerSegment
 from app.core.control import ardupilot_parameters, px4_parameters
@@ -77,7 +78,13 @@ def px4_loop(parameters: Mapping[str, float]) -> Px4Loop:
     """The same for PX4."""
     require_within(parameters, dict.fromkeys(px4_parameters.FIRMWARE_NAMES, PLAUSIBLE))
     given, step_s = px4_parameters.parameters_from(parameters), px4_parameters.estimator_step_s(parameters)
-    return Px4Loop(parameters=given, step_s=step_s, row_s=_whole_steps(step_s), descent_m_s=given.descent_m_s)
+    return Px4Loop(
+        parameters=given,
+        step_s=step_s,
+        row_s=_whole_steps(step_s),
+        descent_m_s=given.descent_m_s,
+        hover_deviation=px4_parameters.hover_deviation(parameters),
+    )
 
 
 def _whole_steps(step_s: float) -> float:
@@ -126,13 +133,14 @@ def read_ardupilot(loop: ArduPilotLoop, trajectory: Trajectory, steps: Steps) ->
 
 
 def read_px4(loop: Px4Loop, trajectory: Trajectory, steps: Steps) -> LoggedFlight:
-    """The same for PX4, whose loop assumes the hover throttle that its own estimator finds: the mean of the flight."""
+    """The same for PX4, whose loop assumes the hover throttle that its own estimator finds: the mean of the flight,
+    within the estimator's limits."""
     _require_channels(trajectory, steps)
     rows_s, steps_s = steps.rows_s(loop.row_s), steps.steps_s(loop.step_s)
     z_d = np.interp(rows_s, trajectory.time_s, trajectory["reference_m"])
     still = np.zeros(len(rows_s))
     sent = np.interp(steps_s, trajectory.time_s, trajectory["throttle"])
-    hover = np.full(len(rows_s), float(sent.mean()))
+    hover = np.full(len(rows_s), found_hover(loop, float(sent.mean())))
     return LoggedFlight(loop=loop, segments=[_segment(trajectory, rows_s, (z_d, still, still), steps_s, sent, hover)])
 
 

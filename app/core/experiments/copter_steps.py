@@ -12,6 +12,7 @@ from typing import ClassVar, Final, Self
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.hover import found_hover
 from app.core.analysis.loop import AltitudeLoop, Run
 from app.core.analysis.recorded_flight import Steps
 from app.core.definition import OptionValue
@@ -236,7 +237,7 @@ class CopterSteps(OwnModel, ABC):
         loop, copter = self.loop(gains), copter_of(model)
         steps_s = self.steps.steps_s(loop.step_s)
         reference = self.references(steps_s)
-        reference[:, 3] = copter.hover_throttle
+        reference[:, 3] = found_hover(loop, copter.hover_throttle)
         run = Run(
             copter=loop.packed(copter),
             reference=reference,

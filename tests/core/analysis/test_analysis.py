@@ -7,6 +7,7 @@ import pytest
 
 from app.core.analysis.analysis import analyze
 from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.hover import advise_hover
 from app.core.analysis.segment import Segment
 from app.core.errors import TrajectoryError
 from app.core.records.trajectory import Samples
@@ -130,7 +131,7 @@ def test_a_flight_that_the_model_does_not_repeat_is_refused() -> None:
 
 def stiff_flight(acceleration_p: float) -> LoggedFlight:
     """3, 8 and an integral gain of 3 on a vehicle with fast motors, in gusts."""
-    nimble = replace(GUSTY, motor_lag_s=0.02)
+    nimble = replace(GUSTY, motor_lag_s=0.02, assumed_hover_throttle=0.4)
     return simulated_flight(
         nimble, position_p_1_s=3.0, velocity_p_1_s=8.0, acceleration_p=acceleration_p, acceleration_i_1_s=3.0
     )
@@ -142,6 +143,10 @@ def test_good_gains_are_kept() -> None:
     assert found.proposed is None
     assert found.answer.startswith("Keep the gains flown")
     assert found.parameter_file("flight.bin") is None
+    advice = advise_hover(found.loop, 0.5)
+    assert advice is not None
+    lines = (replace(found, hover=advice).parameter_file("flight.bin") or "").splitlines()
+    assert lines[1:] == [f"# {advice.reason}", "# MOT_THST_HOVER was 0.4", "MOT_THST_HOVER,0.5"]
 
 
 def test_gains_that_lack_the_margin_are_answered_by_some_that_have_it() -> None:

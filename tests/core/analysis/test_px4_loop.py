@@ -93,6 +93,23 @@ def test_soft_gains_are_answered_by_better_ones_than_the_defaults_within_the_lim
     assert sum(within) >= 7
 
 
+def test_a_hover_throttle_that_the_estimator_cannot_reach_is_told_and_the_gains_are_judged_with_a_better_one() -> None:
+    """The vehicle hovers at 0.40, PX4's estimate stops at 0.45, and makes the loop 1.125 times as stiff."""
+    found = analyze(simulated_px4(replace(CALM, assumed_hover_throttle=0.65)))
+    hover = found.hover
+    assert hover is not None
+    assert (hover.is_outside, hover.present) == (True, 0.65)
+    assert hover.proposed == pytest.approx(0.40, abs=0.01)
+    assert found.answer.endswith(f"Set MPC_THR_HOVER to {hover.proposed:g}.")
+    flown, defaults = found.assessments[:2]
+    assert flown.gains == defaults.gains
+    assert defaults.margin == pytest.approx(1.125 * flown.margin, rel=0.02)
+    lines = (found.parameter_file("flight.ulg") or "").splitlines()
+    assert lines[1] == f"# {hover.reason}"
+    assert "# MPC_THR_HOVER was 0.65" in lines
+    assert lines[-1] == f"1\t1\tMPC_THR_HOVER\t{hover.proposed:g}\t9"
+
+
 @pytest.mark.complete
 def test_gains_without_a_margin_are_answered_by_gains_that_have_one() -> None:
     """P of 15 on motors of 0.2 s: with 30 ms more it rings. The error hardly rises."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from app.core.control.px4_parameters import ESTIMATOR_NAMES, LOOP_NAMES, UNSUPPORTED
+from app.core.control.px4_parameters import ESTIMATOR_NAMES, HOVER_RANGE_NAME, LOOP_NAMES, UNSUPPORTED
 from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
@@ -90,8 +90,8 @@ class Px4:
             "COM_FAIL_ACT_T", "5 s or less (in which it holds before it lands)", least=0.0, most=5.0, may_lack=True
         ),
     )
-    may_lack: Final = frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, "HTE_THR_RANGE"})
-    loop_parameters: Final = ((*LOOP_NAMES, "HTE_THR_RANGE"),)
+    may_lack: Final = frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME})
+    loop_parameters: Final = (LOOP_NAMES,)
 
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
