@@ -5,8 +5,6 @@ that may be written to such a vehicle at all: a campaign narrows them to suit it
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Final
 
 from app.core.analysis.ardupilot_loop import ArduPilotLoop
 from app.core.analysis.flight import LoggedFlight
@@ -26,18 +24,13 @@ from app.core.experiments.takeoff import ARDUPILOT_GAINS, PX4_GAINS
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 
-_LEAST_I: Final = 0.2
-"""A smaller integral gain of the acceleration fails the arming check."""
-
 
 class ArduPilotSteps(CopterSteps):
     """Altitude steps under ArduCopter."""
 
     name = "altitude-steps-ardupilot"
     autopilot = "ArduCopter"
-    space = PolicySpace(
-        tuple(replace(gain, lower=_LEAST_I) if gain.name == "PSC_ACCZ_I" else gain for gain in ARDUPILOT_GAINS)
-    )
+    space = PolicySpace(ARDUPILOT_GAINS)
     scatter = Scatter(0.003, degrees_of_freedom=1.0, measured=False)
     """That of a few flights of the firmware's binary in its own simulation, in gusts."""
     data_sheet = copter_parameters(hover=(0.35, 0.12), slope=ArduPilotLoop.usual_slope)

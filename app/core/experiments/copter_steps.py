@@ -5,6 +5,7 @@ first height, `LEAD_S` before the first step; until then it is where its referen
 experiment's space, filters and limits are the autopilot's parameters (`under`), by default the firmware's.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, Final, Self
@@ -28,7 +29,13 @@ from app.core.experiments.base import (
     SimplexSearch,
     informed_parameters,
 )
-from app.core.experiments.copter_steps_hazards import COPTERS, check_altitudes, check_margin, refuse_parameters
+from app.core.experiments.copter_steps_hazards import (
+    COPTERS,
+    check_altitudes,
+    check_hover,
+    check_margin,
+    refuse_parameters,
+)
 from app.core.experiments.step_sequence import ALTITUDE, REFERENCE, StepSequence, step_options
 from app.core.models.copter import DISTURBANCES, FLOWN, Copter
 from app.core.policy import PolicySpace, Vector
@@ -222,7 +229,8 @@ class CopterSteps(OwnModel, ABC):
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """Altitudes of simulated flights, and the margin from ringing, on a few copters of the distribution; nothing is
-        simulated with parameters with which the replica does not hold."""
+        simulated with parameters with which the replica does not hold. A known hover throttle that the autopilot's
+        parameter does not suit is told."""
         if self._unfit:
             return refuse_parameters(self._unfit)
         models = spread.sample(self, COPTERS)
@@ -230,6 +238,7 @@ class CopterSteps(OwnModel, ABC):
         return (
             *check_altitudes(altitudes, self.set_points, envelope.ceiling_m),
             check_margin(self.loop(gains), [copter_of(model) for model in models]),
+            *check_hover(self.loop(gains), spread.mean[0], math.sqrt(spread.covariance[0][0])),
         )
 
     def _fly(self, gains: Vector, model: Vector) -> tuple[Samples, Samples]:

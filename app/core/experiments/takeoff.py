@@ -108,10 +108,11 @@ ARDUPILOT_GAINS: Final = (
     _copter_gain("PSC_POSZ_P", "Climb rate per altitude error", "1/s", 0.1, 4.0, 1.0),
     _copter_gain("PSC_VELZ_P", "Acceleration per climb rate error", "1/s", 0.5, 10.0, 5.0),
     _copter_gain("PSC_ACCZ_P", "Thrust per acceleration error", "10 %·s²/m", 0.05, 2.0, 0.5),
-    _copter_gain("PSC_ACCZ_I", "Thrust per integrated acceleration error", "10 %·s/m", 0.0, 4.0, 1.0),
+    _copter_gain("PSC_ACCZ_I", "Thrust per integrated acceleration error", "10 %·s/m", 0.2, 4.0, 1.0),
     _copter_gain("PSC_ACCZ_D", "Thrust per change of acceleration error", "10 %·s³/m", 0.0, 0.4, 0.0),
 )
-"""Names and defaults before release 4.7; from 4.7 on the names differ, and the acceleration gains are a tenth."""
+"""Names and defaults before release 4.7; from 4.7 on the names differ, and the acceleration gains are a tenth. Without
+an integral gain of the acceleration the firmware does not arm, and a wrong hover throttle is never corrected."""
 
 PX4_GAINS: Final = (
     _copter_gain("MPC_Z_P", "Climb rate per altitude error", "1/s", 0.1, 1.5, 1.0),

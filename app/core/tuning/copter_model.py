@@ -15,6 +15,7 @@ import numpy as np
 
 from app.core.analysis.analysis import find_unexplained, is_alike
 from app.core.analysis.flight import LoggedFlight
+from app.core.analysis.hover import advise_hover
 from app.core.analysis.loop import AltitudeLoop, GainSpace
 from app.core.analysis.margin import (
     EXTRA_LAG_S,
@@ -59,7 +60,9 @@ class CopterModel:
     least_improvement: Final = 0.05
 
     def __init__(self, experiment: CopterSteps, flights: Sequence[Flight]) -> None:
-        """Raises TrajectoryError naming the flight whose record does not suffice, or whose autopilot had a parameter
+        """`experiment` has the autopilot's parameters of the last flight.
+
+        Raises TrajectoryError naming the flight whose record does not suffice, or whose autopilot had a parameter
         with which its replica does not hold."""
         used = fitted_flights(flights)
         self.base: Final = best_flight(used)
@@ -70,6 +73,7 @@ class CopterModel:
         if (why := find_unexplained(self._estimate)) is not None:
             worst = max(self.numbers, key=lambda number: fit_copter(self._logs[number]).residual_m_s2)
             raise _unlike(worst, why)
+        self._hover: Final = advise_hover(experiment.loop(experiment.space.default), self._estimate.mean.hover_throttle)
         first = next(flight for flight in flights if flight.outcome == "valid")
         self._first: Final = self._loop(experiment.space.vector(first.gains))
 
@@ -185,7 +189,7 @@ class CopterModel:
             f"With {1e3 * EXTRA_LAG_S:.0f} ms more {texts.lateness}, the altitude begins to ring with {beyond}"
             f"{margin:.1f} times the {texts.fast_gains}; {REQUIRED_MARGIN:g} times is required."
         )
-        return (moves, rings)
+        return (moves, rings) if self._hover is None else (self._hover.reason, moves, rings)
 
 
 def _unlike(number: int, reason: str) -> TrajectoryError:

@@ -1,8 +1,10 @@
 """Campaigns of altitude steps under ArduCopter and PX4: the model from flights over a link, and what it proposes."""
 
 import pickle
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -30,9 +32,9 @@ def definition_of(rig: CampaignRig) -> Definition:
     return Definition(experiment=rig.experiment.name, experiment_options=dict(OPTIONS), strategy="calibrated")
 
 
-def fly(rig: CampaignRig, number: int, gains: Gains) -> Flight:
+def fly(rig: CampaignRig, number: int, gains: Gains, changed: Mapping[str, float] = MappingProxyType({})) -> Flight:
     steps = rig.experiment.configured(OPTIONS)
-    parameters = {**rig.parameters(CALM), **gains}
+    parameters = {**rig.parameters(CALM), **gains, **changed}
     record = rig.fly(steps, CALM, parameters, number)
     return Flight(
         number=number,
@@ -151,6 +153,26 @@ def test_a_proposal_says_that_other_parameters_changed_between_the_flights() -> 
     said = "The errors are compared as if only the gains had changed, but MOT_THST_HOVER was 0.35 in flight 1 and "
     assert [note for note in notes if "gains had changed" in note] == [f"{said}0.31 in flight 2."]
     assert changed_parameters(rig.experiment, flights[:1]) == changed_parameters(rig.experiment, []) == ""
+
+
+@compiled_only
+def test_a_hover_throttle_outside_what_px4_finds_is_told_until_the_parameter_is_set() -> None:
+    """The vehicle hovers at 0.40; with MPC_THR_HOVER 0.65 the estimate stops at 0.45."""
+    rig, definition = RIGS["PX4"], definition_of(RIGS["PX4"])
+    steps = rig.experiment.configured(OPTIONS)
+    gains = steps.space.mapping(steps.space.default)
+    first = fly(rig, 1, gains, {"MPC_THR_HOVER": 0.65})
+    proposal = next_proposal(definition, [first])
+    said = proposal.explanation.notes[0]
+    assert "outside MPC_THR_HOVER ± HTE_THR_RANGE (0.450 … 0.850): the estimate in flight stops at 0.450" in said
+    assert float(said.removesuffix(".").rpartition(" ")[2]) == pytest.approx(0.40, abs=0.01)
+    checks = check_policy(definition, steps, steps.space, proposal.gains, [first], spread=proposal.spread).checks
+    (told,) = (check for check in checks if check.name == "hover throttle")
+    assert told.passed
+    assert told.limit == pytest.approx(0.45)
+    assert told.sentence == f"{said} Do this before the flight."
+    later = [first, replace(first, number=2, parameters={**first.parameters, "MPC_THR_HOVER": 0.4})]
+    assert all("MPC_THR_HOVER ±" not in note for note in next_proposal(definition, later).explanation.notes)
 
 
 @compiled_only

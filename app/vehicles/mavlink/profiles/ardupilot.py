@@ -41,7 +41,8 @@ _MAY_LACK: Final = _LATER | {
 
 
 class ArduPilot:
-    """Gains have the names before 4.7; on vehicles with the new names, some of the values are a tenth."""
+    """Gains have the names before 4.7; on vehicles with the new names, some of the values are a tenth. It does not arm
+    without an integral gain of the acceleration."""
 
     name: Final = "ardupilot"
     title: Final = "ArduCopter"
@@ -77,14 +78,14 @@ class ArduPilot:
             GainParameter("PSC_POSZ_P", "PSC_POSZ_P", 0.1, 4.0),
             GainParameter("PSC_VELZ_P", "PSC_VELZ_P", 0.5, 10.0),
             GainParameter("PSC_ACCZ_P", "PSC_ACCZ_P", 0.05, 2.0),
-            GainParameter("PSC_ACCZ_I", "PSC_ACCZ_I", 0.0, 4.0, integrates=True),
+            GainParameter("PSC_ACCZ_I", "PSC_ACCZ_I", 0.2, 4.0, integrates=True),
             GainParameter("PSC_ACCZ_D", "PSC_ACCZ_D", 0.0, 0.4),
         ),
         (
             GainParameter("PSC_POSZ_P", "PSC_D_POS_P", 0.1, 4.0),
             GainParameter("PSC_VELZ_P", "PSC_D_VEL_P", 0.5, 10.0),
             GainParameter("PSC_ACCZ_P", "PSC_D_ACC_P", 0.05, 2.0, factor=0.1),
-            GainParameter("PSC_ACCZ_I", "PSC_D_ACC_I", 0.0, 4.0, factor=0.1, integrates=True),
+            GainParameter("PSC_ACCZ_I", "PSC_D_ACC_I", 0.2, 4.0, factor=0.1, integrates=True),
             GainParameter("PSC_ACCZ_D", "PSC_D_ACC_D", 0.0, 0.4, factor=0.1),
         ),
     )

@@ -2075,6 +2075,36 @@ export type Health = {
 };
 
 /**
+ * HoverSetting
+ *
+ * A better value of the parameter for the hover throttle.
+ */
+export type HoverSetting = {
+    /**
+     * Parameter
+     */
+    parameter: string;
+    /**
+     * Present
+     */
+    present: number;
+    /**
+     * Proposed
+     */
+    proposed: number;
+    /**
+     * Is Outside
+     *
+     * whether the vehicle hovers outside MPC_THR_HOVER ± HTE_THR_RANGE, where PX4's estimate stops; the gain sets but the first are then assessed with the proposed value
+     */
+    is_outside: boolean;
+    /**
+     * Reason
+     */
+    reason: string;
+};
+
+/**
  * Identity
  *
  * Identity that the vehicle reports over its link; pinned at the first connection without a concern.
@@ -2498,6 +2528,10 @@ export type ManoeuvreNumbers = {
      * proposed gains at an end of the range that was searched
      */
     at_limit: Array<string>;
+    /**
+     * none if the present value suits
+     */
+    hover: HoverSetting | null;
 };
 
 /**
@@ -2832,7 +2866,7 @@ export type PageVehicle = {
 /**
  * ParameterFile
  *
- * The proposed gains as a ground station or an airframe takes them.
+ * The proposed gains and hover throttle as a ground station or an airframe takes them.
  */
 export type ParameterFile = {
     /**
