@@ -4,9 +4,9 @@
     ./dev exec uv pip install --require-hashes -r requirements/bench.txt
     ./dev exec python -m bench.flights_to_target --vehicles 200 --twins 400 --methods all --out docs
 
-Prints tables; with `--out` writes them and the figure there. `--results FILE` saves every result at once, and the same
-command continues where it was stopped. Exits with 1 if Gainline exceeds the limits, which are loose because the
-vehicles are few.
+Prints tables; with `--out` writes them and the figure there, and keeps the section of bench.steps_to_target. `--results
+FILE` saves every result at once, and the same command continues where it was stopped. Exits with 1 if Gainline exceeds
+the limits, which are loose because the vehicles are few.
 """
 
 import argparse
@@ -14,13 +14,14 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from bench.targets.methods import DISTRIBUTIONS, METHODS
-from bench.targets.pages import TITLES, draw, page, safety, summary
+from bench.targets.pages import TITLES, draw, page, safety, steps_of, summary, with_steps
 from bench.targets.report import Outcome, outcomes
-from bench.targets.results import OPTIMUM, Results, Task, work
+from bench.targets.results import OPTIMUM, Results, Task, carry_out, work
 from bench.targets.vehicles import SampledVehicle, population
 
 SEED: Final = 20261121
@@ -77,7 +78,8 @@ def run(options: argparse.Namespace, results: Results) -> dict[str, dict[str, Ou
     quick = QUICK_FLIGHTS if not options.methods and options.vehicles == QUICK_VEHICLES else None
     wanted = tasks(methods, options.vehicles, options.twins, options.seed)
     started = time.monotonic()
-    carried_out = work(wanted, results, processes=options.processes, budget=options.flights or quick)
+    fly = partial(carry_out, budget=options.flights or quick)
+    carried_out = work(wanted, results, processes=options.processes, carry_out=fly)
     for done, task in enumerate(carried_out, 1):
         if done % 50 == 0:
             print(f"{done} done after {time.monotonic() - started:.0f} s; {task}", file=sys.stderr, flush=True)
@@ -108,7 +110,9 @@ def main() -> int:
         figure = Path("images") / "flights-to-target.svg"
         draw(found, options.out / figure)
         text = page(found, results, options.seed, figure.as_posix())
-        (options.out / "flights-to-target.md").write_text(text, encoding="utf-8")
+        document = options.out / "flights-to-target.md"
+        steps = steps_of(document.read_text(encoding="utf-8")) if document.is_file() else ""
+        document.write_text(with_steps(text, steps), encoding="utf-8")
     return 0 if is_within_limits(found) else 1
 
 

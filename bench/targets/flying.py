@@ -54,6 +54,11 @@ class Tuning:
     _asked_s: float = field(default_factory=time.process_time)
 
     @property
+    def space(self) -> PolicySpace:
+        """The bounds that all methods search."""
+        return SPACE
+
+    @property
     def campaign_seed(self) -> int:
         """Seed of the method and of its flights."""
         return int(np.random.SeedSequence((self.seed, self.vehicle.number)).generate_state(1)[0])

@@ -6,17 +6,17 @@ have observed. The Gaussian processes are told the logarithm of the error, which
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from scipy.optimize import minimize
 
 from app.core.definition import Definition, Flight, OptionValue, StopRule
-from app.core.policy import Vector
+from app.core.policy import PolicySpace, Vector
 from app.core.tuning.definition_checks import check_definition
 from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import prediction_of
@@ -51,81 +51,99 @@ class Compared:
         return tuple(name for name in self.needs if find_spec(name) is None)
 
 
-def _from_unit(point: Vector) -> Vector:
-    return np.asarray(SPACE.lower + point * (SPACE.upper - SPACE.lower))
+class Search(Protocol):
+    """What a black-box method needs to know: the bounds, the number of flights, and the error of gains flown."""
+
+    @property
+    def space(self) -> PolicySpace: ...
+    @property
+    def budget(self) -> int: ...
+    @property
+    def campaign_seed(self) -> int: ...
+    def error(self, gains: Vector) -> float:
+        """Fly the nearest valid gains and return their error. Raises BudgetSpentError."""
+        ...
 
 
-_DEFAULT_POINT: Final = (SPACE.default - SPACE.lower) / (SPACE.upper - SPACE.lower)
+def _from_unit(search: Search, point: Vector) -> Vector:
+    space = search.space
+    return np.asarray(space.lower + point * (space.upper - space.lower))
 
 
-def _optuna(tuning: Tuning, sampler: "BaseSampler", *, logarithm: bool) -> None:
+def _default_point(search: Search) -> Vector:
+    space = search.space
+    return np.asarray((space.default - space.lower) / (space.upper - space.lower))
+
+
+def _optuna(search: Search, sampler: "BaseSampler", *, logarithm: bool) -> None:
     import optuna  # noqa: PLC0415 - of the group `bench`
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     study = optuna.create_study(sampler=sampler)
-    study.enqueue_trial(dict(zip(SPACE.names, _DEFAULT_POINT.tolist(), strict=True)))
+    study.enqueue_trial(dict(zip(search.space.names, _default_point(search).tolist(), strict=True)))
     while True:
         trial = study.ask()
-        error = tuning.error(_from_unit(np.array([trial.suggest_float(name, 0.0, 1.0) for name in SPACE.names])))
+        point = [trial.suggest_float(name, 0.0, 1.0) for name in search.space.names]
+        error = search.error(_from_unit(search, np.array(point)))
         study.tell(trial, math.log(error) if logarithm else error)
 
 
-def _tpe(tuning: Tuning) -> None:
+def _tpe(search: Search) -> None:
     from optuna.samplers import TPESampler  # noqa: PLC0415
 
-    _optuna(tuning, TPESampler(seed=tuning.campaign_seed), logarithm=False)
+    _optuna(search, TPESampler(seed=search.campaign_seed), logarithm=False)
 
 
-def _cma_es(tuning: Tuning) -> None:
+def _cma_es(search: Search) -> None:
     """Start in the middle of the bounds, after flying the default gains."""
     from optuna.samplers import CmaEsSampler  # noqa: PLC0415
 
-    _optuna(tuning, CmaEsSampler(seed=tuning.campaign_seed), logarithm=False)
+    _optuna(search, CmaEsSampler(seed=search.campaign_seed), logarithm=False)
 
 
-def _gp(tuning: Tuning) -> None:
+def _gp(search: Search) -> None:
     import torch  # noqa: PLC0415
     from optuna.samplers import GPSampler  # noqa: PLC0415
 
     torch.set_num_threads(1)
-    _optuna(tuning, GPSampler(seed=tuning.campaign_seed), logarithm=True)
+    _optuna(search, GPSampler(seed=search.campaign_seed), logarithm=True)
 
 
-def _bayes_opt(tuning: Tuning) -> None:
+def _bayes_opt(search: Search) -> None:
     """Expected improvement by 1 %; noise of a thousandth of the observed variance, about what the flights have."""
     from bayes_opt import BayesianOptimization  # noqa: PLC0415
     from bayes_opt.acquisition import ExpectedImprovement  # noqa: PLC0415
 
     optimizer = BayesianOptimization(
         f=None,
-        pbounds=dict.fromkeys(SPACE.names, (0.0, 1.0)),
+        pbounds=dict.fromkeys(search.space.names, (0.0, 1.0)),
         acquisition_function=ExpectedImprovement(xi=0.01),
-        random_state=tuning.campaign_seed,
+        random_state=search.campaign_seed,
         verbose=0,
         allow_duplicate_points=True,
     )
     optimizer.set_gp_params(alpha=1e-3)
-    random = np.random.default_rng(tuning.campaign_seed)
-    for point in (_DEFAULT_POINT, *random.random((_STARTUP - 1, len(SPACE.names)))):
-        optimizer.register(point, -math.log(tuning.error(_from_unit(point))))
+    random = np.random.default_rng(search.campaign_seed)
+    for point in (_default_point(search), *random.random((_STARTUP - 1, len(search.space.names)))):
+        optimizer.register(point, -math.log(search.error(_from_unit(search, point))))
     while True:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # scikit-learn warns about length scales at their bounds
             suggested = optimizer.suggest()
-        point = np.array([suggested[name] for name in SPACE.names], dtype=np.float64)
-        optimizer.register(point, -math.log(tuning.error(_from_unit(point))))
+        point = np.array([suggested[name] for name in search.space.names], dtype=np.float64)
+        optimizer.register(point, -math.log(search.error(_from_unit(search, point))))
 
 
 _STARTUP: Final = 5
 """Random flights before the Gaussian process is used, including the default gains: the library's default."""
 
 
-def _nelder_mead(tuning: Tuning) -> None:
+def _nelder_mead(search: Search) -> None:
     """First steps of a tenth of each range, upward; begun again from the best when the simplex has collapsed."""
-    start = _DEFAULT_POINT
+    start = _default_point(search)
 
     def error(point: Vector) -> float:
-        return tuning.error(_from_unit(point))
+        return search.error(_from_unit(search, point))
 
     while True:
         simplex = np.vstack((start, start + np.diag(np.where(start > 0.5, -0.1, 0.1))))
@@ -134,23 +152,23 @@ def _nelder_mead(tuning: Tuning) -> None:
             start,
             method="Nelder-Mead",
             bounds=[(0.0, 1.0)] * len(start),
-            options={"initial_simplex": simplex, "xatol": 0.002, "fatol": 1e-4, "maxfev": tuning.budget + 1},
+            options={"initial_simplex": simplex, "xatol": 0.002, "fatol": 1e-4, "maxfev": search.budget + 1},
         )
         start = np.asarray(found.x)
 
 
-def _finite_differences(tuning: Tuning) -> None:
+def _finite_differences(search: Search) -> None:
     """The gradient by one more flight for each gain, a twentieth of its range further on; then a line search that
     doubles the step while that helps, or halves it until it does."""
-    base, lowest, length = _DEFAULT_POINT, tuning.error(_from_unit(_DEFAULT_POINT)), 0.2
+    base, lowest, length = _default_point(search), search.error(_from_unit(search, _default_point(search))), 0.2
     while True:
         steps = np.diag(np.where(base > 0.5, -0.05, 0.05))
-        slopes = np.array([(tuning.error(_from_unit(base + step)) - lowest) / step.sum() for step in steps])
+        slopes = np.array([(search.error(_from_unit(search, base + step)) - lowest) / step.sum() for step in steps])
         direction = -slopes / (float(np.linalg.norm(slopes)) or 1.0)
         improved = False
         for _ in range(5):
             point = np.clip(base + length * direction, 0.0, 1.0)
-            error = tuning.error(_from_unit(point))
+            error = search.error(_from_unit(search, point))
             if error < lowest:
                 base, lowest, improved = point, error, True
                 length *= 2.0
@@ -204,6 +222,18 @@ def _definition(strategy: str, options: Mapping[str, OptionValue], tuning: Tunin
     check_definition(definition)
     return definition
 
+
+SEARCHES: Final[Mapping[str, Callable[[Search], None]]] = MappingProxyType(
+    {
+        "nelder-mead": _nelder_mead,
+        "finite-differences": _finite_differences,
+        "tpe": _tpe,
+        "cma-es": _cma_es,
+        "gp": _gp,
+        "bayes-opt": _bayes_opt,
+    }
+)
+"""The black-box methods."""
 
 METHODS: Final[Mapping[str, Compared]] = MappingProxyType(
     {

@@ -45,8 +45,8 @@ that is possible on the vehicle.
 - A method that ends early, or has fewer flights than the number in the column, is counted with its last
   recommendation.
 - Shares have Wilson 95 % intervals.
-- All of this is about takeoffs under Paparazzi. Steps under ArduCopter, with the rules of its documentation and
-  searches for comparison, are in [benchmarks.md](benchmarks.md#from-a-log-to-gains).
+- All of this but the last section is about takeoffs under Paparazzi; the
+  [last section](#altitude-steps-under-arducopter-and-px4) is about altitude steps under ArduCopter and PX4.
 
 ![Share of vehicles within 5 % against flights]({figure})
 
@@ -135,6 +135,21 @@ def page(all_found: Mapping[str, Mapping[str, Outcome]], results: Results, seed:
         if "calibrated" in found:
             lines += ["", *own_lines(found["calibrated"])]
     return "\n".join([*lines, ""])
+
+
+def with_steps(text: str, steps: str) -> str:
+    """A page with another section on altitude steps, its last; without one if `steps` is empty."""
+    own, _, _ = text.partition(f"\n{_STEPS}")
+    return f"{own}\n{steps}" if steps else own
+
+
+def steps_of(text: str) -> str:
+    """The section on altitude steps of a page; empty if it has none."""
+    _, found, rest = text.partition(f"\n{_STEPS}")
+    return f"{_STEPS}{rest}" if found else ""
+
+
+_STEPS: Final = "## Altitude steps"
 
 
 def _made(results: Results, seed: int) -> str:

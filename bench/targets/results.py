@@ -3,13 +3,13 @@
 import json
 import multiprocessing
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from bench.targets.flying import Tuning, tune
 from bench.targets.methods import DISTRIBUTIONS, METHODS
@@ -19,6 +19,8 @@ OPTIMUM: Final = "optimum"
 """Task that finds a vehicle's own best gains."""
 
 Record = Mapping[str, object]
+
+_Vehicle = TypeVar("_Vehicle")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,16 +78,18 @@ def carry_out(task: Task, vehicle: SampledVehicle, budget: int | None = None) ->
 
 
 def work(
-    tasks: Iterable[tuple[Task, SampledVehicle]], results: Results, *, processes: int, budget: int | None = None
+    tasks: Iterable[tuple[Task, _Vehicle]],
+    results: Results,
+    *,
+    processes: int,
+    carry_out: Callable[[Task, _Vehicle], Record],
 ) -> Iterator[Task]:
     """Run the missing tasks in single-threaded processes of low priority; yield each task once it is stored."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=context, initializer=os.nice, initargs=(10,)) as pool:
-        waiting = {
-            pool.submit(carry_out, task, vehicle, budget): task for task, vehicle in tasks if task not in results
-        }
+        waiting = {pool.submit(carry_out, task, vehicle): task for task, vehicle in tasks if task not in results}
         for done in as_completed(waiting):
             results.add(waiting[done], done.result())
             yield waiting[done]

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -137,7 +138,7 @@ def test_results_are_read_again_and_a_line_cut_off_is_dropped(tmp_path: Path) ->
     again = Results(file)
     assert list(again) == [TASK]
     assert again[TASK]["flights"] == json.loads(json.dumps(first[TASK]["flights"]))
-    assert list(work([(TASK, vehicle)], again, processes=1)) == []
+    assert list(work([(TASK, vehicle)], again, processes=1, carry_out=carry_out)) == []
     assert file.read_text().count("\n") == 1
 
 
@@ -146,7 +147,9 @@ def test_what_is_missing_is_made_in_processes_and_reported(tmp_path: Path) -> No
     results = Results(tmp_path / "results.jsonl")
     vehicle = population(TASK.population, 1, TASK.seed)[0]
     optimum = Task(population=TASK.population, number=1, seed=TASK.seed, what=OPTIMUM)
-    assert set(work([(optimum, vehicle), (TASK, vehicle)], results, processes=1, budget=3)) == {optimum, TASK}
+    assert set(
+        work([(optimum, vehicle), (TASK, vehicle)], results, processes=1, carry_out=partial(carry_out, budget=3))
+    ) == {optimum, TASK}
     found = {"four-parameter": outcomes(results, "four-parameter", TASK.seed)}
     assert found["four-parameter"]["nelder-mead"].budget == 3
     assert len(summary(found["four-parameter"], 0.05)) == 3

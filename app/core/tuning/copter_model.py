@@ -39,7 +39,7 @@ from app.core.experiments.base import (
 )
 from app.core.experiments.copter_steps import CopterSteps, copter_of, vector_of
 from app.core.experiments.copter_steps_hazards import COPTERS
-from app.core.formatting import count
+from app.core.formatting import count, short
 from app.core.models.copter import Copter
 from app.core.policy import Vector
 from app.core.records.trajectory import Trajectory
@@ -48,6 +48,7 @@ from app.core.tuning.predictions import CONFIDENCE, FlightPrediction, interval_r
 from app.core.tuning.strategy import Interval, band_channels
 from app.core.tuning.trust_region import Box
 
+_COMPARED: Final = "For comparison: "
 _DIGITS: Final = 3
 _MODEL_ERROR: Final = 0.04
 """Relative error of even the best fit: without it, 75 % of the flights of random vehicles under PX4 were inside their
@@ -189,7 +190,21 @@ class CopterModel:
             f"With {1e3 * EXTRA_LAG_S:.0f} ms more {texts.lateness}, the altitude begins to ring with {beyond}"
             f"{margin:.1f} times the {texts.fast_gains}; {REQUIRED_MARGIN:g} times is required."
         )
-        return (moves, rings) if self._hover is None else (self._hover.reason, moves, rings)
+        hover = () if self._hover is None else (self._hover.reason,)
+        return (*hover, moves, rings, self._rules_note)
+
+    @cached_property
+    def _rules_note(self) -> str:
+        """What the likeliest vehicle would fly with the sets that are set without a model."""
+        log = self._log
+        found = [self._rule_note(name, gains) for name, gains in log.loop.rules(log.throttle_mean).items()]
+        return f"For comparison, the model predicts {'; '.join(found)}."
+
+    def _rule_note(self, name: str, gains: Mapping[str, float]) -> str:
+        loop = self._log.loop.with_gains(gains)
+        error_m, margin = self._likeliest.fly(loop)[0], gain_margin(loop, self._copters[0])
+        lacks = ", which lacks the margin" if margin < REQUIRED_MARGIN else ""
+        return f"{short(error_m)} {self._experiment.error_unit} with {name.removeprefix(_COMPARED)}{lacks}"
 
 
 def _unlike(number: int, reason: str) -> TrajectoryError:

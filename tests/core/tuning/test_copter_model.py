@@ -74,6 +74,8 @@ def test_the_second_flight_is_better_and_where_it_was_predicted(autopilot: str) 
     assert fitted["hover_throttle"].value == pytest.approx(CALM.hover_throttle, rel=0.05)
     assert "times as much as with the gains of the first flight; 1.5 times is allowed." in explanation.notes[0]
     assert "2 times is required" in explanation.notes[1]
+    assert explanation.notes[2].startswith("For comparison, the model predicts ")
+    assert f" m with {autopilot}'s default gains; " in explanation.notes[2]
 
 
 @compiled_only
