@@ -381,6 +381,24 @@ def evaluate_set_points(set_points: SetPoints) -> CheckItem:
     )
 
 
+def evaluate_hover(hover_throttle: float | None, limits: tuple[float, float] | None) -> tuple[CheckItem, ...]:
+    """Check that the autopilot's estimate can reach the throttle at which the vehicle hovered in its last flight; no
+    item while one of the two is not known."""
+    if hover_throttle is None or limits is None:
+        return ()
+    low, high = limits
+    passed = low <= hover_throttle <= high
+    item = CheckItem(
+        name="hover_throttle",
+        title="Hover throttle",
+        passed=passed,
+        found=f"{hover_throttle:.2f} in the last flight",
+        needed=f"within MPC_THR_HOVER ± HTE_THR_RANGE, {low:.2f} … {high:.2f}: PX4's estimate stops there",
+        hint="" if passed else f"Set MPC_THR_HOVER to {hover_throttle:.2f}.",
+    )
+    return (item,)
+
+
 def require(items: Sequence[CheckItem]) -> None:
     """Raise VehicleError naming every failed check, or SafeGainsError if the vehicle is armed."""
     failed = [item for item in items if not item.passed]

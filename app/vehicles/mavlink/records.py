@@ -10,7 +10,7 @@ from typing import Final, Literal
 import numpy as np
 
 from app.core.errors import TrajectoryError
-from app.core.experiments.step_sequence import REFERENCE
+from app.core.experiments.step_sequence import REFERENCE, SETTLED_FOR_S
 from app.core.formatting import count
 from app.core.records.alignment import Alignment, align, compare, resample
 from app.core.records.metrics import MAX_GAP_S
@@ -205,6 +205,16 @@ def ending_of(trial: Trial) -> Ending:
     if outcome is None:
         return "completed"
     return "aborted" if outcome == "aborted" else "invalid"
+
+
+def hover_throttle_of(trajectory: Trajectory, *, until_s: float) -> float | None:
+    """Return the mean throttle over the 2 s until then, in which the vehicle is at rest; None if it was not recorded
+    there."""
+    at_rest = (trajectory.time_s >= until_s - SETTLED_FOR_S) & (trajectory.time_s < until_s)
+    throttle = trajectory.channels.get("throttle")
+    if throttle is None or not at_rest.any() or not np.isfinite(throttle[at_rest]).all():
+        return None
+    return float(throttle[at_rest].mean())
 
 
 def reason_of(trial: Trial) -> str:

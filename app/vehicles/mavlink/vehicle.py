@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from app.core.clock import Clock
+from app.core.experiments.step_sequence import SETTLED_FOR_S
 from app.core.policy import Gains
 from app.vehicles.base import (
     CheckItem,
@@ -106,6 +107,7 @@ class MavlinkVehicle:
         self._repeated: RepeatedCommand | None = None
         self._is_restoring = self._is_starting = False
         self._loop: dict[str, float] = {}
+        self._hover_throttle: float | None = None
         self._secondary = None if source is None else AlignedAltitudeSource(source)
         on_message = None if source is None else source.on_message
         self._on_wait = on_wait
@@ -521,7 +523,8 @@ class MavlinkVehicle:
         if self._radio.profile.flying_blocks:
             plan_time_s = float(self._options["plan_time_s"])
             items = (*items, preflight.evaluate_flight_time(order.record_s, plan_time_s=plan_time_s))
-        items = (*items, *needed, preflight.evaluate_set_points(order.set_points))
+        hover = preflight.evaluate_hover(self._hover_throttle, self._radio.profile.hover_limits(self._loop))
+        items = (*items, *needed, *hover, preflight.evaluate_set_points(order.set_points))
         self._require_not_quarantined()
         preflight.require(items)
         return watched.ground
@@ -692,6 +695,8 @@ class MavlinkVehicle:
             ground_m=plan.ground_m - plan.datum_m,
             reference=flown.reference,
         )
+        if records.ending_of(trial) == "completed":
+            self._hover_throttle = records.hover_throttle_of(own, until_s=referred_from_s(plan) + SETTLED_FOR_S)
         both = AlignedRecord(trajectory=own)
         if self._secondary is not None:
             zero_s, name = start_s + flown.offset_s, self._secondary.source.name

@@ -12,6 +12,7 @@ from app.core.models.set_points import SetPoints
 from app.simdrone.copter_parameters import Parameters
 from app.vehicles.base import FlightOptions, FlightRecord, OptionValue, StopRequest, VehicleError
 from app.vehicles.mavlink.dialects import number
+from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import compiled_only
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
@@ -201,6 +202,21 @@ def order_of(autopilot: str) -> FlightOptions:
     return FlightOptions(seed=1, window_s=steps.window_s, set_points=steps.set_points)
 
 
+def require_hover_throttle(rig: LockstepRig, vehicle: MavlinkVehicle, order: FlightOptions) -> None:
+    """It hovered at 0.62, where PX4's estimate must reach before it flies again."""
+    assert vehicle._hover_throttle == pytest.approx(0.62, abs=0.02)
+    parameters = copter_of(rig.drone).parameters
+    held = parameters["HTE_THR_RANGE"]
+    parameters["HTE_THR_RANGE"] = 0.05
+    vehicle.stage(OWN_SAFE["px4"])
+    said = r"Hover throttle: 0\.6\d in the last flight, required: within MPC_THR_HOVER ± HTE_THR_RANGE, 0\.45 … 0\.55"
+    with pytest.raises(VehicleError, match=said) as refused:
+        vehicle.fly(order, on_sample=unwatched, should_stop=never)
+    assert refused.value.not_flown
+    assert "Set MPC_THR_HOVER to 0.6" in refused.value.hint
+    parameters["HTE_THR_RANGE"] = held
+
+
 @compiled_only
 @pytest.mark.parametrize("release", ["ardupilot", pytest.param("ardupilot-4.7", marks=pytest.mark.complete), "px4"])
 def test_the_copters_hold_by_a_position_target_then_step_and_report_their_reference(release: str) -> None:
@@ -216,6 +232,8 @@ def test_the_copters_hold_by_a_position_target_then_step_and_report_their_refere
             assert rig.drone.autopilot.held("MOT_HOVER_LEARN") == learns == 2.0
         targets = [(at_s, -number(message, "z")) for at_s, message in rig.heard if message.get_type() == TARGET]
         commanded_s = next(at_s for at_s, message in reversed(rig.heard) if message.get_type() == "COMMAND_LONG")
+        if name == "px4":
+            require_hover_throttle(rig, vehicle, order)
         vehicle.close()
     flight = record.trajectory
     low, high = ERRORS_M[release]

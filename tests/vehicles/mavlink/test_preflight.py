@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from app.vehicles.mavlink.events import Position
-from app.vehicles.mavlink.preflight import GroundObservation
+from app.vehicles.mavlink.preflight import GroundObservation, evaluate_hover
+from app.vehicles.mavlink.profiles import PROFILES
 
 HEARD = tuple(Position(60.0 + 0.02 * count, 0.1, 0.0) for count in range(100))
 STRANGE = (replace(HEARD[0], time_boot_s=3661.0), replace(HEARD[0], time_boot_s=0.2))
@@ -23,3 +24,16 @@ def test_one_position_by_another_clock_is_not_where_its_record_begins(strange: P
 
 def test_a_single_position_is_the_last_one() -> None:
     assert GroundObservation(HEARD[:1], 2.0).ground.last == HEARD[0]
+
+
+@pytest.mark.parametrize(("hover", "passed"), [(0.62, True), (0.742, False)])
+def test_the_hover_throttle_of_the_last_flight_must_be_within_what_px4_finds(hover: float, passed: bool) -> None:
+    (item,) = evaluate_hover(hover, PROFILES["px4"].hover_limits({"MPC_THR_HOVER": 0.5}))
+    assert (item.passed, item.hint) == (passed, "" if passed else "Set MPC_THR_HOVER to 0.74.")
+    assert item.needed.startswith("within MPC_THR_HOVER ± HTE_THR_RANGE, 0.30 … 0.70")
+
+
+def test_a_hover_throttle_that_is_not_known_or_has_no_limits_is_not_checked() -> None:
+    assert evaluate_hover(None, (0.3, 0.7)) == evaluate_hover(0.9, PROFILES["px4"].hover_limits({})) == ()
+    for name in ("ardupilot", "paparazzi"):
+        assert evaluate_hover(0.9, PROFILES[name].hover_limits({"MOT_THST_HOVER": 0.3})) == ()

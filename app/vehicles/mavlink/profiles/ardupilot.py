@@ -112,6 +112,9 @@ class ArduPilot:
     may_lack: Final = _MAY_LACK
     loop_parameters: Final = (LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in _RENAMED), *NEWER_NAMES))
 
+    def hover_limits(self, parameters: Mapping[str, float]) -> None:
+        """Return None: it keeps to what it is told or has learned."""
+
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 

@@ -322,6 +322,11 @@ class Profile(Protocol):
         """Those of them that some releases lack, whose replica then has their default."""
         ...
 
+    def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
+        """Return the least and the largest hover throttle that its loop can find in flight with these parameters of it;
+        None without such limits."""
+        ...
+
     def measure(self, message: Message) -> Measurement | None: ...
     def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:
         """Return the blocks of the flight plan, if there is one. Raises VehicleError if a required one is missing."""

@@ -79,6 +79,9 @@ class Paparazzi:
     may_lack: Final[frozenset[str]] = frozenset()
     loop_parameters: Final[tuple[tuple[str, ...], ...]] = ()
 
+    def hover_limits(self, parameters: Mapping[str, float]) -> None:
+        """Return None: it keeps to what it is told or has learned."""
+
     def measure(self, message: Message) -> Measurement | None:
         """Read a message; altitude only from LOCAL_POSITION_NED, because other messages mix their units."""
         return base.read(_READERS, message)

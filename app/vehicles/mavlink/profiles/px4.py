@@ -5,7 +5,14 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from app.core.control.px4_parameters import ESTIMATOR_NAMES, HOVER_RANGE_NAME, LOOP_NAMES, UNSUPPORTED
+from app.core.control.px4_parameters import (
+    ESTIMATOR_NAMES,
+    HOVER_RANGE_NAME,
+    LOOP_NAMES,
+    UNSUPPORTED,
+    hover_deviation,
+    hover_limits,
+)
 from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
@@ -19,6 +26,7 @@ from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Req
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 
+_HOVER: Final = "MPC_THR_HOVER"
 _SET_MODE: Final = 176
 _RUN_PREARM_CHECKS: Final = 401
 _CUSTOM_MODE: Final = 1.0
@@ -92,6 +100,11 @@ class Px4:
     )
     may_lack: Final = frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME})
     loop_parameters: Final = (LOOP_NAMES,)
+
+    def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
+        """Return those of its estimator; None if its parameter is not known."""
+        told = parameters.get(_HOVER)
+        return None if told is None else hover_limits(told, hover_deviation(parameters))
 
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
