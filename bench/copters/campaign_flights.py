@@ -5,7 +5,7 @@ a little later than commanded.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -46,7 +46,7 @@ def _copter_steps(name: str) -> CopterSteps:
 
 def _late(set_points: SetPoints, seed: int) -> SetPoints:
     late_s = np.random.default_rng(seed).uniform(0.0, _LATEST_S, len(set_points.times_s) - 1)
-    return SetPoints((0.0, *(set_points.times_s[1:] + late_s).tolist()), set_points.altitudes_m)
+    return replace(set_points, times_s=(0.0, *(set_points.times_s[1:] + late_s).tolist()))
 
 
 def _fly_ardupilot(
@@ -63,7 +63,8 @@ def _fly_px4(experiment: CopterSteps, copter: SimulatedCopter, values: Mapping[s
     step_s = px4_parameters.STEP_S
     time_s = np.arange(0.0, experiment.window_s + _BEYOND_S, step_s)
     reference = np.zeros((len(time_s), 3))
-    reference[:, 0] = _late(experiment.set_points, seed).at(time_s)
+    set_points = _late(experiment.set_points, seed)
+    reference[:, 0], reference[:, 2] = set_points.at(time_s), set_points.acceleration_at(time_s)
     flown = px4_simulation.fly_reference(copter, px4_parameters.parameters_from(values), reference, seed=seed)
     columns = {"altitude_m": flown[:, 0], "climb_rate_m_s": flown[:, 1], "throttle": flown[:, 3]}
     return _record(experiment, time_s, {**columns, "reference_m": reference[:, 0]})

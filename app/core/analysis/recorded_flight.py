@@ -34,6 +34,7 @@ _LATENESS_S: Final = (np.arange(-0.2, 1.2, 0.05), np.arange(-0.05, 0.051, 0.01))
 """How late a set point may take effect, coarsely, then beside the best of these."""
 _LARGEST_MISFIT_M: Final = 0.1
 _LEAST_VARIATION: Final = 1e-6
+_LEAST_STEP_M: Final = 0.1
 _RANGES: Final = {
     **dict.fromkeys(ardupilot_parameters.FIRMWARE_NAMES, PLAUSIBLE),
     ardupilot_parameters.LOOP_RATE: ardupilot_parameters.LOOP_RATES_HZ,
@@ -102,9 +103,11 @@ def shaped_reference(loop: ArduPilotLoop, set_points: SetPoints, steps_s: Sample
 
 
 def straight_reference(set_points: SetPoints, steps_s: Samples) -> Samples:
-    """PX4's reference at the times of its steps, shape (m, 4): the set point, without rates and a hover throttle."""
+    """PX4's reference at the times of its steps, shape (m, 4): the set point and what is fed forward beside it, without
+    a climb rate and a hover throttle."""
     references = np.zeros((len(steps_s), len(REFERENCE)))
     references[:, 0] = set_points.at(steps_s)
+    references[:, 2] = set_points.acceleration_at(steps_s)
     return references
 
 
@@ -139,9 +142,18 @@ def read_px4(loop: Px4Loop, trajectory: Trajectory, steps: Steps) -> LoggedFligh
     rows_s, steps_s = steps.rows_s(loop.row_s), steps.steps_s(loop.step_s)
     z_d = np.interp(rows_s, trajectory.time_s, trajectory["reference_m"])
     still = np.zeros(len(rows_s))
+    pushed = steps.set_points.acceleration_at(rows_s - _lateness_s(trajectory, steps.set_points))
     sent = np.interp(steps_s, trajectory.time_s, trajectory["throttle"])
     hover = np.full(len(rows_s), found_hover(loop, float(sent.mean())))
-    return LoggedFlight(loop=loop, segments=[_segment(trajectory, rows_s, (z_d, still, still), steps_s, sent, hover)])
+    return LoggedFlight(loop=loop, segments=[_segment(trajectory, rows_s, (z_d, still, pushed), steps_s, sent, hover)])
+
+
+def _lateness_s(trajectory: Trajectory, set_points: SetPoints) -> float:
+    """How late the steps took effect on average, by the recorded reference; 0 if it does not show all of them."""
+    nominal = np.array(set_points.times_s[1:])[np.diff(set_points.altitudes_m) != 0.0]
+    after = trajectory.time_s[1:] >= nominal[0] - LEAD_S
+    flown = trajectory.time_s[1:][(np.abs(np.diff(trajectory["reference_m"])) > _LEAST_STEP_M) & after]
+    return float(np.mean(flown - nominal)) if len(flown) == len(nominal) else 0.0
 
 
 def _segment(

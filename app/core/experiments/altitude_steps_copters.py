@@ -19,7 +19,8 @@ from app.core.analysis.recorded_flight import (
 )
 from app.core.control import ardupilot_parameters, px4_parameters
 from app.core.experiments.base import Scatter
-from app.core.experiments.copter_steps import CopterSteps, copter_parameters
+from app.core.experiments.copter_steps import LARGEST_STEP_M, CopterSteps, copter_parameters
+from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2, step_options
 from app.core.experiments.takeoff import ARDUPILOT_GAINS, PX4_GAINS
 from app.core.policy import PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -59,6 +60,7 @@ class Px4Steps(CopterSteps):
     name = "altitude-steps-px4"
     autopilot = "PX4"
     space = PolicySpace(PX4_GAINS)
+    options = step_options(largest_step_m=LARGEST_STEP_M, largest_push_m_s2=LARGEST_PUSH_M_S2)
     scatter = Scatter(0.02, degrees_of_freedom=1.0, measured=False)
     """That of a few flights of the firmware's binary in its own simulation, in gusts."""
     data_sheet = copter_parameters(hover=(0.5, 0.12), slope=Px4Loop.usual_slope)
@@ -76,5 +78,5 @@ class Px4Steps(CopterSteps):
         return read_px4(self.loop(gains), trajectory, self.steps)
 
     def references(self, steps_s: Samples) -> Samples:
-        """The set points."""
+        """The set points, with what is fed forward beside them."""
         return straight_reference(self.set_points, steps_s)

@@ -16,7 +16,7 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.hover import found_hover
 from app.core.analysis.loop import AltitudeLoop, Run
 from app.core.analysis.recorded_flight import Steps
-from app.core.definition import OptionValue
+from app.core.definition import Option, OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import (
     Check,
@@ -44,6 +44,7 @@ from app.core.records.trajectory import Samples, Trajectory
 CLIMB_S: Final = 15.0
 """Time from the command to the first step: ArduCopter's motors are off for 2 s after arming, PX4's thrust rises for 3 s
 in a takeoff, and both then settle."""
+LARGEST_STEP_M: Final = 2.0
 GRID_HZ: Final = 50.0
 """Rate of a model run's output."""
 
@@ -87,7 +88,7 @@ class CopterSteps(OwnModel, ABC):
     data_sheet: ClassVar[tuple[ModelParameter, ...]]
     """The parameters of copters under this autopilot in general."""
 
-    options: Final = step_options(largest_step_m=2.0)
+    options: ClassVar[tuple[Option, ...]] = step_options(largest_step_m=LARGEST_STEP_M)
     output: Final = ALTITUDE
     integrates: Final = False
     error_unit: Final = "m"

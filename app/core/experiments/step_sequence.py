@@ -30,25 +30,32 @@ LARGEST_DRIFT_M: Final = 0.2
 """A vehicle at rest stays within a band of this height; means over a tenth of a second count."""
 _MEAN_S: Final = 0.1
 
+LARGEST_PUSH_M_S2: Final = 2.0
+"""A fifth of gravity, beside which thrust remains in both directions."""
+
 DOWN_FIRST: Final = "down first"
 UP_FIRST: Final = "up first"
 
 
-def step_options(*, largest_step_m: float) -> tuple[Option, ...]:
-    """The settings of a sequence. Its lowest set point must be above half of the highest, see
-    `app.core.tuning.definition_checks`."""
-    return (
+def step_options(*, largest_step_m: float, largest_push_m_s2: float = 0.0) -> tuple[Option, ...]:
+    """The settings of a sequence, with a push where the autopilot takes one. Its lowest set point must be above half of
+    the highest, see `app.core.tuning.definition_checks`."""
+    push = Option(name="push_m_s2", title="Push", default=0.0, unit="m/s²", lower=0.0, upper=largest_push_m_s2)
+    steps = (
         Option(name="height_m", title="Height", default=3.0, unit="m", lower=2.5, upper=10.0),
         Option(name="step_m", title="Step", default=1.0, unit="m", lower=0.25, upper=largest_step_m),
         Option(name="steps", title="Number of steps", default=4, lower=2, upper=6),
         Option(name="order", title="Order of the steps", default=DOWN_FIRST, choices=(DOWN_FIRST, UP_FIRST)),
         Option(name="step_window_s", title="Scored time after each step", default=5.0, unit="s", lower=3.0, upper=8.0),
     )
+    return (*steps, push) if largest_push_m_s2 else steps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepSequence:
-    """Steps from `height_m` by `step_m` and back, `steps` of them in all; each is scored for `step_window_s`.
+    """Steps from `height_m` by `step_m` and back, `steps` of them in all; each is scored for `step_window_s`. If there
+    is a push, they are followed by a downward acceleration of `push_m_s2`, fed forward while the last altitude is held,
+    for another such window, and by a window without it.
 
     The first one follows `climb_s` after the command. The windows follow each other, so that a mean over all of them is
     one over that time.
@@ -60,6 +67,7 @@ class StepSequence:
     steps: int = 4
     order: str = DOWN_FIRST
     step_window_s: float = 5.0
+    push_m_s2: float = 0.0
 
     def chosen(self, options: Mapping[str, OptionValue], offered: tuple[Option, ...]) -> Self:
         """The sequence of these settings, the others at their defaults, after the same climb."""
@@ -71,25 +79,34 @@ class StepSequence:
             steps=int(values["steps"]),
             order=str(values["order"]),
             step_window_s=float(values["step_window_s"]),
+            push_m_s2=float(values.get("push_m_s2", 0.0)),
         )
 
     @property
     def ends_s(self) -> float:
-        """End of the last step's window, s since the command."""
-        return self._time_s(self.steps)
+        """End of the last window, s since the command."""
+        return self._time_s(self.steps + len(self._pushes_m_s2))
+
+    @property
+    def _pushes_m_s2(self) -> tuple[float, ...]:
+        """The push, downward, and its end, if there is one."""
+        return (self.push_m_s2, 0.0) if self.push_m_s2 else ()
 
     @property
     def set_points(self) -> SetPoints:
-        """The first height from the command on, then the steps."""
+        """The first height from the command on, then the steps, then the push and its end, if there is one."""
         other_m = self.height_m + (self.step_m if self.order == UP_FIRST else -self.step_m)
         stepped = [self.height_m if number % 2 else other_m for number in range(self.steps)]
-        times_s = [self._time_s(number) for number in range(self.steps)]
-        return SetPoints((0.0, *times_s), (self.height_m, *stepped))
+        pushes = self._pushes_m_s2
+        times_s = [self._time_s(number) for number in range(self.steps + len(pushes))]
+        altitudes_m = (self.height_m, *stepped, *(stepped[-1] for _ in pushes))
+        accelerations_m_s2 = (*np.zeros(1 + self.steps).tolist(), *(-push for push in pushes)) if pushes else ()
+        return SetPoints((0.0, *times_s), altitudes_m, accelerations_m_s2)
 
     def __str__(self) -> str:
         return (
             f"{self.steps} steps of {self.step_m:g} m from {self.height_m:g} m, {self.order}, "
-            f"{self.step_window_s:g} s each"
+            f"{self.step_window_s:g} s each{f', then a push of {self.push_m_s2:g} m/s²' if self.push_m_s2 else ''}"
         )
 
     def _time_s(self, number: int) -> float:

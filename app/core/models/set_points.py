@@ -14,11 +14,13 @@ from app.core.records.trajectory import Samples
 class SetPoints:
     """Set points `altitudes_m` (m, up), each from its time in `times_s` until the next; the last one holds.
 
-    Times are seconds since the command, increase, and are multiples of the loop's step; the first is 0.
+    Times are seconds since the command, increase, and are multiples of the loop's step; the first is 0. With
+    `accelerations_m_s2` (up), as many, an acceleration is fed forward beside each; without, none is.
     """
 
     times_s: tuple[float, ...]
     altitudes_m: tuple[float, ...]
+    accelerations_m_s2: tuple[float, ...] = ()
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -28,6 +30,15 @@ class SetPoints:
     def at(self, time_s: Samples) -> Samples:
         """Set point at each time, same shape; zero before the command."""
         return np.array((0.0, *self.altitudes_m))[np.searchsorted(self.times_s, time_s, side="right")]
+
+    def acceleration_of(self, number: int) -> float:
+        """What is fed forward beside the set point at this place, m/s² up."""
+        return self.accelerations_m_s2[number] if self.accelerations_m_s2 else 0.0
+
+    def acceleration_at(self, time_s: Samples) -> Samples:
+        """What is fed forward at each time, m/s² up, same shape; zero before the command."""
+        given = (0.0, *map(self.acceleration_of, range(len(self.times_s))))
+        return np.array(given)[np.searchsorted(self.times_s, time_s, side="right")]
 
     @property
     def targets(self) -> NDArray[np.int64]:

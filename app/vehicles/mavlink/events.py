@@ -300,10 +300,12 @@ Event = (
 
 @dataclass(frozen=True, slots=True)
 class PerformAction:
-    """Carry out an action; `altitude_m` is the altitude to fly to, on the vehicle's datum."""
+    """Carry out an action; `altitude_m` is the altitude to fly to, on the vehicle's datum, with this acceleration fed
+    forward, up."""
 
     action: Action
     altitude_m: float | None = None
+    acceleration_m_s2: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

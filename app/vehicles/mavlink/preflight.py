@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
+from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import (
     ALTITUDE_LIMIT_M,
@@ -369,14 +370,16 @@ def evaluate_set_point_requirements(radio: AutopilotLink) -> tuple[CheckItem, ..
 def evaluate_set_points(set_points: SetPoints) -> CheckItem:
     """Check that the set points are well below the altitude limit and well above the ground."""
     first_m, lowest_m, highest_m = set_points.altitudes_m[0], min(set_points.altitudes_m), max(set_points.altitudes_m)
-    passed = highest_m <= HIGHEST_SET_POINT_M and lowest_m > 0.5 * first_m
+    pushed_m_s2 = max(map(abs, set_points.accelerations_m_s2), default=0.0)
+    passed = highest_m <= HIGHEST_SET_POINT_M and lowest_m > 0.5 * first_m and pushed_m_s2 <= LARGEST_PUSH_M_S2
+    pushed = f", pushed by {pushed_m_s2:g} m/s²" if pushed_m_s2 else ""
     return CheckItem(
         name="altitudes",
         title="Altitudes",
         passed=passed,
-        found=f"set points from {lowest_m:g} to {highest_m:g} m",
+        found=f"set points from {lowest_m:g} to {highest_m:g} m{pushed}",
         needed=f"above {0.5 * first_m:g} m, half of the first, and at most {HIGHEST_SET_POINT_M:g} m: the flight is "
-        f"aborted at {ALTITUDE_LIMIT_M:g} m",
+        f"aborted at {ALTITUDE_LIMIT_M:g} m" + (f"; at most {LARGEST_PUSH_M_S2:g} m/s²" if pushed else ""),
         hint="" if passed else "Choose a lower height, or smaller steps.",
     )
 

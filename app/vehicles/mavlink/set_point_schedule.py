@@ -30,7 +30,11 @@ def with_hold(set_points: SetPoints) -> SetPoints:
     """The set points with the first one again, for a vehicle that must hold it by position targets before it steps."""
     first_s, *others_s = set_points.times_s
     first_m, *others_m = set_points.altitudes_m
-    return SetPoints((first_s, others_s[0] - HELD_BEFORE_S, *others_s), (first_m, first_m, *others_m))
+    return SetPoints(
+        (first_s, others_s[0] - HELD_BEFORE_S, *others_s),
+        (first_m, first_m, *others_m),
+        set_points.accelerations_m_s2[:1] + set_points.accelerations_m_s2,
+    )
 
 
 def referred_from_s(plan: Plan) -> float:
@@ -106,7 +110,8 @@ def _not_confirmed(why: str) -> Finding:
 
 def command_next(trial: Trial) -> Step:
     """Command the next set point, to which all limits refer from now on. The first one again changes no limit."""
-    set_point_m = trial.plan.set_points.altitudes_m[len(trial.changes) + 1] + trial.plan.datum_m
+    number = len(trial.changes) + 1
+    set_point_m = trial.plan.set_points.altitudes_m[number] + trial.plan.datum_m
     if is_hold(trial):
         return replace(trial, changes_set_point=True), (PerformAction(Action.HOLD, set_point_m),)
     trial = replace(
@@ -115,7 +120,8 @@ def command_next(trial: Trial) -> Step:
         watch=watching.change_set_point(trial.watch, set_point_m),
         changes_set_point=True,
     )
-    return trial, (PerformAction(Action.FLY_TO, set_point_m),)
+    acceleration_m_s2 = trial.plan.set_points.acceleration_of(number)
+    return trial, (PerformAction(Action.FLY_TO, set_point_m, acceleration_m_s2),)
 
 
 def confirm(trial: Trial, done: ActionDone) -> Trial:

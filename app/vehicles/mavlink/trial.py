@@ -211,8 +211,8 @@ class TrialRunner:
     def _carry_out(self, commands: tuple[Command, ...], now_s: float) -> None:
         for command in commands:
             match command:
-                case PerformAction(action, altitude_m):
-                    self._perform(action, altitude_m)
+                case PerformAction():
+                    self._perform(command)
                 case WithdrawSetPoint():
                     self._sequence, self._stream = None, ()
                 case SendGain(setting):
@@ -226,10 +226,12 @@ class TrialRunner:
                     throttle, reference_m = self._loop.throttle_at(now_s), self._reference_m(command.position, now_s)
                     self._record_sample(replace(command, throttle=throttle, reference_m=reference_m))
 
-    def _perform(self, action: Action, altitude_m: float | None) -> None:
-        profile, target = self._radio.profile, self._radio.target
-        if altitude_m is not None:
-            target = self._target = replace(self._place(action), altitude_m=altitude_m)
+    def _perform(self, command: PerformAction) -> None:
+        action, (profile, target) = command.action, (self._radio.profile, self._radio.target)
+        if command.altitude_m is not None:
+            target = self._target = replace(
+                self._place(action), altitude_m=command.altitude_m, acceleration_m_s2=command.acceleration_m_s2
+            )
             if not self._stream:
                 self._streamed_s = self._radio.clock.now_s()
             self._stream = profile.stream(target)

@@ -35,6 +35,33 @@ def test_the_first_step_follows_15_s_after_the_command(name: str) -> None:
     assert not steps.scatter.measured
 
 
+PUSHED: Final = Px4Steps().configured({**SHORT, "push_m_s2": 2.0})
+
+
+def test_a_push_follows_the_steps_under_px4_for_a_window_and_leaves_another() -> None:
+    assert PUSHED.set_points.times_s == (0.0, 15.0, 18.0, 21.0, 24.0)
+    assert PUSHED.set_points.altitudes_m == (3.0, 2.0, 3.0, 3.0, 3.0)
+    assert PUSHED.set_points.acceleration_at(np.array([-1.0, 20.9, 21.0, 23.9, 24.0])).tolist() == [0, 0, -2, -2, 0]
+    assert BOTH[1].set_points.acceleration_at(np.array([16.0])).tolist() == [0.0]
+    assert PUSHED.window_s == 27.0
+    assert PUSHED.measure == "2 steps of 1 m from 3 m, down first, 3 s each, then a push of 2 m/s², under PX4"
+    assert "push_m_s2" not in {option.name for option in ArduPilotSteps().options}
+
+
+@compiled_only
+def test_a_push_moves_the_vehicle_down_and_back_and_gains_too_soft_for_it_are_refused() -> None:
+    """2 m/s² against a P of 1 1/s · 4 1/s is half a metre at rest, which the integral makes up for."""
+    default = PUSHED.space.mapping(PUSHED.space.default)
+    flown = PUSHED.simulate(PUSHED.space.default, PUSHED.nominal_model)
+    pushed, left = ((flown.time_s > begin_s) & (flown.time_s < begin_s + 3.0) for begin_s in (21.0, 24.0))
+    assert flown["altitude_m"][pushed].min() == pytest.approx(2.7, abs=0.1)
+    assert flown["altitude_m"][left].max() == pytest.approx(3.2, abs=0.1)
+    assert all(check.passed for check in hazards(PUSHED, default).values())
+    soft = {"MPC_Z_P": 0.1, "MPC_Z_VEL_P_ACC": 2.0, "MPC_Z_VEL_I_ACC": 0.2, "MPC_Z_VEL_D_ACC": 0.0}
+    refused = hazards(PUSHED, soft)["lowest altitude"]
+    assert (refused.passed, hazards(BOTH[1], soft)["lowest altitude"].passed) == (False, True)
+
+
 def test_errors_of_different_autopilots_and_steps_are_different_quantities() -> None:
     measures = {
         get_experiment(name, {"steps": steps}).measure for name in (*NAMES, "altitude-steps") for steps in (2, 4)

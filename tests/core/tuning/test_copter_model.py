@@ -14,6 +14,7 @@ from app.core.definition import Definition, Flight, StopRule
 from app.core.errors import TrajectoryError
 from app.core.experiments.base import prior_distribution
 from app.core.policy import Gains
+from app.core.records.trajectory import Trajectory
 from app.core.tuning.campaign_models import changed_parameters, known_distribution
 from app.core.tuning.copter_model import CopterModel
 from app.core.tuning.flight_predictor import flight_predictor, modelled_flights
@@ -76,6 +77,29 @@ def test_the_second_flight_is_better_and_where_it_was_predicted(autopilot: str) 
     assert "2 times is required" in explanation.notes[1]
     assert explanation.notes[2].startswith("For comparison, the model predicts ")
     assert f" m with {autopilot}'s default gains; " in explanation.notes[2]
+
+
+@compiled_only
+def test_a_flight_with_a_push_is_fitted_and_predicted() -> None:
+    rig = RIGS["PX4"]
+    steps = rig.experiment.configured({**OPTIONS, "push_m_s2": 2.0})
+
+    def flight(gains: Gains, seed: int) -> tuple[Trajectory, Mapping[str, float]]:
+        parameters = {**rig.parameters(CALM), **gains}
+        return rig.fly(steps, CALM, parameters, seed), parameters
+
+    gains = steps.space.mapping(steps.space.default)
+    record, parameters = flight(gains, 1)
+    first = Flight(
+        number=1, gains=gains, trajectory=record, error=steps.error(record), outcome="valid", parameters=parameters
+    )
+    model = CopterModel(steps, [first])
+    assert {each.name: each.value for each in model.fitted}["hover_throttle"] == pytest.approx(0.4, rel=0.05)
+    stiff = {"MPC_Z_P": 1.5, "MPC_Z_VEL_P_ACC": 6.0, "MPC_Z_VEL_I_ACC": 3.0, "MPC_Z_VEL_D_ACC": 0.3}
+    predicted = model.predict(steps.space.vector(stiff))
+    flown = steps.error(flight(stiff, 2)[0])
+    assert predicted.error == pytest.approx(flown, rel=0.15)
+    assert flown < 0.8 * steps.error(record)
 
 
 @compiled_only

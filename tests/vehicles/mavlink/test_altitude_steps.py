@@ -196,8 +196,8 @@ def copter(release: str) -> LockstepRig:
     return rig
 
 
-def order_of(autopilot: str) -> FlightOptions:
-    steps = get_experiment(f"altitude-steps-{autopilot}", SHORT)
+def order_of(autopilot: str, **more: OptionValue) -> FlightOptions:
+    steps = get_experiment(f"altitude-steps-{autopilot}", SHORT | more)
     assert steps.set_points is not None
     return FlightOptions(seed=1, window_s=steps.window_s, set_points=steps.set_points)
 
@@ -314,13 +314,57 @@ def test_a_stall_that_interrupts_the_stream_of_set_points_ends_the_flight_as_inv
     assert record.reason.startswith("The set points paused. Gainline stalled, and sent no set point for 0.")
 
 
+def pushes_of(rig: LockstepRig) -> list[tuple[float, float]]:
+    """Times of the targets that feed an acceleration forward, and these, m/s² up."""
+    targets = [(at_s, message) for at_s, message in rig.heard if message.get_type() == TARGET]
+    return [(at_s, -number(each, "afz")) for at_s, each in targets if not int(number(each, "type_mask")) & 1 << 8]
+
+
 @compiled_only
-def test_an_abort_during_a_px4s_step_ends_the_stream_and_lands() -> None:
-    watcher = Watcher(abort_at_s=15.5)
+def test_a_px4_is_pushed_while_it_holds_its_altitude() -> None:
+    order = order_of("px4", push_m_s2=2.0)
     with copter("px4") as rig:
         vehicle = rig.vehicle()
         vehicle.stage(OWN_SAFE["px4"])
-        record = vehicle.fly(order_of("px4"), on_sample=watcher.see, should_stop=watcher.decide)
+        record = vehicle.fly(order, on_sample=unwatched, should_stop=never)
+        pushes = pushes_of(rig)
+        vehicle.close()
+    assert (record.ending, record.reason) == ("completed", "")
+    assert {acceleration for _, acceleration in pushes} == {-2.0}
+    assert pushes[-1][0] - pushes[0][0] == pytest.approx(3.0, abs=0.1)
+    flight = record.trajectory
+    lowest = {name: flight["altitude_m"][(flight.time_s > begin_s) & (flight.time_s < begin_s + 3.0)].min()
+              for name, begin_s in (("pushed", 21.0), ("left", 24.0))}  # fmt: skip
+    assert lowest["pushed"] == pytest.approx(2.7, abs=0.1)
+    assert lowest["pushed"] < lowest["left"] - 0.1
+    assert flight["set_point_m"][-1] == 3.0
+    steps = get_experiment("altitude-steps-px4", {**SHORT, "push_m_s2": 2.0})
+    assert 0.15 < steps.error(flight) < 0.35
+
+
+@compiled_only
+@pytest.mark.complete
+def test_a_px4_that_hears_no_more_set_points_while_it_is_pushed_lands() -> None:
+    with LockstepRig("px4", faults=["deaf:30@22"]) as rig:
+        rig.switch_on_failsafes()
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE["px4"])
+        record = vehicle.fly(order_of("px4", push_m_s2=2.0), on_sample=unwatched, should_stop=never)
+        assert rig.drone.body.stands
+        vehicle.close()
+    assert record.ending != "completed"
+
+
+@compiled_only
+@pytest.mark.parametrize(("abort_at_s", "push_m_s2"), [(15.5, 0.0), (22.0, 2.0)])
+def test_an_abort_during_a_px4s_step_or_push_ends_the_stream_and_lands(abort_at_s: float, push_m_s2: float) -> None:
+    watcher = Watcher(abort_at_s=abort_at_s)
+    with copter("px4") as rig:
+        vehicle = rig.vehicle()
+        vehicle.stage(OWN_SAFE["px4"])
+        order = order_of("px4", push_m_s2=push_m_s2)
+        record = vehicle.fly(order, on_sample=watcher.see, should_stop=watcher.decide)
+        assert bool(pushes_of(rig)) == bool(push_m_s2)
         assert rig.drone.body.stands
         assert vehicle.read_gains() == OWN_SAFE["px4"]
         vehicle.close()

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink.events import Position
-from app.vehicles.mavlink.preflight import GroundObservation, evaluate_hover
+from app.vehicles.mavlink.preflight import GroundObservation, evaluate_hover, evaluate_set_points
 from app.vehicles.mavlink.profiles import PROFILES
 
 HEARD = tuple(Position(60.0 + 0.02 * count, 0.1, 0.0) for count in range(100))
@@ -24,6 +25,13 @@ def test_one_position_by_another_clock_is_not_where_its_record_begins(strange: P
 
 def test_a_single_position_is_the_last_one() -> None:
     assert GroundObservation(HEARD[:1], 2.0).ground.last == HEARD[0]
+
+
+@pytest.mark.parametrize(("push_m_s2", "passed"), [(2.0, True), (2.5, False)])
+def test_a_push_is_limited(push_m_s2: float, passed: bool) -> None:
+    item = evaluate_set_points(SetPoints((0.0, 21.0, 24.0), (3.0, 3.0, 3.0), (0.0, -push_m_s2, 0.0)))
+    assert (item.passed, item.found) == (passed, f"set points from 3 to 3 m, pushed by {push_m_s2:g} m/s²")
+    assert item.needed.endswith("; at most 2 m/s²")
 
 
 @pytest.mark.parametrize(("hover", "passed"), [(0.62, True), (0.742, False)])

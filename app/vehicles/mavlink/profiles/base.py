@@ -50,6 +50,8 @@ TARGET: Final = "position target"
 """`Step.awaits` of a step that ends when the vehicle reports the position target of the step."""
 POSITION_ALONE: Final = 0b110111111000
 """POSITION_TARGET_TYPEMASK: everything but the position is ignored."""
+WITH_ACCELERATION: Final = POSITION_ALONE & ~(1 << 8)
+"""Position and vertical acceleration: bits 6 and 7 go on ignoring the horizontal ones."""
 _IGNORES_Z: Final = 1 << 2
 _LOCAL_NED: Final = 1
 SET_POINT_ATTEMPTS: Final = 3
@@ -185,7 +187,7 @@ class Target:
     matches in most messages; `newer_names` are the parameters found on it that newer releases name differently, by
     their older names; `blocks` are the numbers of its flight plan's blocks by name; `stop_settings` are the
     settings found on it that stop its motors, `stops_by_command`: it has accepted the command that stops them;
-    `east_m` and `north_m` are its place on the ground."""
+    `east_m` and `north_m` are its place on the ground; `acceleration_m_s2`, up, is fed forward beside the altitude."""
 
     system: int
     aircraft: int
@@ -198,6 +200,7 @@ class Target:
     east_m: float = 0.0
     north_m: float = 0.0
     altitude_m: float = 3.0
+    acceleration_m_s2: float = 0.0
 
 
 Ask = Callable[[Outgoing, Callable[[Measurement], bool]], Measurement | None]
@@ -461,8 +464,9 @@ def battery(message: Message) -> Battery:
 
 
 def position_target(target: Target) -> Outgoing:
-    """Return SET_POSITION_TARGET_LOCAL_NED: position alone, in the vehicle's local frame, whose z points down."""
-    unused = dict.fromkeys(("vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0.0)
+    """Return SET_POSITION_TARGET_LOCAL_NED: position, and a vertical acceleration if one is fed forward, in the
+    vehicle's local frame, whose z points down."""
+    unused = dict.fromkeys(("vx", "vy", "vz", "afx", "afy", "yaw", "yaw_rate"), 0.0)
     return Outgoing(
         "SET_POSITION_TARGET_LOCAL_NED",
         {
@@ -470,10 +474,11 @@ def position_target(target: Target) -> Outgoing:
             "target_system": target.aircraft,
             "target_component": target.component,
             "coordinate_frame": _LOCAL_NED,
-            "type_mask": POSITION_ALONE,
+            "type_mask": WITH_ACCELERATION if target.acceleration_m_s2 else POSITION_ALONE,
             "x": target.north_m,
             "y": target.east_m,
             "z": -target.altitude_m,
+            "afz": -target.acceleration_m_s2,
             **unused,
         },
     )
