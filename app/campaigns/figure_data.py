@@ -16,7 +16,7 @@ from app.campaigns.trials import service as trials_service
 from app.common.states import TrialState
 from app.core.experiments import experiment_of
 from app.core.experiments.base import Experiment, Scatter
-from app.core.records.flight_events import flight_events, pinned_notes
+from app.core.records.flight_events import FlightEvent, flight_events, pinned_notes
 from app.core.records.trajectory import CHANNEL_UNITS, Trajectory
 from app.core.statistics.comparisons import groups_of, pool_scatter, select_winner
 from app.core.tuning.predictions import is_informative
@@ -320,11 +320,16 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,
         panels=() if record is None else tuple(_panels(record)),
-        events=() if record is None or experiment.output != "altitude_m" else flight_events(record, glitches_s),
+        events=() if record is None or experiment.output != "altitude_m" else _events(experiment, record, glitches_s),
         notes=pinned_notes(row.note),
         is_over=row.state in history.FLOWN,
         by_reference=experiment.target_channel is not None,
     )
+
+
+def _events(experiment: Experiment, record: Trajectory, glitches_s: Sequence[float]) -> tuple[FlightEvent, ...]:
+    set_points = experiment.set_points
+    return flight_events(record, glitches_s, () if set_points is None else set_points.pushes)
 
 
 def _recorded_reference(record: Trajectory) -> Curve | None:

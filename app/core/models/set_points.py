@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.core.control.paparazzi import POSITION_BITS, RATE_HZ, fix
+from app.core.records.flight_events import FlightEvent
 from app.core.records.trajectory import Samples
 
 
@@ -39,6 +41,16 @@ class SetPoints:
         """What is fed forward at each time, m/s² up, same shape; zero before the command."""
         given = (0.0, *map(self.acceleration_of, range(len(self.times_s))))
         return np.array(given)[np.searchsorted(self.times_s, time_s, side="right")]
+
+    @property
+    def pushes(self) -> tuple[FlightEvent, ...]:
+        """Where a feed-forward begins, and where it ends."""
+        given = [self.acceleration_of(number) for number in range(len(self.times_s))]
+        return tuple(
+            FlightEvent(time_s, "Push" if after else "End of push")
+            for time_s, (before, after) in zip(self.times_s[1:], pairwise(given), strict=True)
+            if before != after
+        )
 
     @property
     def targets(self) -> NDArray[np.int64]:

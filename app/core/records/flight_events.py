@@ -27,13 +27,16 @@ class FlightEvent:
     name: str
 
 
-def flight_events(trajectory: Trajectory, glitches_s: Sequence[float] = ()) -> tuple[FlightEvent, ...]:
+def flight_events(
+    trajectory: Trajectory, glitches_s: Sequence[float] = (), planned: Sequence[FlightEvent] = ()
+) -> tuple[FlightEvent, ...]:
     """The events that the record shows, in order, with its glitches, which begin at `glitches_s`.
 
     Lift-off: the first sample more than 0.1 m above the last one before the command. Landing: the first sample at most
     that high after the last one higher. Abort: the set point, where it was recorded, returns to the ground. No data: no
     samples for longer than a second, which is no glitch as well. Only the command, the glitches and the times without
-    data, if there is no altitude. More than three of a kind are one event, at the first.
+    data, if there is no altitude. The `planned` ones happened, unless the record ended or the flight was aborted before.
+    More than three of a kind are one event, at the first.
     """
     time_s, channels = trajectory.time_s, trajectory.channels
     gaps = _gaps(time_s)
@@ -46,8 +49,11 @@ def flight_events(trajectory: Trajectory, glitches_s: Sequence[float] = ()) -> t
     airborne = np.flatnonzero(is_commanded & (channels["altitude_m"] - ground_m > AIRBORNE_M))
     if airborne.size:
         found.append(FlightEvent(float(time_s[airborne[0]]), "Lift-off"))
-    if (abort := _abort(trajectory)) is not None:
+    abort = _abort(trajectory)
+    if abort is not None:
         found.append(FlightEvent(float(time_s[abort]), "Abort"))
+    until_s = float(time_s[-1 if abort is None else abort])
+    found += [event for event in planned if event.time_s <= until_s]
     if airborne.size and airborne[-1] < len(time_s) - 1:
         found.append(FlightEvent(float(time_s[airborne[-1] + 1]), "Landing"))
     return tuple(sorted(found, key=_time))

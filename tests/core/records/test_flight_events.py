@@ -3,6 +3,7 @@ import io
 import numpy as np
 import pytest
 
+from app.core.models.set_points import SetPoints
 from app.core.records.flight_events import flight_events, pinned_notes
 from app.core.records.trajectory import Samples, Trajectory
 from app.logs.readers import read_takeoff
@@ -46,6 +47,20 @@ def test_an_aborted_flight_shows_when_its_set_point_returned_to_the_ground_and_w
         (4.0, "Abort"),
         (8.0, "Landing"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("aborted_s", "shown"),
+    [(np.inf, [(5.0, "Push"), (8.0, "End of push")]), (6.0, [(5.0, "Push"), (6.0, "Abort")]), (4.0, [(4.0, "Abort")])],
+)
+def test_a_push_is_shown_until_an_abort(aborted_s: float, shown: list[tuple[float, str]]) -> None:
+    set_points = SetPoints((0.0, 2.0, 5.0, 8.0), (3.0, 2.0, 2.0, 2.0), (0.0, 0.0, -2.0, 0.0))
+    channels = {
+        "altitude_m": np.where(TIME_S > 0.0, 3.0, 0.0),
+        "set_point_m": np.where((TIME_S >= 0.0) & (aborted_s > TIME_S), 3.0, 0.0),
+    }
+    found = flight_events(Trajectory(TIME_S, channels, "px4", "vehicle"), planned=set_points.pushes)
+    assert [(event.time_s, event.name) for event in found if event.name not in {"Command", "Lift-off"}] == shown
 
 
 def test_a_vehicle_that_stays_on_the_ground_has_only_a_command() -> None:
