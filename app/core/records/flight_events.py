@@ -35,7 +35,7 @@ def flight_events(
     Lift-off: the first sample more than 0.1 m above the last one before the command. Landing: the first sample at most
     that high after the last one higher. Abort: the set point, where it was recorded, returns to the ground. No data: no
     samples for longer than a second, which is no glitch as well. Only the command, the glitches and the times without
-    data, if there is no altitude. The `planned` ones happened, unless the record ended or the flight was aborted before.
+    data, if there is no altitude. The `planned` events happened, unless the record or the flight ended before them.
     More than three of a kind are one event, at the first.
     """
     time_s, channels = trajectory.time_s, trajectory.channels
