@@ -12,6 +12,7 @@ from bench.targets.report import Share
 from bench.targets.results import Results, Task
 
 AT_FLIGHTS: Final = (2, 3, 5, 10, 20, 40)
+_COMPARED: Final = "For comparison: "
 NEAR: Final = 1.1
 """Error, of the best, up to which gains count as near it."""
 
@@ -109,7 +110,8 @@ def tables(found: Mapping[str, Outcome]) -> list[str]:
     errors = [["method", "vehicles", "flights", *at, "95 % of the vehicles below"]]
     shares = [["method", *at, "flights that ring", "end with ringing gains", "end without the margin"]]
     for name, outcome in found.items():
-        title, count = METHODS[name].title if name in METHODS else name, len(outcome.courses)
+        title = METHODS[name].title if name in METHODS else name.removeprefix(_COMPARED)
+        count = len(outcome.courses)
         ends = outcome.errors_m(AT_FLIGHTS[-1])
         medians = [_mm(float(np.median(outcome.errors_m(number)))) for number in AT_FLIGHTS]
         flights = str(outcome.flights) if outcome.flights else "none"
@@ -151,7 +153,8 @@ gusts, an estimator that wanders: `bench/copters/simulation.py`).
   of a proposal: no ringing with 30 ms more lag and up to twice the fast gains.
 - The sets below the methods are flown without a search, so that their figures are the same after any number of flights:
   the firmware's defaults, the rule of ArduCopter's documentation, and sets that are common.
-- Gainline's proposals pass its gate; methods with slow proposals tuned fewer vehicles, the first ones.
+- Gainline's proposals pass its gate. A method that ends early, or has fewer flights than the number in the column, is
+  counted with its last recommendation. Methods with slow proposals tuned fewer vehicles, the first ones.
 
 To regenerate this section (`--results FILE` can be interrupted and continued):
 
