@@ -16,12 +16,13 @@ _DECIMALS: Final = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HoverAdvice:
-    """A better value of the parameter for the hover throttle, and why; `is_outside` if the loop cannot find the
-    vehicle's hover throttle in flight with the present one."""
+    """A better value of the parameter for the hover throttle, and why. With the present one the loop assumes `found` in
+    flight; `is_outside` if that is not the vehicle's, because the loop cannot find it."""
 
     parameter: str
     present: float
     proposed: float
+    found: float
     is_outside: bool
     reason: str
 
@@ -44,6 +45,7 @@ def advise_hover(loop: AltitudeLoop, hover_throttle: float) -> HoverAdvice | Non
         parameter=texts.hover_parameter,
         present=present,
         proposed=proposed,
+        found=found_hover(loop, hover_throttle),
         is_outside=is_outside,
         reason=f"The vehicle hovers at a throttle of {hover_throttle:.3f}, {why}. Set {texts.hover_parameter} to "
         f"{proposed:g}.",

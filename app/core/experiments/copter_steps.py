@@ -13,7 +13,7 @@ from typing import ClassVar, Final, Self
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.hover import found_hover
+from app.core.analysis.hover import HoverAdvice, advise_hover, found_hover
 from app.core.analysis.loop import AltitudeLoop, Run
 from app.core.analysis.recorded_flight import Steps
 from app.core.definition import Option, OptionValue
@@ -239,8 +239,13 @@ class CopterSteps(OwnModel, ABC):
         return (
             *check_altitudes(altitudes, self.set_points, envelope.ceiling_m),
             check_margin(self.loop(gains), [copter_of(model) for model in models]),
-            *check_hover(self.loop(gains), spread.mean[0], math.sqrt(spread.covariance[0][0])),
+            *check_hover(self.advise_hover(spread.mean[0]), spread.mean[0], math.sqrt(spread.covariance[0][0])),
         )
+
+    def advise_hover(self, hover_throttle: float) -> HoverAdvice | None:
+        """Advice for a vehicle that hovers with this throttle; None if its parameter suits, or was not recorded."""
+        loop = self.loop(self.space.default)
+        return advise_hover(loop, hover_throttle) if loop.texts.hover_parameter in self.parameters else None
 
     def _fly(self, gains: Vector, model: Vector) -> tuple[Samples, Samples]:
         """Times of the loop's steps, shape (m,), and what is flown in still air, (m, 6) as `FLOWN`."""

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from app.core.analysis.hover import advise_hover, found_hover
+from app.core.analysis.hover import HoverAdvice
 from app.core.analysis.loop import AltitudeLoop
 from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
 from app.core.errors import Problem
@@ -58,22 +58,14 @@ def refuse_parameters(problems: Sequence[Problem]) -> tuple[Check, ...]:
     )
 
 
-def check_hover(loop: AltitudeLoop, hover_throttle: float, deviation: float) -> tuple[Check, ...]:
+def check_hover(advice: HoverAdvice | None, hover_throttle: float, deviation: float) -> tuple[Check, ...]:
     """A check that passes, and says that the vehicle hovers outside what its autopilot finds in flight; none if it does
     not, or while flights have not shown the hover throttle. No refusal: only another flight can show that the parameter
     was set."""
-    advice = advise_hover(loop, hover_throttle)
     if advice is None or not advice.is_outside or deviation > _KNOWN_TO:
         return ()
-    return (
-        Check(
-            "hover throttle",
-            True,
-            f"{advice.reason} Do this before the flight.",
-            worst=hover_throttle,
-            limit=found_hover(loop, hover_throttle),
-        ),
-    )
+    sentence = f"{advice.reason} Do this before the flight."
+    return (Check("hover throttle", True, sentence, worst=hover_throttle, limit=advice.found),)
 
 
 _KNOWN_TO: Final = 0.03

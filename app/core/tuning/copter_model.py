@@ -15,7 +15,6 @@ import numpy as np
 
 from app.core.analysis.analysis import find_unexplained, is_alike
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.hover import advise_hover
 from app.core.analysis.loop import AltitudeLoop, GainSpace
 from app.core.analysis.margin import (
     EXTRA_LAG_S,
@@ -74,7 +73,7 @@ class CopterModel:
         if (why := find_unexplained(self._estimate)) is not None:
             worst = max(self.numbers, key=lambda number: fit_copter(self._logs[number]).residual_m_s2)
             raise _unlike(worst, why)
-        self._hover: Final = advise_hover(experiment.loop(experiment.space.default), self._estimate.mean.hover_throttle)
+        self._hover: Final = experiment.advise_hover(self._estimate.mean.hover_throttle)
         first = next(flight for flight in flights if flight.outcome == "valid")
         self._first: Final = self._loop(experiment.space.vector(first.gains))
 

@@ -197,6 +197,9 @@ def test_a_hover_throttle_outside_what_px4_finds_is_told_until_the_parameter_is_
     assert told.passed
     assert told.limit == pytest.approx(0.45)
     assert told.sentence == f"{said} Do this before the flight."
+    unknown = {name: value for name, value in first.parameters.items() if name != "MPC_THR_HOVER"}
+    silent = CopterModel(steps.under(unknown), [replace(first, parameters=unknown)])
+    assert "MPC_THR_HOVER" not in silent.notes(steps.space.default)[0]
     later = [first, replace(first, number=2, parameters={**first.parameters, "MPC_THR_HOVER": 0.4})]
     assert all("MPC_THR_HOVER ±" not in note for note in next_proposal(definition, later).explanation.notes)
 
