@@ -154,7 +154,8 @@ gusts, an estimator that wanders: `bench/copters/simulation.py`).
 - The sets below the methods are flown without a search, so that their figures are the same after any number of flights:
   the firmware's defaults, the rule of ArduCopter's documentation, and sets that are common.
 - Gainline's proposals pass its gate. A method that ends early, or has fewer flights than the number in the column, is
-  counted with its last recommendation. Methods with slow proposals tuned fewer vehicles, the first ones.
+  counted with its last recommendation. Methods with slow proposals tuned fewer vehicles, the first ones, so that only
+  their shares compare with those of the others, not their errors.
 
 To regenerate this section (`--results FILE` can be interrupted and continued):
 
