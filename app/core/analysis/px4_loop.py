@@ -110,7 +110,7 @@ class Px4Loop:
     @property
     def firmware_parameters(self) -> dict[str, float]:
         values = {name: getattr(self.parameters, field) for name, field in FIRMWARE_NAMES.items()}
-        return values | step_parameters(self.step_s)
+        return values | {HOVER_RANGE_NAME: self.hover_deviation} | step_parameters(self.step_s)
 
     @property
     def assumed_hover_throttle(self) -> float:

@@ -149,8 +149,11 @@ def read_px4(loop: Px4Loop, trajectory: Trajectory, steps: Steps) -> LoggedFligh
 
 
 def _lateness_s(trajectory: Trajectory, set_points: SetPoints) -> float:
-    """How late the steps took effect on average, by the recorded reference; 0 if it does not show all of them."""
+    """How late the steps took effect on average, by the recorded reference; 0 if it does not show all of them, or there
+    are none."""
     nominal = np.array(set_points.times_s[1:])[np.diff(set_points.altitudes_m) != 0.0]
+    if not nominal.size:
+        return 0.0
     after = trajectory.time_s[1:] >= nominal[0] - LEAD_S
     flown = trajectory.time_s[1:][(np.abs(np.diff(trajectory["reference_m"])) > _LEAST_STEP_M) & after]
     return float(np.mean(flown - nominal)) if len(flown) == len(nominal) else 0.0
