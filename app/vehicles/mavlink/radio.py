@@ -42,6 +42,7 @@ RATE_OVER_S: Final = 2.0
 LOSS_OVER_S: Final = 10.0
 _COUNT_EVERY_S: Final = 1.0
 _MAX_AGE_S: Final = 2.0
+_JUST_HEARD_S: Final = 0.1
 _REFERENCE_HOLDS_S: Final = 0.25
 """Greatest age of a report of the autopilot's reference."""
 _SAME_TARGET_M: Final = 0.01
@@ -356,12 +357,12 @@ class CommandSequence:
             self._radio.send(*self._steps[0].sends)
 
     def _may_send(self, step: Step) -> bool:
-        """Whether the newest heartbeat reports one of the modes in which the step may be sent. After a
-        sending only a new one counts: if the reply was lost, a pilot may have taken over since."""
+        """Whether a heartbeat that has just arrived reports one of the modes in which the step may be sent: since an
+        older one, a pilot may have taken over."""
         seen = self._radio.seen
         if not step.modes:
             return True
-        is_new = not self._sent_s or seen.heartbeat_s > self._sent_s[-1]
+        is_new = self._radio.clock.now_s() - seen.heartbeat_s <= _JUST_HEARD_S * self._radio.timeout_factor
         return is_new and seen.heartbeat is not None and seen.heartbeat.mode in step.modes
 
     def _refused(self, measurement: Measurement | None) -> ActionRefused:

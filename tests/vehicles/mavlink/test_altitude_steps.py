@@ -268,8 +268,9 @@ def test_a_px4_that_refuses_to_follow_set_points_at_first_is_asked_again() -> No
 
 
 @compiled_only
-@pytest.mark.parametrize("faults", [["taken-over:20@9.3"], ["ack-lost:0.3@10.1", "taken-over:20@10.25"]])
+@pytest.mark.parametrize("faults", [["taken-over:20@10.1"], ["ack-lost:0.3@10.9", "taken-over:20@11.1"]])
 def test_a_pilot_who_takes_a_px4_over_before_or_as_it_follows_set_points_keeps_it(faults: list[str]) -> None:
+    """Its heartbeats are sent at whole seconds, set points from 9 s on."""
     with LockstepRig("px4", faults=faults) as rig:
         rig.switch_on_failsafes()
         vehicle = rig.vehicle()

@@ -51,9 +51,11 @@ def test_a_reply_received_before_the_message_was_sent_confirms_nothing() -> None
     assert commanded.hear(reply) is not None
 
 
-def test_offboard_is_requested_only_while_the_newest_heartbeat_reports_hold_and_again_only_after_another() -> None:
+def test_offboard_is_requested_only_right_after_a_heartbeat_that_reports_hold() -> None:
+    """Set points must have arrived for a second then; the request that follows is at most 0.1 s later."""
     commanded = Commanded("px4", Action.HOLD)
-    assert [commanded.second(HOLD), commanded.second(POSITION), commanded.second(POSITION)] == [0, 0, 0]
+    assert [commanded.second(HOLD), commanded.second(HOLD)] == [0, 0], "the newest heartbeat is 0.2 s old"
+    assert [commanded.second(POSITION), commanded.second(POSITION)] == [0, 0]
     assert [commanded.second(HOLD), commanded.second(), commanded.second(HOLD)] == [1, 0, 1]
     assert [commanded.second(OFFBOARD), commanded.second(OFFBOARD)] == [0, 0], "though the reply was lost"
     assert commanded.sent[-1] == "SET_POSITION_TARGET_LOCAL_NED"

@@ -168,7 +168,7 @@ class Step:
     `TARGET` with its `altitude_m`, or "mode " and the mode of a heartbeat; if it awaits none, the step ends after
     `pause_s`. `shown_by`: the "mode " of a heartbeat that ends it too, for replies get lost. A step that is not
     `needed` may be refused, or have no reply; one that `persists` is sent again after a refusal, up to `attempts`
-    times. If there are `modes`, it is sent only while the newest heartbeat reports one of them."""
+    times. If there are `modes`, it is sent only right after a heartbeat that reports one of them."""
 
     sends: tuple[Outgoing, ...]
     awaits: str = ""
