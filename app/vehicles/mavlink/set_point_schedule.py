@@ -14,14 +14,25 @@ from app.core.experiments.step_sequence import SETTLED_FOR_S, unsettled
 from app.core.formatting import count
 from app.core.models.set_points import SetPoints
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.events import Action, ActionDone, PerformAction, Position
+from app.vehicles.mavlink.events import (
+    Action,
+    ActionDone,
+    Heartbeat,
+    Measurement,
+    PerformAction,
+    Position,
+    TargetAltitude,
+)
 from app.vehicles.mavlink.failures import Failure, Finding
-from app.vehicles.mavlink.trial_reactions import Plan, SetPointChange, Step, Trial
+from app.vehicles.mavlink.trial_reactions import Plan, SetPointChange, Step, Trial, note
 
 HELD_BEFORE_S: Final = 6.0
 """Time before the first step from which a vehicle holds the first set point by position targets."""
 _OVERDUE: Final = 1.2
 """Share of the permitted delay after which no confirmation is awaited: a refusal, with its reason, comes before."""
+_SAME_M: Final = 0.05
+_ASTRAY_S: Final = 0.3
+"""Time after which it is not a late report of the previous set point, and the next heartbeat is a later one."""
 LEAD_S: Final = 0.02
 """Usual time from the command of a set point to its effect: it is commanded so much before it is due."""
 
@@ -50,6 +61,23 @@ def note_settling(trial: Trial, positions: tuple[Position, ...]) -> Trial:
         return trial
     recent = tuple(each for each in positions if each.time_boot_s - start_s >= first_s - SETTLED_FOR_S)
     return replace(trial, settling=(*trial.settling, *recent)) if recent else trial
+
+
+def note_target(trial: Trial, measurement: Measurement | None, now_s: float) -> Trial:
+    """Note a vehicle that follows another set point than the one it has confirmed, once a heartbeat reports that it
+    still follows set points: a pilot's mode changes its set point too."""
+    since_s, wanted_m = trial.astray_since_s, trial.plan.limits.set_point_m
+    match measurement:
+        case TargetAltitude(altitude_m=altitude_m):
+            is_known = trial.plan.holds_first and trial.changes and not trial.changes_set_point
+            is_astray = is_known and abs(altitude_m - wanted_m) > _SAME_M
+            return watching.with_changes(trial, astray_since_s=(since_s or now_s) if is_astray else None)
+        case Heartbeat(mode=mode) if since_s is not None and now_s - since_s >= _ASTRAY_S:
+            why = "Its set point was changed by a command that was not Gainline's."
+            follows = mode in trial.plan.following_modes
+            return note(trial, Finding(failure=Failure.INTERRUPTED, why=why)) if follows else trial
+        case _:
+            return trial
 
 
 def is_due(trial: Trial, now_s: float) -> bool:

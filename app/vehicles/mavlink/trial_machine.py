@@ -118,6 +118,7 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
         trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
     elif trial.state is State.RECORD:
         trial = set_point_schedule.note_settling(trial, positions)
+        trial = set_point_schedule.note_target(trial, event.measurement, event.now_s)
     to_m = trial.plan.ground_m if trial.state not in _STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
     return trial, tuple(RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)

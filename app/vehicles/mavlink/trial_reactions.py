@@ -195,8 +195,9 @@ class Trial:
     and the takeoff command, `ground_shift_m` is the increase of its altitude on the ground in that time. `doubt` is
     the reason why it will be quarantined at the end, however it lands. `changes` are the set points after the
     takeoff's that it has confirmed; `changes_set_point`: it has not confirmed the newest; `settling` are the positions
-    that show whether it is at rest before the first of them. `withdrawn`: a heartbeat has reported a manual mode since
-    the first of them was commanded, after which none is commanded any more.
+    that show whether it is at rest before the first of them. `astray_since_s`: since when it has reported another set
+    point than the one it confirmed. `withdrawn`: a heartbeat has reported a manual mode since the first of them was
+    commanded, after which none is commanded any more.
     """
 
     plan: Plan
@@ -227,6 +228,7 @@ class Trial:
     changes: tuple[SetPointChange, ...] = ()
     changes_set_point: bool = False
     settling: tuple[Position, ...] = ()
+    astray_since_s: float | None = None
     withdrawn: bool = False
 
     @property
