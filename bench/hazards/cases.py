@@ -111,9 +111,9 @@ class Case:
 
     @property
     def flies_steps(self) -> bool:
-        """Whether it flies altitude steps after its takeoff, as every second block of seeds under Paparazzi does."""
+        """Whether it flies altitude steps after its takeoff, as every second block of seeds does."""
         is_wild = any(each.kind == WILD_GAINS for each in self.faults)
-        return self.autopilot == "paparazzi" and not is_wild and self.seed // _STEPS_EVERY % 2 == 0
+        return not is_wild and self.seed // _STEPS_EVERY % 2 == 0
 
     @property
     def safe(self) -> Mapping[str, float]:

@@ -18,6 +18,8 @@ from bench.hazards.trial_states import AIR, DESCENT, LIFTED_M, RESTING_M, State
 from bench.hazards.wire import Command
 
 GROUND: Final = (State.PREFLIGHT, State.SET_GAINS)
+STEPPING: Final = (State.ARM, *AIR)
+"""States in which set points may be sent; the first is sent to Paparazzi before it takes off."""
 SILENT: Final = ("link-lost", "wrong-system", "reboot")
 UNSEEN: Final = ("frozen-position", "jumping-position", *MOCAP)
 """Faults in which the position of the vehicle is not known."""
@@ -297,9 +299,11 @@ class _Checker:
                 yield f"Land was not repeated for {max(gaps):.1f} s while the link was lost"
             if any(lost_s <= at_s < min(end_s, self.stop_asked_s) for at_s in self.states.times_of(Command.MOTORS_OFF)):
                 yield "motors off was sent while the link was lost"
-        for at_s in self.states.times_of(Command.SET_POINT):
-            if (state := self.states.at(at_s)) not in (State.ARM, *AIR):
-                yield f"a set point was sent in the state {state}"
+        for command in (Command.SET_POINT, Command.FOLLOW):
+            wrong = {
+                str(state) for at_s in self.states.times_of(command) if (state := self.states.at(at_s)) not in STEPPING
+            }
+            yield from (f"“{command}” was sent in the state {state}" for state in sorted(wrong))
         yield from self._first_command_out_of_the_air()
 
     def _first_command_out_of_the_air(self) -> Iterator[str]:

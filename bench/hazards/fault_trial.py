@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from app.core.experiments.altitude_steps import AltitudeSteps
+from app.core.experiments import get_experiment
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
@@ -13,6 +13,11 @@ from bench.hazards.rig import InjectedFault, MotorStop, Rig
 from bench.hazards.trial_states import TrialStates
 
 _STEPS: Final = 4
+_STEPS_OF: Final = {
+    "paparazzi": "altitude-steps",
+    "ardupilot": "altitude-steps-ardupilot",
+    "px4": "altitude-steps-px4",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,10 +135,12 @@ def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[FlightRecord | No
 def _order(case: Case) -> FlightOptions:
     """Return the order for a takeoff, or for altitude steps of the same length."""
     order = FlightOptions(seed=1)
-    steps = AltitudeSteps()
-    step_s = (order.window_s - steps.scored_from_s) / _STEPS
-    steps = steps.configured({"steps": _STEPS, "step_window_s": step_s})
-    return replace(order, set_points=steps.set_points) if case.flies_steps else order
+    if not case.flies_steps:
+        return order
+    name = _STEPS_OF[case.autopilot]
+    step_s = (order.window_s - get_experiment(name).scored_from_s) / _STEPS
+    set_points = get_experiment(name, {"steps": _STEPS, "step_window_s": step_s}).set_points
+    return order if set_points is None else replace(order, set_points=set_points)
 
 
 def _ignore_sample(_sample: Sample) -> None:

@@ -17,6 +17,7 @@ class Command(StrEnum):
     ARM = "arm"
     TAKE_OFF = "take off"
     SET_POINT = "set point"
+    FOLLOW = "follow set points"
     LAND = "land"
     MOTORS_OFF = "motors off"
 
@@ -41,6 +42,8 @@ _TERMINATE: Final = 185
 _SET_MODE: Final = 176
 _TAKE_OFF: Final = 22
 _LAND: Final = 21
+_TARGET: Final = "SET_POSITION_TARGET_LOCAL_NED"
+_OFFBOARD: Final = 6.0
 _ARDUPILOT_MODES: Final = {4.0: Command.PREPARE_ARMING, 9.0: Command.LAND, 6.0: Command.LAND}
 _PX4_AUTO: Final = {2.0: Command.TAKE_OFF, 6.0: Command.LAND, 5.0: Command.LAND}
 
@@ -87,6 +90,8 @@ def _paparazzi(message: Message) -> Command:
 
 
 def _ardupilot(message: Message) -> Command:
+    if message.get_type() == _TARGET:
+        return Command.SET_POINT
     if message.get_type() != "COMMAND_LONG":
         return _gain_or_request("ardupilot", message)
     if number(message, "command") == _SET_MODE:
@@ -95,9 +100,13 @@ def _ardupilot(message: Message) -> Command:
 
 
 def _px4(message: Message) -> Command:
+    if message.get_type() == _TARGET:
+        return Command.SET_POINT
     if message.get_type() != "COMMAND_LONG":
         return _gain_or_request("px4", message)
     if number(message, "command") == _SET_MODE:
+        if number(message, "param2") == _OFFBOARD:
+            return Command.FOLLOW
         return _PX4_AUTO.get(number(message, "param3"), Command.REQUEST)
     return _command(message)
 
