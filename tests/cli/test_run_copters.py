@@ -161,7 +161,7 @@ def test_what_a_killed_run_had_set_is_put_back_at_the_next_connection(
 
 
 @pytest.mark.complete
-@pytest.mark.parametrize("autopilot", ["ardupilot-4.7", "ardupilot", "px4"])
+@pytest.mark.parametrize("autopilot", ["ardupilot-4.7", "px4"])
 def test_three_sets_are_flown_by_hand_and_the_safe_gains_are_back(
     tmp_path: Path, autopilot: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

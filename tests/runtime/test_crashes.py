@@ -183,11 +183,11 @@ def test_stopping_the_server_in_mid_flight_lands_and_records_it(tmp_path: Path) 
 @pytest.mark.complete
 def test_a_worker_killed_at_random_moments_never_leaves_a_false_state(serving: Serving) -> None:
     campaign_id = serving.campaign(max_flights=200)
-    for number in range(6):
+    for number in range(4):
         wait_for("the vehicle", lambda: serving.get(f"/campaigns/{campaign_id}")["vehicle"]["state"] == "ready")
         worker = serving.worker_pid()
         trial_id = serving.fly(campaign_id, speed=200.0)
-        time.sleep(0.04 * number)
+        time.sleep(0.06 * number)
         os.kill(worker, signal.SIGKILL)
         wait_for("the flight's end", lambda: not under_way(serving, trial_id))  # noqa: B023 - called at once
         trial = serving.trial(trial_id, "valid", "lost", "planned")

@@ -37,9 +37,13 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize(
-    "table", ["campaign", *(pytest.param(one, marks=pytest.mark.complete) for one in ("event", "alembic_version"))]
+    ("command", "table"),
+    [
+        *((command, "campaign") for command in COMMANDS),
+        pytest.param("report", "event", marks=pytest.mark.complete),
+        *(pytest.param(command, "alembic_version", marks=pytest.mark.complete) for command in ("serve", "worker")),
+    ],
 )
-@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_reports_a_damaged_database(
     migrated_file: Path, tmp_path: Path, command: str, table: str
 ) -> None:

@@ -35,10 +35,8 @@ def test_without_scatter_every_seed_flies_alike() -> None:
     np.testing.assert_array_equal(one["altitude_m"], other["altitude_m"])
 
 
-@pytest.mark.parametrize(
-    ("gains", "paper_m"),
-    [(SAFE, 0.0141), pytest.param({"kp": 1624, "ki": 1356, "kd": 195}, 0.0066, marks=pytest.mark.complete)],
-)
+@pytest.mark.complete
+@pytest.mark.parametrize(("gains", "paper_m"), [(SAFE, 0.0141), ({"kp": 1624, "ki": 1356, "kd": 195}, 0.0066)])
 def test_repeated_takeoffs_scatter_as_the_real_drones_did(gains: dict[str, float], paper_m: float) -> None:
     """Fig. 12 of the paper; the spread of 120 flights is itself known to 6 %."""
     assert spread(gains) == pytest.approx(paper_m, rel=0.3)

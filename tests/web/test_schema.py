@@ -41,6 +41,8 @@ FEW = {
     "/api/campaigns/{campaign_id}/report.html": 8,
     "/api/trials/{trial_id}/trajectory": 12,
     "/api/controller-checks": 12,
+    "/api/log-analyses": 6,
+    "/api/log-analyses/campaign": 6,
 }
 """Examples of what takes a second, a process or a browser for each."""
 ANSWERED_WITHIN_S = 120.0

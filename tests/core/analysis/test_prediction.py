@@ -59,6 +59,7 @@ def test_activity_rises_with_the_acceleration_gain() -> None:
     assert ratio == pytest.approx(flown, rel=0.2)
 
 
+@pytest.mark.complete
 def test_most_flights_in_other_weather_lie_within_the_interval() -> None:
     """Ten models, each from another flight, and three other flights for each: of 30 inside 90 %, at least 22, which
     chance misses once in 1500 times."""

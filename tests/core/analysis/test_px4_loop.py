@@ -60,6 +60,7 @@ def test_the_binary_flew_other_gains_as_one_flight_predicts(logged: str, predict
     assert event_error_m(flight, rows[:, FLOWN.index("z_m")]) == pytest.approx(flown_m, rel=0.25)
 
 
+@pytest.mark.complete
 def test_random_vehicles_lie_within_their_uncertainty() -> None:
     """Of eight, with more physics than the model has: the slope in hover within three stated deviations and, but for
     the share of usual vehicles, without a bias."""

@@ -52,6 +52,7 @@ def test_random_vehicles_lie_within_their_uncertainty() -> None:
     assert abs(np.mean(apart)) < 1.0
 
 
+@pytest.mark.complete
 def test_the_stated_uncertainty_of_the_slope_is_that_of_many_flights() -> None:
     """Of 24 flights of one vehicle in gusts, with 10 rows a second: the deviation of (slope − 1)/stated is within 30 %
     of 1, twice the error of 24."""

@@ -160,7 +160,13 @@ def test_other_outputs_are_looked_at_for_gaps_only() -> None:
 
 
 @compiled_only
-@pytest.mark.parametrize("gains", [DEFAULT, TUNED, {"kp": 1500, "ki": 1000, "kd": 40}])
+@pytest.mark.parametrize(
+    "gains",
+    [
+        TUNED,
+        *(pytest.param(each, marks=pytest.mark.complete) for each in (DEFAULT, {"kp": 1500, "ki": 1000, "kd": 40})),
+    ],
+)
 @pytest.mark.parametrize(
     ("kind", "options"),
     [

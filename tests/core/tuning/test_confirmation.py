@@ -143,6 +143,7 @@ def test_before_the_first_flight_nothing_stands() -> None:
     assert compare_winner(NOISE, QuadraticExperiment(), []) is None
 
 
+@pytest.mark.complete
 def test_equal_policies_are_rarely_called_better() -> None:
     """Three others as good as the first, the luckiest of them confirmed against it: 400 campaigns with the scatter that
     the statistics expect. At most the rule's 10 %."""

@@ -63,6 +63,7 @@ def test_from_the_models_optimum_the_ardrone_reaches_the_papers_best() -> None:
 
 
 @pytest.mark.parametrize("options", [{}, RAW])
+@pytest.mark.complete
 def test_on_the_twin_a_wrong_hover_throttle_latency_and_lag_do_not_hinder(options: dict[str, bool]) -> None:
     """At most 0.1400 m within 7 flights; the paper's best real flight scored 0.2265 m."""
     flights, _ = campaign(Definition(options={**options}, stop=PAPER), TWIN)
@@ -78,6 +79,7 @@ def test_on_the_twin_the_models_optimum_is_a_good_start() -> None:
 @pytest.mark.timeout(600)
 @settings(max_examples=6)
 @given(DEFINITIONS)
+@pytest.mark.complete
 def test_every_proposal_is_recomputed_bit_for_bit_and_passes_the_gate(definition: Definition) -> None:
     if problems_of(definition):
         return
@@ -141,7 +143,7 @@ def test_under_the_rule_noise_the_winner_and_the_first_gains_are_flown_again() -
     assert proposals[-1].explanation.summary.startswith("Better with more than 99.9\u00a0% confidence")
 
 
-@pytest.mark.parametrize("strategy", ["gradient", "calibrated"])
+@pytest.mark.parametrize("strategy", ["calibrated", pytest.param("gradient", marks=pytest.mark.complete)])
 def test_under_the_rule_noise_gains_outside_the_bounds_are_not_flown_again(strategy: str) -> None:
     """The second flight, the best until then, was flown over the gate's refusal."""
     bounds: dict[str, tuple[float, float]] = {"kp": (0, 1000), "ki": (0, 400)}

@@ -245,7 +245,7 @@ def stopped(autopilot: str, at_s: float, *, motors_off: bool) -> tuple[FlightRec
 def test_whenever_it_is_stopped_a_drone_that_truly_rose_has_flown_and_one_that_was_not_commanded_has_not(
     autopilot: str, motors_off: bool
 ) -> None:
-    for tenths in (0, *range(14, 27)):
+    for tenths in (0, *range(14, 27, 2)):
         record, rose_m, _ = stopped(autopilot, tenths / 10, motors_off=motors_off)
         assert record.ending == "aborted"
         assert record.has_flown or rose_m <= RESTING_M, tenths
@@ -264,9 +264,9 @@ def test_an_abort_before_the_lift_off_of_a_drone_is_no_flight(at_s: float, flown
     ("seed", "hazard", "state"),
     [
         (504, "on the ground after 0 s", BenchState.SET_GAINS),
-        (510, "on the ground after 0 s", BenchState.ARM),
-        (522, "on the ground after 0.3 s", BenchState.SET_GAINS),
-        (534, "on the ground after 0.3 s", BenchState.TAKEOFF),
+        pytest.param(510, "on the ground after 0 s", BenchState.ARM, marks=pytest.mark.complete),
+        pytest.param(522, "on the ground after 0.3 s", BenchState.SET_GAINS, marks=pytest.mark.complete),
+        pytest.param(534, "on the ground after 0.3 s", BenchState.TAKEOFF, marks=pytest.mark.complete),
         (540, "on the ground after 0.6 s", BenchState.SET_GAINS),
     ],
 )

@@ -402,6 +402,7 @@ def test_a_restart_between_flights_is_noticed_before_the_next_which_then_flies(a
         assert vehicle.fly(ORDER, on_sample=unwatched, should_stop=never).ending == "completed"
 
 
+@pytest.mark.complete
 def test_a_restart_is_noticed_by_staging_itself() -> None:
     with LockstepRig("ardupilot") as rig, connected(rig) as vehicle:
         rig.switch_on_failsafes()

@@ -49,7 +49,8 @@ class FlickeringOtherwise(Flickering):
     first = 1
 
 
-@pytest.mark.parametrize("kind", [Flickering, pytest.param(FlickeringOtherwise, marks=pytest.mark.complete)])
+@pytest.mark.parametrize("kind", [Flickering, FlickeringOtherwise])
+@pytest.mark.complete
 def test_one_heartbeat_of_a_pilot_keeps_no_quarantined_vehicle_from_being_told_to_land_on(
     kind: type[Flickering],
 ) -> None:
@@ -95,6 +96,7 @@ def test_one_that_flies_home_is_quarantined_told_to_land_on_and_never_said_to_ha
             vehicle.release()
 
 
+@pytest.mark.complete
 def test_once_a_pilot_has_set_its_mode_it_lands_and_the_trouble_is_over() -> None:
     with LockstepRig(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
         fly(vehicle)
@@ -108,6 +110,7 @@ def test_once_a_pilot_has_set_its_mode_it_lands_and_the_trouble_is_over() -> Non
         assert vehicle.concern == ""
 
 
+@pytest.mark.complete
 def test_while_it_does_not_come_down_the_operator_is_told_so_before_the_landing_is_given_up() -> None:
     told: list[tuple[float, str]] = []
 
@@ -127,6 +130,7 @@ def test_while_it_does_not_come_down_the_operator_is_told_so_before_the_landing_
         assert 4.9 < warned_s - landed_s < 15.0
 
 
+@pytest.mark.complete
 def test_a_landing_that_is_obeyed_is_no_trouble() -> None:
     troubles: set[str] = set()
 

@@ -85,7 +85,7 @@ def flown(
         return record, watcher.samples, rig.heard
 
 
-@pytest.mark.parametrize("autopilot", AUTOPILOTS)
+@pytest.mark.parametrize("autopilot", FLOWN_ON)
 def test_it_is_recorded_and_shown_live(autopilot: str) -> None:
     record, live, _ = flown(autopilot)
     flight = record.trajectory
@@ -105,7 +105,7 @@ def test_no_model_is_fitted_to_it_because_it_is_rare_and_rounded() -> None:
     assert takeoff.disturbances(record.trajectory, gains, takeoff.nominal_model) is None
 
 
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+@pytest.mark.parametrize("autopilot", ["ardupilot", pytest.param("px4", marks=pytest.mark.complete)])
 def test_it_is_requested_on_the_ground_only(autopilot: str) -> None:
     _, _, heard = flown(autopilot)
     of_hud = [at_s for at_s, message in heard if _requests(message, 74)]
@@ -222,6 +222,7 @@ def test_a_vehicle_that_reports_none_has_none_rather_than_zero(
     assert [sample for sample in live if "throttle" in sample.channels] == []
 
 
+@pytest.mark.complete
 def test_a_report_that_is_too_old_is_not_shown_and_not_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
     record, live, _ = flown("px4", ThrottleEnds, monkeypatch)
     has = [sample.time_s for sample in live if "throttle" in sample.channels]
@@ -232,7 +233,8 @@ def test_a_report_that_is_too_old_is_not_shown_and_not_recorded(monkeypatch: pyt
     assert "throttle" not in record.trajectory.channels
 
 
-@pytest.mark.parametrize("fault", [ForeignThrottle, pytest.param(LateThrottle, marks=pytest.mark.complete)])
+@pytest.mark.parametrize("fault", [ForeignThrottle, LateThrottle])
+@pytest.mark.complete
 def test_another_vehicle_s_throttle_and_late_reports_are_never_taken_for_saturation(
     fault: type[Fault], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -243,7 +245,7 @@ def test_another_vehicle_s_throttle_and_late_reports_are_never_taken_for_saturat
 
 
 @pytest.mark.parametrize("autopilot", FLOWN_ON)
-@pytest.mark.parametrize("fault", [WildThrottle, NoThrottle])
+@pytest.mark.parametrize("fault", [WildThrottle, pytest.param(NoThrottle, marks=pytest.mark.complete)])
 def test_nothing_that_is_sent_and_nothing_else_recorded_depends_on_it(
     autopilot: str, fault: type[Fault], monkeypatch: pytest.MonkeyPatch
 ) -> None:

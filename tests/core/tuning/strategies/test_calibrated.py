@@ -194,6 +194,7 @@ def test_pinned_gains_and_narrow_bounds_are_kept() -> None:
     jitter=st.integers(0, 2**32 - 1),
     flown=st.integers(1, 3),
 )
+@pytest.mark.complete
 def test_the_same_history_gives_the_same_proposal_bit_for_bit(
     hover: float, latency: float, lag: float, jitter: int, flown: int
 ) -> None:

@@ -73,6 +73,7 @@ def test_with_noisy_logs_the_prediction_counts_the_noise_and_its_band_holds_it()
     assert np.mean(upper - lower) == pytest.approx(2 * 1.6449 * LOG_NOISE[1], rel=0.3)
 
 
+@pytest.mark.complete
 def test_the_same_flights_give_the_same_proposal_bit_for_bit() -> None:
     flown = flight(1, HAND)
     fresh = replace(flown, trajectory=flown.trajectory.as_stored())
@@ -81,6 +82,7 @@ def test_the_same_flights_give_the_same_proposal_bit_for_bit() -> None:
     assert one.predicted_error == other.predicted_error
 
 
+@pytest.mark.complete
 def test_a_step_limit_holds_the_optimum_back() -> None:
     proposal = next_proposal(definition(step_fraction=0.1), [flight(1, HAND)])
     space = MODEL.space
