@@ -36,7 +36,7 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 
 
 EVERYDAY = {
-    "test_flight_day.py::test_a_day_from_the_wizard_to_the_report",
+    "test_fly_real.py::test_a_flight_that_ran_to_its_end_wants_a_persons_word",
     "test_pages.py::test_the_ui_stays_light_before_its_charts",
 }
 """What `./dev test` runs of the browser tests; all others belong to the complete ring."""
