@@ -16,6 +16,14 @@ OTHER_LANDING: Final = "other-landing"
 """Another ground station commands the vehicle to land."""
 OTHER_MODE: Final = "other-mode"
 """Another ground station changes the mode of the vehicle."""
+OTHER_TARGET: Final = "other-target"
+"""Another ground station commands another set point."""
+OTHER_GAIN: Final = "other-gain"
+"""Another ground station writes a gain."""
+STALL: Final = "stall"
+"""Gainline's process stands still."""
+TAKEN_OVER: Final = "taken-over"
+"""A pilot switches to a manual mode, and back at the end."""
 WILD_GAINS: Final = "wild-gains"
 """The trial's gains are so bad that the vehicle exceeds its limits."""
 MOCAP: Final = ("mocap-lost", "mocap-frozen", "mocap-drift")
@@ -38,10 +46,14 @@ FAULT_KINDS: Final = (
     MOTORS_OFF,
     OTHER_LANDING,
     OTHER_MODE,
+    OTHER_TARGET,
+    OTHER_GAIN,
+    STALL,
+    TAKEN_OVER,
     WILD_GAINS,
 )
 """Faults of the simulated drone, and those that only the bench can cause."""
-_ACTS: Final = frozenset({ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS})
+_ACTS: Final = frozenset({ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, OTHER_TARGET, OTHER_GAIN, WILD_GAINS})
 """Faults without a duration."""
 CELLS: Final = tuple(product(FAULT_KINDS, State))
 
@@ -77,6 +89,7 @@ _DELAYS_S: Final[Mapping[State, float]] = {
 }
 """Largest delay of a fault after the beginning of each state."""
 _EARLY_S: Final = 6.0
+_LONGEST_STALL_S: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +183,8 @@ def _delay_s(chance: random.Random, state: State) -> float:
 def _duration_s(chance: random.Random, kind: str) -> float:
     if kind in _ACTS:
         return FOR_GOOD_S
+    if kind == STALL:
+        return chance.uniform(0.1, _LONGEST_STALL_S)
     how = chance.random()
     if how < 0.3:
         return FOR_GOOD_S

@@ -10,7 +10,19 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from bench.hazards.cases import ABORT, MOCAP, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case
+from bench.hazards.cases import (
+    ABORT,
+    MOCAP,
+    MOTORS_OFF,
+    OTHER_GAIN,
+    OTHER_LANDING,
+    OTHER_MODE,
+    OTHER_TARGET,
+    STALL,
+    TAKEN_OVER,
+    WILD_GAINS,
+    Case,
+)
 from bench.hazards.fault_trial import TrialResult
 from bench.hazards.intervals import Span, covers, longest, overlap, total
 from bench.hazards.rig import InjectedFault
@@ -25,7 +37,9 @@ UNSEEN: Final = ("frozen-position", "jumping-position", *MOCAP)
 """Faults in which the position of the vehicle is not known."""
 DEAF: Final = ("link-lost", "reboot")
 """Faults in which the vehicle receives nothing either."""
-GAIN_FAILURES: Final = (ABORT, WILD_GAINS, "no-lift-off")
+GAIN_FAILURES: Final = (ABORT, WILD_GAINS, "no-lift-off", OTHER_TARGET)
+JUST_SHOWN_S: Final = 0.15
+"""Time in which a command may meet a pilot who has just taken over."""
 HEARTBEAT_S: Final[Mapping[str, float]] = {"paparazzi": 0.5, "ardupilot": 1.0, "px4": 1.0}
 BATTERY_S: Final[Mapping[str, float]] = {"paparazzi": 1.2, "ardupilot": 0.5, "px4": 0.2}
 LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "px4": 8.0}
@@ -108,7 +122,9 @@ class _Checker:
             yield "a trial that took off left no record"
         if outcome == "refused" and self.took_off_s is not None and self.result.rose_m > RESTING_M:
             yield f"the vehicle rose to {self.result.rose_m:.3f} m, but nothing is said to have been flown"
-        if self.result.flew_on is not None and not _same(self.result.flew_on, self.case.gains):
+        changed = any(each.state in (State.ARM, State.TAKEOFF) for each in self._kinds(OTHER_GAIN))
+        is_known = changed and outcome != "completed"
+        if self.result.flew_on is not None and not _same(self.result.flew_on, self.case.gains) and not is_known:
             yield f"the vehicle lifted off with {dict(self.result.flew_on)}"
 
     def _on_ground(self) -> Iterator[Cause]:
@@ -123,7 +139,8 @@ class _Checker:
             ("preflight", MOCAP, 0.0),
             ("preflight", ("arm-refused", OTHER_LANDING), 0.0),
             ("F2", ("param-unconfirmed",), 0.0),
-            ("F10", ("reboot", OTHER_MODE), 0.0),
+            ("F10", ("reboot", OTHER_MODE, TAKEN_OVER), 0.0),
+            ("F2", (OTHER_GAIN,), 0.0),
         ):
             if self.within(self.of(*kinds), *GROUND) > shortest_s:
                 yield Cause(failure, "refused")
@@ -144,8 +161,12 @@ class _Checker:
             yield Cause("F7", "refused")
         if self.within(self.of("frozen-position", *MOCAP), *arming) > 0.15:
             yield Cause("F9a", "refused")
-        if any(self.began_in(kind, *arming) for kind in ("reboot", OTHER_MODE)):
+        if any(self.began_in(kind, *arming) for kind in ("reboot", OTHER_MODE, OTHER_GAIN)):
             yield Cause("F10", "refused")
+        if self.within(self.of(TAKEN_OVER), *arming) > 0.0:
+            yield Cause("F10", "refused")
+        if any(self.began_in(STALL, state) for state in (State.CONNECT, *GROUND, *arming)):
+            yield Cause("F3", "refused")
         if self.began_in(ABORT, *arming) or self.began_in(MOTORS_OFF, *arming):
             yield Cause("F8", "refused", is_certain=True)
         refused = [covers(self.of("arm-refused"), (at_s, at_s)) for at_s in self.states.times_of(Command.ARM)]
@@ -182,7 +203,36 @@ class _Checker:
         jumped_s = total(self.of("jumping-position"), self.states.spans(State.ARM, *AIR))
         if jumped_s > 1.3:
             yield Cause("F9b", "invalid", is_certain=jumped_s > 3.0)
+        yield from self._by_other_people()
         yield from self._counting_against_gains()
+
+    def _by_other_people(self) -> Iterator[Cause]:
+        """Yield the failures that a pilot, another ground station or this computer causes."""
+        flown_s = self.within(self.of(TAKEN_OVER), State.RECORD)
+        if self.within(self.of(TAKEN_OVER), State.ARM, *AIR) > 0.0:
+            yield Cause("F10a", "invalid", is_certain=flown_s > 2.0 * self.heartbeat_s + 1.0 + SLACK_S)
+        if self.within(self.of(TAKEN_OVER), State.ARM, State.TAKEOFF) > 0.0:
+            yield Cause("F4", "aborted")
+        if self._kinds(OTHER_GAIN):
+            yield Cause("F10c", "invalid", is_certain=self.began_in(OTHER_GAIN, *AIR) and not self.beatless)
+        for begun_s, _ in self.of(OTHER_TARGET):
+            yield Cause("F10c", "invalid", is_certain=self._leads_astray(begun_s))
+            if self.case.autopilot != "px4":
+                yield Cause("F6", "aborted")
+        stalled_s = self.within(self.of(STALL), State.RECORD)
+        follows = bool(self.states.times_of(Command.FOLLOW))
+        if self._kinds(STALL) and self.case.flies_steps:
+            started_s = min(self.states.times_of(Command.FOLLOW), default=0.0)
+            is_certain = follows and stalled_s > 0.5 + SLACK_S and min(self.of(STALL))[0] > started_s + 1.0
+            yield Cause("F14", "invalid", is_certain=is_certain)
+
+    def _leads_astray(self, begun_s: float) -> bool:
+        """Whether an ArduCopter that holds a set point follows another one until a second heartbeat, or longer."""
+        own = self.states.times_of(Command.SET_POINT)
+        if self.case.autopilot != "ardupilot" or not own or begun_s < own[0] + SLACK_S or self.beatless:
+            return False
+        ends_s = min(at_s for at_s in (*own, *(end_s for _, end_s in self.states.spans(*AIR))) if at_s > begun_s)
+        return ends_s - begun_s > 0.3 + self.heartbeat_s + 2.0 * SLACK_S
 
     def _counting_against_gains(self) -> Iterator[Cause]:
         """Yield the failures that count against the gains."""
@@ -217,7 +267,7 @@ class _Checker:
             yield Cause("F8", "aborted")
         if self.within(self.of("no-lift-off"), State.LAND) > 0.0:
             yield Cause("F6", "aborted")
-        if any(self.within(self.of(kind), State.LAND) > 0.0 for kind in ("reboot", OTHER_MODE)):
+        if any(self.within(self.of(kind), State.LAND) > 0.0 for kind in ("reboot", OTHER_MODE, TAKEN_OVER)):
             yield Cause("F10", "invalid")
 
     # ---- the state of the vehicle afterwards
@@ -225,7 +275,7 @@ class _Checker:
     def _vehicle(self) -> Iterator[str]:
         match self.result.vehicle:
             case "safe":
-                if not self.result.holds_safe:
+                if not self.result.holds_safe and not self.began_in(OTHER_GAIN, State.RESTORE):
                     yield f"reported as holding its safe gains, but holds {dict(self.result.held)}"
                 if self.result.armed or abs(self.result.height_m) > LIFTED_M:
                     yield f"reported as safe, but is {'armed' if self.result.armed else 'off the ground'}"
@@ -254,7 +304,8 @@ class _Checker:
         """Yield, for each reason that justifies quarantine, whether it applies."""
         mute = self.of("param-unconfirmed")
         yield any(each.state not in (State.CONNECT, *GROUND) for each in self._kinds("reboot", OTHER_MODE))
-        yield any(each.kind == OTHER_MODE for each in self.result.injected)
+        yield any(each.kind in (OTHER_MODE, TAKEN_OVER) for each in self.result.injected)
+        yield self.began_in(OTHER_GAIN, State.DISARM, State.RESTORE)
         yield self.result.impact_m_s > IMPACT_M_S
         yield bool(self.of("mocap-drift"))  # motion capture still shows it in the air
         yield self._dropped_m() > RESTING_M
@@ -295,7 +346,7 @@ class _Checker:
                 for earlier, later in pairwise(lands)
                 if later - earlier > (1.0 if earlier < lost_s + 4.0 else LAND_AGAIN_S[self.case.autopilot]) + SLACK_S
             ]
-            if gaps:
+            if gaps and not self._kinds(STALL, TAKEN_OVER):
                 yield f"Land was not repeated for {max(gaps):.1f} s while the link was lost"
             if any(lost_s <= at_s < min(end_s, self.stop_asked_s) for at_s in self.states.times_of(Command.MOTORS_OFF)):
                 yield "motors off was sent while the link was lost"
@@ -304,7 +355,18 @@ class _Checker:
                 str(state) for at_s in self.states.times_of(command) if (state := self.states.at(at_s)) not in STEPPING
             }
             yield from (f"“{command}” was sent in the state {state}" for state in sorted(wrong))
+        yield from self._overridden_pilots()
         yield from self._first_command_out_of_the_air()
+
+    def _overridden_pilots(self) -> Iterator[str]:
+        """Yield commands to a vehicle of which a heartbeat has shown that a pilot flies it."""
+        for each in self.result.overridden:
+            if each.command is Command.FOLLOW and each.flown_s > JUST_SHOWN_S:
+                yield f"“{each.command}” was sent to a vehicle that a pilot had flown for {each.flown_s:.2f} s"
+            is_known = each.shown_s is not None and each.shown_s > JUST_SHOWN_S
+            is_known = is_known and not self.beatless and not self._kinds(ABORT, STALL)
+            if each.command is not Command.FOLLOW and is_known:
+                yield f"“{each.command}” was sent {each.shown_s:.2f} s after a heartbeat that showed a pilot"
 
     def _first_command_out_of_the_air(self) -> Iterator[str]:
         """Check that the safe gains precede Land only if the gains are suspect."""
@@ -349,7 +411,7 @@ class _Checker:
                 yield f"the landing lasted {end_s - begun_s:.1f} s"
         for since_s in (each.begun_s for each in self._kinds(ABORT) if each.state in AIR):
             left = [end_s for begun_s, end_s in self.states.spans(*AIR) if begun_s <= since_s + SLACK_S]
-            if left and max(left) - since_s > 0.05 + SLACK_S:
+            if left and max(left) - since_s > 0.05 + SLACK_S and not self._kinds(STALL):
                 yield f"an abort took effect only after {max(left) - since_s:.2f} s"
 
 

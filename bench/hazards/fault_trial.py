@@ -9,7 +9,7 @@ from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sampl
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import Case
-from bench.hazards.rig import InjectedFault, MotorStop, Rig
+from bench.hazards.rig import InjectedFault, MotorStop, Overridden, Rig
 from bench.hazards.trial_states import TrialStates
 
 _STEPS: Final = 4
@@ -47,6 +47,7 @@ class TrialResult:
     stops: tuple[MotorStop, ...]
     injected: tuple[InjectedFault, ...]
     states: TrialStates = field(repr=False)
+    overridden: tuple[Overridden, ...] = ()
 
 
 def run_trial(case: Case) -> TrialResult:
@@ -103,6 +104,7 @@ def _end(rig: Rig, record: FlightRecord | None, vehicle: str, reason: str) -> Tr
         stops=tuple(rig.stops),
         injected=tuple(rig.injected),
         states=rig.states,
+        overridden=tuple(rig.overridden),
     )
 
 
@@ -128,7 +130,7 @@ def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[FlightRecord | No
     if held != rig.case.gains:
         return None, f"it holds {held}"
     rig.wait_s(rig.case.staged_s)
-    record = vehicle.fly(_order(rig.case), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
+    record = vehicle.fly(_order(rig.case), on_sample=_ignore_sample, should_stop=rig.decide)
     return record, record.reason
 
 

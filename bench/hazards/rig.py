@@ -12,7 +12,18 @@ from app.simdrone.registry import get_autopilot
 from app.vehicles.base import OptionValue, StopRequest
 from app.vehicles.mavlink.dialects import FieldValue
 from app.vehicles.mavlink_kind import MAVLINK
-from bench.hazards.cases import ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, WILD_GAINS, Case, PlannedFault
+from bench.hazards.cases import (
+    ABORT,
+    MOTORS_OFF,
+    OTHER_GAIN,
+    OTHER_LANDING,
+    OTHER_MODE,
+    OTHER_TARGET,
+    STALL,
+    WILD_GAINS,
+    Case,
+    PlannedFault,
+)
 from bench.hazards.trial_states import RESTING_M, State, TrialStates
 from bench.hazards.wire import DIALECTS, GAINS, Command, read_command, stops_motors
 
@@ -34,6 +45,26 @@ _INTERFERENCE: Final[Mapping[tuple[str, str], tuple[str, Mapping[str, FieldValue
     (OTHER_LANDING, "px4"): ("SET_MODE", {"base_mode": 1, "custom_mode": _AUTO_LAND}),
 }
 """Messages of another ground station: a mode (failsafe, altitude hold, position control), and Land."""
+_OTHER_HEIGHT_M: Final = 2.2
+_TARGET: Final[Mapping[str, FieldValue]] = {
+    "time_boot_ms": 0,
+    "target_component": 1,
+    "coordinate_frame": 1,
+    "type_mask": 0b1101_1111_1000,
+    **dict.fromkeys(("x", "y", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"), 0.0),
+}
+_WAYPOINT: Final[Mapping[str, FieldValue]] = {
+    "target_component": 0,
+    "seq": 2,
+    "frame": 4,
+    "command": 16,
+    "current": 0,
+    "autocontinue": 0,
+    **dict.fromkeys(("param1", "param2", "param3", "param4", "x", "y"), 0.0),
+    "z": _OTHER_HEIGHT_M,
+}
+_OTHER_GAINS: Final = {"paparazzi": ("gui_v_kp", 900.0), "ardupilot": ("PSC_ACCZ_P", 0.6), "px4": ("MPC_Z_P", 0.7)}
+"""Set point and gain that another ground station sends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +75,16 @@ class InjectedFault:
     state: State
     begun_s: float
     ended_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Overridden:
+    """A command to a vehicle that a pilot flies: how long ago a heartbeat that shows it arrived; None: none has."""
+
+    at_s: float
+    command: Command
+    flown_s: float
+    shown_s: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +111,17 @@ class Rig(Lockstep):
         self.impact_m_s = 0.0
         self.touched_down_s = 0.0
         self.stop_request: StopRequest | None = None
+        self.stalls_s = 0.0
+        self.overridden: list[Overridden] = []
+        self._by_hand_since_s: float | None = None
+        self._shown_s: float | None = None
         self._waiting = list(case.faults)
         self._kind = get_autopilot(case.autopilot)
         body = new_body("twin", {}, seed=case.seed % 100_000)
         outlet = VehicleLinkOutput() if case.has_second_source else None
         super().__init__(Drone(body, lambda fresh: self._kind.set_up(fresh, self._kind.system), outlet=outlet))
         self._codec = DIALECTS[case.autopilot].codec(system=1, component=1)
+        self._reading = DIALECTS[case.autopilot].codec(system=1, component=1)
         self._other = DIALECTS[case.autopilot].codec(system=_OTHER_STATION, component=1)
 
     def tick(self) -> None:
@@ -98,6 +144,18 @@ class Rig(Lockstep):
             return
         self._stood_m = body.altitude_m if self._stood_m is None else self._stood_m
         self.rose_m = max(self.rose_m, body.altitude_m - self._stood_m)
+
+    def arriving(self, frames: list[bytes]) -> list[bytes]:
+        """Note since when a pilot has flown the drone, and when a heartbeat first showed it."""
+        if not self.drone.autopilot.is_by_hand:
+            self._by_hand_since_s = self._shown_s = None
+            return frames
+        now_s = self.drone.time_s
+        self._by_hand_since_s = now_s if self._by_hand_since_s is None else self._by_hand_since_s
+        if self._shown_s is None:
+            kinds = {message.get_type() for frame in frames for message in self._reading.parse(frame)}
+            self._shown_s = now_s if "HEARTBEAT" in kinds else None
+        return frames
 
     def write(self, data: bytes) -> bool:
         for message in self._codec.parse(data):
@@ -124,6 +182,9 @@ class Rig(Lockstep):
         now_s, height_m = self.drone.time_s, self.drone.body.altitude_m
         self.packets += command is not Command.HEARTBEAT
         self.sent.append((now_s, command))
+        if self._by_hand_since_s is not None and command in (Command.LAND, Command.FOLLOW, Command.TAKE_OFF):
+            shown_s = None if self._shown_s is None else now_s - self._shown_s
+            self.overridden.append(Overridden(now_s, command, now_s - self._by_hand_since_s, shown_s))
         if stops:
             self.stops.append(MotorStop(now_s, height_m))
         if self.states.now is None or self.states.ended_s < now_s:
@@ -165,12 +226,34 @@ class Rig(Lockstep):
                 )
             case str(kind) if kind in (OTHER_MODE, OTHER_LANDING):
                 self._interfere(_INTERFERENCE[kind, self.case.autopilot])
+            case str(kind) if kind == OTHER_TARGET:
+                self._interfere(self._other_target())
+            case str(kind) if kind == OTHER_GAIN:
+                name, value = _OTHER_GAINS[self.case.autopilot]
+                fields = {"target_component": 1, "param_id": name, "param_value": value, "param_type": 9}
+                self._interfere(("PARAM_SET", fields))
+            case str(kind) if kind == STALL:
+                self.stalls_s += planned.duration_s
             case str(kind) if kind != WILD_GAINS:
                 self.drone.inject_fault(kind, planned.duration_s)
 
     @property
     def _is_stopping(self) -> bool:
         return self.stop_request is not None and self.stop_request.motors_off
+
+    def _other_target(self) -> tuple[str, Mapping[str, FieldValue]]:
+        """Return a set point between those of the trial, on the vehicle's own datum."""
+        if self.case.autopilot == "paparazzi":
+            return "MISSION_ITEM", _WAYPOINT
+        ground_m = 0.51 if self.case.autopilot == "px4" else 0.0
+        return "SET_POSITION_TARGET_LOCAL_NED", {**_TARGET, "z": -(_OTHER_HEIGHT_M + ground_m)}
+
+    def decide(self) -> StopRequest | None:
+        """Return the operator's request, after the time for which the program's process stands still."""
+        stalls_s, self.stalls_s = self.stalls_s, 0.0
+        if stalls_s:
+            self.wait_s(stalls_s)
+        return self.stop_request
 
     def _interfere(self, message: tuple[str, Mapping[str, FieldValue]]) -> None:
         """Send a message to the drone from another ground station."""

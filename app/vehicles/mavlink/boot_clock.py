@@ -15,7 +15,8 @@ BACK_S: Final = 1.0
 RESTARTED_S: Final = 0.4
 """Time for which another clock goes on alone before it is the vehicle's."""
 BEHIND_S: Final = 20.0
-"""A clock that fell behind ours by more than this was not only late: the vehicle restarted while nothing was heard."""
+"""A clock that fell behind ours by more than this was not only late: the vehicle may have restarted while nothing was
+heard."""
 KNOWN_BY: Final = 10
 """Positions by a clock before it is known to be the vehicle's. Fewer may be a stranger's, heard before the vehicle's
 own positions were requested."""
@@ -60,8 +61,12 @@ class RestartCounter:
             self._take_other(position, now_s)
 
     def _is_expected(self, last: Position, position: Position, now_s: float) -> bool:
+        """Whether the position is by the same clock. One that fell behind may be that of a simulation that stood still,
+        unless it can have begun since the last position."""
         gained_s, passed_s = position.time_boot_s - last.time_boot_s, now_s - self._last_s
-        return gained_s > 0.0 and (1.0 - _DRIFT) * passed_s - BEHIND_S <= gained_s <= passed_s + AHEAD_S
+        is_behind = gained_s < (1.0 - _DRIFT) * passed_s - BEHIND_S
+        may_be_new = position.time_boot_s <= (1.0 + _DRIFT) * passed_s + AHEAD_S
+        return 0.0 < gained_s <= passed_s + AHEAD_S and not (is_behind and may_be_new)
 
     def _take_other(self, position: Position, now_s: float) -> None:
         other = self._other

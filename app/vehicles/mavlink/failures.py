@@ -137,7 +137,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.INTERRUPTED: Response(
             "one heartbeat in a manual mode, and the next in another; under ArduCopter and PX4 also a flight that "
-            "never came within 1 m of the set point, or whose set point was changed by another ground station",
+            "never came within 1 m of the set point, or whose set point was changed by another ground station; a "
+            "gain that changed in flight",
             "note",
             "invalid",
             "The flight may have been interrupted.",

@@ -222,6 +222,11 @@ class GainStore:
         """Safe gains in the order in which an abort sends them."""
         return settings(self._found(), self.safe)
 
+    @property
+    def staged_settings(self) -> tuple[Setting, ...]:
+        """Staged gains, which it was seen to hold; none without staged ones."""
+        return () if self.staged is None else settings(self._found(), self.staged)
+
     def check(self) -> CheckItem:
         """Read the gains and check that they are those wanted."""
         try:

@@ -43,6 +43,7 @@ LOSS_OVER_S: Final = 10.0
 _COUNT_EVERY_S: Final = 1.0
 _MAX_AGE_S: Final = 2.0
 _JUST_HEARD_S: Final = 0.1
+_PAUSE_S: Final = 0.2
 _REFERENCE_HOLDS_S: Final = 0.25
 """Greatest age of a report of the autopilot's reference."""
 _SAME_TARGET_M: Final = 0.01
@@ -180,6 +181,9 @@ class AutopilotLink:
         self.target = target
         self.reply_timeout_s: Final = reply_timeout_s
         self.seen: Final = VehicleMemory()
+        self.paused_until_s = float("-inf")
+        """End of the last time in which nothing was received because this program stalled: what arrives then is old."""
+        self._listened_s = clock.now_s()
         self._on_message = on_message
         self._on_wait = on_wait
 
@@ -232,7 +236,11 @@ class AutopilotLink:
     def receive(self, timeout_s: float) -> list[PacketReceived]:
         """Return the packets since the last call, waiting at most `timeout_s` for the first. Raises LinkError as
         `send` does."""
+        is_paused = self.clock.now_s() - self._listened_s > _PAUSE_S
         messages = self.link.receive(timeout_s)
+        self._listened_s = self.clock.now_s()
+        if is_paused:
+            self.paused_until_s = self._listened_s + _JUST_HEARD_S
         if self._on_message is not None:
             for message in messages:
                 self._on_message(message)
@@ -363,6 +371,7 @@ class CommandSequence:
         if not step.modes:
             return True
         is_new = self._radio.clock.now_s() - seen.heartbeat_s <= _JUST_HEARD_S * self._radio.timeout_factor
+        is_new = is_new and seen.heartbeat_s > self._radio.paused_until_s
         return is_new and seen.heartbeat is not None and seen.heartbeat.mode in step.modes
 
     def _refused(self, measurement: Measurement | None) -> ActionRefused:

@@ -3,6 +3,7 @@
 It depends on no autopilot and no clock: events carry their time, and commands are data that `trial.py` carries out.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
@@ -19,6 +20,7 @@ from app.vehicles.mavlink.events import (
     Event,
     GainsRestored,
     Heartbeat,
+    Measurement,
     MotorsOffRequested,
     PacketReceived,
     Parameter,
@@ -111,7 +113,7 @@ def _confirm_take_off(trial: Trial, event: Event) -> Step:
 
 def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan.limits)
-    trial = replace(_with_interruption(trial, watch), watch=watch)
+    trial = _with_changed_gain(replace(_with_interruption(trial, watch), watch=watch), event.measurement)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
         return trial, ()
     if trial.state is State.ARM:
@@ -122,6 +124,17 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     to_m = trial.plan.ground_m if trial.state not in _STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
     return trial, tuple(RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)
+
+
+def _with_changed_gain(trial: Trial, measurement: Measurement | None) -> Trial:
+    """Note a gain that the vehicle reports with another value than it was seen to hold before its flight."""
+    if trial.state not in {State.ARM, *_STATES_WITH_TRIAL_GAINS} or not isinstance(measurement, Parameter):
+        return trial
+    for setting in trial.plan.trial_gains:
+        if setting.parameter == measurement.name and not math.isclose(setting.value, measurement.value, rel_tol=1e-6):
+            why = f"{measurement.name} changed to {measurement.value:g} by a command that was not Gainline's."
+            return note(trial, Finding(failure=Failure.INTERRUPTED, why=why))
+    return trial
 
 
 def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
@@ -166,6 +179,8 @@ def _arm(trial: Trial, event: Event) -> Step:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
         return fail(measure_ground(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
+    if trial.failure is Failure.INTERRUPTED:
+        return fail(measure_ground(trial, now_s), Finding(failure=Failure.INTERRUPTED, why=trial.why), now_s)
     if finding := limit_checks.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last

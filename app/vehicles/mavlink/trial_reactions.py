@@ -119,10 +119,11 @@ class Plan:
     command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again;
     `set_points`: the takeoff's altitude, and those that follow, in the record's altitude; `holds_first`: the second of
     them is the takeoff's again, commanded by `Action.HOLD`, after which the vehicle may only be in `following_modes`
-    until it lands. The set point of `limits` is the current one.
+    until it lands. The set point of `limits` is the current one. `trial_gains` are those that it was seen to hold.
     """
 
     safe_gains: tuple[Setting, ...]
+    trial_gains: tuple[Setting, ...] = ()
     limits: Limits
     ground_m: float
     set_points: SetPoints = SET_POINTS

@@ -591,7 +591,7 @@ class MavlinkVehicle:
         last = ground.last
         self._radio.target = replace(self._radio.target, east_m=last.east_m, north_m=last.north_m)
         self._enter(State.ARM)
-        plan = self._plan_of(order, ground)
+        plan = replace(self._plan_of(order, ground), trial_gains=self._gains.staged_settings)
         self._gains.staged = self._repeated = None
         watch = watching.begin(
             self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S

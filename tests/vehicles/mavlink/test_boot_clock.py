@@ -40,6 +40,12 @@ def test_a_long_silence_without_a_restart_is_none() -> None:
     assert restarts_of(BEFORE, every_40_ms(2.0, from_s=610.0, boot_s=1108.0)) == 0
 
 
+def test_a_simulation_that_stood_still_while_nothing_was_heard_has_not_restarted() -> None:
+    """Observed defect: after a drone's process had been stopped for a minute on the ground, it was said to have
+    restarted. Its clock was too old for that."""
+    assert restarts_of(BEFORE, every_40_ms(2.0, from_s=70.0, boot_s=511.0)) == 0
+
+
 def test_every_further_restart_counts() -> None:
     again = every_40_ms(10.0, from_s=12.0, boot_s=1.5)
     assert restarts_of(BEFORE, again, every_40_ms(10.0, from_s=24.0, boot_s=1.5)) == 2

@@ -24,6 +24,7 @@ from app.vehicles.mavlink.events import (
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
+    Setting,
 )
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_machine import Plan
@@ -706,6 +707,17 @@ def test_positions_that_fall_behind_are_no_positions() -> None:
         walk.trial.why
         == "Its positions arrive more than 0.5 s late, or its clock is slower than the clock speed in its settings."
     )
+
+
+def test_a_gain_that_changes_in_flight_makes_the_flight_invalid() -> None:
+    for reported, failure in ((1600.0, None), (300.0, Failure.INTERRUPTED)):
+        walk = TrialDriver(plan=replace(PLAN, trial_gains=(Setting("gui_v_kp", 1600.0),))).lift_off()
+        walk.hear(Parameter("gui_v_kp", reported))
+        assert (walk.state, walk.trial.failure) == (State.RECORD, failure)
+    assert walk.trial.why == "gui_v_kp changed to 300 by a command that was not Gainline's."
+    assert walk.pass_s(9.0).state is State.LAND
+    walk = TrialDriver(plan=replace(PLAN, trial_gains=(Setting("gui_v_kp", 1600.0),)))
+    assert walk.hear(Parameter("gui_v_kp", 300.0)).state is State.DISARM, "it is not flown at all"
 
 
 @pytest.mark.parametrize(
