@@ -1,5 +1,6 @@
 """What this installation offers (experiments, strategies, vehicles, presets), and its health."""
 
+import math
 from typing import Literal
 
 from fastapi import APIRouter
@@ -98,6 +99,7 @@ class VehicleKindInfo(Schema):
     registered: bool
     experiments: list[str]
     options: list[OptionInfo]
+    highest_set_point_m: float | None = Field(description="highest altitude that it is commanded to fly to; null: any")
 
 
 class PresetInfo(Schema):
@@ -166,6 +168,7 @@ def _kind(kind: VehicleKind) -> VehicleKindInfo:
             "registered": is_registered_one_by_one(kind),
             "experiments": list(kind.experiments),
             "options": kind.options,
+            "highest_set_point_m": kind.highest_set_point_m if math.isfinite(kind.highest_set_point_m) else None,
         },
         from_attributes=True,
     )

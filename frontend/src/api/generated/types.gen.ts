@@ -4447,6 +4447,12 @@ export type VehicleKindInfo = {
      * Options
      */
     options: Array<OptionInfo>;
+    /**
+     * Highest Set Point M
+     *
+     * highest altitude that it is commanded to fly to; null: any
+     */
+    highest_set_point_m: number | null;
 };
 
 /**

@@ -262,3 +262,23 @@ test("a reason about bounds is given at the wrong one, or at both", () => {
   expect(boundReasons(kp, [300, 200], "wrong")).toEqual(["wrong", "wrong"]);
   expect(boundReasons(kp, [0, 100], undefined)).toEqual([undefined, undefined]);
 });
+
+test("the height of steps is at most what the vehicle is commanded to fly to", () => {
+  const steps = {
+    name: "altitude-steps",
+    options: [
+      { name: "height_m", upper: 10 },
+      { name: "step_m", upper: 1 },
+    ],
+  };
+  const kinds = [{ name: "twin" }, { name: "mavlink", highest_set_point_m: 3.5 }];
+  const offered = { experiments: [steps], strategies: [], vehicle_kinds: kinds } as unknown as Catalogue;
+  const uppers = (vehicle: string) =>
+    optionsOf({ ...startingForm(catalogue), experiment: "altitude-steps", vehicle }, offered).experiment.map(
+      ({ upper }) => upper,
+    );
+  expect([uppers("twin"), uppers("mavlink")]).toEqual([
+    [10, 1],
+    [3.5, 1],
+  ]);
+});

@@ -265,12 +265,16 @@ export interface OffersOptions {
   vehicle: readonly OptionInfo[];
 }
 
-/** Options of the selected experiment, strategy and vehicle. */
+/** Options of the selected experiment, strategy and vehicle; the height is at most what the vehicle is commanded to. */
 export function optionsOf(form: CampaignForm, catalogue: Catalogue): OffersOptions {
+  const kind = catalogue.vehicle_kinds.find(({ name }) => name === form.vehicle);
+  const experiment = catalogue.experiments.find(({ name }) => name === form.experiment)?.options ?? [];
   return {
-    experiment: catalogue.experiments.find(({ name }) => name === form.experiment)?.options ?? [],
+    experiment: experiment.map((option) =>
+      option.name === "height_m" ? { ...option, upper: kind?.highest_set_point_m ?? option.upper } : option,
+    ),
     strategy: catalogue.strategies.find(({ name }) => name === form.strategy)?.options ?? [],
-    vehicle: form.registered ? [] : (catalogue.vehicle_kinds.find(({ name }) => name === form.vehicle)?.options ?? []),
+    vehicle: form.registered ? [] : (kind?.options ?? []),
   };
 }
 
