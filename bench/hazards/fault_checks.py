@@ -231,7 +231,8 @@ class _Checker:
         own = self.states.times_of(Command.SET_POINT)
         if self.case.autopilot != "ardupilot" or not own or begun_s < own[0] + SLACK_S or self.beatless:
             return False
-        ends_s = min(at_s for at_s in (*own, *(end_s for _, end_s in self.states.spans(*AIR))) if at_s > begun_s)
+        later = (*own, *(end_s for _, end_s in self.states.spans(*AIR)))
+        ends_s = min((at_s for at_s in later if at_s > begun_s), default=begun_s)
         return ends_s - begun_s > 0.3 + self.heartbeat_s + 2.0 * SLACK_S
 
     def _counting_against_gains(self) -> Iterator[Cause]:

@@ -147,7 +147,8 @@ class Rig(Lockstep):
 
     def arriving(self, frames: list[bytes]) -> list[bytes]:
         """Note since when a pilot has flown the drone, and when a heartbeat first showed it."""
-        if not self.drone.autopilot.is_by_hand:
+        has_begun = self.states.first_s(State.TAKEOFF) is not None
+        if not (has_begun and self.drone.autopilot.armed and self.drone.autopilot.is_by_hand):
             self._by_hand_since_s = self._shown_s = None
             return frames
         now_s = self.drone.time_s

@@ -28,6 +28,7 @@ test("a flight is in flight from its takeoff on, as the bar says, even before th
   expect(flyingStage(trial(8, "staged"), { ...none, phase: "staging" })).toBe("Staging");
   expect(flyingStage(waiting, none)).toBe(STAGED);
   expect(flyingStage(trial(8, "staged"), { ...none, phase: "flying" })).toBe("In flight");
+  expect(flyingStage(trial(8, "flying"), null)).toBe("In flight");
 });
 
 test("a flight that has landed is not flying any more, even if the campaign is not up to date yet", () => {

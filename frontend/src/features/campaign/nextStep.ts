@@ -21,7 +21,7 @@ export const STAGED = "Staged, waiting for takeoff";
 export function flyingStage(trial: Trial | undefined, live: Pick<LiveFlight, "phase" | "timeS"> | null): string {
   const waits = trial?.state === "staged" && trial.flight?.mode === "stage" && trial.flight.take_off_at === null;
   if (waits && live?.phase !== "flying") return STAGED;
-  if (live?.phase === "flying" || (live !== null && live.timeS.length > 0)) return "In flight";
+  if (trial?.state === "flying" || live?.phase === "flying" || live?.timeS.length) return "In flight";
   return trial?.state === "planned" ? "Waiting for the worker" : "Staging";
 }
 
