@@ -221,6 +221,8 @@ class _Checker:
                 yield Cause("F6", "aborted")
         stalled_s = self.within(self.of(STALL), State.RECORD)
         follows = bool(self.states.times_of(Command.FOLLOW))
+        if self.within(self.of(STALL), *AIR) > 1.0 - SLACK_S:
+            yield Cause("F5", "invalid")  # nothing was received for so long
         if self._kinds(STALL) and self.case.flies_steps:
             started_s = min(self.states.times_of(Command.FOLLOW), default=0.0)
             is_certain = follows and stalled_s > 0.5 + SLACK_S and min(self.of(STALL))[0] > started_s + 1.0
@@ -260,7 +262,7 @@ class _Checker:
     def _may_have_stayed_down(self) -> bool:
         """Whether the takeoff command may not have arrived, or another command may have followed before the climb."""
         unheard = any(covers(self.of(*DEAF), (at_s, at_s)) for at_s in self.states.times_of(Command.TAKE_OFF))
-        return unheard or bool(self.of(OTHER_MODE, OTHER_LANDING))
+        return unheard or bool(self.of(OTHER_MODE, OTHER_LANDING, TAKEN_OVER))
 
     def _coming_down(self) -> Iterator[Cause]:
         """Yield the failures after a complete record that can still interrupt the landing."""
@@ -383,6 +385,7 @@ class _Checker:
             return
         may_be_suspect = any(each.kind in GAIN_FAILURES and each.begun_s <= max(left) for each in self.result.injected)
         may_be_suspect |= self.states.first_s(State.RECORD) is None and self._may_have_stayed_down()
+        may_be_suspect |= self.within(self.of(TAKEN_OVER), State.ARM, State.TAKEOFF) > 0.0
         may_be_suspect |= "The steps were not flown." in self.result.reason
         if first is Command.GAIN and not may_be_suspect:
             yield "the safe gains were sent before Land, though the gains were not suspect"

@@ -129,8 +129,10 @@ The checks are:
 - Was no packet that stops motors sent while the drone was more than 0.15 m above the ground, except by the operator?
 - Did the drone take off with the gains that were read back?
 - Were Land and the safe gains sent in the order that the table requires, and was Land repeated while the link was lost?
-- Was no set point sent after the flight had ended, for whatever reason? Under Paparazzi half of the trials fly altitude
-  steps after their takeoff.
+- Was no set point sent after the flight had ended, for whatever reason? Half of the trials fly altitude steps after
+  their takeoff, PX4 in offboard mode.
+- Was nothing commanded to a vehicle of which a heartbeat had shown that a pilot flies it, and offboard mode never
+  requested from a pilot, except in the 0.15 s after the takeover?
 - Was nothing sent before a heartbeat was received?
 - Were all time limits kept: the record, 40 s to land, 5 s to disarm, 60 s without a link?
 
@@ -148,6 +150,10 @@ Number of runs in which each fault began in each state:
 {where}
 
 - `other-mode` and `other-landing`: another ground station changes the mode, or commands Land.
+- `other-target` and `other-gain`: another ground station sends a set point, or writes a gain. Under Paparazzi a set
+  point that another ground station moves is not reported, and the flight may count.
+- `stall`: Gainline's process stands still, for up to 3 s in flight.
+- `taken-over`: a pilot switches to a manual mode, and back at the end.
 - `motors-off`: the operator stops the motors.
 - `wild-gains`: the gains of the trial do not fly.
 - `mocap-…`: faults of a second source of altitude, which only these trials have.
@@ -168,6 +174,11 @@ These were found by such runs and have been fixed. `tests/bench/test_faults.py` 
 - When gains overshot to the altitude limit of the vehicle's own flight plan, Gainline took the landing for one that
   the vehicle had begun for another reason. It landed with these gains, and the flight did not count against them.
 - When the link was lost during lift-off, Gainline took this for no lift-off and counted it against the gains.
+- A pilot who had taken over a PX4 less than a second before it was to follow set points was overridden once.
+- An ArduCopter that followed the set point of another ground station counted as flown to Gainline's.
+- A flight in which another ground station wrote a gain counted for the staged gains; if it did so between arming and
+  takeoff, the vehicle took off.
+- When Gainline's process stood still for more than a second, its own silence could be taken for the vehicle's.
 
 Not covered: sideways movement, radios that lose single packets, other autopilots, and hardware. Trials in which the
 link delivers false messages of a sound vehicle are in [hostile-links.md](hostile-links.md).

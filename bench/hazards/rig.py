@@ -1,5 +1,6 @@
 """Test rig: a simulated drone in lockstep with the program, a tap on the link between them, and timed faults."""
 
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -147,13 +148,13 @@ class Rig(Lockstep):
 
     def arriving(self, frames: list[bytes]) -> list[bytes]:
         """Note since when a pilot has flown the drone, and when a heartbeat first showed it."""
-        has_begun = self.states.first_s(State.TAKEOFF) is not None
-        if not (has_begun and self.drone.autopilot.armed and self.drone.autopilot.is_by_hand):
+        if not (self.drone.autopilot.armed and self.drone.autopilot.is_by_hand):
             self._by_hand_since_s = self._shown_s = None
             return frames
         now_s = self.drone.time_s
-        self._by_hand_since_s = now_s if self._by_hand_since_s is None else self._by_hand_since_s
-        if self._shown_s is None:
+        if self._by_hand_since_s is None:  # a mode from before the takeoff command says nothing after it
+            self._by_hand_since_s = now_s if self.states.first_s(State.TAKEOFF) is not None else math.inf
+        if self._shown_s is None and self._by_hand_since_s <= now_s:
             kinds = {message.get_type() for frame in frames for message in self._reading.parse(frame)}
             self._shown_s = now_s if "HEARTBEAT" in kinds else None
         return frames
@@ -183,9 +184,9 @@ class Rig(Lockstep):
         now_s, height_m = self.drone.time_s, self.drone.body.altitude_m
         self.packets += command is not Command.HEARTBEAT
         self.sent.append((now_s, command))
-        if self._by_hand_since_s is not None and command in (Command.LAND, Command.FOLLOW, Command.TAKE_OFF):
+        if (self._by_hand_since_s or math.inf) <= now_s and command in (Command.LAND, Command.FOLLOW, Command.TAKE_OFF):
             shown_s = None if self._shown_s is None else now_s - self._shown_s
-            self.overridden.append(Overridden(now_s, command, now_s - self._by_hand_since_s, shown_s))
+            self.overridden.append(Overridden(now_s, command, now_s - (self._by_hand_since_s or now_s), shown_s))
         if stops:
             self.stops.append(MotorStop(now_s, height_m))
         if self.states.now is None or self.states.ended_s < now_s:
@@ -231,7 +232,12 @@ class Rig(Lockstep):
                 self._interfere(self._other_target())
             case str(kind) if kind == OTHER_GAIN:
                 name, value = _OTHER_GAINS[self.case.autopilot]
-                fields = {"target_component": 1, "param_id": name, "param_value": value, "param_type": 9}
+                fields: dict[str, FieldValue] = {
+                    "target_component": 1,
+                    "param_id": name,
+                    "param_value": value,
+                    "param_type": 9,
+                }
                 self._interfere(("PARAM_SET", fields))
             case str(kind) if kind == STALL:
                 self.stalls_s += planned.duration_s

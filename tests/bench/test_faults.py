@@ -17,8 +17,9 @@ from bench.hazards.wire import DIALECTS, Command, read_command, stops_motors
 
 
 def case(*faults: PlannedFault, autopilot: str = "paparazzi", staged_s: float = 0.0) -> Case:
+    """A case that flies steps under Paparazzi alone."""
     return Case(
-        seed=1,
+        seed=1 if autopilot == "paparazzi" else 12,
         autopilot=autopilot,
         faults=faults,
         gains=TUNED[autopilot],
@@ -63,6 +64,7 @@ PACKETS: Final[list[tuple[str, str, dict[str, FieldValue], Command, bool]]] = [
     ("px4", "COMMAND_LONG", {**TO, **ARM_DISARM, "param2": 21196.0}, Command.MOTORS_OFF, True),
     ("px4", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 4.0, "param3": 6.0}, Command.LAND, False),
     ("px4", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 4.0, "param3": 2.0}, Command.TAKE_OFF, False),
+    ("px4", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 6.0}, Command.FOLLOW, False),
     ("ardupilot", "COMMAND_LONG", {**TO, **SET_MODE, "param2": 9.0}, Command.LAND, False),
     ("ardupilot", "COMMAND_LONG", {**TO, **ARM_DISARM, "command": 22}, Command.TAKE_OFF, False),
 ]
@@ -219,6 +221,8 @@ FOUND: Final = [
     # an abort before the lift-off passed for an aborted flight
     (case(PlannedFault("abort", State.ARM, 0.6)), "refused", "safe"),
     (case(PlannedFault("motors-off", State.ARM, 0.6), autopilot="px4"), "refused", "safe"),
+    # a program that stood still between listening and looking at the time took its own silence for the vehicle's
+    (case(PlannedFault("stall", State.RECORD, 2.0, 1.2)), "completed", "safe"),
     # a vehicle whose motors were stopped at 3 m passed for safe
     (case(PlannedFault("motors-off", State.RECORD, 5.0), autopilot="ardupilot"), "aborted", "quarantined"),
 ]
