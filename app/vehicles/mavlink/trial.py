@@ -46,7 +46,8 @@ PAUSED_S: Final = 0.5
 SINKS_M: Final = 0.3
 """A vehicle that has descended by less than this in five seconds is not landing."""
 STALL_S: Final = 0.2
-"""After a stall of this program of this length, pending packets are received before silence is evaluated."""
+"""After a stall of this program of this length, pending packets are received before silence is evaluated, wherever it
+stalled."""
 LONGEST_STALL_S: Final = 1.0
 """After a longer stall before the takeoff command, the request to fly may be out of date, so the flight is refused."""
 _SAMPLE_EVERY_S: Final = 0.015
@@ -184,7 +185,8 @@ class TrialRunner:
         if (stop := self._wanted()) is not None:
             wanted = MotorsOffRequested if stop.motors_off else AbortRequested
             self._advance(wanted(stop.reason, self._radio.clock.now_s()))
-        self._advance(Tick(self._radio.clock.now_s()))
+        if (now_s := self._radio.clock.now_s()) - self._listened_s <= STALL_S:  # otherwise it listens first
+            self._advance(Tick(now_s))
         self._note_sinking()
 
     def _wanted(self) -> StopRequest | None:
