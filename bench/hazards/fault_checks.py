@@ -123,7 +123,7 @@ class _Checker:
         if outcome == "refused" and self.took_off_s is not None and self.result.rose_m > RESTING_M:
             yield f"the vehicle rose to {self.result.rose_m:.3f} m, but nothing is said to have been flown"
         changed = any(each.state in (State.ARM, State.TAKEOFF) for each in self._kinds(OTHER_GAIN))
-        is_known = changed and outcome != "completed"
+        is_known = (changed and outcome != "completed") or self.began_in("reboot", State.TAKEOFF)
         if self.result.flew_on is not None and not _same(self.result.flew_on, self.case.gains) and not is_known:
             yield f"the vehicle lifted off with {dict(self.result.flew_on)}"
 
@@ -309,6 +309,7 @@ class _Checker:
         yield any(each.state not in (State.CONNECT, *GROUND) for each in self._kinds("reboot", OTHER_MODE))
         yield any(each.kind in (OTHER_MODE, TAKEN_OVER) for each in self.result.injected)
         yield self.began_in(OTHER_GAIN, State.DISARM, State.RESTORE)
+        yield self.began_in(OTHER_LANDING, State.TAKEOFF)  # on the ground, its autopilot disarms it at once (F10b)
         yield self.result.impact_m_s > IMPACT_M_S
         yield bool(self.of("mocap-drift"))  # motion capture still shows it in the air
         yield self._dropped_m() > RESTING_M

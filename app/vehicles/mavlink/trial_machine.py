@@ -25,6 +25,7 @@ from app.vehicles.mavlink.events import (
     PacketReceived,
     Parameter,
     PerformAction,
+    Position,
     RecordSample,
     RestoreGains,
     SecondaryAltitudeReceived,
@@ -67,6 +68,8 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
+_WAITED_S: Final = 0.1
+"""Longest usual time from a sample to the next."""
 _REPLY_S: Final = 0.5
 """Interval at which a reply after the takeoff command is requested."""
 _OTHER_M: Final = 1.0
@@ -193,9 +196,17 @@ def _arm(trial: Trial, event: Event) -> Step:
     ):
         return fail(trial, finding, now_s)
     mode, watch = trial.watch.mode, replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S)
-    trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=last.time_boot_s, commanded_in=mode)
+    boot_s = _boot_s(trial.watch, last, now_s)
+    trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=boot_s, commanded_in=mode)
     trial, request = request_reply(enter(trial, State.TAKEOFF, now_s), now_s)
     return trial, (PerformAction(Action.TAKE_OFF), *request)
+
+
+def _boot_s(watch: TrialObservation, last: Position, now_s: float) -> float:
+    """Return the vehicle's own time of the takeoff command: that of its last sample, or later if that one had waited
+    through a stall of this program."""
+    offset_s = watch.least_offset_s
+    return last.time_boot_s if offset_s is None else max(last.time_boot_s, now_s - offset_s - _WAITED_S)
 
 
 def _not_armed(trial: Trial, event: Event) -> Finding | None:
