@@ -141,7 +141,8 @@ def draw(seed: int) -> Case:
     first = PlannedFault(kind, state, _delay_s(chance, state), _duration_s(chance, kind))
     if kind == WILD_GAINS:
         first = PlannedFault(kind, State.CONNECT, 0.0)
-    faults = (first, *_further_faults(chance, first.state))
+    further = _further_faults(chance, first.state)  # the end of a drift also ends another one
+    faults = (first, *(each for each in further if each.kind not in MOCAP or each.kind != kind))
     return Case(
         seed=seed,
         autopilot=autopilot,

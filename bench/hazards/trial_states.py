@@ -9,7 +9,7 @@ from bench.hazards.wire import Command
 LIFTED_M: Final = 0.15
 RESTING_M: Final = 0.002
 """Greatest height of a vehicle that stands on the ground: above it, it is lifting off or touching down."""
-RECORDED_S: Final = 32.9
+RECORDED_S: Final = 32.8
 _SILENT_S: Final = 0.9
 
 

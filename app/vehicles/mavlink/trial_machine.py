@@ -68,7 +68,7 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
-_WAITED_S: Final = 0.1
+_WAITED_S: Final = 0.05
 """Longest usual time from a sample to the next."""
 _REPLY_S: Final = 0.5
 """Interval at which a reply after the takeoff command is requested."""
