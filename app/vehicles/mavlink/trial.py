@@ -105,6 +105,7 @@ class TrialRunner:
         self._error: BaseException | None = None
         self._shown_s = float("-inf")
         self._listened_s = self._sank_s = radio.clock.now_s()
+        self._listens_first = False
         self._sank_to_m = float("inf")
         self._trial, commands = begin(plan, watch, radio.clock.now_s())
         self._begin_with = commands
@@ -146,6 +147,7 @@ class TrialRunner:
             work()
         except LinkError:  # counts as silence, which the trial machine detects
             self._radio.clock.wait_s(LISTEN_S)
+            self._listened_s = self._radio.clock.now_s()
         except BaseException as error:  # noqa: BLE001 - kept for the caller; the vehicle comes first
             self._error = self._error or error
 
@@ -185,7 +187,9 @@ class TrialRunner:
         if (stop := self._wanted()) is not None:
             wanted = MotorsOffRequested if stop.motors_off else AbortRequested
             self._advance(wanted(stop.reason, self._radio.clock.now_s()))
-        if (now_s := self._radio.clock.now_s()) - self._listened_s <= STALL_S:  # otherwise it listens first
+        now_s = self._radio.clock.now_s()
+        self._listens_first = now_s - self._listened_s > STALL_S and not self._listens_first
+        if not self._listens_first:
             self._advance(Tick(now_s))
         self._note_sinking()
 
