@@ -67,6 +67,6 @@ def _reason(loop: AltitudeLoop, hover_throttle: float) -> tuple[str, bool]:
                 f"near the end of {within}: another load or battery may take it beyond, where the estimate stops",
                 False,
             )
-    if abs(hover_throttle / present - 1.0) <= _LARGEST_DIFFERENCE:
+    if abs(hover_throttle - present) <= _LARGEST_DIFFERENCE * present:
         return "", False
     return f"and {texts.hover_parameter} is {present:.3f}: {texts.hover_use}", False

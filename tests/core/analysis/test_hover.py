@@ -30,6 +30,7 @@ def ardupilot(hover: float) -> AltitudeLoop:
         (px4(0.5), 0.34, 0.34, "near the end of"),
         (px4(0.5), 0.56, 0.56, "MPC_THR_HOVER is 0.500: PX4 estimates the hover throttle in flight, but takes off"),
         (ardupilot(0.35), 0.53, 0.53, "MOT_THST_HOVER is 0.350: the integral has to make up for the difference"),
+        (ardupilot(0.0), 0.53, 0.53, "MOT_THST_HOVER is 0.000: the integral has to make up for the difference"),
     ],
 )
 def test_a_wrong_hover_throttle_is_told_with_a_better_value(
