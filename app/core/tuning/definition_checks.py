@@ -21,6 +21,8 @@ MAX_CEILING_M: Final = 100.0
 MIN_CONFIDENCE: Final = 0.5
 MAX_SEED: Final = 2**53 - 1
 """Highest whole number up to which a JSON number is exact."""
+_LARGEST_DEVIATION: Final = 100.0
+"""Far beyond the range of every parameter of a vehicle's model; the square of any such number is finite."""
 
 
 def check_definition(definition: Definition) -> None:
@@ -131,9 +133,12 @@ def _check_log(definition: Definition, log: LogEvidence) -> None:
         reason = f"must have {', '.join(known)}"
         raise InputError("Invalid start.", hint="", problems=(Problem("start.log.vehicle", reason),))
     wrong = tuple(
-        Problem(f"start.log.vehicle.{name}", f"must be {low:g} … {high:g}, with a standard deviation of at least 0")
+        Problem(
+            f"start.log.vehicle.{name}",
+            f"must be {low:g} … {high:g}, with a standard deviation of 0 … {_LARGEST_DEVIATION:g}",
+        )
         for name, (low, high) in known.items()
-        if not (low <= log.vehicle[name][0] <= high and 0.0 <= log.vehicle[name][1] < math.inf)
+        if not (low <= log.vehicle[name][0] <= high and 0.0 <= log.vehicle[name][1] <= _LARGEST_DEVIATION)
     )
     if wrong:
         raise InputError("Invalid start.", hint="", problems=wrong)

@@ -63,6 +63,7 @@ def test_a_log_belongs_to_the_digest() -> None:
     [
         (replace(LOG, vehicle={}), "start.log.vehicle"),
         (replace(LOG, vehicle={**VEHICLE, "motor_lag_s": (0.05, -0.01)}), "start.log.vehicle.motor_lag_s"),
+        (replace(LOG, vehicle={**VEHICLE, "motor_lag_s": (0.05, 1e200)}), "start.log.vehicle.motor_lag_s"),
         (replace(LOG, vehicle={**VEHICLE, "drag_1_s": (float("nan"), 0.1)}), "start.log.vehicle.drag_1_s"),
         (replace(LOG, parameters={"PSC_ACCZ_NTF": 1.0}), "start.log.parameters.PSC_ACCZ_NTF"),
     ],
