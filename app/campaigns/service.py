@@ -165,9 +165,7 @@ def clone_campaign(session: Session, campaign_id: int, clone: Clone) -> Campaign
     origin = repository.get_campaign(session, campaign_id)
     vehicle = clone.vehicle or _choice_of(origin)
     name = clone.name or _name_of_clone(session, origin.name)
-    definition = Definition.model_validate(origin.definition)
-    if vehicle != _choice_of(origin):  # a log tells only of the vehicle that flew it
-        definition = definition.model_copy(update={"start": definition.start.model_copy(update={"log": None})})
+    definition = _definition_for(origin, vehicle)
     if clone.warm_start:
         definition = definition.model_copy(update={"start": Start(kind="campaign", donor=Donor(campaign_id=origin.id))})
     row = add_campaign(session, name, definition, vehicle, parent_id=origin.id)
@@ -278,6 +276,15 @@ def compute_proposal(session: Session, campaign_id: int) -> NextFlight:
     return next_flight_view(session, row)
 
 
+def _definition_for(row: CampaignRow, vehicle: VehicleChoice) -> Definition:
+    """The campaign's definition for this vehicle: for another than its own without a log, which tells only of the
+    vehicle that flew it."""
+    definition = Definition.model_validate(row.definition)
+    if vehicle == _choice_of(row):
+        return definition
+    return definition.model_copy(update={"start": definition.start.model_copy(update={"log": None})})
+
+
 def _choice_of(row: CampaignRow) -> VehicleChoice:
     vehicle = row.vehicle
     if vehicle.registered:
@@ -298,8 +305,8 @@ def _checked(
 def _define(session: Session, row: CampaignRow, edit: CampaignEdit) -> None:
     check_action(CAMPAIGN_ACTIONS, "define", row.state, f"Campaign {row.id}")
     _require_no_flight(session, row)
-    asked = edit.definition or Definition.model_validate(row.definition)
-    definition, options, row.vehicle = _checked(session, asked, edit.vehicle or _choice_of(row))
+    vehicle = edit.vehicle or _choice_of(row)
+    definition, options, row.vehicle = _checked(session, edit.definition or _definition_for(row, vehicle), vehicle)
     row.experiment, row.strategy = definition.experiment, definition.strategy
     row.definition, row.vehicle_options = stored(definition), options
     if row.vehicle.is_real:  # it gets the safe gains of its own vehicle; a rehearsal had those of another

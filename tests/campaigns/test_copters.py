@@ -142,7 +142,7 @@ def test_the_catalogue_says_which_experiments_have_no_model_and_what_they_can_be
     assert create_campaign(client, vehicle="import", definition=PX4)["state"] == "draft"
 
 
-def test_a_clone_keeps_what_a_log_tells_of_the_vehicle_unless_it_is_for_another(client: TestClient) -> None:
+def test_what_a_log_tells_of_the_vehicle_is_kept_unless_the_campaign_is_for_another(client: TestClient) -> None:
     one, other = (
         {"kind": "mavlink", "id": register(client, name, options={"autopilot": "px4", "simulated": True})["id"]}
         for name in ("One", "Other")
@@ -162,6 +162,8 @@ def test_a_clone_keeps_what_a_log_tells_of_the_vehicle_unless_it_is_for_another(
     starts = [client.post(path, json=json).json()["definition"]["start"] for json in ({}, {"vehicle": other})]
     assert [start["gains"] for start in starts] == [FIRMER, FIRMER]
     assert [start["log"] for start in starts] == [log, None]
+    moved = client.patch(f"/api/campaigns/{campaign.json()['id']}", json={"vehicle": other, "version": 1})
+    assert (moved.status_code, moved.json()["definition"]["start"]["log"]) == (200, None), moved.text
     del vehicle["drag_1_s"]
     refused = client.post("/api/campaigns", json=new)
     assert "must have hover_throttle" in problems_of(refused)["definition.start.log.vehicle"]
