@@ -27,6 +27,7 @@ HEARTBEAT: Final = 0
 PARAM_VALUE: Final = 22
 PARAM_SET: Final = 23
 LOCAL_POSITION_NED: Final = 32
+SET_POSITION_TARGET_LOCAL_NED: Final = 84
 NAV_CONTROLLER_OUTPUT: Final = 62
 ATTITUDE_TARGET: Final = 83
 POSITION_TARGET_LOCAL_NED: Final = 85
@@ -37,6 +38,7 @@ _LAYOUTS: Final[Mapping[int, tuple[struct.Struct, int]]] = MappingProxyType(
         PARAM_VALUE: (struct.Struct("<4sHH16sB"), 220),
         PARAM_SET: (struct.Struct("<4sBB16sB"), 168),
         LOCAL_POSITION_NED: (struct.Struct("<I6f"), 185),
+        SET_POSITION_TARGET_LOCAL_NED: (struct.Struct("<I11fHBBB"), 143),
         NAV_CONTROLLER_OUTPUT: (struct.Struct("<5fhhH"), 183),
         ATTITUDE_TARGET: (struct.Struct("<I8fB"), 22),
         POSITION_TARGET_LOCAL_NED: (struct.Struct("<I11fHB"), 140),
@@ -46,7 +48,9 @@ _LAYOUTS: Final[Mapping[int, tuple[struct.Struct, int]]] = MappingProxyType(
 
 _ARMED: Final = 128
 _IGNORES_Z: Final = 4
+_IGNORES_VZ, _IGNORES_AZ = 1 << 5, 1 << 8
 _IGNORES_ATTITUDE: Final = 128
+_FROM_GROUND: Final = frozenset({PARAM_SET, SET_POSITION_TARGET_LOCAL_NED})
 _INTEGERS: Final = range(1, 9)
 _BACK_S: Final = 20.0
 """If the clock goes back by less than this, the message was late."""
@@ -102,10 +106,10 @@ class Telemetry:
     """One vehicle's reports, altitudes up; the first column of each is the time, s, which increases.
 
     `positions`, shape (n, 3): altitude, climb rate; `throttles`, (k, 3): demanded share of full, cosine of the lean;
-    `targets`, (k, 2): altitude that it flies to, NaN where it flies to none; `errors`, (k, 2): how far its own
-    reference is above it; `states`, (k, 3): armed or not, and its mode. `settings` has time, name and value of its
-    parameters, in order; values that nobody had written before hold from −∞ on. `has_all_parameters` if it sent as many
-    as it has.
+    `targets`, (k, 2): altitude that it flies to, NaN where it flies to none, or was given a speed or an acceleration
+    beside it; `errors`, (k, 2): how far its own reference is above it; `states`, (k, 3): armed or not, and its mode.
+    `settings` has time, name and value of its parameters, in order; values that nobody had written before hold from −∞
+    on. `has_all_parameters` if it sent as many as it has.
     """
 
     positions: Samples
@@ -119,9 +123,9 @@ class Telemetry:
     @classmethod
     def of(cls, data: Contents, sender: Sender) -> Self:
         """Those of this vehicle in a log; damaged messages are left out."""
-        heard = _Heard(sender.autopilot == PX4)
+        heard = _Heard(sender.system, sender.autopilot == PX4)
         for frame in frames(data):
-            concerns = frame.message in _LAYOUTS and (frame.message == PARAM_SET or sender.sent(frame))
+            concerns = frame.message in _LAYOUTS and (frame.message in _FROM_GROUND or sender.sent(frame))
             if concerns and _is_whole(data, frame):
                 heard.take(frame.message, *_unpacked(data, frame))
         return cls(
@@ -160,6 +164,7 @@ def _rows(reports: "array[float]", columns: int) -> Samples:
 class _Heard:
     """Reports in order of receipt, those without a time dated by the last one that has one."""
 
+    system: int
     encodes_integers: bool
     """Whether integer parameters are sent byte by byte in place of a float."""
     positions: "array[float]" = field(default_factory=_numbers)
@@ -171,6 +176,8 @@ class _Heard:
     known: set[str] = field(default_factory=set)
     parameters: int = 0
     _written: set[str] = field(default_factory=set)
+    _is_fed: bool = False
+    """Whether the last position target for it has more than a position, which it does not report."""
     _clock: _Clock = field(default_factory=_Clock)
     _takes: Mapping[int, Callable[..., None]] = field(init=False)
 
@@ -183,6 +190,7 @@ class _Heard:
             NAV_CONTROLLER_OUTPUT: self._error,
             ATTITUDE_TARGET: self._throttle,
             POSITION_TARGET_LOCAL_NED: self._target,
+            SET_POSITION_TARGET_LOCAL_NED: self._feed,
         }
 
     def take(self, message: int, *fields: float | bytes) -> None:
@@ -201,7 +209,13 @@ class _Heard:
 
     def _target(self, boot_ms: int, _x: float, _y: float, z: float, *rest: float) -> None:
         ignored = int(rest[-2])
-        self.targets.extend((self._clock.at(boot_ms), np.nan if ignored & _IGNORES_Z else -z))
+        self.targets.extend((self._clock.at(boot_ms), np.nan if ignored & _IGNORES_Z or self._is_fed else -z))
+
+    def _feed(self, _boot_ms: int, *fields: float) -> None:
+        (vz, az), (mask, system) = fields[5:9:3], fields[11:13]
+        if system == self.system:
+            given = ((vz, _IGNORES_VZ), (az, _IGNORES_AZ))
+            self._is_fed = any(abs(value) > 0.0 and not int(mask) & ignored for value, ignored in given)
 
     def _error(self, _roll: float, _pitch: float, altitude: float, *_: float) -> None:
         self.errors.extend((self._clock.now_s, altitude))

@@ -102,6 +102,19 @@ def test_px4_flies_the_set_point_itself() -> None:
     assert found.error_m == pytest.approx(0.17, abs=0.02)
 
 
+def test_rows_in_which_more_than_a_position_was_commanded_are_left_out() -> None:
+    """The vehicle reports the altitude alone: a push would be taken for a disturbance. Zeros, and those given to
+    another vehicle, change nothing."""
+    whole, log = read(PX4_RECORDING.content), PX4_RECORDING.written()
+    for system, mask, afz in ((1, 0xCF8, 0.0), (9, 0xCF8, 2.0), (1, 0xDF8, 2.0)):
+        log.ground("set_position_target_local_ned", 0, system, 1, 1, mask, *[0.0] * 2, -5.0, *[0.0] * 5, afz, 0.0, 0.0)
+    assert read(log.content + PX4_RECORDING.content).error_m == pytest.approx(whole.error_m, abs=1e-6)
+    log = PX4_RECORDING.written()
+    log.ground("set_position_target_local_ned", 0, 1, 1, 1, 0xCF8, *[0.0] * 2, -5.0, *[0.0] * 5, 2.0, 0.0, 0.0)
+    pushed = replace(PX4_RECORDING, set_points=((0.0, 5.0), (5.0, 8.0))).content
+    assert read(log.content + pushed).error_m == pytest.approx(whole.error_m, abs=1e-6)
+
+
 def test_the_names_and_units_of_release_4_7_are_kept(flight: LoggedFlight) -> None:
     found = read(replace(STEPS, parameters=NEWER_PARAMETERS).content)
     assert isinstance(found.loop, ArduPilotLoop)
