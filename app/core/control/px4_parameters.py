@@ -139,6 +139,8 @@ _RANGES: Final = {_PREDICTION: (0.0, 1e6), _IMU_RATE: (0.0, 1000.0)}
 """With these no step is shorter than 1 ms."""
 ESTIMATOR_NAMES: Final = (_PREDICTION, _IMU_RATE)
 """Parameters on which the interval of the estimates depends."""
+HOVER_THRUSTS: Final = (0.1, 0.8)
+"""Documented range of MPC_THR_HOVER."""
 HOVER_RANGE_NAME: Final = "HTE_THR_RANGE"
 HOVER_RANGE: Final = 0.2
 """How far the estimated hover thrust may be from MPC_THR_HOVER, by default."""

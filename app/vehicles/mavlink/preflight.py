@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
+from app.core.control.px4_parameters import HOVER_THRUSTS
 from app.core.experiments.step_sequence import LARGEST_PUSH_M_S2
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import (
@@ -397,7 +398,10 @@ def evaluate_hover(hover_throttle: float | None, limits: tuple[float, float] | N
         passed=passed,
         found=f"{hover_throttle:.2f} in the last flight",
         needed=f"within MPC_THR_HOVER ± HTE_THR_RANGE, {low:.2f} … {high:.2f}: PX4's estimate stops there",
-        hint="" if passed else f"Set MPC_THR_HOVER to {hover_throttle:.2f}.",
+        hint=""
+        if passed
+        else f"Set MPC_THR_HOVER to {min(hover_throttle, HOVER_THRUSTS[1]):.2f}. If the vehicle or its "
+        "load was changed since that flight, disconnect it and connect it again instead.",
     )
     return (item,)
 

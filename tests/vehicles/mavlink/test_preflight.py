@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.core.models.set_points import SetPoints
+from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.events import Position
 from app.vehicles.mavlink.preflight import GroundObservation, evaluate_hover, evaluate_set_points
 from app.vehicles.mavlink.profiles import PROFILES
@@ -34,10 +35,11 @@ def test_a_push_is_limited(push_m_s2: float, passed: bool) -> None:
     assert item.needed.endswith("; at most 2 m/s²")
 
 
-@pytest.mark.parametrize(("hover", "passed"), [(0.62, True), (0.742, False)])
-def test_the_hover_throttle_of_the_last_flight_must_be_within_what_px4_finds(hover: float, passed: bool) -> None:
+@pytest.mark.parametrize(("hover", "hint"), [(0.62, ""), (0.742, "Set MPC_THR_HOVER to 0.74. "), (0.85, "to 0.80. ")])
+def test_the_hover_throttle_of_the_last_flight_must_be_within_what_px4_finds(hover: float, hint: str) -> None:
     (item,) = evaluate_hover(hover, PROFILES["px4"].hover_limits({"MPC_THR_HOVER": 0.5}))
-    assert (item.passed, item.hint) == (passed, "" if passed else "Set MPC_THR_HOVER to 0.74.")
+    assert (item.passed, bool(item.hint)) == (not hint, bool(hint))
+    assert hint in item.hint
     assert item.needed.startswith("within MPC_THR_HOVER ± HTE_THR_RANGE, 0.30 … 0.70")
 
 
@@ -45,3 +47,8 @@ def test_a_hover_throttle_that_is_not_known_or_has_no_limits_is_not_checked() ->
     assert evaluate_hover(None, (0.3, 0.7)) == evaluate_hover(0.9, PROFILES["px4"].hover_limits({})) == ()
     for name in ("ardupilot", "paparazzi"):
         assert evaluate_hover(0.9, PROFILES[name].hover_limits({"MOT_THST_HOVER": 0.3})) == ()
+
+
+def test_a_range_that_px4_cannot_have_is_a_refusal_of_the_flight() -> None:
+    with pytest.raises(VehicleError, match="HTE_THR_RANGE: must be 0 to 1"):
+        PROFILES["px4"].hover_limits({"MPC_THR_HOVER": 0.5, "HTE_THR_RANGE": 1.5})

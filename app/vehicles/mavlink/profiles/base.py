@@ -327,7 +327,7 @@ class Profile(Protocol):
 
     def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
         """Return the least and the largest hover throttle that its loop can find in flight with these parameters of it;
-        None without such limits."""
+        None without such limits. Raises VehicleError for a parameter out of its range."""
         ...
 
     def measure(self, message: Message) -> Measurement | None: ...

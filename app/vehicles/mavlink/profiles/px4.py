@@ -13,6 +13,8 @@ from app.core.control.px4_parameters import (
     hover_deviation,
     hover_limits,
 )
+from app.core.errors import InputError
+from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
@@ -104,7 +106,12 @@ class Px4:
     def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
         """Return those of its estimator; None if its parameter is not known."""
         told = parameters.get(_HOVER)
-        return None if told is None else hover_limits(told, hover_deviation(parameters))
+        try:
+            return None if told is None else hover_limits(told, hover_deviation(parameters))
+        except InputError as error:
+            raise VehicleError(
+                str(error), hint=f"Correct {HOVER_RANGE_NAME} on the vehicle, then try again."
+            ) from error
 
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
