@@ -696,7 +696,8 @@ class MavlinkVehicle:
             reference=flown.reference,
         )
         if records.ending_of(trial) == "completed":
-            self._hover_throttle = records.hover_throttle_of(own, until_s=referred_from_s(plan) + SETTLED_FOR_S)
+            found = records.hover_throttle_of(own, until_s=referred_from_s(plan) + SETTLED_FOR_S)
+            self._hover_throttle = self._hover_throttle if found is None else found
         both = AlignedRecord(trajectory=own)
         if self._secondary is not None:
             zero_s, name = start_s + flown.offset_s, self._secondary.source.name
