@@ -114,14 +114,26 @@ def simulation_for(session: Session, experiment: str, gains: Gains) -> VehicleCh
 
 
 def registered_for(session: Session, experiment: str, vehicle_id: int | None) -> VehicleChoice:
-    """The registered vehicle with that id; without one, the last registered one that flies an experiment. Raises
-    InputError when there is none."""
-    if vehicle_id is not None and (row := repository.one_or_none(session, vehicle_id)) is not None:
+    """The registered vehicle with that id; without one, the only registered one that flies an experiment. Raises
+    InputError when there is none, or there are several."""
+    if vehicle_id is not None:
+        row = repository.one_or_none(session, vehicle_id)
+        if row is None:
+            raise _no_vehicle(f"{vehicle_id} is not registered", hint="Choose a registered vehicle.")
         return VehicleChoice(kind=row.kind, id=row.id)
     flying = [row for row in repository.registered_in(session, *VehicleState) if experiment in experiments_of(row)]
-    if vehicle_id is not None or not flying:
-        raise _no_choice("id", f"there is no registered vehicle {vehicle_id or f'that flies {experiment!r}'}")
-    return VehicleChoice(kind=flying[-1].kind, id=flying[-1].id)
+    if not flying:
+        raise _no_vehicle(
+            f"no registered vehicle flies {experiment!r}", hint="Register the vehicle of the log on the Vehicles page."
+        )
+    if len(flying) > 1:
+        names = ", ".join(f"{row.name} ({row.id})" for row in flying)
+        raise _no_vehicle(f"must be given: {names} fly {experiment!r}", hint="Choose the vehicle of the log.")
+    return VehicleChoice(kind=flying[0].kind, id=flying[0].id)
+
+
+def _no_vehicle(reason: str, *, hint: str) -> InputError:
+    return InputError("Invalid vehicle.", problems=(Problem("vehicle", reason),), hint=hint)
 
 
 def _no_choice(field: str, reason: str) -> InputError:

@@ -46,7 +46,7 @@ def start_campaign(
 
 
 def _start_steps(session: Session, found: CopterStart, *, name: str, vehicle_id: int | None) -> Campaign:
-    """A draft for a registered vehicle, by default the last registered one that flies the steps."""
+    """A draft for a registered vehicle, by default the only one that flies the steps."""
     choice = fleet.registered_for(session, found.experiment, vehicle_id)
     log = LogEvidence(**{**asdict(found.log), "file_name": name})
     definition = Definition(experiment=found.experiment, start=Start(kind="given", gains=dict(found.gains), log=log))

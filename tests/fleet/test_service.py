@@ -55,11 +55,19 @@ def test_an_experiment_is_flown_by_the_named_vehicle_or_the_last_registered_one(
     client: TestClient, database: Database
 ) -> None:
     options = {"autopilot": "px4", "simulated": True}
-    first, second = (register(client, name, options=options)["id"] for name in ("First", "Second"))
+    first = register(client, "First", options=options)["id"]
     register(client, "Paparazzi")
     with database.read() as session:
-        assert registered_for(session, "altitude-steps-px4", None).id == second
-        assert registered_for(session, "altitude-steps-px4", first).id == first
-        for experiment, vehicle_id in (("altitude-steps-ardupilot", None), ("altitude-steps-px4", 99)):
-            with pytest.raises(InputError, match=r"Invalid vehicle"):
+        assert registered_for(session, "altitude-steps-px4", None).id == first
+    second = register(client, "Second", options=options)["id"]
+    refused = {
+        ("altitude-steps-px4", None): f"must be given: First ({first}), Second ({second}) fly 'altitude-steps-px4'",
+        ("altitude-steps-ardupilot", None): "no registered vehicle flies 'altitude-steps-ardupilot'",
+        ("altitude-steps-px4", 99): "99 is not registered",
+    }
+    with database.read() as session:
+        assert registered_for(session, "altitude-steps-px4", second).id == second
+        for (experiment, vehicle_id), reason in refused.items():
+            with pytest.raises(InputError) as raised:
                 registered_for(session, experiment, vehicle_id)
+            assert [(each.field, each.reason) for each in raised.value.problems] == [("vehicle", reason)]

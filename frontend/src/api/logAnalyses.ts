@@ -10,9 +10,17 @@ export type { LogAnalysis } from "./generated";
 /** File types of the file chooser. A .log file belongs to Paparazzi's .data file. */
 export const ANALYSED_FILES = ".bin,.ulg,.tlog,.data,.log";
 
-/** Create a campaign with the takeoffs of a Paparazzi log. */
+interface CampaignStart {
+  files: RecordFiles;
+  vehicle: number | null;
+}
+
+/** Create a campaign with the takeoffs of a Paparazzi log, or of a copter with the gains proposed from its log. */
 export function useStartCampaign() {
-  return useMutation({ mutationFn: (files: RecordFiles) => answer(startCampaign({ body: { ...files } })) });
+  return useMutation({
+    mutationFn: ({ files, vehicle }: CampaignStart) =>
+      answer(startCampaign({ body: { ...files }, query: { vehicle } })),
+  });
 }
 
 export function useAnalyzeLog() {

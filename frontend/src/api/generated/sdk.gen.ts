@@ -764,8 +764,8 @@ export const analyzeLog = <ThrowOnError extends boolean = false>(options: Option
  * Create the campaign of a log.
  *
  * From a Paparazzi log: of a vehicle that is flown elsewhere, with the takeoffs as its first flights. From a log of an
- * ArduCopter or PX4: a draft of altitude steps with a registered `vehicle`, by default the last registered one that
- * flies them, with the gains proposed from the log for the first flight. The fitted vehicle replaces the data sheet
+ * ArduCopter or PX4: a draft of altitude steps with a registered `vehicle`, by default the only one that flies them,
+ * with the gains proposed from the log for the first flight. The fitted vehicle replaces the data sheet
  * until then.
  */
 export const startCampaign = <ThrowOnError extends boolean = false>(options: Options<StartCampaignData, ThrowOnError>): RequestResult<StartCampaignResponses, StartCampaignErrors, ThrowOnError> => (options.client ?? client).post<StartCampaignResponses, StartCampaignErrors, ThrowOnError>({

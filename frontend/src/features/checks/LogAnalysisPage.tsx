@@ -4,8 +4,10 @@ import { useRef, useState } from "react";
 import { Link, useNavigate } from "react-router";
 import { ANALYSED_FILES, type LogAnalysis, useAnalyzeLog, useStartCampaign } from "../../api/logAnalyses";
 import { type RecordFiles, recordOf } from "../../api/records";
+import { useVehicles } from "../../api/vehicles";
 import { FigurePanel } from "../../charts/FigurePanel";
 import { DataTable } from "../../ui/DataTable";
+import { SelectField } from "../../ui/Fields";
 import { ErrorNotice } from "../../ui/Notices";
 import page from "../../ui/Page.module.css";
 import { Panel } from "../../ui/Panel";
@@ -15,6 +17,7 @@ import classes from "./Checks.module.css";
 
 const FIGURE_HEIGHT_PX = 560;
 const ROW_PX = 37;
+const STEPS: Readonly<Record<string, string>> = { ArduCopter: "altitude-steps-ardupilot", PX4: "altitude-steps-px4" };
 
 /** Better altitude gains from the log of a flight, without a campaign. */
 export function LogAnalysisPage() {
@@ -114,7 +117,9 @@ function Result({ analysis, files }: ResultProps) {
           ))}
         </ul>
         <Group gap={10} mt="sm">
-          {(autopilot === "Paparazzi" || proposes) && <StartCampaign key={file_name} files={files} />}
+          {(autopilot === "Paparazzi" || proposes) && (
+            <StartCampaign key={file_name} files={files} autopilot={autopilot} />
+          )}
           {parameter_file !== null && (
             <Button
               component="a"
@@ -134,14 +139,36 @@ function Result({ analysis, files }: ResultProps) {
 }
 
 /** Starts a campaign with the takeoffs of the log as its first flights, or with the gains proposed from it. */
-function StartCampaign({ files }: { files: RecordFiles }) {
+function StartCampaign({ files, autopilot }: { files: RecordFiles; autopilot: LogAnalysis["autopilot"] }) {
   const { mutate, error, isPending } = useStartCampaign();
   const navigate = useNavigate();
+  const [chosen, setChosen] = useState("");
+  const flying = (useVehicles().data ?? []).filter(
+    ({ registered, experiments }) => registered && experiments.includes(STEPS[autopilot] ?? ""),
+  );
+  const isOpen = flying.length > 1 && chosen === "";
   return (
     <>
+      {flying.length > 1 && (
+        <SelectField
+          aria-label="Vehicle of the log"
+          data={[
+            { value: "", label: "Vehicle of the log…" },
+            ...flying.map(({ id, name }) => ({ value: String(id), label: name })),
+          ]}
+          value={chosen}
+          onChange={setChosen}
+        />
+      )}
       <Button
         loading={isPending}
-        onClick={() => mutate(files, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) })}
+        disabled={isOpen}
+        onClick={() =>
+          mutate(
+            { files, vehicle: chosen === "" ? null : Number(chosen) },
+            { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) },
+          )
+        }
       >
         Start campaign
       </Button>
