@@ -84,6 +84,13 @@ def test_px4_follows_the_recorded_set_point_with_the_hover_throttle_of_the_fligh
     assert segment.v_d_m_s.tolist() == [0.0] * len(segment.time_s)
 
 
+def test_px4_at_one_set_point_has_no_step_that_could_be_late() -> None:
+    still = Steps(set_points=SetPoints((0.0,), (3.0,)), begin_s=4.0, end_s=10.0)
+    (segment,) = read_px4(px4_loop({}), recorded(reference_m=3.0), still).segments
+    assert segment.z_d_m.tolist() == [3.0] * len(segment.z_d_m)
+    assert not segment.a_d_m_s2.any(), "nothing is fed forward"
+
+
 @compiled_only
 def test_noise_of_the_accelerometer_follows_from_how_much_the_throttle_moved() -> None:
     log = read_ardupilot(ardupilot_loop({}), recorded(), STEPS)

@@ -61,7 +61,6 @@ def test_a_warm_start_predicts_with_the_other_vehicles_model() -> None:
 
 
 @pytest.mark.parametrize("recorded", [True, False])
-@pytest.mark.complete
 def test_the_identified_model_predicts_as_in_the_proposal(recorded: bool) -> None:
     experiment = PitchTracking()
     gains = experiment.space.mapping(experiment.space.default)
