@@ -4,6 +4,7 @@ import io
 from typing import Final
 
 from app.core.analysis.analysis import analyze
+from app.core.analysis.flight import LoggedFlight
 from app.core.errors import Problem, TrajectoryError
 from app.core.tuning.logged_takeoffs import analyze_takeoffs
 from app.log_analyses.copter_start import CopterStart, start_of
@@ -36,6 +37,12 @@ _FLIGHTS: Final = (
 )
 
 
+def _read_flight(content: bytes, name: str) -> LoggedFlight | None:
+    """The flight of a copter's log; None if this is none."""
+    read = next((read for recognises, read in _FLIGHTS if recognises(content)), None)
+    return None if read is None else read(io.BytesIO(content), name=name)
+
+
 def _read_takeoffs(content: bytes, companion: bytes | None, name: str) -> list[Takeoff]:
     """Every takeoff of a Paparazzi log."""
     head = content[:HEAD_BYTES]
@@ -56,17 +63,14 @@ def _what_else(head: bytes) -> str:
 def read_start(content: bytes, companion: bytes | None, name: str) -> list[Takeoff] | CopterStart:
     """Read what a campaign starts with: the takeoffs of a Paparazzi log, or the gains proposed from a copter's, which
     takes some seconds. Raises InputError that names what is missing or wrong."""
-    for recognises, read in _FLIGHTS:
-        if recognises(content):
-            return start_of(analyze(read(io.BytesIO(content), name=name)), name)
-    return _read_takeoffs(content, companion, name)
+    flight = _read_flight(content, name)
+    return _read_takeoffs(content, companion, name) if flight is None else start_of(analyze(flight), name)
 
 
 def analyze_content(content: bytes, companion: bytes | None, name: str) -> AnalysedManoeuvres | AnalysedTakeoffs:
     """Analyse a log in memory; takes some seconds. Raises InputError that names what is missing or wrong."""
-    for recognises, read in _FLIGHTS:
-        if recognises(content):
-            flight = read(io.BytesIO(content), name=name)
-            return AnalysedManoeuvres(analyze(flight), name, flight.assumed)
+    flight = _read_flight(content, name)
+    if flight is not None:
+        return AnalysedManoeuvres(analyze(flight), name, flight.assumed)
     found = _read_takeoffs(content, companion, name)
     return AnalysedTakeoffs(analyze_takeoffs(logged_takeoffs(found, name=name)), name)
