@@ -110,10 +110,10 @@ def _check_start(definition: Definition, space: PolicySpace) -> None:
     if brings_gains != (start.gains is not None):
         needed = f"are required with start.kind {start.kind!r}"
         reason = needed if start.gains is None else f"are not allowed with start.kind {start.kind!r}"
-        raise InputError("Invalid start.", hint="", problems=(Problem("start.gains", reason),))
+        raise _invalid_start(Problem("start.gains", reason))
     if (start.kind == "campaign") != (start.donor is not None):
         reason = "is required with start.kind 'campaign', and not allowed with any other"
-        raise InputError("Invalid start.", hint="", problems=(Problem("start.donor", reason),))
+        raise _invalid_start(Problem("start.donor", reason))
     if start.log is not None:
         _check_log(definition, start.log)
     if start.kind == "given" and start.gains is not None:
@@ -127,11 +127,11 @@ def _check_log(definition: Definition, log: LogEvidence) -> None:
     modelled = EXPERIMENTS[definition.experiment].modelled
     if definition.start.kind != "given" or not isinstance(modelled, CopterSteps):
         reason = "is allowed only with start.kind 'given', for altitude steps under ArduCopter or PX4"
-        raise InputError("Invalid start.", hint="", problems=(Problem("start.log", reason),))
+        raise _invalid_start(Problem("start.log", reason))
     known = {each.name: (each.lower, each.upper) for each in modelled.model_parameters}
     if log.vehicle.keys() != known.keys():
         reason = f"must have {', '.join(known)}"
-        raise InputError("Invalid start.", hint="", problems=(Problem("start.log.vehicle", reason),))
+        raise _invalid_start(Problem("start.log.vehicle", reason))
     wrong = tuple(
         Problem(
             f"start.log.vehicle.{name}",
@@ -141,12 +141,16 @@ def _check_log(definition: Definition, log: LogEvidence) -> None:
         if not (low <= log.vehicle[name][0] <= high and 0.0 <= log.vehicle[name][1] <= _LARGEST_DEVIATION)
     )
     if wrong:
-        raise InputError("Invalid start.", hint="", problems=wrong)
+        raise _invalid_start(*wrong)
     try:
         modelled.exactly_under(log.parameters)
     except InputError as error:
-        problems = tuple(Problem(f"start.log.parameters.{each.field}", each.reason) for each in error.problems)
-        raise InputError("Invalid start.", hint="", problems=problems) from error
+        problems = (Problem(f"start.log.parameters.{each.field}", each.reason) for each in error.problems)
+        raise _invalid_start(*problems) from error
+
+
+def _invalid_start(*problems: Problem) -> InputError:
+    return InputError("Invalid start.", hint="", problems=problems)
 
 
 def _check_bounds_hold(space: PolicySpace, gains: Mapping[str, float]) -> None:
