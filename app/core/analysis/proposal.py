@@ -94,7 +94,7 @@ def propose(
 
     found = _minimum(cost, excess, start, low, high)
     rounded = tuple(space.coordinates(_rounded(space, space.gains_at(np.array(found)))).tolist())
-    candidates = [point for point in (rounded, start, *allowed) if is_allowed(point)]
+    candidates = [*filter(is_allowed, [rounded]), start, *allowed]
     least = min(map(cost, candidates))
     best = max((point for point in candidates if cost(point) <= least + _AS_GOOD), key=margin)
     return _rounded(space, space.gains_at(np.array(best)))

@@ -144,6 +144,8 @@ HOVER_THRUSTS: Final = (0.1, 0.8)
 HOVER_RANGE_NAME: Final = "HTE_THR_RANGE"
 HOVER_RANGE: Final = 0.2
 """How far the estimated hover thrust may be from MPC_THR_HOVER, by default."""
+_HIGHEST_LOW, _LOWEST_HIGH, _HIGHEST = 0.8, 0.2, 0.9
+"""Ends of its limits, whatever the parameters are."""
 LOOP_NAMES: Final = (*FIRMWARE_NAMES, *UNSUPPORTED, *ESTIMATOR_NAMES, HOVER_RANGE_NAME)
 """All that the loop depends on."""
 
@@ -174,9 +176,6 @@ def hover_limits(hover_thrust: float, deviation: float) -> tuple[float, float]:
     """Least and largest hover thrust that the estimator finds, with MPC_THR_HOVER and HTE_THR_RANGE."""
     low, high = hover_thrust - deviation, hover_thrust + deviation
     return min(max(low, 0.0), _HIGHEST_LOW), min(max(high, _LOWEST_HIGH), _HIGHEST)
-
-
-_HIGHEST_LOW, _LOWEST_HIGH, _HIGHEST = 0.8, 0.2, 0.9
 
 
 def parameters_from(values: Mapping[str, float]) -> Parameters:

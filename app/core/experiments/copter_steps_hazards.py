@@ -15,6 +15,8 @@ from app.core.models.set_points import SetPoints
 
 COPTERS: Final = 5
 """Copters of a distribution that are checked, and for which gains are searched."""
+_KNOWN_TO: Final = 0.03
+"""Standard deviation of a hover throttle that flights have shown; the data sheet's is larger."""
 
 
 def check_altitudes(altitudes: Matrix, set_points: SetPoints, ceiling_m: float) -> tuple[Check, Check]:
@@ -66,10 +68,6 @@ def check_hover(advice: HoverAdvice | None, hover_throttle: float, deviation: fl
         return ()
     sentence = f"{advice.reason} Do this before the flight."
     return (Check("hover throttle", True, sentence, worst=hover_throttle, limit=advice.found),)
-
-
-_KNOWN_TO: Final = 0.03
-"""Standard deviation of a hover throttle that flights have shown; the data sheet's is larger."""
 
 
 def check_margin(loop: AltitudeLoop, copters: Sequence[Copter]) -> Check:
