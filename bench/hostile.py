@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Final
 
 from bench.hazards.cases import Case
-from bench.hazards.hostile_links import HAZARDS
+from bench.hazards.hostile_table import HAZARDS
 from bench.hazards.hostile_trial import HostileResult, cases, run_trial
 
 STRIDE: Final = 37
 """Step between the cases of the sample, chosen so that it covers hazards, states and autopilots."""
-VERDICTS: Final = ("completed", "aborted", "invalid", "refused")
+VERDICTS: Final = ("completed", "aborted", "invalid", "refused", "lost")
 VEHICLE_STATES: Final = ("safe", "quarantined", "unopened")
 
 

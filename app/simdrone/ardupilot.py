@@ -108,6 +108,7 @@ _FIRMWARE: Final = FirmwareProfile(
         FlightMode("BRAKE", 17, _GUIDED, may_arm=False),
     ),
     land="LAND",
+    home="RTL",
     hold="BRAKE",
     by_hand="ALT_HOLD",
     automatic="GUIDED",

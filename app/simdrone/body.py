@@ -209,6 +209,14 @@ class Autopilot(Protocol):
         """Switch back from the pilot's mode to the automatic one."""
         ...
 
+    def kill(self) -> None:
+        """Stop the motors, at any height, as another ground station commands."""
+        ...
+
+    def fly_home(self) -> None:
+        """Enter the mode in which it flies home by itself."""
+        ...
+
     def restore_persistent(self, before: Self) -> None:
         """Copy what survives a reboot from the autopilot before it."""
         ...

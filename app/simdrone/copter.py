@@ -193,6 +193,12 @@ class Copter(ABC):
     def hand_back(self) -> None:
         self.enter(self.find_mode(self.firmware.automatic))
 
+    def kill(self) -> None:
+        self._disarm()
+
+    def fly_home(self) -> None:
+        self.enter(self.find_mode(self.firmware.home))
+
     def held(self, parameter: str) -> float:
         return self.parameters[parameter]
 

@@ -135,9 +135,9 @@ class FlightMode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareProfile:
-    """Data of an autopilot. `modes` contains all modes, of which the first is that after the start; `land`, `hold`,
-    `by_hand` and `automatic` are names of modes; `refused` is the result of a refusal, and the texts from `no_estimate`
-    on are those sent with it or with a failsafe."""
+    """Data of an autopilot. `modes` contains all modes, of which the first is that after the start; `land`, `home`,
+    `hold`, `by_hand` and `automatic` are names of modes; `refused` is the result of a refusal, and the texts from
+    `no_estimate` on are those sent with it or with a failsafe."""
 
     dialect: Dialect
     autopilot: int
@@ -150,6 +150,7 @@ class FirmwareProfile:
     """Messages that REQUEST_DATA_STREAM requests; none if it is ignored."""
     modes: tuple[FlightMode, ...]
     land: str
+    home: str
     hold: str
     by_hand: str
     """Mode in which a pilot flies."""

@@ -92,15 +92,15 @@ PEER: Final[Peer] = ("lockstep", 0)
 class Lockstep:
     """The ground side's clock and its transport: `MavlinkVehicle(…, clock=lockstep, transport=lockstep)`.
 
-    `muted`: the drone receives, but none of its packets arrive.
+    `muted`: the drone receives, but none of its packets arrive. The drone sends from the address `peer`, and receives
+    only what is sent there.
     """
-
-    remote: Final = PEER
 
     def __init__(self, drone: Drone) -> None:
         self.drone: Final = drone
         self.muted = False
-        self._frames: deque[bytes] = deque()
+        self.peer = self.remote = PEER
+        self._frames: deque[tuple[bytes, Peer]] = deque()
 
     # ---- the clock of both sides
 
@@ -121,16 +121,17 @@ class Lockstep:
     # ---- the ground side's transport
 
     def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:  # noqa: ARG002 - nothing more comes by itself
-        frames = [(frame, PEER) for frame in self._frames]
+        frames = list(self._frames)
         self._frames.clear()
         return frames
 
     def write(self, data: bytes) -> bool:
-        self.drone.receive(data)
+        if self.remote == self.peer:
+            self.drone.receive(data)
         return True
 
     def adopt(self, peer: Peer) -> None:
-        """Do nothing: there is only one peer."""
+        self.remote = peer
 
     def wake(self) -> None:
         """Do nothing: no thread waits."""
@@ -145,7 +146,12 @@ class Lockstep:
         """Advance the drone by one tick."""
         frames = self.drone.tick()
         if not self.muted:
-            self._frames.extend(self.arriving(frames))
+            for frame in self.arriving(frames):
+                self.deliver(frame, self.peer)
+
+    def deliver(self, frame: bytes, peer: Peer) -> None:
+        """Let a packet arrive from this address."""
+        self._frames.append((frame, peer))
 
     def arriving(self, frames: list[bytes]) -> list[bytes]:
         """Return the packets of one tick that arrive; subclasses override it to disturb the link."""

@@ -1,5 +1,6 @@
 """Faults that can be injected into a simulated drone: each is one class and one line in `FAULTS`."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -7,14 +8,14 @@ from typing import ClassVar, Final, Protocol
 
 from app.core.errors import InputError, Problem
 from app.core.policy import is_finite
-from app.simdrone.body import Autopilot, Body, OutgoingMessage
+from app.simdrone.body import Autopilot, Body, Fields, OutgoingMessage
 from app.simdrone.motion_capture import MotionCapture
 from app.vehicles.mavlink.dialects import FieldValue
 
 CONNECT: Final = "connect"
 FORM: Final = "NAME[:DURATION]@T, T in seconds after the takeoff command, or NAME[:DURATION]@connect"
 
-_POSITIONS: Final = frozenset({"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"})
+_POSITION: Final = "LOCAL_POSITION_NED"
 _LOW_MV: Final = 9000
 _JUMP_M: Final = 1.0
 _JUMP_EVERY: Final = 25
@@ -22,6 +23,10 @@ _TWICE_EVERY: Final = 5
 _SWAP_EVERY: Final = 4
 _WRONG_SYSTEM: Final = 77
 _WIND_M_S: Final = 2.0
+_DRIFT_M_S: Final = 0.5
+_CREEP_M_S: Final = 0.1
+_LEAN_RAD: Final = math.radians(28.0 * math.sqrt(2.0))
+_LEAN_HZ: Final = 1.7
 
 
 class FaultTarget(Protocol):
@@ -59,13 +64,38 @@ class Fault:
         return False
 
 
-class NoHeartbeat(Fault):
+class MissingMessages(Fault):
+    """Base of faults in which messages of some kinds are not sent."""
+
+    kinds: ClassVar[frozenset[str]]
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [message for message in messages if message.kind not in self.kinds]
+
+
+class ChangedMessages(Fault):
+    """Base of faults in which messages of some kinds have other values."""
+
+    kinds: ClassVar[frozenset[str]]
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        return [
+            replace(message, fields={**message.fields, **self.change(message)})
+            if message.kind in self.kinds
+            else message
+            for message in messages
+        ]
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        """Return the fields that differ."""
+        raise NotImplementedError
+
+
+class NoHeartbeat(MissingMessages):
     """HEARTBEAT is not sent."""
 
     name = "no-heartbeat"
-
-    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [message for message in messages if message.kind != "HEARTBEAT"]
+    kinds = frozenset({"HEARTBEAT"})
 
 
 class ParamUnconfirmed(Fault):
@@ -117,13 +147,18 @@ class LinkLost(Fault):
         return True
 
 
-class AcknowledgementLost(Fault):
+class AcknowledgementLost(MissingMessages):
     """Waypoints are taken, but their acknowledgements are lost."""
 
     name = "ack-lost"
+    kinds = frozenset({"MISSION_ACK"})
 
-    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [message for message in messages if message.kind != "MISSION_ACK"]
+
+class SilentWitness(MissingMessages):
+    """The autopilot's own judgement of the landing is not sent: SCRIPT_CURRENT, EXTENDED_SYS_STATE."""
+
+    name = "silent-witness"
+    kinds = frozenset({"SCRIPT_CURRENT", "EXTENDED_SYS_STATE"})
 
 
 class Deaf(Fault):
@@ -148,46 +183,116 @@ class TakenOver(Fault):
         drone.autopilot.hand_back()
 
 
+class ForeignKill(Fault):
+    """Another ground station stops the motors: the setting that stops the throttle, or a forced disarming."""
+
+    name = "foreign-kill"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.autopilot.kill()
+
+
+class FliesHome(Fault):
+    """The drone flies home by itself: Paparazzi's HOME mode, the return mode of the others."""
+
+    name = "flies-home"
+
+    def begin(self, drone: FaultTarget) -> None:
+        drone.autopilot.fly_home()
+
+    def end(self, drone: FaultTarget) -> None:
+        drone.autopilot.hand_back()
+
+
 @dataclass
-class FrozenPosition(Fault):
+class FrozenPosition(ChangedMessages):
     """Position messages repeat the last one, with its time; other packets are unchanged."""
 
     name: ClassVar[str] = "frozen-position"
-    _held: dict[str, OutgoingMessage] = field(default_factory=dict)
+    kinds: ClassVar[frozenset[str]] = frozenset({_POSITION, "GLOBAL_POSITION_INT"})
+    _held: dict[str, Fields] = field(default_factory=dict)
 
-    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [
-            self._held.setdefault(message.kind, message) if message.kind in _POSITIONS else message
-            for message in messages
-        ]
+    def change(self, message: OutgoingMessage) -> Fields:
+        return self._held.setdefault(message.kind, message.fields)
 
 
 @dataclass
-class JumpingPosition(Fault):
+class JumpingPosition(ChangedMessages):
     """Every 25th position is one metre too high."""
 
     name: ClassVar[str] = "jumping-position"
+    kinds: ClassVar[frozenset[str]] = frozenset({_POSITION})
     _count: int = 0
 
-    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [self._jumped(message) for message in messages]
-
-    def _jumped(self, message: OutgoingMessage) -> OutgoingMessage:
-        z = message.fields.get("z")
-        if message.kind != "LOCAL_POSITION_NED" or not isinstance(z, int | float):
-            return message
+    def change(self, message: OutgoingMessage) -> Fields:
         self._count += 1
-        jumps = self._count % _JUMP_EVERY == 0
-        return replace(message, fields={**message.fields, "z": z - _JUMP_M}) if jumps else message
+        return {"z": _value(message, "z") - _JUMP_M} if self._count % _JUMP_EVERY == 0 else {}
 
 
-class LowBattery(Fault):
+@dataclass
+class StuckAltitude(ChangedMessages):
+    """The altitude stays as it was, with a climb rate of 0, while the clock of the position advances."""
+
+    name: ClassVar[str] = "stuck-altitude"
+    kinds: ClassVar[frozenset[str]] = frozenset({_POSITION})
+    _z_m: float | None = None
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        self._z_m = _value(message, "z") if self._z_m is None else self._z_m
+        return {"z": self._z_m, "vz": 0.0}
+
+
+@dataclass
+class DriftingAltitude(ChangedMessages):
+    """Altitude and climb rate drift down from the true ones by 0.5 m/s, until they show the ground."""
+
+    name: ClassVar[str] = "drifting-altitude"
+    kinds: ClassVar[frozenset[str]] = frozenset({_POSITION})
+    drift_m_s: ClassVar[float] = _DRIFT_M_S
+    _body: Body | None = None
+    _since_ms: float | None = None
+
+    def begin(self, drone: FaultTarget) -> None:
+        self._body = drone.body
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        boot_ms, height_m = _value(message, "time_boot_ms"), 0.0 if self._body is None else self._body.altitude_m
+        self._since_ms = boot_ms if self._since_ms is None else self._since_ms
+        sunk_m = self.drift_m_s * (boot_ms - self._since_ms) / 1000.0
+        if sunk_m > height_m:
+            return {"z": _value(message, "z") + height_m, "vz": 0.0}
+        return {"z": _value(message, "z") + sunk_m, "vz": _value(message, "vz") + self.drift_m_s}
+
+
+class CreepingAltitude(DriftingAltitude):
+    """Altitude and climb rate drift down from the true ones by 0.1 m/s, until they show the ground."""
+
+    name: ClassVar[str] = "creeping-altitude"
+    drift_m_s: ClassVar[float] = _CREEP_M_S
+
+
+class LeanOscillation(ChangedMessages):
+    """The roll angle oscillates with a standard deviation of 28°; the flight is otherwise unchanged."""
+
+    name = "lean-oscillation"
+    kinds = frozenset({"ATTITUDE"})
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        angle_rad = 2.0 * math.pi * _LEAN_HZ * _value(message, "time_boot_ms") / 1000.0
+        return {
+            "roll": _LEAN_RAD * math.sin(angle_rad),
+            "rollspeed": 2.0 * math.pi * _LEAN_HZ * _LEAN_RAD * math.cos(angle_rad),
+        }
+
+
+class LowBattery(ChangedMessages):
     """The battery voltage is reported as 9.0 V, and the remaining charge as 10 %."""
 
     name = "low-battery"
+    kinds = frozenset({"SYS_STATUS", "BATTERY_STATUS"})
 
-    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
-        return [replace(message, fields=_drained(message.fields)) for message in messages]
+    def change(self, message: OutgoingMessage) -> Fields:
+        return _drained(message.fields)
 
 
 class Reboot(Fault):
@@ -303,9 +408,16 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
             LinkLost,
             Deaf,
             AcknowledgementLost,
+            SilentWitness,
             TakenOver,
+            ForeignKill,
+            FliesHome,
             FrozenPosition,
             JumpingPosition,
+            StuckAltitude,
+            DriftingAltitude,
+            CreepingAltitude,
+            LeanOscillation,
             LowBattery,
             Reboot,
             DuplicatedPackets,
@@ -386,7 +498,14 @@ class Faults:
         return frames
 
 
-def _drained(fields: Mapping[str, FieldValue]) -> dict[str, FieldValue]:
+def _value(message: OutgoingMessage, field: str) -> float:
+    value = message.fields[field]
+    if not isinstance(value, int | float):
+        raise TypeError(f"{message.kind}.{field} is not a number")
+    return value
+
+
+def _drained(fields: Fields) -> Fields:
     """Return the fields with low values for the battery."""
     low: dict[str, FieldValue] = dict(fields)
     if "voltage_battery" in low:

@@ -24,6 +24,7 @@ from app.simdrone.body import (
     vertical_command,
     whole_ticks,
 )
+from app.simdrone.paparazzi_estimator import FIX_S, FallEstimator
 from app.simdrone.paparazzi_plan import (
     BLOCKS,
     DESCENT_M_S,
@@ -69,6 +70,7 @@ _HIGHEST_M: Final = 10_000.0
 
 _POLL_TICKS: Final = whole_ticks(0.018)
 _NAV_TICKS: Final = 16
+_FIX_TICKS: Final = whole_ticks(FIX_S)
 _BLOCK_TICKS: Final = whole_ticks(0.1)
 _LIST_TICKS: Final = whole_ticks(0.2)
 
@@ -120,6 +122,7 @@ class Paparazzi:
         self._touched_s: float | None = None
         self._touched_m = 0.0
         self._held_m = 0.0
+        self._estimator = FallEstimator()
         self._timetable = Timetable.from_periods(paparazzi_telemetry.PERIODS_S)
         if not tuned_telemetry:
             self._timetable.set("LOCAL_POSITION_NED", paparazzi_telemetry.BARE_POSITION_PERIOD_S)
@@ -140,7 +143,11 @@ class Paparazzi:
             self._listen()
         if self._ticks % _NAV_TICKS == 0:
             self._navigate()
-        self._body.advance(TICK_STEPS, self._command())
+        command = self._command()
+        self._body.advance(TICK_STEPS, command)
+        if self._ticks % _FIX_TICKS == 0:
+            is_driven = command is not MOTORS_OFF and not self._body.motors_dead
+            self._estimator.fix(self._body.altitude_m, self._body.climb_rate_m_s, is_driven=is_driven)
         self._watch_thrust()
         self._report()
         out, self._out = self._out, []
@@ -178,6 +185,14 @@ class Paparazzi:
 
     def hand_back(self) -> None:
         self._set_mode(NAV)
+
+    def kill(self) -> None:
+        self._set_motors(on=False)
+        if (place := self._settings.find(self._kill_setting)) is not None:
+            self._send_setting(place)
+
+    def fly_home(self) -> None:
+        self._set_mode(HOME)
 
     def _set_motors(self, *, on: bool) -> None:
         self._motors_on = on and self.mode != KILL and not self.refuses_arming
@@ -282,8 +297,8 @@ class Paparazzi:
         body = self._body
         return paparazzi_telemetry.Snapshot(
             boot_s=self.boot_s,
-            height_m=self.height_m,
-            climb_rate_m_s=body.climb_rate_m_s,
+            height_m=self.height_m + self._estimator.error_m,
+            climb_rate_m_s=self._estimator.climb_rate_m_s(body.climb_rate_m_s),
             thrust=body.thrust,
             battery_v=body.battery_v,
             mode=self.mode,

@@ -127,6 +127,7 @@ class Px4(Copter):
             FlightMode("AUTO.LAND", custom_mode(4, 6), _AUTO, Behaviour.LAND, may_arm=False),
         ),
         land="AUTO.LAND",
+        home="AUTO.RTL",
         hold="AUTO.LOITER",
         by_hand="POSCTL",
         automatic="AUTO.LOITER",

@@ -12,8 +12,7 @@ import numpy as np
 
 from app.core.records.trajectory import Trajectory
 from bench.hazards.cases import ABORT, FOR_GOOD_S, Case
-from bench.hazards.hostile_expectations import EXPECTED, HARMLESS, LEADS
-from bench.hazards.hostile_links import PILOTS
+from bench.hazards.hostile_table import HARMLESS, HAZARDS, LEADS, NOT_SEEN, PILOTS, PROCESS_KILLED, Expected
 from bench.hazards.rig import InjectedFault, MotorStop
 from bench.hazards.trial_states import LIFTED_M, RECORDED_S, RESTING_M, TrialStates
 from bench.hazards.wire import Command
@@ -26,6 +25,10 @@ HOVERS_M: Final = 2.0
 SINKS_M_S: Final = -0.2
 LAND_WITHIN_S: Final = 8.0
 """Longest time without Land for a vehicle that does not descend; Land is repeated every six seconds under Paparazzi."""
+LAND_AFTER_DEATH_S: Final = 15.0
+"""The same from the death of the process on, of which 3 s pass until another one has connected."""
+FELL_M_S: Final = 2.2
+"""Speed of ground contact of a vehicle that certainly fell."""
 SEEN_S: Final = 2.3
 """Largest time between the first and the second heartbeat of a pilot, with one heartbeat per second."""
 QUIET: Final = frozenset({Command.HEARTBEAT, Command.REQUEST})
@@ -49,7 +52,8 @@ class TrueState:
 
 @dataclass(frozen=True, slots=True)
 class ReportedOutcome:
-    """Outcome of a trial and state of the vehicle (safe, quarantined, unopened) as reported by the program.
+    """Outcome of a trial and state of the vehicle (safe, quarantined, unopened) as reported by the program; a trial
+    whose process was killed is "lost", and its concern is the next process's.
 
     `concern` is the program's concern about the vehicle at the end of the trial, `final_concern` that after attending
     to the vehicle.
@@ -61,6 +65,8 @@ class ReportedOutcome:
     concern: str = ""
     final_concern: str = ""
     record: Trajectory | None = None
+    failure: str | None = None
+    """Code of the failure; empty without one, None if it is not known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +83,8 @@ class GroundTruth:
     holds_safe: bool
     rose_m: float = 0.0
     """How far it has risen from where it stood."""
+    impact_m_s: float = 0.0
+    """Greatest speed near the ground, downwards."""
     pilot_seen_s: Sequence[float] = ()
     """Times of heartbeats that showed a pilot's mode, after the takeoff."""
     overruled_s: float = FOR_GOOD_S
@@ -86,6 +94,10 @@ class GroundTruth:
     def hazard(self) -> InjectedFault | None:
         """The hazard under test; None if its state was never reached."""
         return next((each for each in self.injected if each.kind == self.case.faults[0].kind), None)
+
+    @property
+    def expected(self) -> Expected:
+        return HARMLESS if self.hazard is None else HAZARDS[self.hazard.kind].expected
 
     @property
     def after(self) -> list[TrueState]:
@@ -121,12 +133,15 @@ def _vehicle(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
     stops = [stop.height_m for stop in truth.stops if stop.height_m > LIFTED_M]
     if stops:
         yield f"motors off was sent at {max(stops):.2f} m"
-    if truth.flies and not truth.may_be_in_hand:
+    stays = truth.case.autopilot in truth.expected.stays
+    if truth.flies and not (truth.may_be_in_hand or stays):
         yield f"the vehicle was left at {truth.true_states[-1].height_m:.2f} m"
     if (highest_m := max((each.height_m for each in truth.true_states), default=0.0)) > CEILING_M:
         yield f"the vehicle rose to {highest_m:.2f} m"
     if reported.vehicle == "safe" and (truth.armed or not truth.holds_safe):
         yield f"reported as safe, but is {'armed' if truth.armed else 'not on its safe gains'}"
+    if reported.vehicle == "safe" and truth.impact_m_s > FELL_M_S:
+        yield f"reported as safe, but it hit the ground at {truth.impact_m_s:.1f} m/s"
     if reported.vehicle == "unopened":
         return
     over = truth.after[0] if truth.after else None
@@ -149,7 +164,7 @@ def _commands(truth: GroundTruth) -> Iterator[str]:
     if truth.overruled_s < FOR_GOOD_S and np.interp(truth.overruled_s, heights[:, 0], heights[:, 1]) > LIFTED_M:
         yield "the vehicle was taken from a pilot whom a heartbeat had shown"
     longest_s = 0.0 if truth.may_be_in_hand else max(_waits(truth), default=0.0)
-    if longest_s > LAND_WITHIN_S:
+    if longest_s > (LAND_AFTER_DEATH_S if truth.case.faults[0].kind == PROCESS_KILLED else LAND_WITHIN_S):
         yield f"the vehicle was left in the air for {longest_s:.0f} s without Land"
 
 
@@ -167,24 +182,33 @@ def _waits(truth: GroundTruth) -> Iterator[float]:
 
 
 def _verdict(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
-    """Check the reported outcome and its reason against what happened."""
-    hazard = truth.hazard
-    expected = HARMLESS if hazard is None else EXPECTED[hazard.kind]
+    """Check the reported outcome and its failure against what happened."""
+    kind, hazard, expected = truth.case.faults[0].kind, truth.hazard, truth.expected
     led = {each.kind for each in truth.injected if each.kind in LEADS}
-    known = (*expected.reasons, *(LEADS[kind] for kind in led))
-    if reported.outcome == "refused" and (truth.rose or truth.rose_m > RESTING_M):
-        yield f"reported as not flown, but it flew ({reported.reason})"
-    if reported.outcome == "completed":
-        if ABORT in led:
-            yield "reported as completed, but it was aborted"
-        if truth.case.faults[0].duration_s == FOR_GOOD_S and hazard is not None and hazard.state in expected.ends_in:
-            yield f"reported as completed, although {truth.case.faults[0].kind} set in"
-    elif not any(words in reported.reason for words in known):
-        yield f"reported as {reported.outcome} for a reason that did not occur ({reported.reason})"
-    if reported.outcome == "aborted" and ABORT not in led and not expected.may_abort:
-        yield f"counted against the gains, but the cause was {truth.case.faults[0].kind} ({reported.reason})"
-    if reported.vehicle == "quarantined" and not expected.may_quarantine:
+    may_abort = ABORT in led or truth.case.autopilot in expected.aborts
+    match reported.outcome:
+        case "refused":
+            if truth.rose or truth.rose_m > RESTING_M:
+                yield f"reported as not flown, but it flew ({reported.reason})"
+            if not (expected.refuses or led):
+                yield f"refused for a reason that did not occur ({reported.reason})"
+        case "completed":
+            if ABORT in led:
+                yield "reported as completed, but it was aborted"
+            if truth.case.faults[0].duration_s == FOR_GOOD_S and hazard and hazard.state in expected.ends_in:
+                yield f"reported as completed, although {kind} set in"
+        case "aborted" | "invalid":
+            yield from _failure(reported, {*expected.codes, *(LEADS[each] for each in led)})
+            if reported.outcome == "aborted" and not may_abort:
+                yield f"counted against the gains, but the cause was {kind} ({reported.reason})"
+    if reported.vehicle == "quarantined" and not expected.quarantines:
         yield f"unnecessary quarantine ({reported.concern})"
+
+
+def _failure(reported: ReportedOutcome, known: set[str]) -> Iterator[str]:
+    is_known = reported.failure in known and (reported.failure != NOT_SEEN or reported.vehicle == "quarantined")
+    if reported.failure is not None and not is_known:
+        yield f"{reported.outcome} as {reported.failure or 'no failure'}, which did not occur ({reported.reason})"
 
 
 def _record(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:

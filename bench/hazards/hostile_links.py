@@ -1,7 +1,4 @@
-"""Hazards of the link, which change the packets from a vehicle or delay those to it, and hazards of the vehicle itself.
-
-A hazard of the link changes nothing that the ground sends but its delay, and the vehicle is sound.
-"""
+"""Hazards of the link, which change the packets from a vehicle: the vehicle is sound."""
 
 import math
 import random
@@ -19,11 +16,8 @@ NO_AUTOPILOT: Final = 8
 POSITION: Final = "LOCAL_POSITION_NED"
 SIGHTING: Final = "VISION_POSITION_ESTIMATE"
 """Message of the second source of altitude."""
+_CLOCK_WRAPS_MS: Final = 1 << 32
 FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz")
-UNREAL: Final = (math.nan, math.inf, -math.inf)
-TWINS_S: Final = (0.0, 0.4, 5.0, 3600.0)
-GAPS_S: Final = (0.0, 0.3, 0.6, 1.0)
-SHIFTS_M: Final = (0.1, 0.2, -0.1, -0.2)
 MAKES: Final[Mapping[str, int]] = {"paparazzi": 9, "ardupilot": 3, "px4": 12}
 BY_HAND: Final[Mapping[str, tuple[int, int]]] = {"paparazzi": (64, 0), "ardupilot": (1, 0), "px4": (1, 3 << 16)}
 """base_mode and custom_mode of a mode in which a pilot flies."""
@@ -99,14 +93,19 @@ class MessageForger:
 
 @dataclass
 class ChangedMessages:
-    """Every message of one kind has changed values."""
+    """Every message of one kind has changed values, or only the next `count` ones."""
 
     forger: MessageForger
     kind: str
     change: Callable[[Message], Mapping[str, FieldValue]]
+    count: float = math.inf
 
     def transform(self, frames: Sequence[bytes], now_s: float) -> list[bytes]:  # noqa: ARG002
-        return [self.forger.changed(frame, self.kind, self.change) for frame in frames]
+        return [self.forger.changed(frame, self.kind, self._change) for frame in frames]
+
+    def _change(self, message: Message) -> Mapping[str, FieldValue]:
+        self.count -= 1
+        return self.change(message) if self.count >= 0 else {}
 
 
 @dataclass
@@ -173,6 +172,17 @@ class DelayedPackets:
                     continue
             passed.append(frame)
         return passed
+
+
+@dataclass
+class LostPackets:
+    """A share of the packets is lost."""
+
+    share: float
+    chance: random.Random
+
+    def transform(self, frames: Sequence[bytes], now_s: float) -> list[bytes]:  # noqa: ARG002
+        return [frame for frame in frames if self.chance.random() >= self.share]
 
 
 @dataclass
@@ -245,27 +255,43 @@ class DuplicateVehicle:
 HazardFactory = Callable[[MessageForger], LinkHazard]
 
 
-def _number(name: str, value: float) -> HazardFactory:
+def a_number(name: str, value: float) -> HazardFactory:
     return lambda forger: ChangedMessages(forger, POSITION, lambda _: {name: value})
 
 
-def _higher(kind: str, by_m: float) -> HazardFactory:
+def stamped(ahead_s: float, *, count: float = math.inf) -> HazardFactory:
+    """Return a factory of positions whose time is ahead of the true one, or behind it if negative; of the next `count`
+    ones, or of all."""
+
+    def change(message: Message) -> Mapping[str, FieldValue]:
+        boot_ms = round(number(message, "time_boot_ms") + 1000.0 * ahead_s)
+        return {"time_boot_ms": boot_ms % _CLOCK_WRAPS_MS}
+
+    return lambda forger: ChangedMessages(forger, POSITION, change, count)
+
+
+def wrapping_after(elapsed_s: float) -> HazardFactory:
+    """Return a factory of positions whose time returns to 0 when the vehicle has been on for this time."""
+    return stamped(_CLOCK_WRAPS_MS / 1000.0 - elapsed_s)
+
+
+def higher(kind: str, by_m: float) -> HazardFactory:
     return lambda forger: ChangedMessages(forger, kind, lambda message: {"z": number(message, "z") - by_m})
 
 
-def _silence(kind: str) -> HazardFactory:
+def silence(kind: str) -> HazardFactory:
     return lambda forger: MissingMessages(forger, kind)
 
 
-def _on_ground(gap_s: float) -> HazardFactory:
+def on_ground(gap_s: float) -> HazardFactory:
     return lambda forger: PositionOnGround(forger, gap_s)
 
 
-def _twin(older_s: float) -> HazardFactory:
+def twin(older_s: float) -> HazardFactory:
     return lambda forger: DuplicateVehicle(forger, older_s)
 
 
-def _heartbeat(*, every_s: float, armed: bool = False, by_hand: bool = False) -> HazardFactory:
+def false_heartbeat(*, every_s: float, armed: bool = False, by_hand: bool = False) -> HazardFactory:
     def make(forger: MessageForger) -> LinkHazard:
         codec = forger.codec(forger.own, forger.chance.randrange(256))
         mode = (BY_HAND if by_hand else HOVERING)[forger.autopilot]
@@ -274,7 +300,7 @@ def _heartbeat(*, every_s: float, armed: bool = False, by_hand: bool = False) ->
     return make
 
 
-def _companion(*, poses: bool) -> HazardFactory:
+def companion(*, poses: bool) -> HazardFactory:
     """Return a factory of heartbeats and positions of a companion computer, which may pose as an autopilot."""
 
     def make(forger: MessageForger) -> LinkHazard:
@@ -290,7 +316,9 @@ def _companion(*, poses: bool) -> HazardFactory:
     return make
 
 
-def _place(*, height_m: float, every_s: float, ahead_s: float = 0.0, boot_s: float | None = None) -> HazardFactory:
+def false_position(
+    *, height_m: float, every_s: float, ahead_s: float = 0.0, boot_s: float | None = None
+) -> HazardFactory:
     """Return a factory of false positions in the vehicle's name; with `boot_s` all have that time."""
 
     def make(forger: MessageForger) -> LinkHazard:
@@ -303,58 +331,6 @@ def _place(*, height_m: float, every_s: float, ahead_s: float = 0.0, boot_s: flo
         return InsertedMessages(forge, every_s)
 
     return make
-
-
-LINK_HAZARDS: Final[Mapping[str, HazardFactory]] = {
-    **{f"{name} {value}": _number(name, value) for name in FIELDS for value in UNREAL},
-    "parameters nan": lambda forger: ChangedMessages(forger, "PARAM_VALUE", lambda _: {"param_value": math.nan}),
-    "parameters wrong": lambda forger: ChangedMessages(
-        forger, "PARAM_VALUE", lambda message: {"param_value": number(message, "param_value") + 1.0}
-    ),
-    "companion": _companion(poses=False),
-    "companion as autopilot": _companion(poses=True),
-    **{f"twin {older_s:g} s older": _twin(older_s) for older_s in TWINS_S},
-    "flying twin": lambda forger: DuplicateVehicle(forger, 5.0, flies=True),
-    "replaced after 1.3 s": lambda forger: ReplacedVehicle(forger, 1.3),
-    **{f"on the ground after {gap_s:g} s": _on_ground(gap_s) for gap_s in GAPS_S},
-    "later and later, to 1 s": lambda _: GrowingDelay(0.8, 1.0),
-    "later and later, to 2 s": lambda _: GrowingDelay(1.5, 2.0),
-    "late by 0.4 s": lambda _: DelayedPackets(0.4, every=3, copies=False),
-    "late by 2 s": lambda _: DelayedPackets(2.0, every=7, copies=False),
-    "copies after 2 s": lambda _: DelayedPackets(2.0, every=2, copies=True),
-    "copies at once": lambda _: DelayedPackets(0.0, every=1, copies=True),
-    "an hour ahead": _place(height_m=0.1, every_s=1.0, ahead_s=3600.0),
-    "reboot once": _place(height_m=0.1, every_s=math.inf, boot_s=0.2),
-    "ground once": _place(height_m=0.1, every_s=math.inf, ahead_s=0.005),
-    "ground every second": _place(height_m=0.1, every_s=1.0, ahead_s=0.005),
-    "ceiling once": _place(height_m=9.0, every_s=math.inf, ahead_s=0.005),
-    "disarmed once": _heartbeat(every_s=math.inf),
-    "disarmed every second": _heartbeat(every_s=1.0),
-    "by hand once": _heartbeat(every_s=math.inf, armed=True, by_hand=True),
-    **{
-        f"no {kind}": _silence(kind)
-        for kind in ("HEARTBEAT", POSITION, "SYS_STATUS", "COMMAND_ACK", "PARAM_VALUE", "EXTENDED_SYS_STATE")
-    },
-    **{f"altitude {by_m:+g} m": _higher(POSITION, by_m) for by_m in SHIFTS_M},
-    "mocap nan": lambda forger: ChangedMessages(forger, SIGHTING, lambda _: {"z": math.nan}),
-    "mocap 1 m higher": _higher(SIGHTING, 1.0),
-    "mocap frozen": lambda forger: FrozenMessages(forger, SIGHTING),
-    "mocap silent": _silence(SIGHTING),
-}
-"""Hazards of the link by name."""
-
-VEHICLE_HAZARDS: Final[Mapping[str, tuple[str, float]]] = {
-    "pilot": ("taken-over", math.inf),
-    "pilot for 1 s": ("taken-over", 1.0),
-    "pilot for 3 s": ("taken-over", 3.0),
-    "deaf": ("deaf", math.inf),
-    "carried away": ("carried-away", math.inf),
-}
-"""Hazards of the vehicle by name: a fault of the simulated drone, and its longest duration."""
-PILOTS: Final = frozenset(name for name, (fault, _) in VEHICLE_HAZARDS.items() if fault == "taken-over")
-COMMAND_DELAYS_S: Final[Mapping[str, float]] = {f"commands {late_s:g} s late": late_s for late_s in (0.6, 1.2, 2.0)}
-"""Delay of everything that the ground sends, by the name of the hazard."""
-HAZARDS: Final = (*LINK_HAZARDS, *COMMAND_DELAYS_S, *VEHICLE_HAZARDS)
 
 
 def _boot_s(drone: Drone) -> float:

@@ -2,25 +2,22 @@
 autopilot. `hostile_checks.py` has the checks."""
 
 import random
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
+from app.simdrone.copter import Copter
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
+from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, PlannedFault, tuned_gains
 from bench.hazards.fault_trial import outcome_of
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, TrueState, find_violations
-from bench.hazards.hostile_links import (
-    COMMAND_DELAYS_S,
-    HAZARDS,
-    LINK_HAZARDS,
-    PILOTS,
-    VEHICLE_HAZARDS,
-    LinkHazard,
-    MessageForger,
-)
+from bench.hazards.hostile_links import POSITION, LinkHazard, MessageForger
+from bench.hazards.hostile_table import HAZARDS, PILOTS, PROCESS_KILLED
 from bench.hazards.rig import InjectedFault, Rig
 from bench.hazards.trial_states import State
 from bench.hazards.wire import DIALECTS
@@ -30,6 +27,9 @@ COMES_DOWN_WITHIN_S: Final = 60.0
 """Time to land after the trial, while the program attends to the vehicle."""
 ATTENDED_S: Final = 5.0
 HEARD_S: Final = 1.0
+KILLED_FOR_S: Final = 3.0
+"""Time from the death of the process until another one has connected."""
+OTHER_PORT: Final[Peer] = ("lockstep", 1)
 _STATE_TICKS: Final = 4
 _AIR: Final = (State.TAKEOFF, State.RECORD, State.LAND)
 
@@ -47,10 +47,15 @@ class HostileResult:
 
 def cases(first: int = 0) -> list[Case]:
     """Return all cases: permanent hazards in every state, short ones in the air; seeds start from `first`."""
-    whole = [(name, state, FOR_GOOD_S) for name, state in product(HAZARDS, State)]
-    brief = [(name, state, SHORT_S) for name, state in product(HAZARDS, _AIR)]
-    drawn = product(SAFE, [*whole, *brief])
-    return [_case(first + seed, autopilot, *what) for seed, (autopilot, what) in enumerate(drawn)]
+    drawn = [
+        (autopilot, name, state, duration_s)
+        for autopilot, (name, hazard) in product(SAFE, HAZARDS.items())
+        if autopilot in hazard.autopilots
+        for states, duration_s in ((State, FOR_GOOD_S), (() if hazard.has_one_length else _AIR, SHORT_S))
+        for state in states
+        if state in hazard.states
+    ]
+    return [_case(first + seed, *what) for seed, what in enumerate(drawn)]
 
 
 def _case(seed: int, autopilot: str, name: str, state: State, duration_s: float) -> Case:
@@ -83,8 +88,17 @@ class HostileRig(Rig):
         self._ticks = 0
         self._delay_s, self._delayed_until_s = 0.0, 0.0
         self._under_way: list[tuple[float, bytes]] = []
+        self._copies_next_position = False
+        self.process: threading.Thread | None = None
+        """Stands for the process of a vehicle that may be killed."""
+        self.is_process_dead = False
+        self.is_over = threading.Event()
+        """The process has ended its work, or is dead."""
         super().__init__(case)
         self._forger = MessageForger(case.autopilot, DIALECTS[case.autopilot], self.drone, random.Random(case.seed))
+        hazard = HAZARDS[case.faults[0].kind]
+        if hazard.is_always and hazard.link is not None:
+            self.acting.append((hazard.link(self._forger), FOR_GOOD_S))
 
     def write(self, data: bytes) -> bool:
         """Deliver data in the order in which it was sent, delayed or at once."""
@@ -103,8 +117,16 @@ class HostileRig(Rig):
             if now_s < until_s:
                 frames = hostility.transform(frames, now_s)
         self._received_s = now_s if frames else self._received_s
+        if self._copies_next_position:
+            self._copy_position(frames)
         self._watch_pilot(frames, now_s)
         return frames
+
+    def _copy_position(self, frames: list[bytes]) -> None:
+        read = ((frame, self._forger.read(frame)) for frame in frames)
+        for frame in (frame for frame, message in read if message is not None and message.get_type() == POSITION):
+            self.deliver(frame, OTHER_PORT)
+            self._copies_next_position = False
 
     def _watch_pilot(self, frames: list[bytes], now_s: float) -> None:
         """Record when heartbeats show a pilot after the takeoff, and when the vehicle is taken from that pilot."""
@@ -120,6 +142,9 @@ class HostileRig(Rig):
 
     def tick(self) -> None:
         super().tick()
+        if self.is_process_dead and threading.current_thread() is self.process:
+            self.is_over.set()
+            threading.Event().wait()
         self._deliver()
         self._ticks += 1
         if self._ticks % _STATE_TICKS == 0:
@@ -143,22 +168,40 @@ class HostileRig(Rig):
             armed=self.drone.autopilot.armed,
             holds_safe=self.holds(self.case.safe),
             rose_m=self.rose_m,
+            impact_m_s=self.impact_m_s,
         )
 
     def _inject(self, planned: PlannedFault, now_s: float) -> None:
-        state = self.states.now
-        if state is None or planned.kind not in HAZARDS:
+        state, hazard = self.states.now, HAZARDS.get(planned.kind)
+        if state is None or hazard is None:
             return super()._inject(planned, now_s)
-        fault, most_s = VEHICLE_HAZARDS.get(planned.kind, ("", FOR_GOOD_S))
-        lasts_s = min(planned.duration_s, most_s)
+        lasts_s = min(planned.duration_s, hazard.longest_s)
         self.injected.append(InjectedFault(planned.kind, state, now_s, now_s + lasts_s))
-        if planned.kind in COMMAND_DELAYS_S:
-            self._delay_s, self._delayed_until_s = COMMAND_DELAYS_S[planned.kind], now_s + lasts_s
-        elif fault:
+        for fault in hazard.faults:
             self.drone.inject_fault(fault, lasts_s)
-        else:
-            self.acting.append((LINK_HAZARDS[planned.kind](self._forger), now_s + lasts_s))
+        if hazard.late_s:
+            self._delay_s, self._delayed_until_s = hazard.late_s, now_s + lasts_s
+        if hazard.link is not None and not hazard.is_always:
+            self.acting.append((hazard.link(self._forger), now_s + lasts_s))
+        if hazard.act is not None:
+            hazard.act(self)
         return None
+
+    # ---- what a hazard can do that changes neither the packets nor the vehicle
+
+    def kill_process(self) -> None:
+        self.is_process_dead = True
+
+    def copy_from_other_port(self) -> None:
+        self._copies_next_position = True
+
+    def move_to_other_port(self) -> None:
+        self.peer = OTHER_PORT
+
+    def enter_offboard(self) -> None:
+        autopilot = self.drone.autopilot
+        if isinstance(autopilot, Copter):
+            autopilot.mode = autopilot.find_mode("OFFBOARD")
 
 
 def run_trial(case: Case) -> HostileResult:
@@ -166,11 +209,15 @@ def run_trial(case: Case) -> HostileResult:
     rig = HostileRig(case)
     rig.wait_s(case.powered_s)
     rig.states.begin(rig.now_s())
+    if case.faults[0].kind != PROCESS_KILLED:
+        return _run(rig)
+    ended = _until_death(rig, lambda: _run(rig))
+    return ended if ended is not None else _go_on_after_death(rig)
+
+
+def _run(rig: HostileRig) -> HostileResult:
     try:
-        source = open_source("odometry", rig) if case.has_second_source else None
-        vehicle = MavlinkVehicle(
-            rig.options(), case.safe, is_real=False, clock=rig, source=source, transport=rig, observes=True
-        )
+        vehicle = _connect(rig)
     except VehicleError as error:
         rig.states.ended_s = rig.drone.time_s
         return _result(rig, ReportedOutcome("refused", "unopened", str(error)))
@@ -180,22 +227,76 @@ def run_trial(case: Case) -> HostileResult:
         vehicle.close()
 
 
+def _connect(rig: HostileRig) -> MavlinkVehicle:
+    case = rig.case
+    source = open_source("odometry", rig) if case.has_second_source else None
+    return MavlinkVehicle(
+        rig.options(), case.safe, is_real=False, clock=rig, source=source, transport=rig, observes=True
+    )
+
+
+def _until_death(rig: HostileRig, work: Callable[[], HostileResult]) -> HostileResult | None:
+    """Return the result of the program's work, which runs in a thread that stands still for ever once the process is
+    killed, without closing or ending anything; None if it was killed."""
+    ended: list[HostileResult] = []
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            ended.append(work())
+        except BaseException as error:  # noqa: BLE001 - raised again by the caller
+            errors.append(error)
+        rig.is_over.set()
+
+    rig.process = threading.Thread(target=run, daemon=True)
+    rig.process.start()
+    rig.is_over.wait()
+    for error in errors:
+        raise error
+    return ended[0] if ended else None
+
+
+def _go_on_after_death(rig: HostileRig) -> HostileResult:
+    """Reconnect as another process does, attend to the vehicle, and return what it reports."""
+    rig.states.ended_s = rig.drone.time_s
+    rig.wait_s(KILLED_FOR_S)
+    try:
+        vehicle = _reconnect(rig)
+    except VehicleError as error:
+        return _result(rig, ReportedOutcome("lost", "unopened", str(error)))
+    _attend(rig, vehicle)
+    concern = vehicle.concern
+    left = _restore_safe_gains(rig, vehicle)
+    return _result(rig, ReportedOutcome("lost", left, concern, concern, vehicle.concern))
+
+
+def _reconnect(rig: HostileRig) -> MavlinkVehicle:
+    """Connect as a new process does, which knows what the program has stored."""
+    return _connect(rig)
+
+
 def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
     record: FlightRecord | None = None
-    outcome = "refused"
+    outcome, failure = "refused", None
     try:
         held = vehicle.stage(rig.case.gains)
         if held != rig.case.gains:
             raise VehicleError(f"it holds {held}", hint="")
         record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
-        outcome, reason = outcome_of(record), record.reason
+        outcome, reason, failure = outcome_of(record), record.reason, _failure_of(record)
     except VehicleError as error:
         reason = str(error)
     rig.states.ended_s, concern = rig.drone.time_s, vehicle.concern
     left = _restore_safe_gains(rig, vehicle)
     _attend(rig, vehicle)
     trajectory = None if record is None else record.trajectory
-    return _result(rig, ReportedOutcome(outcome, left, reason, concern or vehicle.concern, vehicle.concern, trajectory))
+    reported = ReportedOutcome(outcome, left, reason, concern or vehicle.concern, vehicle.concern, trajectory, failure)
+    return _result(rig, reported)
+
+
+def _failure_of(record: FlightRecord) -> str | None:
+    """Return the code of the failure; None if records do not have it."""
+    return getattr(record, "failure", None)
 
 
 def _attend(rig: HostileRig, vehicle: MavlinkVehicle) -> None:

@@ -160,7 +160,7 @@ class Rig(Lockstep):
         return frames
 
     def write(self, data: bytes) -> bool:
-        for message in self._codec.parse(data):
+        for message in self._codec.parse(data) if self.remote == self.peer else ():
             self._tap(read_command(self.case.autopilot, message), stops=stops_motors(self.case.autopilot, message))
         return super().write(data)
 

@@ -1,14 +1,17 @@
 """Everything that can go wrong with a simulated drone on demand, as a ground station sees it."""
 
+import math
+import statistics
 from itertools import pairwise
 
 import pytest
 
 from app.core.errors import InputError
+from app.simdrone.drone import Drone
 from app.simdrone.faults import FAULTS, PlannedFault, parse_fault
 from tests.simdrone import copters
-from tests.simdrone.ground import Heard, flying
-from tests.simdrone.paparazzi import LAND_HERE, START_ENGINE, Pilot, from_vehicle
+from tests.simdrone.ground import Ground, Heard, LockstepWire, flying
+from tests.simdrone.paparazzi import GROUND_M, LAND_HERE, START_ENGINE, Pilot, from_vehicle
 
 
 def positions(messages: list[Heard]) -> list[Heard]:
@@ -226,10 +229,110 @@ def test_a_pilot_takes_it_over_holds_it_and_hands_it_back(
         assert ground.expect("LOCAL_POSITION_NED").z == pytest.approx(before_m, abs=0.4)
 
 
+def hovering(autopilot: str) -> Ground:
+    """A ground station of a drone that hovers at 3 m."""
+    ground = flying(autopilot)
+    match autopilot:
+        case "paparazzi":
+            pilot = Pilot(ground)
+            pilot.set_gains(1624, 1356, 195)
+            pilot.hover()
+        case "ardupilot":
+            copters.ArduPilot(ground).hover()
+        case _:
+            copters.Px4(ground).hover()
+    ground.listen(4.0)
+    return ground
+
+
+def drone_of(ground: Ground) -> Drone:
+    assert isinstance(ground.wire, LockstepWire)
+    return ground.wire.lockstep.drone
+
+
+def test_in_a_fall_paparazzis_estimated_altitude_steps_as_in_the_recorded_one() -> None:
+    """Recorded in a fall from 3.3 m: −0.30, −0.45 and −0.52 m from one sample to the next at −3.7, −5.0 and −6.8 m/s,
+    then down to 1.2 m below the ground, which it passed at −6.5 m/s."""
+    ground = hovering("paparazzi")
+    drone_of(ground).inject_fault("foreign-kill")
+    heard = positions(ground.listen(4.0))
+    steps_m = [before.z - after.z + 0.02 * after.vz for before, after in pairwise(heard)]
+    assert min(steps_m) == pytest.approx(-0.52, abs=0.1)
+    assert sum(step_m < -0.25 for step_m in steps_m) >= 3
+    assert max(each.vz for each in heard) == pytest.approx(6.5, abs=1.0)
+    assert max(each.z for each in heard) == pytest.approx(1.2, abs=0.6)
+    assert (-heard[-1].z, heard[-1].vz) == pytest.approx((GROUND_M, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize("autopilot", ["paparazzi", "ardupilot", "px4"])
+def test_another_station_stops_the_motors_in_the_air(autopilot: str) -> None:
+    ground = hovering(autopilot)
+    drone_of(ground).inject_fault("foreign-kill")
+    assert not ground.expect("HEARTBEAT", within_s=4.0).base_mode & 128
+    ground.listen(1.5)
+    assert drone_of(ground).body.altitude_m == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("fault", "drift_m_s"), [("drifting-altitude", 0.5), ("creeping-altitude", 0.1)])
+def test_a_drift_of_the_altitude_is_in_the_telemetry_alone(fault: str, drift_m_s: float) -> None:
+    ground = hovering("paparazzi")
+    drone_of(ground).inject_fault(fault)
+    last = positions(ground.listen(4.0))[-1]
+    true_m = drone_of(ground).body.altitude_m
+    assert true_m == pytest.approx(2.9, abs=0.1)
+    assert last.z + true_m + GROUND_M == pytest.approx(4.0 * drift_m_s, abs=0.03)
+    assert last.vz == pytest.approx(drift_m_s, abs=0.1)
+
+
+def test_a_drift_ends_at_the_ground() -> None:
+    ground = hovering("paparazzi")
+    drone_of(ground).inject_fault("drifting-altitude")
+    last = positions(ground.listen(8.0))[-1]
+    assert (-last.z, last.vz) == pytest.approx((GROUND_M, 0.0), abs=0.01)
+    assert drone_of(ground).body.altitude_m > 2.5
+
+
+def test_a_stuck_altitude_keeps_its_clock() -> None:
+    ground = flying("paparazzi", faults=["stuck-altitude@connect"])
+    pilot = Pilot(ground)
+    pilot.set_gains(1624, 1356, 195)
+    pilot.take_off()
+    heard = positions(ground.listen(6.0))
+    assert {(each.z, each.vz) for each in heard} == {(-GROUND_M, 0.0)}
+    assert len({each.time_boot_ms for each in heard}) == len(heard) > 250
+    assert drone_of(ground).body.altitude_m > 2.0
+
+
+def test_a_lean_oscillation_has_a_standard_deviation_of_28_degrees() -> None:
+    ground = flying("paparazzi", faults=["lean-oscillation@connect"])
+    rolls = [each.roll for each in ground.listen(20.0) if each.get_type() == "ATTITUDE"]
+    assert math.degrees(statistics.pstdev(rolls)) == pytest.approx(28.0, abs=2.0)
+
+
+@pytest.mark.parametrize(("autopilot", "height_m"), [("paparazzi", 0.9), ("ardupilot", 0.0)])
+def test_it_flies_home_by_itself(autopilot: str, height_m: float) -> None:
+    """Paparazzi to the height of its HOME mode, 1 m in its own frame; a return of the others only lands."""
+    ground = hovering(autopilot)
+    drone_of(ground).inject_fault("flies-home")
+    ground.listen(12.0)
+    assert drone_of(ground).body.altitude_m == pytest.approx(height_m, abs=0.1)
+
+
+@pytest.mark.parametrize(("autopilot", "kind"), [("paparazzi", "SCRIPT_CURRENT"), ("px4", "EXTENDED_SYS_STATE")])
+def test_a_silent_witness_does_not_tell_of_the_landing(autopilot: str, kind: str) -> None:
+    ground = hovering(autopilot)
+    assert any(each.get_type() == kind for each in ground.heard)
+    drone_of(ground).inject_fault("silent-witness")
+    if autopilot == "paparazzi":
+        Pilot(ground).block(LAND_HERE)
+    assert all(each.get_type() != kind for each in ground.listen(3.0))
+
+
 def test_the_registry_holds_what_was_promised() -> None:
     promised = (
-        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost deaf ack-lost taken-over frozen-position "
-        "jumping-position low-battery reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost "
+        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost deaf ack-lost silent-witness taken-over "
+        "foreign-kill flies-home frozen-position jumping-position stuck-altitude drifting-altitude creeping-altitude "
+        "lean-oscillation low-battery reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost "
         "mocap-frozen mocap-drift"
     )
     assert list(FAULTS) == promised.split()

@@ -168,7 +168,7 @@ STOPS: dict[str, Callable[[Pilot], object]] = {
 def test_what_stops_the_motors_stops_them_in_the_air_and_it_falls(stop: str, pilot: Pilot) -> None:
     pilot.hover()
     STOPS[stop](pilot)
-    fall = from_vehicle(pilot.ground.listen(2.0), "LOCAL_POSITION_NED")
+    fall = from_vehicle(pilot.ground.listen(3.0), "LOCAL_POSITION_NED")
     assert max(each.vz for each in fall) > 5.5
     assert -fall[-1].z == pytest.approx(GROUND_M, abs=0.03)
     assert not pilot.ground.expect("HEARTBEAT").base_mode & ARMED
