@@ -14,7 +14,7 @@ from app.core.records.trajectory import Trajectory
 from bench.hazards.cases import ABORT, FOR_GOOD_S, Case
 from bench.hazards.hostile_table import HARMLESS, HAZARDS, LEADS, NOT_SEEN, PILOTS, PROCESS_KILLED, Expected
 from bench.hazards.rig import InjectedFault, MotorStop
-from bench.hazards.trial_states import LIFTED_M, RECORDED_S, RESTING_M, TrialStates
+from bench.hazards.trial_states import LIFTED_M, RECORDED_S, RESTING_M, State, TrialStates
 from bench.hazards.wire import Command
 
 CEILING_M: Final = 5.5
@@ -140,7 +140,8 @@ def _vehicle(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
         yield f"the vehicle rose to {highest_m:.2f} m"
     if reported.vehicle == "safe" and (truth.armed or not truth.holds_safe):
         yield f"reported as safe, but is {'armed' if truth.armed else 'not on its safe gains'}"
-    if reported.vehicle == "safe" and truth.impact_m_s > FELL_M_S:
+    was_heard = truth.hazard is None or truth.hazard.state is not State.LINK_LOST
+    if reported.vehicle == "safe" and truth.impact_m_s > FELL_M_S and was_heard:
         yield f"reported as safe, but it hit the ground at {truth.impact_m_s:.1f} m/s"
     if reported.vehicle == "unopened":
         return

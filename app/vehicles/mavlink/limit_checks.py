@@ -32,6 +32,8 @@ _JUMP_ENDS_RECORD_M: Final = 0.5
 _UNCHANGED_S: Final = 1.0
 """In recordings of all three autopilots, no two consecutive estimates in flight are equal in altitude and climb
 rate."""
+_CONTRADICTED_S: Final = 4.0
+"""Longer than an autopilot takes to detect its landing."""
 _STEPPED_S: Final = 0.3
 """A greater step of the clock is not one of the latency."""
 _LEANING: Final = 0.5
@@ -164,7 +166,8 @@ def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, s
 def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     why = ""
     if watch.stuck_s > limits.stuck_s and watch.other is not None and watch.last is not None:
-        why = f"Its clock jumped by {watch.other.last.time_boot_s - watch.last.time_boot_s:+.1f} s."
+        gained_s = watch.other.last.time_boot_s - watch.last.time_boot_s
+        why = f"Its clock jumped by {gained_s - (watch.other.last_s - watch.accepted_s):+.1f} s."
     elif watch.stuck_s > limits.stuck_s:
         why = f"Its clock stood still for more than {limits.stuck_s:g} s."
     elif watch.stepped_s > _STEPPED_S:
@@ -240,15 +243,29 @@ def find_jump(watch: TrialObservation) -> Finding | None:
 
 
 def find_drift(watch: TrialObservation, now_s: float, ground_m: float, landed_blocks: frozenset[str]) -> Finding | None:
-    """Find that the altitude of a flown vehicle has drifted: it is below the ground, or the vehicle reports that it has
-    landed where its altitude does not."""
+    """Find that the altitude of a flown vehicle has drifted: it is below the ground, or it shows the ground or the air
+    where the vehicle reports the other."""
     if watch.last is None or watch.doubted is not None or not is_fresh(watch, now_s):
         return None
     off_m = watch.last.altitude_m - ground_m
     has_landed = watch.lifted and has_reported_landing(watch, now_s, landed_blocks)
+    since_s = watch.contradicted_since_s
+    if since_s is not None and now_s - since_s > _CONTRADICTED_S:
+        return Finding(failure=Failure.LOST_POSITION, why="It reports that it flies, but its altitude is the ground's.")
     if off_m >= -DRIFT_M and not (off_m > DRIFT_M and has_landed):
         return None
     return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude has drifted: it was {off_m:+.1f} m on the ground.")
+
+
+def find_sunken(watch: TrialObservation, lowest_m: float, ground_m: float) -> Finding | None:
+    """Find at the end of a record that the vehicle, or its altitude alone, has sunk to less than half of the lowest set
+    point, where it had been near that."""
+    had_climbed = watch.highest_m >= lowest_m - _CLIMBED_WITHIN_M
+    height_m = 0.0 if watch.last is None else watch.last.altitude_m - ground_m
+    if not had_climbed or height_m >= 0.5 * (lowest_m - ground_m):
+        return None
+    why = f"At the end of the record it was {height_m:.1f} m above the ground: it, or its altitude alone, has sunk."
+    return Finding(failure=Failure.LOST_POSITION, why=why)
 
 
 def find_altitude_behind(watch: TrialObservation) -> Finding | None:

@@ -138,6 +138,8 @@ class TrialObservation:
     landed_since_s: float = 0.0
     """Since when its landed state has been the same."""
     grounded_since_s: float | None = None
+    contradicted_since_s: float | None = None
+    """Since when it reports that it flies while its position is on the ground."""
     highest_m: float = float("-inf")
     """Greatest altitude since the command."""
     lifted: bool = False
@@ -232,12 +234,14 @@ def settle(watch: TrialObservation, now_s: float, ground_m: float, *, commanded:
     stands = not commanded and stands_by_own_account(watch, now_s, ground_m)
     airborne = is_airborne(watch, now_s, ground_m) and not stands
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
-    grounded = (stands or is_grounded(watch, now_s, ground_m)) and not is_said_to_fly(watch, now_s, ground_m)
+    grounded, said_to_fly = stands or is_grounded(watch, now_s, ground_m), is_said_to_fly(watch, now_s, ground_m)
+    flying_since_s = watch.contradicted_since_s if watch.contradicted_since_s is not None else now_s
     return with_changes(
         watch,
         lifted=watch.lifted or airborne,
         unseen=watch.unseen and not airborne,
-        grounded_since_s=since_s if grounded else None,
+        grounded_since_s=since_s if grounded and not said_to_fly else None,
+        contradicted_since_s=flying_since_s if grounded and said_to_fly else None,
     )
 
 

@@ -201,8 +201,8 @@ def _with_disarming(trial: Trial) -> Trial:
 
 
 def _with_drift(trial: Trial, now_s: float) -> Trial:
-    """Note an altitude that has drifted: limits that it exceeded may have been false."""
-    if trial.stopped or trial.state not in {*_FLOWN, State.DISARM} or trial.commanded_s is None:
+    """Note an altitude that has drifted: limits that it exceeded may have been false. In a fall it lags."""
+    if trial.stopped or trial.state not in {*_FLOWN, State.DISARM} or trial.commanded_s is None or trial.fell_s:
         return trial
     plan = trial.plan
     drift = limit_checks.find_drift(trial.watch, now_s, plan.ground_m, plan.limits.landed_blocks)
@@ -328,6 +328,9 @@ def _record(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
+    lowest_m = min(trial.plan.set_points.altitudes_m) + trial.plan.datum_m
+    if sunken := limit_checks.find_sunken(trial.watch, lowest_m, trial.plan.ground_m):
+        trial = note(trial, sunken)
     incomplete = limit_checks.find_incomplete_climb(trial.watch, trial.plan.climb_to_m)
     if trial.plan.climbs_from_ground and incomplete:
         trial = note(trial, incomplete)

@@ -1,15 +1,17 @@
 """Recorded traffic of whole trials with the real Paparazzi autopilot, both directions, read back."""
 
+import gzip
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from app.vehicles.mavlink.dialects import PAPARAZZI, Message, source_system
+from app.vehicles.mavlink.dialects import PAPARAZZI, Dialect, Message, source_system
 
 LOGS = Path(__file__).parents[2] / "data" / "logs"
 VEHICLE = 31
+_MAVLINK_1 = 0xFE
 GROUND_STATION = 255
 FLOWN = [(283, 13, 82), (1624, 1356, 195)]
 """Gains (kp, ki, kd) of the trials that were recorded."""
@@ -34,17 +36,18 @@ class Recorded:
 @cache
 def recorded(gains: tuple[int, int, int]) -> tuple[Recorded, ...]:
     """Every message of one trial in the order of the wire."""
-    return tuple(_read(gains))
+    return tuple(read(LOGS / f"paparazzi_{'_'.join(map(str, gains))}.tlog", PAPARAZZI))
 
 
-def _read(gains: tuple[int, int, int]) -> Iterator[Recorded]:
-    data = (LOGS / f"paparazzi_{'_'.join(map(str, gains))}.tlog").read_bytes()
-    codec = PAPARAZZI.codec(system=GROUND_STATION, component=190)
+def read(path: Path, dialect: Dialect) -> Iterator[Recorded]:
+    """Every message of a telemetry log, which may be compressed."""
+    data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+    codec = dialect.codec(system=GROUND_STATION, component=190)
     (first_us,) = struct.unpack_from(">Q", data)
     at = 0
     while at < len(data):
         (time_us,) = struct.unpack_from(">Q", data, at)
-        length = 8 + data[at + 9]
+        length = data[at + 9] + (8 if data[at + 8] == _MAVLINK_1 else 12)
         for message in codec.parse(data[at + 8 : at + 8 + length]):
             yield Recorded((time_us - first_us) / 1e6, message)
         at += 8 + length

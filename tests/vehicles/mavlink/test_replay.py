@@ -9,6 +9,7 @@ import pytest
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
 from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.dialects import source_system
 from app.vehicles.mavlink.events import (
     Action,
     ActionDone,
@@ -23,11 +24,11 @@ from app.vehicles.mavlink.events import (
     Setting,
     Tick,
 )
-from app.vehicles.mavlink.failures import Limits
+from app.vehicles.mavlink.failures import Failure, Limits
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.trial_machine import Plan, Trial, advance, begin
 from app.vehicles.mavlink.trial_reactions import State
-from tests.vehicles.mavlink.replaying import FLOWN, Recorded, messages, recorded
+from tests.vehicles.mavlink.replaying import FLOWN, GROUND_STATION, LOGS, Recorded, messages, read, recorded
 
 PAPARAZZI = PROFILES["paparazzi"]
 TAKEOFFS = Path(__file__).parents[2] / "data" / "takeoffs"
@@ -158,3 +159,49 @@ def test_land_is_told_when_it_was_and_the_ground_is_recognised_soon(
     touched_s = flight.when(Action.MOTORS_OFF) - 2.0
     assert 3.0 < touched_s - flight.landing_s < 8.0
     assert flight.when(Action.MOTORS_OFF) < flight.kill_s - 10.0
+
+
+def heard(log: str, autopilot: str) -> list[PacketReceived]:
+    """What the vehicle sent in a log."""
+    profile = PROFILES[autopilot]
+    vehicle = [each for each in read(LOGS / log, profile.dialect) if source_system(each.message) != GROUND_STATION]
+    return [PacketReceived(profile.measure(each.message), each.time_s) for each in vehicle]
+
+
+def follow(plan: Plan, packets: list[PacketReceived], armed_s: float) -> tuple[Trial, list[Action]]:
+    """Begin a trial at the last position before `armed_s`, and hear the rest."""
+    before = [each.measurement for each in packets if each.now_s < armed_s and isinstance(each.measurement, Position)]
+    trial, commands = begin(plan, watching.begin(armed_s, last=before[-1], battery_v=12.4, stood_s=1.0), armed_s)
+    told = list(commands)
+    events: list[Event] = [ActionDone(Action.ARM, armed_s)]
+    events += [event for each in packets if each.now_s >= armed_s for event in (each, Tick(each.now_s))]
+    for event in events:
+        trial, commands = advance(trial, event)
+        told += commands
+        if RestoreGains() in commands:
+            trial, _ = advance(trial, GainsRestored(event.now_s))
+    return trial, [command.action for command in told if isinstance(command, PerformAction)]
+
+
+def test_a_recorded_fall_whose_altitude_steps_is_a_fall_and_not_the_gains() -> None:
+    """Another station stopped the motors at 3.3 m: 8 steps of its altitude, up to 0.65 m, and -6.5 m/s at the ground.
+    It was aborted for its climb rate of -4.1 m/s, and ready."""
+    packets = heard("paparazzi_motors_stopped_in_the_air.tlog", "paparazzi")
+    limits = replace(LIMITS, landed_blocks=PAPARAZZI.landed_blocks)
+    plan = Plan(safe_gains=SAFE_GAINS, limits=limits, ground_m=0.1, lift_off_s=PAPARAZZI.lift_off_s)
+    trial, actions = follow(plan, packets, 1.5)
+    assert (trial.state, trial.failure, trial.contact) == (State.QUARANTINE, Failure.UNEXPECTED, "fell")
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(actions)
+
+
+def test_a_recorded_drift_on_the_ground_after_arming_is_no_takeoff_and_no_quarantine() -> None:
+    """0.45 m in 3.6 s, while its landed state was on the ground: its motors were not stopped, because it was taken to
+    be in the air."""
+    px4 = PROFILES["px4"]
+    packets = heard("px4_ground_drift_after_arming.tlog.gz", "px4")
+    limits = replace(LIMITS, heartbeat_s=1.0, flying_modes=px4.flying_modes, landing_modes=px4.landing_modes, blocks={})
+    limits = replace(limits, arming_blocks=frozenset(), flying_blocks=frozenset(), landing_blocks=frozenset())
+    plan = Plan(safe_gains=SAFE_GAINS, limits=limits, ground_m=0.2, lift_off_s=px4.lift_off_s, climbs_from_ground=True)
+    trial, actions = follow(plan, [each for each in packets if each.now_s < 5.0], 1.1)
+    assert (trial.state, trial.failure) == (State.DISARM, Failure.LOST_POSITION)
+    assert (actions[0], set(actions[1:])) == (Action.ARM, {Action.MOTORS_OFF})

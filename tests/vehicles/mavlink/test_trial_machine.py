@@ -1,23 +1,28 @@
 """A trial as a pure machine: the good flight, then every failure in every state."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
+from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     DISARMING,
     AbortRequested,
     Action,
     ActionDone,
     ActionRefused,
+    Attitude,
     BlockEntered,
     CommandReply,
     DuplicateVehicleDetected,
     FenceBreach,
     Heartbeat,
+    InvalidPosition,
     Measurement,
+    ModeParameter,
     Parameter,
     PerformAction,
     Position,
@@ -926,3 +931,125 @@ def test_an_altitude_that_drifts_up_does_not_hide_that_the_vehicle_has_landed_an
     walk.pass_s(0.5).armed = False
     walk.pass_s(4.0)
     assert (walk.state, walk.trial.failure) == (State.RESTORE, None)
+
+
+def test_motors_that_another_station_stops_in_the_air_are_found_off_though_a_limit_was_exceeded_first() -> None:
+    walk = recording()
+    walk.armed = False
+    walk.climb_rate_m_s = -4.5
+    walk.pass_s(0.2)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.ENVELOPE)
+    walk.climb_rate_m_s = -6.0
+    walk.pass_s(0.3)
+    walk.altitude_m, walk.climb_rate_m_s, walk.climbed_m = GROUND_M, 0.0, 0.0
+    walk.pass_s(4.0).restore()
+    assert (walk.state, walk.trial.failure, walk.trial.contact) == (State.QUARANTINE, Failure.UNEXPECTED, "fell")
+
+
+@pytest.mark.parametrize("report_s", [1.0, 30.0])
+def test_a_landing_is_not_believed_by_altitude_alone_once_the_landed_state_that_told_of_it_is_silent(
+    report_s: float,
+) -> None:
+    """A drifting altitude showed the ground at 2.1 m, and the motors were stopped there."""
+    walk = recording()
+    walk.without_landed_state = True
+    walk.pass_s(report_s).touch_down()
+    assert walk.state is State.QUARANTINE
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+
+
+def test_an_altitude_that_drifts_below_the_ground_is_lost_and_is_no_limit_of_the_gains() -> None:
+    walk = TrialDriver(plan=replace(PLAN, record_s=33.0)).lift_off()
+    walk.climb_rate_m_s, walk.landed = -0.5, False
+    walk.pass_s(8.5)
+    assert (walk.trial.failure, walk.trial.outcome) == (Failure.LOST_POSITION, "invalid")
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+
+
+def test_a_record_at_whose_end_the_vehicle_or_its_altitude_has_sunk_is_invalid() -> None:
+    walk = recording()
+    walk.climb_rate_m_s = -0.5
+    walk.pass_s(3.9)
+    walk.climb_rate_m_s = 0.0
+    while walk.state is State.RECORD:
+        walk.pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.LAND, Failure.LOST_POSITION)
+
+
+def test_an_altitude_that_shows_the_ground_while_the_vehicle_reports_that_it_flies_is_lost() -> None:
+    walk = landing()
+    walk.landed = False
+    walk.touch_down()
+    assert (walk.trial.failure, walk.trial.outcome) == (Failure.LOST_POSITION, "quarantine")
+
+
+@pytest.mark.parametrize(("by_s", "failure"), [(0.1, None), (0.25, None), (1.0, Failure.FROZEN), (3.0, Failure.FROZEN)])
+def test_a_clock_that_steps_ahead_by_more_than_a_latency_ends_the_flight(by_s: float, failure: Failure | None) -> None:
+    walk = recording()
+    walk.boot_s += by_s
+    walk.pass_s(0.5)
+    assert walk.trial.failure is failure
+    assert walk.trial.why == (f"Its clock jumped {'ahead by 1.0' if by_s == 1.0 else 'by +3.0'} s." if failure else "")
+
+
+@pytest.mark.parametrize("by_s", [-3.0, -1.0, -0.1, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0])
+def test_one_stamp_ahead_or_behind_decides_nothing(by_s: float) -> None:
+    walk = recording().hear(Position(recording().boot_s + by_s, GROUND_M, 0.0))
+    walk.pass_s(2.0)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+
+
+def test_the_clock_may_begin_again_after_49_7_days() -> None:
+    walk = TrialDriver(boot_s=WRAP_S - 5.0).lift_off().pass_s(2.0)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+    assert walk.kept[-1].position.time_boot_s > WRAP_S
+
+
+def test_positions_that_are_not_numbers_for_a_moment_are_only_left_out() -> None:
+    walk = recording()
+    for _ in range(15):
+        walk.blind = True
+        walk.hear(InvalidPosition(walk.boot_s + STEP_S)).pass_s(STEP_S)
+    walk.blind = False
+    walk.pass_s(0.5)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+    walk.blind = True
+    for _ in range(30):
+        walk.hear(InvalidPosition(walk.boot_s + STEP_S)).pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
+
+
+def test_a_mode_that_heartbeats_do_not_show_is_asked_for_and_two_replies_end_the_flight() -> None:
+    mode = ModeParameter("aut_mod", 1600.0, {2.0: "home"})
+    walk = TrialDriver(plan=replace(PLAN, mode_parameter=mode)).lift_off().pass_s(1.0)
+    asked = [at_s for at_s, command in walk.told if command == RequestGain("aut_mod")]
+    assert len(asked) >= 3, "every second"
+    walk.hear(Parameter("aut_mod", 2.0))
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+    walk.hear(Parameter("aut_mod", 2.0)).pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.UNEXPECTED)
+    assert walk.trial.why == "The vehicle entered mode home."
+
+
+@pytest.mark.parametrize(("amplitude_rad", "ends"), [(0.69, True), (0.2, False)], ids=["28 deg rms", "8 deg rms"])
+def test_an_attitude_that_oscillates_exceeds_a_limit(amplitude_rad: float, ends: bool) -> None:
+    """0.69 rad are a standard deviation of 28°; at 2 Hz, as Paparazzi reports it."""
+    walk = recording()
+    for half_s in range(10):
+        walk.hear(Attitude(abs(amplitude_rad * math.sin(2.3 * half_s + 0.4)))).pass_s(0.5)
+    assert (walk.trial.failure is Failure.ENVELOPE) is ends
+
+
+def test_one_attitude_decides_nothing() -> None:
+    walk = recording().hear(Attitude(0.0)).pass_s(0.5).hear(Attitude(3.0)).pass_s(0.5)
+    assert walk.trial.failure is None
+
+
+def test_an_altitude_that_stands_still_while_the_clock_runs_is_frozen() -> None:
+    walk = recording()
+    stuck = walk.kept[-1].position
+    walk.blind = True
+    for _ in range(60):
+        walk.hear(replace(stuck, time_boot_s=walk.boot_s + STEP_S)).pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
+    assert walk.trial.why == "Its altitude stood still for more than 1 s while its clock ran."

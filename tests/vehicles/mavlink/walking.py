@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from app.vehicles.mavlink import observation as watching
+from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     DISARMING,
     Action,
@@ -123,7 +124,7 @@ class TrialDriver:
 
     def _speak(self) -> None:
         estimated_m = self.altitude_m + _NOISE_M * (self.steps % 2)
-        here = Position(round(self.boot_s, 6), estimated_m, self.climb_rate_m_s, self.north_m)
+        here = Position(round(self.boot_s % WRAP_S, 6), estimated_m, self.climb_rate_m_s, self.north_m)
         self.hear(None if self.blind else here)
         if not self.without_landed_state:
             self.hear(LandedState(self.climbed_m < 0.1 if self.landed is None else self.landed))
