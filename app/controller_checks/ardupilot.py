@@ -15,7 +15,7 @@ from app.logs.ardupilot_log import read_ardupilot_log
 from app.logs.ardupilot_trace import is_ardupilot_trace, read_ardupilot_trace
 from app.logs.dataflash import is_dataflash
 
-_PRECISION: Final = "the firmware computes in single precision, the replica in double"
+_PRECISION: Final = "firmware and recording have single precision"
 
 
 def _signal(title: str, unit: str, digits: int, tolerance: float) -> Signal:

@@ -11,7 +11,7 @@ from app.controller_checks.autopilot import Autopilot, Beginning, Recording
 from app.controller_checks.results import Kind, Result, Signal, SignalResult, TraceReplay, grouped, result_of_trace
 from app.core.control.px4 import OUTPUTS
 from app.core.control.px4_log import COMPARED, LoopLog, replica_of
-from app.core.control.px4_replay import LoopTrace, replayed
+from app.core.control.px4_replay import LoopTrace, Replay, replayed
 from app.core.errors import InputError, Problem
 from app.core.records.trajectory import Samples
 from app.logs.px4_log import read_px4_log
@@ -39,7 +39,7 @@ _SIGNALS: Final[Mapping[str, Signal]] = MappingProxyType(
     }
 )
 _MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
-    {"takeoff_state": _TOLERANCE, "out_vz_m_s": 1e-6, "out_az_m_s2": 2e-2, "out_thrust": 1e-3}
+    {"takeoff_state": _TOLERANCE, "out_vz_m_s": 1e-6, "out_az_m_s2": 2e-3, "out_thrust": 1e-4}
 )
 """What the median difference of a signal over a flight may be."""
 _LOG_MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
@@ -47,7 +47,7 @@ _LOG_MEDIANS: Final[Mapping[str, float]] = MappingProxyType(
 )
 """The same in a log, whose rows are computed from themselves or the row before, with a hover thrust interpolated."""
 
-_OF_A_FLIGHT: Final = "the median over the flight; single rows are undecided where messages share a time stamp"
+_OF_A_FLIGHT: Final = "the median over the flight; at a limit the thrust depends on the tilt, which is not recorded"
 _DOWN: Final = "Altitude, velocity and acceleration are positive down, as in PX4."
 _HOW: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
@@ -83,15 +83,24 @@ def _examine(recording: Recording) -> Result:
 
 def _replayed(trace: LoopTrace) -> TraceReplay:
     recorded = dict(zip(OUTPUTS, trace.outputs.T, strict=True))
-    computed = dict(zip(OUTPUTS, replayed(trace).T, strict=True))
+    replay = replayed(trace)
+    computed = dict(zip(OUTPUTS, replay.outputs.T, strict=True))
     compared = [name for name, values in recorded.items() if not np.isnan(values).all()]
     return TraceReplay(
         time_s=trace.time_s,
         recorded={name: recorded[name] for name in compared},
         replica={name: computed[name] for name in compared},
         gains=trace.parameters.gains,
-        notes=(_DOWN,),
+        notes=(*_order_notes(replay), _DOWN),
     )
+
+
+def _order_notes(replay: Replay) -> Iterable[str]:
+    if replay.late_rows:
+        rows = ", ".join(map(str, replay.late_rows))
+        yield f"The recording fits if the set-point or flag that changed in these rows was read one row later: {rows}."
+    if replay.armed_before:
+        yield "The recording fits if the spool-up began one row before it."
 
 
 def _compared(log: LoopLog) -> TraceReplay:

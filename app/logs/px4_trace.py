@@ -17,7 +17,8 @@ _MODE: Final = "offboard"
 _SETPOINTS: Final = ("set_z_m", "set_vz_m_s", "set_az_m_s2")
 _ALWAYS: Final = ("takeoff_state", "out_vz_m_s", "out_az_m_s2", "out_thrust")
 _GIVEN: Final = tuple(each for each in INPUTS if each not in (_DERIVATIVE, _NEW))
-_FLAGS: Final = ("armed", "landed", "ground_contact", "want_takeoff")
+_MESSAGES: Final = ("armed", "landed", "ground_contact")
+_FLAGS: Final = (*_MESSAGES, "want_takeoff")
 _MAY_BE_EMPTY: Final = (
     *_SETPOINTS, "hover_estimate", "out_vz_m_s", "out_az_m_s2", "out_thrust",
     "az_m_s2", "true_z_m", *OUTPUTS[len(_ALWAYS):], _DERIVATIVE,
@@ -46,12 +47,14 @@ def read_px4_trace(stream: BinaryIO, *, name: str) -> LoopTrace:
     checks.require_positive(table, "dt_s")
     derived = {_DERIVATIVE: np.diff(table["z_m"], prepend=table["z_m"][0]) / table["dt_s"], _NEW: _new(table)}
     known = derived | dict(table.columns)
+    inputs = np.ascontiguousarray(np.column_stack([known[each] for each in INPUTS]))
     return LoopTrace(
         parameters=parameters_from(_values(checks, described)),
         filter_sample_s=checks.positive_in({"filter_sample_s": STEP_S} | dict(described), "filter_sample_s"),
         flown=_MODE in known,
         time_s=table["time_s"],
-        inputs=np.ascontiguousarray(np.column_stack([known[each] for each in INPUTS])),
+        inputs=inputs,
+        late_inputs=_late(table, inputs),
         outputs=_outputs(table),
     )
 
@@ -62,6 +65,15 @@ def _new(table: TraceTable) -> Samples:
     same = (given[1:] == given[:-1]) | (np.isnan(given[1:]) & np.isnan(given[:-1]))
     changed = np.append(True, ~same.all(axis=1))
     return np.where(table[_MODE] > 0.0, 1.0, changed) if _MODE in table.columns else np.ones(len(table))
+
+
+def _late(table: TraceTable, inputs: Samples) -> Samples:
+    """Inputs if each message with the time stamp of a flight's row was read in the next row, shape (n, 15). Set-points
+    of auto modes are computed from the estimate of the row, before the loop runs, so that they are never late."""
+    if _MODE not in table.columns:
+        return inputs
+    may_be_late = np.isin(INPUTS, _MESSAGES) | (np.isin(INPUTS, (*_SETPOINTS, _NEW)) & (table[_MODE] > 0.0)[:, None])
+    return np.where(may_be_late, np.concatenate([inputs[:1], inputs[:-1]]), inputs)
 
 
 def _outputs(table: TraceTable) -> Samples:

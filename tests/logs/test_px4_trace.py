@@ -67,6 +67,26 @@ def test_set_points_of_a_flight_are_new_where_they_change_and_in_offboard_contro
     assert column(read(content(*rows)), "set_new") == [1.0] * 5
 
 
+def test_flags_of_a_flight_and_set_points_of_offboard_control_may_have_been_read_one_row_later() -> None:
+    """Set-points of auto modes are computed from the estimate of the row."""
+    rows = [
+        {"offboard": "0"},
+        {"offboard": "0", "landed": "1", "want_takeoff": "1", "set_z_m": "-3.6"},
+        {"offboard": "1", "set_z_m": "-3.7", "limit_up_m_s": "2"},
+    ]
+    trace = read(content(*rows))
+    late = {name: trace.late_inputs[:, place].tolist() for place, name in enumerate(INPUTS)}
+    assert late["landed"] == [0.0, 0.0, 1.0]
+    assert late["set_z_m"] == [-3.5, -3.6, -3.6]
+    unchanged = [name for name in INPUTS if name not in ("landed", "set_z_m")]
+    assert all(np.array_equal(late[name], column(trace, name), equal_nan=True) for name in unchanged)
+
+
+def test_of_the_loop_alone_the_recording_tells_when_it_read_what() -> None:
+    trace = read(content({}, {"landed": "1", "set_z_m": "-3.6"}))
+    assert np.array_equal(trace.late_inputs, trace.inputs, equal_nan=True)
+
+
 def test_a_trace_is_recognised_by_its_columns() -> None:
     assert is_px4_trace(content())
     assert not is_px4_trace(content().replace(b"out_thrust", b"thrust"))

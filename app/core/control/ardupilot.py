@@ -1,11 +1,10 @@
 """ArduCopter's vertical loop (4.7, October 2025): shaped altitude target, position, velocity and acceleration
 controllers, throttle filter, and the takeoff before them.
 
-The loop runs at 400 Hz, in double precision where the firmware has single. Altitude, climb rate and acceleration are
-positive up, in m, m/s and m/s²; inside the velocity controller they are cm/s, inside the acceleration controller cm/s²
-and per mille of throttle, as the gains are. A step is `take_off` or, in flight, `shape` and `control`, on a state array
-that the caller owns: two kernels, because compiled code that calls what is not inlined counts references, which takes
-as long as the step. docs/models.md has the formulas.
+The loop runs at 400 Hz. Altitude, climb rate and acceleration are positive up, in m, m/s and m/s²; inside the velocity
+controller they are cm/s, inside the acceleration controller cm/s² and per mille of throttle, as the gains are. A step
+is `take_off` or, in flight, `shape` and `control`, on a state array that the caller owns: two kernels, because compiled
+code that calls what is not inlined counts references, which takes as long as the step. docs/models.md has the formulas.
 """
 
 from typing import Final
@@ -84,7 +83,9 @@ SPOOL_LEFT_S: Final = 20
 UNFILTERED: Final = 21
 STATE_SIZE: Final = 22
 
-State = NDArray[np.float64]
+State = NDArray[np.float32 | np.float64]
+"""What the loop remembers: in single precision, as in the firmware, it follows a recording; in double precision it is
+smooth enough for differences."""
 
 INPUTS: Final = ("target_m", "z_m", "v_m_s", "a_m_s2", "limit_lower", "limit_upper")
 OUTPUTS: Final = (

@@ -39,8 +39,8 @@ class LoopTrace:
     def followed(self) -> NDArray[np.bool_]:
         """Rows after which a replay continues from the recording, shape (n,): those around an active throttle limit.
 
-        There the loop decides by signs. In another precision than the recorder's, a decision may fall one step earlier
-        or later, and the two runs part for good.
+        There the loop decides by signs, and the recorded inputs are rounded: a decision may fall one step earlier or
+        later, and the two runs part for good.
         """
         limited = np.pad(self.inputs[:, -2:].any(axis=1), 1)
         return np.asarray(limited[:-2] | limited[1:-1] | limited[2:])
@@ -48,7 +48,7 @@ class LoopTrace:
 
 def replayed(trace: LoopTrace) -> Samples:
     """The replica's own outputs, shape (n, 8): free running, except after the rows in `followed`."""
-    state, packed = np.empty(loop.STATE_SIZE), trace.parameters.packed(trace.dt_s)
+    state, packed = np.empty(loop.STATE_SIZE, dtype=np.float32), trace.parameters.packed(trace.dt_s)
     if trace.hover is None:
         loop.start_takeoff(state, packed, 0.0)
     else:

@@ -36,7 +36,12 @@ from app.core.records.trajectory import Samples
 from app.logs.px4_trace import read_px4_trace
 
 DATA = Path(__file__).parents[2] / "data" / "px4_loop"
-FLIGHTS = ("default_steps_push.csv.gz", "stiff_steps_push.csv.gz")
+FLIGHTS = {
+    "default_steps_push.csv.gz": ((1550, 6283, 10354, 10484), False),
+    "stiff_steps_push.csv.gz": ((1760, 2596, 5293, 6078, 7999, 8279, 8342), False),
+    "soft_steps_push.csv.gz": ((2163, 2714, 3326, 6043, 8649, 8771, 8835), True),
+}
+"""Recorded flights: the rows of which something was read one row later, and whether the spool-up began before them."""
 NAN = math.nan
 G = 9.80665
 
@@ -44,12 +49,17 @@ G = 9.80665
 def read(name: str, rows: slice = slice(None)) -> LoopTrace:
     with (DATA / name).open("rb") as stream:
         trace = read_px4_trace(stream, name=name)
-    return replace(trace, time_s=trace.time_s[rows], inputs=trace.inputs[rows], outputs=trace.outputs[rows])
+    return replace(
+        trace,
+        time_s=trace.time_s[rows],
+        inputs=trace.inputs[rows],
+        late_inputs=trace.late_inputs[rows],
+        outputs=trace.outputs[rows],
+    )
 
 
-def differences(trace: LoopTrace) -> Samples:
+def differences(trace: LoopTrace, computed: Samples) -> Samples:
     """|replica − recording|, shape (n, 6): 0 where neither has a value, infinite where one has."""
-    computed = replayed(trace)
     apart = np.abs(computed - trace.outputs)
     apart[np.isnan(computed) & np.isnan(trace.outputs)] = 0.0
     apart[np.isnan(apart)] = np.inf
@@ -83,31 +93,41 @@ def test_random_inputs_give_what_the_original_gave() -> None:
     """Rows 0 to 1200 pass through every state of the takeoff."""
     trace = read("wild_inputs.csv.gz", slice(1200))
     assert set(trace.outputs[:, 0]) == {SPOOL_UP, READY, RAMP_UP, FLIGHT}
-    assert differences(trace).max() < 2e-7
+    assert differences(trace, replayed(trace).outputs).max() < 2e-7
 
 
 @pytest.mark.complete
 def test_all_random_inputs_give_what_the_original_gave() -> None:
     trace = read("wild_inputs.csv.gz")
+    replay = replayed(trace)
     assert len(trace.time_s) == 3000
-    assert differences(trace).max() < 2e-7
+    assert differences(trace, replay.outputs).max() < 2e-7
+    assert (replay.late_rows, replay.armed_before) == ((), False)
+
+
+def follows(name: str, rows: slice) -> None:
+    """Every row agrees to the recorded digits, but for the share of a tilted thrust at the limits of thrust."""
+    trace, (late_rows, armed_before) = read(name, rows), FLIGHTS[name]
+    replay = replayed(trace)
+    apart = differences(trace, replay.outputs)[:, :4]
+    at_limit = np.isin(replay.outputs[:, THRUST].astype(np.float32), np.array([0.001, 0.12, 1.0], dtype=np.float32))
+    assert apart[:, THRUST][at_limit].max() < 2.1e-3
+    apart[at_limit, THRUST] = 0.0
+    assert (apart.max(axis=0) < [1e-9, 1e-8, 1e-7, 1e-7]).all()
+    assert replay.armed_before == armed_before
+    assert replay.late_rows == tuple(row for row in late_rows if row < len(trace.time_s))
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_takeoff_follows_the_recorded_flight(name: str) -> None:
-    """Until the first offboard step every row agrees: takeoff, climb and hold with a hover estimate."""
-    trace = read(name, slice(1400))
-    assert np.isfinite(trace.inputs[:, INPUTS.index("hover_estimate")]).sum() > 300
-    assert differences(trace)[:, :4].max() < 1e-5
+    """Takeoff, climb, and hold with a hover estimate; in one flight with the first row of offboard control."""
+    follows(name, slice(1600))
 
 
 @pytest.mark.complete
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_whole_recorded_flight_is_followed(name: str) -> None:
-    """The medians: single rows differ where two messages share a time stamp."""
-    medians = np.median(differences(read(name)), axis=0)
-    assert medians[OUTPUTS.index("out_vz_m_s")] < 1e-6
-    assert medians[OUTPUTS.index("out_thrust")] < 1e-3
+    follows(name, slice(None))
 
 
 def test_velocity_and_thrust_of_a_position_error() -> None:
@@ -255,7 +275,7 @@ def test_during_the_ramp_hover_thrust_is_the_parameter_and_accelerations_beside_
 
 
 def test_a_rollout_continues_where_the_one_before_ended() -> None:
-    trace = read(FLIGHTS[0], slice(200, 203))
+    trace = read("default_steps_push.csv.gz", slice(200, 203))
     inputs, outputs = trace.inputs.astype(np.float32), np.empty((3, len(OUTPUTS)), dtype=np.float32)
     state, packed = flying(trace.parameters)
     rollout(state, packed, inputs, outputs)
