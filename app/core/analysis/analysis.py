@@ -20,6 +20,7 @@ from app.core.records.trajectory import Samples
 
 _SHORTEST_S: Final = 6.0
 _LEAST_CHANGE_M: Final = 0.3
+_LEAST_RATE_CHANGE_M_S: Final = 0.1
 _LARGEST_SATURATION: Final = 0.05
 _LEAST_VARIATION: Final = 1e-6
 _OTHER_CONTROLLER_SHARE: Final = 0.05
@@ -302,8 +303,11 @@ def _require_likeness(loop: AltitudeLoop, behaviour: Behaviour, estimate: Copter
 
 def _insufficient(flight: LoggedFlight, estimate: CopterEstimate) -> str | None:
     known_to = estimate.deviation.thrust_slope
-    if not _climbs_and_descends(flight):
-        why = "it does not both climb and descend, so that slope, lag and drag cannot be told apart."
+    if not _begins_and_ends_a_change(flight):
+        why = (
+            "no altitude change both begins and ends in it, as in the last part of a takeoff, so that slope, lag and "
+            "drag cannot be told apart."
+        )
     elif known_to > _LARGEST_SLOPE_DEVIATION:
         why = f"the thrust slope is known only to ±{known_to:.2f}; ±{_LARGEST_SLOPE_DEVIATION} is needed."
     else:
@@ -311,12 +315,13 @@ def _insufficient(flight: LoggedFlight, estimate: CopterEstimate) -> str | None:
     return f"The log is not sufficient to propose gains: {why} {flight.loop.texts.what_to_fly}"
 
 
-def _climbs_and_descends(flight: LoggedFlight) -> bool:
-    """Whether the reference does both in the scored rows; a takeoff with a hover does not."""
-    references = [each.z_d_m[each.scored] for each in flight.segments]
-    climbs = [float(np.max(each - np.minimum.accumulate(each))) for each in references]
-    descents = [float(np.max(np.maximum.accumulate(each) - each)) for each in references]
-    return min(max(climbs), max(descents)) >= _LEAST_CHANGE_M
+def _begins_and_ends_a_change(flight: LoggedFlight) -> bool:
+    """Whether the climb rate that follows from the reference both rises and falls in the scored rows."""
+    loop, throttle = flight.loop, flight.throttle_mean
+    rates = [loop.excitation(each, throttle)[0][each.scored] for each in flight.segments]
+    rises = [float(np.max(each - np.minimum.accumulate(each))) for each in rates]
+    falls = [float(np.max(np.maximum.accumulate(each) - each)) for each in rates]
+    return min(max(rises), max(falls)) >= _LEAST_RATE_CHANGE_M_S
 
 
 def _assess(

@@ -5,8 +5,8 @@
 where u_f is the throttle that the loop gives the motors, u that after their lag, h the throttle in hover and s the
 slope of log thrust over log throttle: a polynomial of the throttle would turn negative at a low hover throttle. The
 acceleration is sensed through the accelerometer's filter. The climb rate and the altitude are those that the vehicle's
-estimator reports; an altitude need not be the integral of its climb rate: the difference is a disturbance, too. Altitude
-up, SI, explicit Euler at the rate of the loop.
+estimator reports, and the altitude need not be the integral of the climb rate: the difference is a disturbance, too.
+Altitude up, SI, explicit Euler at the rate of the loop.
 """
 
 import math
