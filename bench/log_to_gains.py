@@ -2,6 +2,7 @@
 
     ./dev exec python -m bench.log_to_gains                    a few vehicles, against the limits
     ./dev exec python -m bench.log_to_gains --vehicles 200 --searches     the figures of docs/benchmarks.md
+    ./dev exec python -m bench.log_to_gains --gusts 0.6 0.04              in turbulence within a row of the log
 
 Every vehicle has more physics than the model (bench/copters/simulation.py). An error is the mean of flights of the same
 steps in other weather. The best gains are the best of a grid that keep the limits of a proposal, the margin on the
@@ -13,7 +14,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from typing import Final
@@ -179,14 +180,23 @@ def described(errors_m: Samples, best_m: Samples) -> str:
     )
 
 
+def _sample_in_gusts(rig: Rig, gust_m_s2: float, gust_s: float, random: np.random.Generator) -> SimulatedCopter:
+    return replace(rig.sample(random), gust_m_s2=gust_m_s2, gust_s=gust_s)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="bench.log_to_gains")
     parser.add_argument("--vehicles", type=int, default=QUICK_VEHICLES)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--searches", action="store_true", help="tune by black-box searches too")
     parser.add_argument("--autopilot", choices=RIGS, default="ArduCopter")
+    parser.add_argument(
+        "--gusts", type=float, nargs=2, metavar=("M_S2", "S"), help="of every vehicle: strength, duration"
+    )
     options = parser.parse_args()
     rig = RIGS[options.autopilot]
+    if options.gusts:
+        rig = replace(rig, sample=partial(_sample_in_gusts, rig, *options.gusts))
     with ProcessPoolExecutor(options.processes) as pool:
         results = list(pool.map(partial(judge, rig=rig, searches=options.searches), range(options.vehicles)))
     refused = [each for each in results if each.refused]

@@ -28,7 +28,7 @@ _STEPS: Final = round((SETTLE_S + 2 * STEP_LASTS_S) / STEP_S)
 _ROW_EVERY: Final = 40
 _SCORED_FROM: Final = round(SETTLE_S / STEP_S)
 
-_GUST_S, _CLIMB_RATE_WANDER_S, _ALTITUDE_WANDER_S = 0.5, 3.0, 5.0
+_CLIMB_RATE_WANDER_S, _ALTITUDE_WANDER_S = 3.0, 5.0
 
 # Indices of a packed vehicle.
 _HOVER, _QUADRATIC, _LAG_GAIN, _DRAG, _DRAG_QUADRATIC, _SAG, _DEAD_STEPS = range(7)
@@ -40,7 +40,7 @@ _Z, _V, _A, _Z_D, _V_D, _A_D, _V_T, _THROTTLE, _FILTERED = range(9)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedCopter:
     """A vehicle and its surroundings: `quadratic` is the share of u² in its thrust, `sag` the thrust lost in 33 s,
-    `gust_m_s2`, `noise_m_s2`, `wander_m_s` and `wander_m` are standard deviations."""
+    `gust_m_s2`, `noise_m_s2`, `wander_m_s` and `wander_m` are standard deviations, and gusts decay within `gust_s`."""
 
     hover_throttle: float
     assumed_hover_throttle: float
@@ -54,6 +54,7 @@ class SimulatedCopter:
     noise_m_s2: float
     wander_m_s: float
     wander_m: float
+    gust_s: float = 0.5
 
     @property
     def thrust_slope(self) -> float:
@@ -177,7 +178,7 @@ def weather_of(
     """Gust, noise of the accelerometer, errors of the estimated climb rate and altitude at each step, shape (n, 4)."""
     random = np.random.default_rng(seed)
     slow = (
-        (copter.gust_m_s2, _GUST_S),
+        (copter.gust_m_s2, copter.gust_s),
         (copter.wander_m_s, climb_rate_wander_s),
         (copter.wander_m, _ALTITUDE_WANDER_S),
     )

@@ -64,7 +64,10 @@ def test_the_log_of_a_flight_gives_better_gains_with_a_figure(client: TestClient
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("arducopter_takeoff.bin", "holds altitude for 4.8 s only; 6 s are needed"),
+        (
+            "arducopter_takeoff.bin",
+            "holds altitude for 4.8 s only; 6 s are needed; the vehicle hovers at a throttle of 0.37",
+        ),
         (
             "px4_takeoff.ulg",
             (
@@ -240,7 +243,10 @@ def test_every_takeoff_of_a_log_is_a_flight_of_its_campaign(client: TestClient) 
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("arducopter_takeoff.bin", "holds altitude for 4.8 s only; 6 s are needed"),
+        (
+            "arducopter_takeoff.bin",
+            "holds altitude for 4.8 s only; 6 s are needed; the vehicle hovers at a throttle of 0.37",
+        ),
     ],
 )
 def test_no_campaign_starts_from_a_log_that_cannot_be_used(client: TestClient, name: str, reason: str) -> None:

@@ -20,12 +20,15 @@ from app.core.records.trajectory import Samples
 
 _SHORTEST_S: Final = 6.0
 _LEAST_CHANGE_M: Final = 0.3
+_LEAST_RATE_CHANGE_M_S: Final = 0.1
 _LARGEST_SATURATION: Final = 0.05
 _LEAST_VARIATION: Final = 1e-6
 _OTHER_CONTROLLER_SHARE: Final = 0.05
 _LARGEST_RESIDUAL_M_S2: Final = 1.5
 _LARGEST_MISFIT: Final = (0.005, 0.25)
 _LARGEST_SLOPE_DEVIATION: Final = 0.15
+_AT_REST: Final = (0.1, 0.2)
+"""Climb rate, m/s, and acceleration, m/s², below which the throttle is that of hover."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +138,7 @@ def analyze(flight: LoggedFlight) -> Analysis:
     Raises TrajectoryError if the flight contains nothing to learn from, or something that no copter of the model does.
     """
     loop, behaviour = flight.loop, _behaviour(flight)
-    _require_altitude_changes(loop, behaviour)
+    _require_altitude_changes(flight, behaviour)
     _require_signals(flight)
     _require_own_controller(flight)
     estimate = fit_copter(flight)
@@ -148,7 +151,7 @@ def analyze(flight: LoggedFlight) -> Analysis:
         assess = _assessor(flight, estimate)
     usual = loop.rules(flight.throttle_mean)
     compared = [present, *(assess(name, gains) for name, gains in usual.items())]
-    insufficient = _insufficient(loop, estimate)
+    insufficient = _insufficient(flight, estimate)
     gains = None if insufficient else propose(flight, estimate.few, [loop.gains, *usual.values()])
     proposed = assess("Proposed", gains) if gains else None
     if proposed is None:
@@ -218,17 +221,31 @@ def _behaviour(flight: LoggedFlight) -> Behaviour:
     )
 
 
-def _require_altitude_changes(loop: AltitudeLoop, behaviour: Behaviour) -> None:
+def _require_altitude_changes(flight: LoggedFlight, behaviour: Behaviour) -> None:
+    loop = flight.loop
     if behaviour.duration_s < _SHORTEST_S:
-        raise _unanswered(loop, f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed")
+        raise _unanswered(
+            loop,
+            f"holds altitude for {behaviour.duration_s:.1f} s only; {_SHORTEST_S:g} s are needed{_in_hover(flight)}",
+        )
     if behaviour.reference_range_m < _LEAST_CHANGE_M:
         raise _unanswered(
             loop,
             f"has no altitude changes: the reference moves by {behaviour.reference_range_m:.2f} m, and "
-            f"{_LEAST_CHANGE_M:g} m are needed",
+            f"{_LEAST_CHANGE_M:g} m are needed{_in_hover(flight)}",
         )
     if behaviour.saturated_share > _LARGEST_SATURATION:
         raise _unanswered(loop, f"has the throttle at a limit in {behaviour.saturated_share:.0%} of its rows")
+
+
+def _in_hover(flight: LoggedFlight) -> str:
+    """What a flight that cannot be analysed tells of the vehicle nevertheless."""
+    slow_m_s, steady_m_s2 = _AT_REST
+    throttle = np.concatenate([
+        each.throttle_filtered[(np.abs(each.v_m_s) < slow_m_s) & (np.abs(each.a_m_s2) < steady_m_s2)]
+        for each in flight.segments
+    ])  # fmt: skip
+    return f"; the vehicle hovers at a throttle of {np.median(throttle):.2f}" if throttle.size else ""
 
 
 def _require_signals(flight: LoggedFlight) -> None:
@@ -279,19 +296,32 @@ def _require_likeness(loop: AltitudeLoop, behaviour: Behaviour, estimate: Copter
         raise _unanswered(
             loop,
             f"has a deviation of {1e3 * behaviour.error_m:.1f} mm, where the gains in the log make the fitted vehicle "
-            f"deviate by {1e3 * present.prediction.error_m:.1f} mm: it flew with other gains, for instance set by a "
-            "tuning knob, or something else replaced the controller",
+            f"deviate by {1e3 * present.prediction.error_m:.1f} mm: perhaps it flew with other gains, for instance "
+            "set by a tuning knob, or something else replaced the controller",
         )
 
 
-def _insufficient(loop: AltitudeLoop, estimate: CopterEstimate) -> str | None:
+def _insufficient(flight: LoggedFlight, estimate: CopterEstimate) -> str | None:
     known_to = estimate.deviation.thrust_slope
-    if known_to <= _LARGEST_SLOPE_DEVIATION:
+    if not _begins_and_ends_a_change(flight):
+        why = (
+            "no altitude change both begins and ends in it, as in the last part of a takeoff, so that slope, lag and "
+            "drag cannot be told apart."
+        )
+    elif known_to > _LARGEST_SLOPE_DEVIATION:
+        why = f"the thrust slope is known only to ±{known_to:.2f}; ±{_LARGEST_SLOPE_DEVIATION} is needed."
+    else:
         return None
-    return (
-        f"The log is not sufficient to propose gains: the thrust slope is known only to ±{known_to:.2f}; "
-        f"±{_LARGEST_SLOPE_DEVIATION} is needed. {loop.texts.what_to_fly}"
-    )
+    return f"The log is not sufficient to propose gains: {why} {flight.loop.texts.what_to_fly}"
+
+
+def _begins_and_ends_a_change(flight: LoggedFlight) -> bool:
+    """Whether the climb rate that follows from the reference both rises and falls in the scored rows."""
+    loop, throttle = flight.loop, flight.throttle_mean
+    rates = [loop.excitation(each, throttle)[0][each.scored] for each in flight.segments]
+    rises = [float(np.max(each - np.minimum.accumulate(each))) for each in rates]
+    falls = [float(np.max(np.maximum.accumulate(each) - each)) for each in rates]
+    return min(max(rises), max(falls)) >= _LEAST_RATE_CHANGE_M_S
 
 
 def _assess(

@@ -238,7 +238,7 @@ class Px4Loop:
 
         def body_after_step(nudge: Samples) -> Samples:
             body = start_body(hover, 0.0, 0.0, 0.0, packed) + nudge[1:]
-            advance(body, packed, self.step_s, hover + float(nudge[0]), 0.0, 0.0, 0.0)
+            advance(body, packed, self.step_s, hover + float(nudge[0]), 0.0, 0.0)
             return np.append(0.0, body)
 
         together = transition_of(after_step, len(_DYNAMIC), _NUDGE)

@@ -171,6 +171,7 @@ def _segment(
     z_m, v_m_s, throttle = (np.interp(rows_s, trajectory.time_s, trajectory[name]) for name in CHANNELS[:3])
     changes = np.diff(v_m_s) / np.diff(rows_s)
     z_d, v_d, a_d = reference
+    before_end = steps_s < rows_s[-1]
     return FinerSegment(
         time_s=rows_s,
         z_m=z_m,
@@ -183,8 +184,8 @@ def _segment(
         throttle=throttle,
         throttle_filtered=np.interp(rows_s, steps_s, sent),
         assumed_hover=assumed_hover,
-        motor_time_s=np.append(steps_s, rows_s[-1]),
-        motor_values=np.append(sent, sent[-1]),
+        motor_time_s=np.append(steps_s[before_end], rows_s[-1]),
+        motor_values=np.append(sent[before_end], sent[-1]),
     )
 
 

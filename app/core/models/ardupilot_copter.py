@@ -30,13 +30,13 @@ def step(
     disturbance: Samples,
 ) -> None:
     """One step of loop and body. `reference` has shape (4,) as `REFERENCE`, of which the assumed hover throttle is not
-    used: it is a parameter of the loop. `disturbance` has shape (4,) as `DISTURBANCES`."""
+    used: it is a parameter of the loop. `disturbance` has shape (3,) as `DISTURBANCES`."""
     state[Z_D], state[V_D], state[A_D] = reference[0], reference[1], reference[2]
     filtered = state[THROTTLE_FILTERED]
     filtered += p[THROTTLE_GAIN] * (state[THROTTLE] - filtered)
-    sensed = body[SENSED] + disturbance[3]
+    sensed = body[SENSED] + disturbance[2]
     control(state, p, body[ALTITUDE], body[CLIMB_RATE], sensed, filtered <= 0.0, filtered >= 1.0)
-    advance(body, copter, p[DT], state[THROTTLE_FILTERED], disturbance[0], disturbance[1], disturbance[2])
+    advance(body, copter, p[DT], state[THROTTLE_FILTERED], disturbance[0], disturbance[1])
 
 
 @kernel
@@ -49,14 +49,14 @@ def fly(
     disturbances: Samples,
     flown: Samples,
 ) -> None:
-    """A step per row of `references`, shape (n, 4), and `disturbances`, (n, 4); fills `flown`, (n, 6) as `FLOWN`.
+    """A step per row of `references`, shape (n, 4), and `disturbances`, (n, 3); fills `flown`, (n, 6) as `FLOWN`.
 
     The loop gives the motors the 2 Hz low-pass of its throttle.
     """
     for row in range(len(references)):
         flown[row, 0] = body[ALTITUDE]
         flown[row, 1] = body[CLIMB_RATE]
-        flown[row, 2] = body[SENSED] + disturbances[row, 3]
+        flown[row, 2] = body[SENSED] + disturbances[row, 2]
         step(state, body, p, copter, references[row], disturbances[row])
         flown[row, 3] = state[THROTTLE]
         flown[row, 4] = flown[row, 5] = state[THROTTLE_FILTERED]

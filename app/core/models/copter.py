@@ -5,8 +5,8 @@
 where u_f is the throttle that the loop gives the motors, u that after their lag, h the throttle in hover and s the
 slope of log thrust over log throttle: a polynomial of the throttle would turn negative at a low hover throttle. The
 acceleration is sensed through the accelerometer's filter. The climb rate and the altitude are those that the vehicle's
-estimator reports, which need not be the integral of its acceleration: the difference is a disturbance, too. Altitude
-up, SI, explicit Euler at the rate of the loop.
+estimator reports, and the altitude need not be the integral of the climb rate: the difference is a disturbance, too.
+Altitude up, SI, explicit Euler at the rate of the loop.
 """
 
 import math
@@ -46,8 +46,8 @@ accelerometer's filter."""
 
 REFERENCE: Final = ("z_d_m", "v_d_m_s", "a_d_m_s2", "assumed_hover")
 """What a loop is given: the desired motion, and the throttle that it assumes to hover with."""
-DISTURBANCES: Final = ("acceleration_m_s2", "climb_rate_m_s2", "altitude_m_s", "sensed_m_s2")
-"""Of the acceleration, of the estimated climb rate and altitude beyond it, and of the sensed acceleration alone."""
+DISTURBANCES: Final = ("acceleration_m_s2", "altitude_m_s", "sensed_m_s2")
+"""Of the acceleration, of the estimated altitude beyond it, and of the sensed acceleration alone."""
 FLOWN: Final = ("z_m", "v_m_s", "a_m_s2", "throttle", "throttle_filtered", "throttle_slow")
 """The estimates that a loop used, the throttle that it demanded with them, what of it the motors get, and the slow part
 of it: throttle activity is the rest."""
@@ -112,14 +112,12 @@ def filtered(values: Samples, *filters: Filter) -> Samples:
 
 
 @kernel
-def advance(
-    body: Samples, copter: Samples, dt: float, throttle: float, gust: float, beyond_v: float, beyond_z: float
-) -> None:
-    """One step of `dt` with the `throttle` that the motors get, and with the first three of `DISTURBANCES`."""
+def advance(body: Samples, copter: Samples, dt: float, throttle: float, gust: float, beyond_z: float) -> None:
+    """One step of `dt` with the `throttle` that the motors get, and with the first two of `DISTURBANCES`."""
     body[LAGGED] += copter[_LAG_GAIN] * (throttle - body[LAGGED])
     thrust = (body[LAGGED] / copter[HOVER_THROTTLE]) ** copter[_SLOPE]
     a = GRAVITY_M_S2 * (thrust - 1.0) - copter[_DRAG] * body[CLIMB_RATE] + gust
-    body[CLIMB_RATE] += dt * (a + beyond_v)
+    body[CLIMB_RATE] += dt * a
     body[ALTITUDE] += dt * (body[CLIMB_RATE] + beyond_z)
     body[SENSED] = copter[_B0] * a + body[_MEMORY_1]
     body[_MEMORY_1] = copter[_B1] * a - copter[_A1] * body[SENSED] + body[_MEMORY_2]

@@ -24,7 +24,7 @@ def fly(
     disturbances: Samples,
     flown: Samples,
 ) -> None:
-    """A step of `dt_s` per row of `references`, shape (n, 4) as `REFERENCE`, and `disturbances`, (n, 4); fills `flown`,
+    """A step of `dt_s` per row of `references`, shape (n, 4) as `REFERENCE`, and `disturbances`, (n, 3); fills `flown`,
     (n, 6) as `FLOWN`.
 
     `inputs`, shape (1, 15) as the loop's `INPUTS`, has the conditions and the limits of the whole flight, in single
@@ -35,13 +35,13 @@ def fly(
     for row in range(len(references)):
         flown[row, 0] = body[ALTITUDE]
         flown[row, 1] = body[CLIMB_RATE]
-        flown[row, 2] = body[SENSED] + disturbances[row, 3]
+        flown[row, 2] = body[SENSED] + disturbances[row, 2]
         inputs[0, 1], inputs[0, 2] = -body[ALTITUDE], -body[CLIMB_RATE]
         inputs[0, 4], inputs[0, 5], inputs[0, 6] = -references[row, 0], -references[row, 1], -references[row, 2]
         inputs[0, 8] = references[row, 3]
         rollout(state, p, inputs, outputs)
         thrust = float(state[THRUST])
-        advance(body, copter, dt_s, thrust, disturbances[row, 0], disturbances[row, 1], disturbances[row, 2])
+        advance(body, copter, dt_s, thrust, disturbances[row, 0], disturbances[row, 1])
         slow += slow_gain * (thrust - slow)
         flown[row, 3] = flown[row, 4] = thrust
         flown[row, 5] = slow

@@ -14,6 +14,7 @@ from app.core.analysis.recorded_flight import (
     read_px4,
     shaped_reference,
 )
+from app.core.analysis.segment import FinerSegment
 from app.core.errors import TrajectoryError
 from app.core.models.copter import Copter
 from app.core.models.set_points import SetPoints
@@ -22,13 +23,13 @@ from tests.core.tuning.flying import compiled_only
 
 STEPS = Steps(set_points=SetPoints((0.0, 4.0, 7.0), (3.0, 2.0, 3.0)), begin_s=4.0, end_s=10.0)
 LATE = SetPoints((0.0, 4.13, 7.02), (3.0, 2.0, 3.0))
-TIME_S = np.arange(0.0, 10.4, 0.02)
+TIME_S = np.arange(0.0, 19.4, 0.02)
 
 
 def recorded(**channels: float) -> Trajectory:
     """A flight exactly on the shaped target, whose set points were late; the channels given are constant."""
     loop = ardupilot_loop({})
-    steps_s = np.arange(0.0, 10.4, loop.step_s)
+    steps_s = np.arange(0.0, 19.4, loop.step_s)
     reference = shaped_reference(loop, LATE, steps_s)
     z, v = (np.interp(TIME_S, steps_s, reference[:, column]) for column in range(2))
     throttle = 0.35 + np.random.default_rng(1).normal(0.0, 0.01, len(TIME_S))
@@ -46,6 +47,16 @@ def test_arducopters_reference_is_shaped_again_with_the_set_points_when_they_too
     assert np.abs(segment.v_d_m_s - segment.v_m_s).max() < 0.02
     assert np.abs(segment.a_m_s2[1:] - (np.diff(segment.v_m_s) / 0.1)).max() < 1e-9
     assert log.activity == pytest.approx(0.0084, abs=0.0005), "of 0.01: a part of it is in the low-pass"
+
+
+@compiled_only
+def test_a_step_of_the_loop_at_the_end_of_the_flight_is_its_last_row() -> None:
+    """Seen: rounding puts the last step 2e-12 s behind the last row, and the motors' throttle was refused."""
+    (segment,) = read_ardupilot(ardupilot_loop({}), recorded(), replace(STEPS, begin_s=6.1, end_s=19.1)).segments
+    assert isinstance(segment, FinerSegment)
+    assert np.all(np.diff(segment.motor_time_s) > 0.0)
+    assert segment.motor_time_s[-1] == segment.time_s[-1] == 19.1
+    assert segment.motor_values[-1] == pytest.approx(segment.throttle_filtered[-1])
 
 
 @compiled_only
