@@ -86,7 +86,7 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "plan lands it.",
         ),
         Failure.ENVELOPE: Response(
-            "a limit of altitude, position, speed or oscillation, or the vehicle's own fence",
+            "a limit of altitude, position, speed, lean or oscillation, or the vehicle's own fence",
             "land, gains first",
             "aborted",
             "A safety limit was exceeded.",
@@ -96,7 +96,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.OPERATOR: Response("requested by the operator", "land, gains first", "aborted", "Aborted."),
         Failure.FROZEN: Response(
-            "packets arrive, but the vehicle's clock stands still for 0.25 s",
+            "packets arrive, but the vehicle's clock stands still for 0.25 s or jumps by more than 0.3 s, or its altitude "
+            "and climb rate stand still for 1 s",
             "land",
             "invalid",
             "The vehicle's position froze while packets still arrived.",
@@ -112,7 +113,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.LOST_POSITION: Response(
             "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
-            "an altitude that jumps by 0.5 m, or stays 0.5 m behind the climb rate during takeoff",
+            "an altitude that jumps by 0.5 m, stays 0.5 m behind the climb rate during takeoff, drifts by more than 1 m, or "
+            "contradicts the vehicle's landed state",
             "land",
             "invalid",
             "The vehicle's position was lost.",
@@ -130,7 +132,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "A pilot took manual control; no further commands were sent.",
         ),
         Failure.UNEXPECTED: Response(
-            "another mode or block, a disarming or a reboot that was not commanded, in messages that agree",
+            "another mode or block, a disarming or a reboot that was not commanded, in messages that agree, also when it "
+            "is found during the landing",
             "land",
             "quarantine",
             "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.",
