@@ -115,7 +115,7 @@ _UNSEEN: Final = Expected(codes=frozenset({"F9a", "F9c"}), refuses=True, ends_in
 _PILOT: Final = _may("F10a", "F10b", "F10c", "F4a", ends_in=AIR, aborts=ALL)
 _DRIFTING: Final = _may("F9d", "F4a", "F6", "F10b", "F10c", NOT_SEEN, ends_in=AIR, aborts=PAPARAZZI)
 _STUCK: Final = _may("F9a", "F9d", "F10c", "F4a", NOT_SEEN, ends_in=(State.TAKEOFF,), aborts=PAPARAZZI)
-_AHEAD: Final = Expected(codes=frozenset({"F9a", "F9d"}), refuses=True)
+_AHEAD: Final = _may("F9a", "F9d")
 _BEHIND: Final = _may("F9a", "F9d", "F10b")
 
 _NUMBERS: Final[Mapping[str, Hazard]] = {
