@@ -119,6 +119,7 @@ def _pack(spooled: SpooledRecord) -> bytes:
     header = {
         "flight_id": spooled.flight_id,
         "ending": record.ending,
+        "failure": record.failure,
         "reason": record.reason,
         "on_request": record.on_request,
         "settings": dict(record.settings),
@@ -147,6 +148,7 @@ def _unpack(content: bytes) -> SpooledRecord:
         FlightRecord(
             trajectory=Trajectory(time_s, channels, header["source"], header["clock"]),
             ending=ending,
+            failure=header.get("failure", ""),
             reason=header["reason"],
             on_request=header.get("on_request", False),
             settings=settings,

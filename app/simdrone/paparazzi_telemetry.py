@@ -38,6 +38,9 @@ _FAILSAFE: Final = 1
 _GUIDED: Final = 19
 _BY_HAND: Final = 12
 _NO_TEMPERATURE: Final = 32767
+_NOISE_M_S: Final = 1.0 / (1 << SPEED_BITS)
+_NOISE_MS: Final = 20
+"""An estimate is never the same twice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +90,7 @@ def local_position(now: Snapshot) -> Fields:
         "z": -_stepped(now.height_m, POSITION_BITS),
         "vx": _stepped(now.north_m_s, SPEED_BITS),
         "vy": 0.0,
-        "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS),
+        "vz": -_stepped(now.climb_rate_m_s, SPEED_BITS) - _NOISE_M_S * (now.boot_ms // _NOISE_MS % 2),
     }
 
 

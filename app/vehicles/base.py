@@ -114,11 +114,13 @@ class FlightRecord:
 
     If `should_stop` ended the flight before any limit did, `reason` begins with the reason of the stop request, or with
     `motors_off_requested` of it. The caller that requested the stop then sets `on_request` of the aborted flight.
-    Without `has_flown` nothing was flown, because the vehicle has certainly never left the ground.
+    Without `has_flown` nothing was flown, because the vehicle has certainly never left the ground. `failure` is the
+    number of the failure in docs/real-flight.md, "F1" to "F14c"; empty without one.
     """
 
     trajectory: Trajectory
     ending: Ending
+    failure: str = ""
     reason: str = ""
     on_request: bool = False
     has_flown: bool = True

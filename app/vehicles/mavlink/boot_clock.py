@@ -3,13 +3,17 @@
 Packets may be late, repeated, in any order, or corrupted: a single one by another clock says nothing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from app.vehicles.mavlink.events import Position
 
 AHEAD_S: Final = 2.0
 """Greatest gain of the vehicle's clock on ours between two packets, because their latencies may differ."""
+EARLY_S: Final = 0.1
+"""Most by which a position may be ahead of the vehicle's clock as it is known by those before it."""
+STEPPED_S: Final = 0.1
+"""Time for which positions that are ahead go on alone before their clock is the vehicle's."""
 BACK_S: Final = 1.0
 """If the clock goes back by less than this, the packet was late."""
 RESTARTED_S: Final = 0.4
@@ -20,8 +24,23 @@ heard."""
 KNOWN_BY: Final = 10
 """Positions by a clock before it is known to be the vehicle's. Fewer may be a stranger's, heard before the vehicle's
 own positions were requested."""
+WRAP_S: Final = 2.0**32 / 1000.0
+"""After this time, 49.7 days, `time_boot_ms` begins at 0 again."""
 _DRIFT: Final = 0.1
 _SAME_CLOCK_S: Final = 0.5
+_NEAR_WRAP_S: Final = 60.0
+
+
+def unwrapped(position: Position, newest: Position | None) -> Position:
+    """Return the position with a time that continues that of the newest one beyond WRAP_S."""
+    near_wrap = newest is not None and newest.time_boot_s > WRAP_S - _NEAR_WRAP_S
+    is_wrapped = near_wrap and position.time_boot_s < _NEAR_WRAP_S
+    return replace(position, time_boot_s=position.time_boot_s + WRAP_S) if is_wrapped else position
+
+
+def may_have_begun(time_boot_s: float, passed_s: float) -> bool:
+    """Whether a clock with this time can have begun in the `passed_s` since the vehicle was last heard."""
+    return time_boot_s <= (1.0 + _DRIFT) * passed_s + AHEAD_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +73,7 @@ class RestartCounter:
 
     def take(self, position: Position, now_s: float) -> None:
         """Process a position received at `now_s` by our clock."""
+        position = unwrapped(position, self._last)
         if self._last is None or self._is_expected(self._last, position, now_s):
             self._last, self._last_s, self._other = position, now_s, None
             self._heard += 1
@@ -65,8 +85,9 @@ class RestartCounter:
         unless it can have begun since the last position."""
         gained_s, passed_s = position.time_boot_s - last.time_boot_s, now_s - self._last_s
         is_behind = gained_s < (1.0 - _DRIFT) * passed_s - BEHIND_S
-        may_be_new = position.time_boot_s <= (1.0 + _DRIFT) * passed_s + AHEAD_S
-        return 0.0 < gained_s <= passed_s + AHEAD_S and not (is_behind and may_be_new)
+        return 0.0 < gained_s <= passed_s + AHEAD_S and not (
+            is_behind and may_have_begun(position.time_boot_s, passed_s)
+        )
 
     def _take_other(self, position: Position, now_s: float) -> None:
         other = self._other

@@ -2,7 +2,7 @@
 
 Two vehicles that send at the same time use every sequence number twice, with different contents, each going on where
 it was, and report two times. Packets that are repeated, late or out of order do neither; a vehicle that restarts uses
-numbers again, but does not go on with the former ones.
+numbers again, but does not go on with the former ones. Copies of packets, however late, are no evidence.
 """
 
 from collections import deque
@@ -30,13 +30,14 @@ _OF_A_ROUND: Final = 0.9
 _LOST: Final = 32
 """A sequence of numbers goes on with one less than this ahead of its last."""
 _SEQUENCES: Final = 8
+_FRAMES: Final = 2048
+"""Frames that are remembered, of more than the 3 s that a copy may be late."""
 
 
 @dataclass(slots=True)
 class _Used:
     at_s: float
     count: int
-    frame: bytes
 
 
 class DuplicateDetector:
@@ -44,6 +45,7 @@ class DuplicateDetector:
 
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
+        self._frames: dict[bytes, None] = {}
         self._sequences = _Sequences()
         self._rate = _Rate()
         self._count = 0
@@ -59,8 +61,17 @@ class DuplicateDetector:
 
     def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None) -> None:
         """Add a message by its whole frame and sequence number; `boot_s` is its time stamp, if it has one."""
-        if self._add_number(frame, number, now_s) and boot_s is not None:
+        if frame in self._frames:
+            return
+        self._frames[frame] = None
+        if len(self._frames) > _FRAMES:
+            del self._frames[next(iter(self._frames))]
+        if self._add_number(number, now_s) and boot_s is not None:
             self._add_clock(boot_s - now_s, now_s)
+
+    def has_seen(self, frame: bytes) -> bool:
+        """Whether a message is a copy of a recent one."""
+        return frame in self._frames
 
     def reason(self, now_s: float) -> str:
         """Return the evidence for two vehicles; empty without evidence."""
@@ -76,14 +87,12 @@ class DuplicateDetector:
             evidence.popleft()
         return len(evidence) >= PIECES and evidence[-1] - evidence[0] >= LASTS_S
 
-    def _add_number(self, frame: bytes, number: int, now_s: float) -> bool:
-        """Process a sequence number; return whether the packet is in order, neither repeated nor late."""
+    def _add_number(self, number: int, now_s: float) -> bool:
+        """Process a sequence number; return whether the packet is in order, not late."""
         self._count += 1
         self._note_burst(now_s)
         used = self._used.get(number)
         is_taken = used is not None and self._is_of_this_round(used, now_s)
-        if used is not None and is_taken and used.frame == frame:
-            return False
         is_return = self._sequences.is_return(number, now_s)
         ahead = (number - self._latest) % NUMBERS
         if ahead < NUMBERS // 2:
@@ -92,7 +101,7 @@ class DuplicateDetector:
         behind = NUMBERS - ahead
         is_late = behind <= _LATE and not is_taken
         late = behind if is_late else 0
-        self._used[number] = _Used(now_s - late / self._rate.number_hz, self._count - late, frame)
+        self._used[number] = _Used(now_s - late / self._rate.number_hz, self._count - late)
         if is_taken and is_return:
             self._repeated_numbers.append(now_s)
         return not is_late

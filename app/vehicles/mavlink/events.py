@@ -3,7 +3,7 @@ trial machine, and its outputs. SI units, altitude and climb rate positive up; e
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
@@ -25,6 +25,20 @@ class Position:
     def away_m(self, start: "Position") -> float:
         """Return the horizontal distance from `start`."""
         return math.hypot(self.north_m - start.north_m, self.east_m - start.east_m)
+
+
+@dataclass(frozen=True, slots=True)
+class InvalidPosition:
+    """A position by the vehicle's clock with a value that is not finite: no sample, but its clock advances."""
+
+    time_boot_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """Attitude of the vehicle by its lean: roll and pitch as one angle, rad."""
+
+    lean_rad: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +167,8 @@ class VehicleEvent:
 
 Measurement = (
     Position
+    | InvalidPosition
+    | Attitude
     | Heartbeat
     | Battery
     | Throttle
@@ -203,6 +219,16 @@ class Setting:
 
     parameter: str
     value: float
+
+
+@dataclass(frozen=True, slots=True)
+class ModeParameter:
+    """Parameter that holds the vehicle's mode: `flying` is its value in flight, `modes` are others, named as in
+    Heartbeat."""
+
+    name: str
+    flying: float
+    modes: Mapping[float, str]
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,15 +4,19 @@ from typing import Final
 
 from app.vehicles.mavlink.failures import GROUND_M, HEARTBEATS_MISSED, Failure, Finding, Limits
 from app.vehicles.mavlink.observation import (
+    DRIFT_M,
     FRESH_S,
     MAX_DIFFERENCE_M,
     SecondaryAltitude,
     TrialObservation,
+    has_reported_landing,
     has_unreliable_position,
     is_behind_climb_rate,
     is_disarmed,
+    is_fresh,
     mode_of,
     secondary_altitude_m,
+    stands_by_own_account,
 )
 
 _IN_TURN: Final = 0.8
@@ -25,6 +29,12 @@ _NO_BATTERY_S: Final = 10.0
 _IMPACT_BELOW_M: Final = 0.5
 _JUMP_ENDS_RECORD_M: Final = 0.5
 """A single false sample near the ground causes smaller jumps."""
+_UNCHANGED_S: Final = 1.0
+"""In recordings of all three autopilots, no two consecutive estimates in flight are equal in altitude and climb
+rate."""
+_STEPPED_S: Final = 0.3
+"""A greater step of the clock is not one of the latency."""
+_LEANING: Final = 0.5
 _CLIMBED_WITHIN_M: Final = 1.0
 """PX4 hovers from 0.8 m below its set point on (NAV_MC_ALT_RAD)."""
 
@@ -47,7 +57,7 @@ def find_taken_over(watch: TrialObservation, limits: Limits) -> Finding | None:
     mode = mode_of(watch, limits)
     if not watch.armed or not limits.is_manual(mode):
         return None
-    return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle entered mode {_named(mode, limits)}.")
+    return Finding(failure=Failure.TAKEN_OVER, why=f"The vehicle entered mode {named(mode, limits)}.")
 
 
 def find_interruption(before: TrialObservation, watch: TrialObservation, limits: Limits) -> Finding | None:
@@ -58,7 +68,7 @@ def find_interruption(before: TrialObservation, watch: TrialObservation, limits:
     is_in_turn = min(before.heartbeat_gap_s, watch.heartbeat_gap_s) >= in_turn_s
     if not (was_by_hand and is_in_turn) or limits.is_manual(watch.mode):
         return None
-    return Finding(failure=Failure.INTERRUPTED, why=f"One heartbeat reported mode {_named(before.mode, limits)}.")
+    return Finding(failure=Failure.INTERRUPTED, why=f"One heartbeat reported mode {named(before.mode, limits)}.")
 
 
 def find_unexpected(
@@ -72,7 +82,7 @@ def find_unexpected(
     elif is_disarmed(watch, limits):
         why = "The vehicle disarmed itself in the air."
     elif modes and mode and mode not in modes:
-        why = f"The vehicle entered mode {_named(mode, limits)}."
+        why = f"The vehicle entered mode {named(mode, limits)}."
     elif blocks and watch.block and watch.block not in blocks:
         why = f"Its flight plan entered the block “{watch.block}”."
     return Finding(failure=Failure.UNEXPECTED, why=why) if why else None
@@ -84,7 +94,7 @@ def find_interrupted_climb(watch: TrialObservation, limits: Limits, climb_to_m: 
     mode = mode_of(watch, limits)
     if mode not in limits.hovering_modes or watch.highest_m >= climb_to_m - _CLIMBED_WITHIN_M:
         return None
-    why = f"The vehicle entered mode {_named(mode, limits)} before it had climbed."
+    why = f"The vehicle entered mode {named(mode, limits)} before it had climbed."
     return Finding(failure=Failure.UNEXPECTED, why=why)
 
 
@@ -100,7 +110,8 @@ def find_incomplete_climb(watch: TrialObservation, climb_to_m: float) -> Finding
     return Finding(failure=Failure.INTERRUPTED, why=why)
 
 
-def _named(mode: str, limits: Limits) -> str:
+def named(mode: str, limits: Limits) -> str:
+    """Return the display name of a mode."""
     return limits.mode_names.get(mode, mode)
 
 
@@ -109,7 +120,7 @@ def find_own_landing(watch: TrialObservation, limits: Limits, ground_m: float, *
     below our ceiling, the vehicle's own ceiling is the cause, and the failure is that of the envelope."""
     why = ""
     if mode_known and (mode := mode_of(watch, limits)) in limits.landing_modes - limits.flying_modes:
-        why = f"It entered mode {_named(mode, limits)}."
+        why = f"It entered mode {named(mode, limits)}."
     elif watch.block in limits.landing_blocks:
         why = f"Its flight plan entered the block “{watch.block}”."
     if not why or watch.last is None:
@@ -145,12 +156,23 @@ def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, s
             why = f"It was {away_m:.1f} m from its start; the limit is {limits.radius_m:g} m."
         elif settling and watch.crossings >= limits.crossings:
             why = f"It crossed its set point {watch.crossings} times by more than ±{limits.crossing_m:g} m."
+    if not why and watch.leaning > _LEANING:
+        why = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
     return Finding(failure=Failure.ENVELOPE, why=why) if why else None
 
 
 def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
-    if watch.stuck_s > limits.stuck_s:
-        return Finding(failure=Failure.FROZEN, why=f"Its clock stood still for more than {limits.stuck_s:g} s.")
+    why = ""
+    if watch.stuck_s > limits.stuck_s and watch.other is not None and watch.last is not None:
+        why = f"Its clock jumped by {watch.other.last.time_boot_s - watch.last.time_boot_s:+.1f} s."
+    elif watch.stuck_s > limits.stuck_s:
+        why = f"Its clock stood still for more than {limits.stuck_s:g} s."
+    elif watch.stepped_s > _STEPPED_S:
+        why = f"Its clock jumped ahead by {watch.stepped_s:.1f} s."
+    elif watch.unchanged_s > _UNCHANGED_S:
+        why = f"Its altitude stood still for more than {_UNCHANGED_S:g} s while its clock ran."
+    if why:
+        return Finding(failure=Failure.FROZEN, why=why)
     return _find_blind(watch.second, now_s, stuck_s=limits.stuck_s, silent_s=limits.silent_s)
 
 
@@ -171,11 +193,14 @@ def find_disagreement(second: SecondaryAltitude | None) -> Finding | None:
     return Finding(failure=Failure.DISAGREEMENT, why=why)
 
 
-def find_departure(watch: TrialObservation, ground_m: float) -> Finding | None:
-    """Find that a vehicle without a takeoff command may have left the ground, by its altitude."""
+def find_departure(watch: TrialObservation, ground_m: float, now_s: float) -> Finding | None:
+    """Find that a vehicle without a takeoff command may have left the ground, by its altitude, or that its altitude
+    drifts while it reports that it stands."""
     if watch.last is None or abs(away_m := watch.last.altitude_m - ground_m) <= GROUND_M:
         return None
-    why = f"Its altitude changed by {away_m:+.2f} m before the takeoff command, and it may have moved."
+    stands = stands_by_own_account(watch, now_s, ground_m)
+    what = "although it stood on the ground: wait until its estimate has settled" if stands else "and it may have moved"
+    why = f"Its altitude changed by {away_m:+.2f} m before the takeoff command, {what}."
     return Finding(failure=Failure.LOST_POSITION, why=why)
 
 
@@ -214,6 +239,18 @@ def find_jump(watch: TrialObservation) -> Finding | None:
     return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude jumped by {watch.jumped_m:.1f} m.")
 
 
+def find_drift(watch: TrialObservation, now_s: float, ground_m: float, landed_blocks: frozenset[str]) -> Finding | None:
+    """Find that the altitude of a flown vehicle has drifted: it is below the ground, or the vehicle reports that it has
+    landed where its altitude does not."""
+    if watch.last is None or watch.doubted is not None or not is_fresh(watch, now_s):
+        return None
+    off_m = watch.last.altitude_m - ground_m
+    has_landed = watch.lifted and has_reported_landing(watch, now_s, landed_blocks)
+    if off_m >= -DRIFT_M and not (off_m > DRIFT_M and has_landed):
+        return None
+    return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude has drifted: it was {off_m:+.1f} m on the ground.")
+
+
 def find_altitude_behind(watch: TrialObservation) -> Finding | None:
     """Find that a vehicle commanded to climb is on the ground by its altitude but climbs by its climb rate."""
     if not is_behind_climb_rate(watch):
@@ -233,7 +270,7 @@ def find_battery(watch: TrialObservation, now_s: float) -> Finding | None:
 def find_fall(watch: TrialObservation, limits: Limits, ground_m: float) -> Finding | None:
     """Find ground contact at a speed above that of any landing."""
     last = watch.last
-    if last is None or watch.doubted is not None or watch.jumped_m:
+    if last is None or watch.doubted is not None:
         return None
     near = last.altitude_m - ground_m < _IMPACT_BELOW_M
     if not near or last.climb_rate_m_s >= -limits.impact_m_s:

@@ -31,6 +31,7 @@ from app.vehicles.mavlink.dialects import (
     source_system,
 )
 from app.vehicles.mavlink.duplicate_vehicle import DuplicateDetector
+from app.vehicles.mavlink.other_peers import GONE_AFTER_S, OtherPeers
 from app.vehicles.mavlink.tlog import TlogWriter
 from app.vehicles.mavlink.transports import LinkError, Peer, Transport, open_transport
 
@@ -46,15 +47,8 @@ STEP_S: Final = 1.0 / 256.0
 """Step of the clock between two reads of a transport without a thread."""
 MAX_SEQUENCE_LEAD: Final = 128
 """A sequence number further ahead than this is an old one, because packets may overtake each other."""
-GONE_AFTER_S: Final = 1.5
-"""A peer that has sent nothing for this long may have moved to another port of the same host."""
 DUPLICATE_TIMEOUT_S: Final = 3.0
-"""Time for which a message of another peer with the vehicle's ids counts."""
-UNKNOWN_PEER_INTERVAL_S: Final = 0.2
-"""Interval at which a datagram of another peer is parsed while the vehicle is received, so that a flood of them costs
-nothing."""
-_MAX_UNKNOWN_PEERS: Final = 32
-"""Greatest number of other peers of which a datagram is parsed in that interval."""
+"""Time for which messages of another peer with the vehicle's ids count."""
 
 MAV_TYPE_GCS: Final = 6
 MAV_STATE_ACTIVE: Final = 4
@@ -147,7 +141,8 @@ class Link:
         self._vehicle_system, self._make = target_system, make
         self._vehicle_component: int | None = None
         self._duplicates = DuplicateDetector()
-        self._checked_s: dict[Peer, float] = {}
+        self._others = OtherPeers()
+        self._last_number = 0
         self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
@@ -341,27 +336,32 @@ class Link:
             self._foreign += 1
 
     def _process_other_peer(self, data: bytes, peer: Peer, *, is_same_host: bool) -> None:
-        """Adopt the vehicle's new port after a silence; before, find out whether another vehicle uses its ids."""
+        """Adopt the vehicle's new port; otherwise find out whether another vehicle uses its ids."""
         now_s = self._clock.now_s()
         since_s = self._last_packet_s if self._last_packet_s is not None else self._opened_s
         is_gone = now_s - since_s > GONE_AFTER_S
         if is_gone and is_same_host:
             if any(self._is_vehicle(message) for message in self._new_codec().parse(data)):
                 self._transport.adopt(peer)
-        elif not is_gone and self._last_packet_s is not None and self._may_check(peer, now_s):
-            ids = (self._vehicle_system, self._vehicle_component)
-            messages = filter(is_known, self._new_codec().parse(data))
-            if any((source_system(each), source_component(each)) == ids for each in messages):
+        elif not is_gone and self._last_packet_s is not None and self._others.may_check(peer, now_s):
+            message = next((each for each in self._new_codec().parse(data) if self._poses_as_vehicle(each)), None)
+            if message is None:
+                return
+            verdict = self._others.add(
+                peer, sequence(message), now_s, last_number=self._last_number, last_s=self._last_packet_s
+            )
+            if verdict == "duplicate":
                 self._duplicate_s = now_s
+            elif verdict == "moved" and is_same_host:
+                self._transport.adopt(peer)
 
-    def _may_check(self, peer: Peer, now_s: float) -> bool:
-        """Whether to parse a datagram of another peer now. Each has its own interval, so that one does not hide
-        another."""
-        recent_s = {each: at_s for each, at_s in self._checked_s.items() if now_s - at_s < UNKNOWN_PEER_INTERVAL_S}
-        if peer in recent_s or len(recent_s) >= _MAX_UNKNOWN_PEERS:
+    def _poses_as_vehicle(self, message: Message) -> bool:
+        """Whether a message of another peer has the vehicle's ids, and is no copy of one of its own."""
+        if not is_known(message) or self._duplicates.has_seen(bytes(message.get_msgbuf())):
             return False
-        self._checked_s = {**recent_s, peer: now_s}
-        return True
+        is_counted = not message.get_type().startswith(self._dialect.uncounted)
+        ids = (source_system(message), source_component(message))
+        return is_counted and ids == (self._vehicle_system, self._vehicle_component)
 
     def _is_vehicle(self, message: Message) -> bool:
         """Whether the message identifies its sender as the vehicle of this link."""
@@ -408,6 +408,7 @@ class Link:
         if self._vehicle_component in (None, source_component(message)):
             self._last_packet_s = now_s
             if not message.get_type().startswith(self._dialect.uncounted):
+                self._last_number = sequence(message)
                 self._duplicates.add(frame, sequence(message), now_s, _boot_s(message))
         if is_autopilot:
             self._last_heartbeat_s = now_s

@@ -5,15 +5,27 @@ messages apart in time confirm it and none between them contradicts. A position 
 one, by itself or by its clock, is doubted until more of the same kind have arrived and none of the previous kind.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from app.vehicles.mavlink.boot_clock import AHEAD_S, BACK_S, RESTARTED_S, OtherClock
+from app.vehicles.mavlink.boot_clock import (
+    AHEAD_S,
+    BACK_S,
+    EARLY_S,
+    RESTARTED_S,
+    STEPPED_S,
+    OtherClock,
+    may_have_begun,
+    unwrapped,
+)
 from app.vehicles.mavlink.events import (
+    Attitude,
     Battery,
     BlockEntered,
     FenceBreach,
     Heartbeat,
+    InvalidPosition,
     LandedState,
     Measurement,
     Position,
@@ -50,8 +62,12 @@ _DOUBT_DECAY_1_S: Final = 5.0
 """Tolerated doubted samples per second; with `_DOUBTED_LIMIT` more than that, the position is unreliable."""
 BEHIND_M: Final = 0.5
 """An altitude that has fallen behind the integrated climb rate by more than this does not follow it."""
-_DRIFT_M: Final = 1.0
+DRIFT_M: Final = 1.0
 """Greatest drift of an altitude during a flight."""
+_LEAN_RAD: Final = math.radians(20.0)
+_LEANING_OVER_S: Final = 1.5
+_LONGEST_LEAN_S: Final = 0.5
+"""Longest time for which one report of its attitude counts."""
 MAX_DIFFERENCE_M: Final = 0.3
 """Greatest difference between the second source of altitude and the vehicle's own."""
 _MAX_SECONDARY_AGE_S: Final = 0.5
@@ -76,7 +92,9 @@ class TrialObservation:
     Times of the last packet (`received_s`), of the last position with a new time stamp (`advanced_s`) and of the last
     one that was not doubted (`accepted_s`), which was sent at `sent_s` if its latency above the least one is delay.
     `armed` and `mode` are from the last heartbeat, `armed_since_s` and `mode_since_s` since when all heartbeats agree
-    with it. `jumped_m` is the greatest jump after which the altitude has continued from another value.
+    with it. `jumped_m` is the greatest jump after which the altitude has continued from another value, `stepped_s` the
+    greatest step ahead of the vehicle's clock. `unchanged_s` is the time by that clock in which neither altitude nor
+    climb rate has changed at all, `leaning` the recent share of time in which it has leaned by more than 20°.
     """
 
     received_s: float
@@ -97,6 +115,10 @@ class TrialObservation:
     glitches: int = 0
     doubt_level: float = 0.0
     jumped_m: float = 0.0
+    stepped_s: float = 0.0
+    unchanged_s: float = 0.0
+    leaning: float = 0.0
+    attitude_s: float | None = None
     least_offset_s: float | None = None
     """Our clock less the vehicle's, by the position with the least latency."""
     late_since_s: float | None = None
@@ -113,6 +135,8 @@ class TrialObservation:
     block_s: float = 0.0
     landed: bool | None = None
     landed_s: float = 0.0
+    landed_since_s: float = 0.0
+    """Since when its landed state has been the same."""
     grounded_since_s: float | None = None
     highest_m: float = float("-inf")
     """Greatest altitude since the command."""
@@ -169,6 +193,11 @@ def update(
     match measurement:
         case Position():
             return _add_position(watch, measurement, now_s, limits)
+        case InvalidPosition(time_boot_s=time_boot_s):
+            is_new = watch.last is None or time_boot_s > watch.last.time_boot_s
+            watch = replace(watch, advanced_s=now_s, stuck_s=0.0) if is_new else watch
+        case Attitude(lean_rad=lean_rad):
+            watch = _add_attitude(watch, lean_rad, now_s)
         case Heartbeat():
             watch = _add_heartbeat(watch, measurement, now_s)
         case Battery(voltage_v=float(volts)):
@@ -178,7 +207,8 @@ def update(
         case FenceBreach(limit=limit):
             watch = replace(watch, breached=limit or "some limit")
         case LandedState(on_ground=landed):
-            watch = replace(watch, landed=landed, landed_s=now_s)
+            since_s = watch.landed_since_s if landed == watch.landed else now_s
+            watch = replace(watch, landed=landed, landed_s=now_s, landed_since_s=since_s)
         case BlockEntered(number=number):
             watch = replace(watch, block=limits.blocks.get(number, str(number)), block_s=now_s)
         case _:
@@ -193,14 +223,16 @@ def update_secondary(watch: TrialObservation, sample: SecondaryAltitudeReceived)
     return replace(watch, second=_add_secondary(second, sample, vehicle_m))
 
 
-def settle(watch: TrialObservation, now_s: float, ground_m: float) -> TrialObservation:
+def settle(watch: TrialObservation, now_s: float, ground_m: float, *, commanded: bool) -> TrialObservation:
     """Note since when every source shows it on the ground: its position by height and speed, the landed state that it
-    reports, and the second source of altitude. A single sample that jumps is ignored."""
+    reports, and the second source of altitude. A single sample that jumps is ignored. Before it is `commanded` to take
+    off, its landed state is believed rather than an altitude that drifts."""
     if watch.doubted is not None and is_fresh(watch, now_s):
         return watch
-    airborne = is_airborne(watch, now_s, ground_m)
+    stands = not commanded and stands_by_own_account(watch, now_s, ground_m)
+    airborne = is_airborne(watch, now_s, ground_m) and not stands
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
-    grounded = is_grounded(watch, now_s, ground_m) and not is_said_to_fly(watch, now_s, ground_m)
+    grounded = (stands or is_grounded(watch, now_s, ground_m)) and not is_said_to_fly(watch, now_s, ground_m)
     return with_changes(
         watch,
         lifted=watch.lifted or airborne,
@@ -231,7 +263,7 @@ def is_fresh(watch: TrialObservation, now_s: float) -> bool:
     return watch.last is not None and now_s - watch.sent_s < FRESH_S
 
 
-def is_still(watch: TrialObservation, now_s: float, ground_m: float, *, within_m: float = _DRIFT_M) -> bool:
+def is_still(watch: TrialObservation, now_s: float, ground_m: float, *, within_m: float = DRIFT_M) -> bool:
     """Whether it neither climbs nor sinks within `within_m` of the ground, by a fresh sample."""
     last = watch.last
     low = last is not None and last.altitude_m - ground_m < within_m
@@ -258,6 +290,19 @@ def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bo
 def reports_landing(watch: TrialObservation, now_s: float) -> bool:
     """Whether it now reports that it is on the ground."""
     return watch.landed is True and now_s - watch.landed_s < AGREED_S
+
+
+def has_reported_landing(watch: TrialObservation, now_s: float, landed_blocks: frozenset[str]) -> bool:
+    """Whether it has reported for a second that it is on the ground, by its landed state or the block of its plan."""
+    if watch.block in landed_blocks:
+        return now_s - watch.block_s >= AGREED_S
+    return reports_landing(watch, now_s) and now_s - watch.landed_since_s >= AGREED_S
+
+
+def stands_by_own_account(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
+    """Whether it reports that it is on the ground, and its altitude has not drifted further than one may."""
+    drifted_m = 0.0 if watch.last is None else watch.last.altitude_m - ground_m
+    return reports_landing(watch, now_s) and abs(drifted_m) <= DRIFT_M
 
 
 def secondary_altitude_m(second: SecondaryAltitude | None, now_s: float) -> float | None:
@@ -331,14 +376,22 @@ def _add_heartbeat(watch: TrialObservation, heartbeat: Heartbeat, now_s: float) 
     )
 
 
+def _add_attitude(watch: TrialObservation, lean_rad: float, now_s: float) -> TrialObservation:
+    passed_s = 0.0 if watch.attitude_s is None else min(now_s - watch.attitude_s, _LONGEST_LEAN_S)
+    weight = -math.expm1(-passed_s / _LEANING_OVER_S)
+    leaning = watch.leaning + weight * ((abs(lean_rad) > _LEAN_RAD) - watch.leaning)
+    return replace(watch, leaning=leaning, attitude_s=now_s)
+
+
 def _add_position(
     watch: TrialObservation, position: Position, now_s: float, limits: Limits
 ) -> tuple[TrialObservation, tuple[Position, ...]]:
     last, doubted = watch.last, watch.doubted
     newest = doubted or last
+    position = unwrapped(position, newest)
     if newest is not None:
-        gained_s = position.time_boot_s - newest.time_boot_s
-        if gained_s <= 0.0 or gained_s > now_s - watch.advanced_s + AHEAD_S:
+        early_s = _early_s(watch, position, now_s, newest)
+        if position.time_boot_s <= newest.time_boot_s or early_s > EARLY_S:
             return _add_other_clock(watch, position, now_s, newest), ()
     watch = _with_latency(watch, position, now_s)
     quiet_s = now_s - watch.advanced_s
@@ -359,20 +412,34 @@ def _add_position(
 
 
 def _add_other_clock(watch: TrialObservation, position: Position, now_s: float, newest: Position) -> TrialObservation:
-    """Process a position whose time is late, repeated or too far ahead. The vehicle has rebooted only if the clock went
-    back and continues from there, and no more positions by the previous clock arrive."""
+    """Process a position whose time is late, repeated or ahead. Only if further ones continue from there, and no more
+    by the previous clock arrive, has the vehicle's clock stepped ahead, or the vehicle rebooted."""
     other = watch.other
     goes_on = other is not None and other.goes_on(position, now_s)
     first_s = other.first_s if other is not None and goes_on else now_s
     is_alone = watch.accepted_s <= first_s and watch.advanced_s <= first_s
+    early_s = _early_s(watch, position, now_s, newest)
     fell_back = position.time_boot_s < newest.time_boot_s - BACK_S
     watch = replace(watch, other=OtherClock(first_s=first_s, last_s=now_s, last=position))
-    if not (fell_back and is_alone and goes_on):
+    if not (is_alone and goes_on):
+        return watch
+    if EARLY_S < early_s <= AHEAD_S and now_s - first_s >= STEPPED_S:
+        step_s = max(watch.stepped_s, early_s)
+        return replace(watch, stepped_s=step_s, least_offset_s=now_s - position.time_boot_s, advanced_s=now_s)
+    if not (fell_back and may_have_begun(position.time_boot_s, first_s - watch.advanced_s)):
         return watch
     if now_s - first_s < RESTARTED_S:
         return replace(watch, stuck_s=0.0)
     watch = replace(watch, rebooted=True, last=position, doubted=None, least_offset_s=None)
     return replace(watch, advanced_s=now_s, accepted_s=now_s, sent_s=now_s)
+
+
+def _early_s(watch: TrialObservation, position: Position, now_s: float, newest: Position) -> float:
+    """Return how far the position's time is ahead of the vehicle's clock: by how much it arrived before the least
+    latency, or, while that is not known, beyond AHEAD_S what the clock can have gained."""
+    if watch.least_offset_s is None:
+        return position.time_boot_s - newest.time_boot_s - (now_s - watch.advanced_s) - AHEAD_S
+    return watch.least_offset_s - (now_s - position.time_boot_s)
 
 
 def _follows(one: Position, other: Position) -> bool:
@@ -411,6 +478,7 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
     has_crossed = side != watch.side
     return replace(
         watch,
+        unchanged_s=_unchanged_s(watch, position),
         behind_m=_behind_m(watch, position),
         unseen=watch.unseen or (watch.last is not None and position.time_boot_s - watch.last.time_boot_s > FRESH_S),
         highest_m=max(watch.highest_m, position.altitude_m),
@@ -423,6 +491,13 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
         may_overshoot=watch.may_overshoot and not has_crossed,
         other=None,
     )
+
+
+def _unchanged_s(watch: TrialObservation, position: Position) -> float:
+    last = watch.last
+    if last is None or (last.altitude_m, last.climb_rate_m_s) != (position.altitude_m, position.climb_rate_m_s):
+        return 0.0
+    return watch.unchanged_s + position.time_boot_s - last.time_boot_s
 
 
 def _behind_m(watch: TrialObservation, position: Position) -> float:

@@ -27,6 +27,7 @@ from app.vehicles.mavlink.events import (
     PerformAction,
     Position,
     RecordSample,
+    RequestGain,
     RestoreGains,
     SecondaryAltitudeReceived,
     SetPointsPaused,
@@ -51,6 +52,7 @@ from app.vehicles.mavlink.trial_reactions import (
     land,
     measure_ground,
     note,
+    note_cause,
     quarantine,
     request_reply,
     send_gains,
@@ -96,11 +98,21 @@ def advance(trial: Trial, event: Event) -> Step:
         trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
     elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=replace(trial.watch, duplicate_reason=event.why))
-    settled = watching.settle(trial.watch, event.now_s, trial.plan.ground_m)
+    settled = watching.settle(trial.watch, event.now_s, trial.plan.ground_m, commanded=trial.commanded_s is not None)
     trial = trial if settled is trial.watch else replace(trial, watch=settled)
     trial, requests = _confirm_take_off(trial, event)
-    trial, commands = _react(_with_jump(_with_fall(trial)), event)
-    return trial, (*kept, *requests, *commands)
+    trial, polls = _poll_mode(trial, event.now_s)
+    trial = _with_drift(_with_jump(_with_disarming(_with_fall(trial, event.now_s))), event.now_s)
+    trial, commands = _react(trial, event)
+    return trial, (*kept, *requests, *polls, *commands)
+
+
+def _poll_mode(trial: Trial, now_s: float) -> Step:
+    """Request the mode of a vehicle whose heartbeats do not distinguish all modes."""
+    mode = trial.plan.mode_parameter
+    if mode is None or trial.state not in _STATES_WITH_TRIAL_GAINS or now_s - trial.polled_s < REPEAT_S:
+        return trial, ()
+    return replace(trial, polled_s=now_s), (RequestGain(mode.name),)
 
 
 def _confirm_take_off(trial: Trial, event: Event) -> Step:
@@ -116,9 +128,10 @@ def _confirm_take_off(trial: Trial, event: Event) -> Step:
 
 def _process_packet(trial: Trial, event: PacketReceived) -> Step:
     watch, positions = watching.update(trial.watch, event.measurement, event.now_s, trial.plan.limits)
-    trial = _with_changed_gain(replace(_with_interruption(trial, watch), watch=watch), event.measurement)
+    trial = _with_disarmed_height(trial, watch, event.now_s)
+    trial, requests = _check_settings(replace(_with_interruption(trial, watch), watch=watch), event.measurement)
     if trial.armed_s is None or trial.state not in _RECORDED or watch.rebooted:
-        return trial, ()
+        return trial, requests
     if trial.state is State.ARM:
         trial = replace(trial, ground_samples=(*trial.ground_samples, *positions))
     elif trial.state is State.RECORD:
@@ -126,18 +139,37 @@ def _process_packet(trial: Trial, event: PacketReceived) -> Step:
         trial = set_point_schedule.note_target(trial, event.measurement, event.now_s)
     to_m = trial.plan.ground_m if trial.state not in _STATES_WITH_TRIAL_GAINS else trial.plan.limits.set_point_m
     second_m = watch.second.altitude_m if watch.second is not None else None
-    return trial, tuple(RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)
+    samples = (RecordSample(position, to_m, watch.battery_v, second_m) for position in positions)
+    return trial, (*requests, *samples)
 
 
-def _with_changed_gain(trial: Trial, measurement: Measurement | None) -> Trial:
-    """Note a gain that the vehicle reports with another value than it was seen to hold before its flight."""
+def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
+    """Note a gain, or the mode, that the vehicle reports with another value than it must hold. A single report may be
+    an old one, and is confirmed by a reply to a request."""
     if trial.state not in {State.ARM, *_STATES_WITH_TRIAL_GAINS} or not isinstance(measurement, Parameter):
+        return trial, ()
+    mode, name, value = trial.plan.mode_parameter, measurement.name, measurement.value
+    held = {setting.parameter: setting.value for setting in trial.plan.trial_gains}
+    held |= {} if mode is None else {mode.name: mode.flying}
+    if math.isclose(held.get(name, value), value, rel_tol=1e-6):
+        return replace(trial, suspects=trial.suspects - {name}) if name in trial.suspects else trial, ()
+    if name not in trial.suspects:
+        return replace(trial, suspects=trial.suspects | {name}), (RequestGain(name),)
+    if mode is not None and name == mode.name:
+        entered = limit_checks.named(mode.modes.get(value, f"{name} {value:g}"), trial.plan.limits)
+        return note(trial, Finding(failure=Failure.UNEXPECTED, why=f"The vehicle entered mode {entered}.")), ()
+    why = f"{name} changed to {value:g} by a command that was not Gainline's."
+    return note(trial, Finding(failure=Failure.INTERRUPTED, why=why)), ()
+
+
+def _with_disarmed_height(trial: Trial, watch: TrialObservation, now_s: float) -> Trial:
+    """Note the height of a vehicle in the air whose heartbeats begin to report that its motors are off."""
+    if watch.armed == trial.watch.armed or trial.state not in _FLOWN:
         return trial
-    for setting in trial.plan.trial_gains:
-        if setting.parameter == measurement.name and not math.isclose(setting.value, measurement.value, rel_tol=1e-6):
-            why = f"{measurement.name} changed to {measurement.value:g} by a command that was not Gainline's."
-            return note(trial, Finding(failure=Failure.INTERRUPTED, why=why))
-    return trial
+    ground_m, last = trial.plan.ground_m, watch.last
+    is_up = last is not None and watching.is_fresh(watch, now_s) and not watching.reports_landing(watch, now_s)
+    height_m = last.altitude_m - ground_m if last is not None and is_up and not watch.armed else 0.0
+    return replace(trial, disarmed_m=height_m)
 
 
 def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
@@ -148,12 +180,33 @@ def _with_interruption(trial: Trial, watch: TrialObservation) -> Trial:
     return trial if finding is None else note(trial, finding)
 
 
-def _with_fall(trial: Trial) -> Trial:
+def _with_fall(trial: Trial, now_s: float) -> Trial:
     """Note a fall in any state, unless a person has requested motors off."""
-    if trial.stopped or trial.commanded_s is None or trial.doubt:
+    if trial.stopped or trial.commanded_s is None or trial.fell_s is not None:
         return trial
     fall = limit_checks.find_fall(trial.watch, trial.plan.limits, trial.plan.ground_m)
-    return trial if fall is None else replace(note(trial, fall), contact="fell")
+    return trial if fall is None else replace(note(trial, fall), contact="fell", fell_s=now_s)
+
+
+def _with_disarming(trial: Trial) -> Trial:
+    """Note that somebody else, or the vehicle itself, stopped its motors in the air: it exceeded its limits because it
+    fell."""
+    watch, limits = trial.watch, trial.plan.limits
+    if trial.stopped or trial.state not in _FLOWN or not watching.is_disarmed(watch, limits):
+        return trial
+    fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= limits.confirmation_s
+    if not fell and trial.disarmed_m <= watching.DRIFT_M:
+        return trial
+    return note_cause(trial, Finding(failure=Failure.UNEXPECTED, why="Its motors were stopped in the air."))
+
+
+def _with_drift(trial: Trial, now_s: float) -> Trial:
+    """Note an altitude that has drifted: limits that it exceeded may have been false."""
+    if trial.stopped or trial.state not in {*_FLOWN, State.DISARM} or trial.commanded_s is None:
+        return trial
+    plan = trial.plan
+    drift = limit_checks.find_drift(trial.watch, now_s, plan.ground_m, plan.limits.landed_blocks)
+    return trial if drift is None else note_cause(trial, drift)
 
 
 def _with_jump(trial: Trial) -> Trial:
@@ -189,10 +242,12 @@ def _arm(trial: Trial, event: Event) -> Step:
     last = trial.watch.last
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    watch = replace(trial.watch, block="", behind_m=0.0, highest_m=last.altitude_m)
+    watch = replace(trial.watch, block="", behind_m=0.0, stepped_s=0.0, highest_m=last.altitude_m)
     trial = measure_ground(replace(trial, watch=watch), now_s)
-    if finding := limit_checks.find_departure(trial.watch, trial.plan.ground_m) or (
-        limit_checks.find_disagreement_on_ground(trial.watch, trial.ground_shift_m, now_s)
+    if finding := (
+        limit_checks.find_departure(trial.watch, trial.plan.ground_m, now_s)
+        or limit_checks.find_disagreement_on_ground(trial.watch, trial.ground_shift_m, now_s)
+        or _unconfirmed_setting(trial)
     ):
         return fail(trial, finding, now_s)
     mode, watch = trial.watch.mode, replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S)
@@ -200,6 +255,13 @@ def _arm(trial: Trial, event: Event) -> Step:
     trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=boot_s, commanded_in=mode)
     trial, request = request_reply(enter(trial, State.TAKEOFF, now_s), now_s)
     return trial, (PerformAction(Action.TAKE_OFF), *request)
+
+
+def _unconfirmed_setting(trial: Trial) -> Finding | None:
+    if not trial.suspects:
+        return None
+    why = f"{', '.join(sorted(trial.suspects))} was reported with another value, and no reply confirmed which holds."
+    return Finding(failure=Failure.INTERRUPTED, why=why)
 
 
 def _boot_s(watch: TrialObservation, last: Position, now_s: float) -> float:
@@ -230,10 +292,19 @@ def _take_off(trial: Trial, event: Event) -> Step:
     if isinstance(event, ActionRefused):
         refused = replace(trial, confirmed_boot_s=trial.commanded_boot_s)
         return fail(refused, Finding(failure=Failure.TAKE_OFF_REFUSED, why=event.why), now_s)
-    if _waited_s(trial) > trial.plan.lift_off_s and watching.is_fresh(trial.watch, now_s):
-        why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
-        return fail(trial, Finding(failure=Failure.NO_LIFT_OFF, why=why), now_s)
+    if finding := _no_lift_off(trial, now_s):
+        return fail(trial, finding, now_s)
     return trial, ()
+
+
+def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
+    if _waited_s(trial) <= trial.plan.lift_off_s or not watching.is_fresh(trial.watch, now_s):
+        return None
+    if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
+        why = "It reports that it flies, but its altitude stayed on the ground."
+        return Finding(failure=Failure.LOST_POSITION, why=why)
+    why = f"It was still on the ground {trial.plan.lift_off_s:g} s after the command."
+    return Finding(failure=Failure.NO_LIFT_OFF, why=why)
 
 
 def _waited_s(trial: Trial) -> float:
@@ -422,8 +493,9 @@ def _disarming(trial: Trial, event: Event) -> Step:
         confirmed = " The vehicle confirmed that its motors have stopped." if trial.stopped else ""
         trial = replace(trial, why=trial.why + confirmed, contact=find_contact(trial, now_s))
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
+    stands = trial.commanded_s is None and watching.stands_by_own_account(trial.watch, now_s, trial.plan.ground_m)
     airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
-    if airborne and not trial.stopped:
+    if airborne and not (stands or trial.stopped):
         why = "It was in the air when its motors were to be stopped."
         return abort(replace(trial, doubt=trial.doubt or why), now_s)
     if now_s - trial.since_s > DISARMED_WITHIN_S:
@@ -483,6 +555,7 @@ _HANDLERS: Final[Mapping[State, Callable[[Trial, Event], Step]]] = {
     State.RESTORE: _restoring,
 }
 _STATES_WITH_TRIAL_GAINS: Final = frozenset({State.TAKEOFF, State.RECORD})
+_FLOWN: Final = frozenset({State.TAKEOFF, State.RECORD, State.LAND, State.ABORT_LAND, State.LINK_LOST})
 _RECORDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.ABORT_LAND, State.LINK_LOST})
 
 
@@ -492,6 +565,7 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
     return (
         _taken_over(trial)
         or limit_checks.find_unexpected(watch, plan.limits, _modes(trial), _blocks(trial))
+        or _noted(trial, Failure.UNEXPECTED, Failure.LOST_POSITION)
         or (limit_checks.find_interrupted_climb(watch, plan.limits, plan.climb_to_m) if _modes(trial) else None)
         or limit_checks.find_duplicate(watch)
         or limit_checks.find_link(watch, plan.limits, now_s)
@@ -503,6 +577,11 @@ def _finding(trial: Trial, now_s: float) -> Finding | None:
         or limit_checks.find_disagreement(watch.second)
         or limit_checks.find_battery(watch, now_s)
     )
+
+
+def _noted(trial: Trial, *failures: Failure) -> Finding | None:
+    """Return the trial's failure if it is one of these, which end the record."""
+    return Finding(failure=trial.failure, why=trial.why) if trial.failure in failures else None
 
 
 def _envelope(trial: Trial) -> Finding | None:

@@ -17,6 +17,7 @@ from app.vehicles.mavlink.events import (
     Action,
     Command,
     Event,
+    ModeParameter,
     PacketReceived,
     Parameter,
     PerformAction,
@@ -119,11 +120,13 @@ class Plan:
     command; `lift_off_s`: latest lift-off after it; `land_again_s`: interval at which a landing is commanded again;
     `set_points`: the takeoff's altitude, and those that follow, in the record's altitude; `holds_first`: the second of
     them is the takeoff's again, commanded by `Action.HOLD`, after which the vehicle may only be in `following_modes`
-    until it lands. The set point of `limits` is the current one. `trial_gains` are those that it was seen to hold.
+    until it lands. The set point of `limits` is the current one. `trial_gains` are those that it was seen to hold;
+    `mode_parameter` is its mode as a parameter, if its heartbeats do not distinguish all modes.
     """
 
     safe_gains: tuple[Setting, ...]
     trial_gains: tuple[Setting, ...] = ()
+    mode_parameter: ModeParameter | None = None
     limits: Limits
     ground_m: float
     set_points: SetPoints = SET_POINTS
@@ -198,7 +201,9 @@ class Trial:
     takeoff's that it has confirmed; `changes_set_point`: it has not confirmed the newest; `settling` are the positions
     that show whether it is at rest before the first of them. `astray_since_s`: since when it has reported another set
     point than the one it confirmed. `withdrawn`: a heartbeat has reported a manual mode since the first of them was
-    commanded, after which none is commanded any more.
+    commanded, after which none is commanded any more. `suspects` are parameters that one message reported with a value
+    other than the vehicle must have. `disarmed_m` is its height when its heartbeats began to report its motors off,
+    0 on the ground; `fell_s` the time of its fall.
     """
 
     plan: Plan
@@ -224,6 +229,10 @@ class Trial:
     resting_since_s: float | None = None
     stopped: bool = False
     answered: bool = False
+    suspects: frozenset[str] = frozenset()
+    polled_s: float = 0.0
+    disarmed_m: float = 0.0
+    fell_s: float | None = None
     doubt: str = ""
     contact: Contact = "unknown"
     changes: tuple[SetPointChange, ...] = ()
@@ -335,6 +344,11 @@ def note(trial: Trial, finding: Finding) -> Trial:
     return replace(trial, failure=finding.failure, why=finding.why)
 
 
+def note_cause(trial: Trial, finding: Finding) -> Trial:
+    """Note a failure that explains why a limit was exceeded: that does not count against the gains."""
+    return note(replace(trial, failure=None) if trial.failure is Failure.ENVELOPE else trial, finding)
+
+
 def enter(trial: Trial, state: State, now_s: float) -> Trial:
     if state not in TRANSITIONS[trial.state]:
         raise AssertionError(f"A trial cannot go from {trial.state} to {state}.")
@@ -372,13 +386,16 @@ def find_doubt_of_ground(trial: Trial, now_s: float) -> str:
 
 def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     """Return why a position on the ground does not show that the vehicle stayed or came down there: it may yet take
-    off, or it was not observed climbing or descending and does not report the landing itself either."""
+    off; it does not report a landing although it can; or it cannot, and was not observed climbing or descending."""
     watch, landed_blocks = trial.watch, trial.plan.limits.landed_blocks
     if trial.may_take_off:
         return "it has not replied since the takeoff command, which may still be under way"
-    is_unseen = trial.commanded_s is not None and (watch.unseen or not watch.lifted)
-    may_fly = watch.block not in landed_blocks if landed_blocks else not watching.reports_landing(watch, now_s)
-    return "its descent was not observed, and it has not reported a landing" if is_unseen and may_fly else ""
+    if trial.commanded_s is None:
+        return ""
+    if landed_blocks or watch.landed is not None:
+        has_landed = watch.block in landed_blocks if landed_blocks else watching.reports_landing(watch, now_s)
+        return "" if has_landed else "it has not reported a landing, and an altitude may drift"
+    return "" if watch.lifted and not watch.unseen else "its descent was not observed"
 
 
 def request_reply(trial: Trial, now_s: float) -> Step:

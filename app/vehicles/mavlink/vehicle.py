@@ -650,6 +650,7 @@ class MavlinkVehicle:
             lift_off_s=profile.lift_off_s,
             land_again_s=profile.land_again_s,
             stop_settings=profile.stop_settings,
+            mode_parameter=profile.mode_parameter,
             limits=limits_of(self._options, self._radio),
         )
         return plan.on_ground_at(ground.altitude_m)
@@ -707,6 +708,7 @@ class MavlinkVehicle:
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
+            failure="" if trial.failure is None else trial.failure.value,
             reason=" ".join(
                 part
                 for part in (reason, _LAND_WAS_REPEATED if self._requested == _LAND_REPEATED else "", both.remark)
@@ -721,7 +723,12 @@ class MavlinkVehicle:
         sample = RecordSample(ground.last, ground.altitude_m, self._radio.seen.battery_v)
         trajectory = records.trajectory_of((sample,), ground.last.time_boot_s, self._plan(ground).datum_m)
         return FlightRecord(
-            trajectory=trajectory, ending="aborted", reason=reason, has_flown=has_flown, settings=self._options
+            trajectory=trajectory,
+            ending="aborted",
+            failure=Failure.OPERATOR.value,
+            reason=reason,
+            has_flown=has_flown,
+            settings=self._options,
         )
 
     # ---- states

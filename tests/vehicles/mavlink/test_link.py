@@ -28,13 +28,13 @@ from app.vehicles.mavlink.dialects import (
     text,
 )
 from app.vehicles.mavlink.link import (
-    GONE_AFTER_S,
     MAX_QUEUED_MESSAGES,
     UNATTENDED_AFTER_S,
     Link,
     LinkError,
     LossCounter,
 )
+from app.vehicles.mavlink.other_peers import GONE_AFTER_S, INTERVAL_S
 from tests.clocks import ManualClock
 from tests.vehicles.mavlink.replaying import FLOWN, recorded
 from tests.vehicles.mavlink.speaking import (
@@ -140,48 +140,85 @@ def test_another_sender_with_the_vehicles_system_id_is_dropped_and_counted(
     assert link.health.foreign == 1
 
 
-def test_another_vehicle_with_its_system_id_beside_it_makes_the_link_doubtful(
-    paparazzi: FakeVehicleEndpoint, link: Link
-) -> None:
-    with FakeVehicleEndpoint(PAPARAZZI, component=190) as other:
-        other.ground = paparazzi.ground
+@contextmanager
+def link_beside(
+    paparazzi: FakeVehicleEndpoint, host: str = "127.0.0.1"
+) -> Iterator[tuple[Link, FakeVehicleEndpoint, ManualClock]]:
+    """A link that has heard its vehicle, and another sender."""
+    clock = ManualClock()
+    with (
+        Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
+        FakeVehicleEndpoint(PAPARAZZI, component=190, host=host) as other,
+    ):
         paparazzi.send(heartbeat(paparazzi, autopilot=9))
         collect(link, 1)
+        other.ground = paparazzi.ground
+        yield link, other, clock
+
+
+def wait_until_dropped(link: Link, datagrams: int) -> None:
+    assert becomes(lambda: link.health.foreign == datagrams)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2"])
+def test_another_vehicle_with_its_system_id_makes_the_link_doubtful_by_its_third_message(
+    paparazzi: FakeVehicleEndpoint, host: str
+) -> None:
+    with link_beside(paparazzi, host) as (link, other, clock):
+        for count in (1, 2, 3):
+            assert link.duplicate_reason == "", "one message, or two, may be anybody's"
+            clock.time_s += INTERVAL_S
+            other.say("LOCAL_POSITION_NED", **position(20 * count))
+            wait_until_dropped(link, count)
+            paparazzi.say("LOCAL_POSITION_NED", **position(20 * count))
+            collect(link, 1)
+        assert link.duplicate_reason == "Another vehicle with the same system id sends from another address."
+
+
+def test_copies_of_the_vehicles_packets_from_another_port_say_nothing(paparazzi: FakeVehicleEndpoint) -> None:
+    with link_beside(paparazzi) as (link, other, clock):
+        for count in range(1, 6):
+            frame = paparazzi.codec.pack(PAPARAZZI.message("LOCAL_POSITION_NED", position(20 * count)))
+            paparazzi.send(frame)
+            collect(link, 1)
+            clock.time_s += INTERVAL_S
+            other.send(frame)
+            wait_until_dropped(link, count)
         assert link.duplicate_reason == ""
-        other.send(heartbeat(other, autopilot=9))
-        assert becomes(lambda: bool(link.duplicate_reason))
-    assert link.duplicate_reason == "Another vehicle with the same system id sends from another address."
 
 
-def test_another_vehicle_with_its_system_id_on_another_host_makes_the_link_doubtful(
-    paparazzi: FakeVehicleEndpoint, link: Link
+def test_a_vehicle_whose_packets_go_on_from_another_port_is_followed_there_at_once(
+    paparazzi: FakeVehicleEndpoint,
 ) -> None:
-    with FakeVehicleEndpoint(PAPARAZZI, component=190, host="127.0.0.2") as other:
-        other.ground = paparazzi.ground
-        paparazzi.send(heartbeat(paparazzi, autopilot=9))
-        collect(link, 1)
-        other.send(heartbeat(other, autopilot=9))
-        assert becomes(lambda: bool(link.duplicate_reason))
+    with link_beside(paparazzi) as (link, moved, clock):
+        moved.codec = paparazzi.codec
+        for count in (1, 2, 3):
+            clock.time_s += INTERVAL_S
+            moved.say("LOCAL_POSITION_NED", **position(20 * count))
+            wait_until_dropped(link, min(count, 2))
+        assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [60], "within 0.6 s"
+        link.send("PARAM_SET", **GAIN)
+        assert [message.get_type() for message in moved.hear()] == ["PARAM_SET"]
+        assert link.duplicate_reason == ""
 
 
 def test_another_vehicle_is_found_by_any_of_its_messages_beside_a_host_that_floods_the_link(
     paparazzi: FakeVehicleEndpoint,
 ) -> None:
     """One interval was shared by all hosts, and only a heartbeat counted: a flood hid the other vehicle."""
-    clock = ManualClock()
     with (
-        Link(paparazzi.address, PAPARAZZI, clock=clock, target_system=31) as link,
-        FakeVehicleEndpoint(PAPARAZZI, component=190, host="127.0.0.2") as other,
+        link_beside(paparazzi, "127.0.0.2") as (link, other, clock),
         FakeVehicleEndpoint(PAPARAZZI, component=7, host="127.0.0.3") as noisy,
     ):
-        paparazzi.send(heartbeat(paparazzi, autopilot=9))
-        collect(link, 1)
-        other.ground = noisy.ground = paparazzi.ground
-        noisy.say("LOCAL_POSITION_NED", **position(20))
-        assert becomes(lambda: link.health.foreign == 1)
-        assert link.duplicate_reason == ""
-        other.say("LOCAL_POSITION_NED", **position(20))
-        assert becomes(lambda: bool(link.duplicate_reason))
+        noisy.ground = paparazzi.ground
+        for count in (1, 2, 3):
+            clock.time_s += INTERVAL_S
+            noisy.say("LOCAL_POSITION_NED", **position(20 * count))
+            other.say("LOCAL_POSITION_NED", **position(20 * count))
+            wait_until_dropped(link, 2 * count)
+            paparazzi.say("LOCAL_POSITION_NED", **position(20 * count))
+            collect(link, 1)
+        assert link.duplicate_reason
 
 
 def test_a_vehicle_that_returns_from_another_port_is_received_and_commanded_again(

@@ -20,6 +20,7 @@ from app.vehicles.mavlink.events import (
     CommandReply,
     FenceBreach,
     Heartbeat,
+    InvalidPosition,
     Measurement,
     Parameter,
     Position,
@@ -147,7 +148,7 @@ def test_positions_are_turned_upside_down() -> None:
 
 
 def test_messages_that_mix_their_units_measure_nothing() -> None:
-    for kind in ("GLOBAL_POSITION_INT", "BATTERY_STATUS", "ATTITUDE"):
+    for kind in ("GLOBAL_POSITION_INT", "BATTERY_STATUS"):
         assert not measured(FLOWN[0], kind)
         assert messages(FLOWN[0], kind, from_vehicle=True)
     assert {type(each) for each in measured(FLOWN[0], "VFR_HUD")} == {Throttle}
@@ -333,6 +334,7 @@ def test_every_message_that_a_trial_listens_to_is_asked_for(profile: Profile) ->
         (245, False),
         (162, False),
         (74, False),
+        (30, False),
     ]
     assert asked[0][0]["param2"] == 8000
 
@@ -382,7 +384,7 @@ def test_values_that_are_not_numbers_are_not_a_position(field: str, nothing: flo
     }
     for profile in PROFILES.values():
         assert isinstance(heard(profile, "LOCAL_POSITION_NED", **sample), Position)
-        assert heard(profile, "LOCAL_POSITION_NED", **sample | {field: nothing}) is None
+        assert heard(profile, "LOCAL_POSITION_NED", **sample | {field: nothing}) == InvalidPosition(1.0)
 
 
 def test_what_is_no_number_is_no_parameter() -> None:

@@ -21,6 +21,7 @@ from app.vehicles.mavlink.events import (
     Parameter,
     PerformAction,
     Position,
+    RequestGain,
     RestoreGains,
     SecondaryAltitudeReceived,
     SendGain,
@@ -527,7 +528,7 @@ def test_a_vehicle_that_reports_flying_is_landed_though_its_altitude_stays_at_ze
     walk = taking_off()
     walk.landed = False
     walk.pass_s(1.5)
-    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.NO_LIFT_OFF)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.LOST_POSITION)
     walk.pass_s(35.0)
     assert Action.MOTORS_OFF not in walk.actions
     walk.landed = True
@@ -712,14 +713,24 @@ def test_positions_that_fall_behind_are_no_positions() -> None:
 def test_a_gain_that_changes_in_flight_makes_the_flight_invalid() -> None:
     plan = replace(PLAN, trial_gains=(Setting("gui_v_kp", 1600.0),))
     walk = TrialDriver(plan=plan).lift_off()
-    walk.hear(Parameter("gui_v_kp", 1600.0))
+    walk.hear(Parameter("gui_v_kp", 300.0))
+    assert walk.told[-1][1] == RequestGain("gui_v_kp"), "one message may be an old one"
+    walk.hear(Parameter("gui_v_kp", 1600.0)).hear(Parameter("gui_v_kp", 300.0))
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)
     walk.hear(Parameter("gui_v_kp", 300.0))
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
     assert walk.trial.why == "gui_v_kp changed to 300 by a command that was not Gainline's."
     assert walk.pass_s(9.0).state is State.LAND
-    arming = TrialDriver(plan=plan)
-    assert arming.hear(Parameter("gui_v_kp", 300.0)).state is State.DISARM, "it is not flown at all"
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_gain_that_changes_before_the_takeoff_command_is_not_flown(times: int) -> None:
+    walk = TrialDriver(plan=replace(PLAN, trial_gains=(Setting("gui_v_kp", 1600.0),)), deaf=True)
+    for _ in range(times):
+        walk.hear(Parameter("gui_v_kp", 300.0))
+    walk.arm()
+    assert (walk.state, walk.trial.failure) == (State.DISARM, Failure.INTERRUPTED)
+    assert Action.TAKE_OFF not in walk.actions
 
 
 @pytest.mark.parametrize(
@@ -910,7 +921,8 @@ def test_a_vehicle_that_comes_down_by_itself_is_not_left_to_wind_up_its_integrat
 
 def test_an_altitude_that_drifts_up_does_not_hide_that_the_vehicle_has_landed_and_disarmed() -> None:
     walk = landing()
-    walk.altitude_m, walk.climb_rate_m_s, walk.armed = GROUND_M + 0.3, 0.0, False
+    walk.altitude_m, walk.climb_rate_m_s, walk.landed = GROUND_M + 0.3, 0.0, True
     walk.boot_s += 1.0
+    walk.pass_s(0.5).armed = False
     walk.pass_s(4.0)
     assert (walk.state, walk.trial.failure) == (State.RESTORE, None)

@@ -18,6 +18,7 @@ _TAKE_OFF: Final = 22
 _SET_MESSAGE_INTERVAL: Final = 511
 _REQUEST_MESSAGE: Final = 512
 _SYS_STATUS: Final = 1
+_ATTITUDE: Final = 30
 _LOCAL_POSITION_NED: Final = 32
 _NAV_CONTROLLER_OUTPUT: Final = 62
 _VFR_HUD: Final = 74
@@ -26,6 +27,7 @@ _POSITION_TARGET_LOCAL_NED: Final = 85
 _FENCE_STATUS: Final = 162
 _EXTENDED_SYS_STATE: Final = 245
 _STATUS_HZ: Final = 4.0
+_ATTITUDE_HZ: Final = 10.0
 _THROTTLE_HZ: Final = 10.0
 REFERENCE_HZ: Final = 50.0
 """Rate of what is compared with the altitude, sample by sample."""
@@ -90,6 +92,7 @@ class ArduPilot:
         ),
     )
     stop_settings: Final[tuple[str, ...]] = ()
+    mode_parameter: Final = None
     requirements: Final = (
         Requirement("FS_GCS_ENABLE", "5 (land when the ground station is lost)", frozenset({5.0})),
         Requirement("FS_GCS_TIMEOUT", "15 s or less (until it lands)", most=15.0),
@@ -181,13 +184,14 @@ class ArduPilot:
 
 
 def request_telemetry(target: Target, telemetry_hz: float) -> tuple[Step, ...]:
-    """Request all messages that a trial uses, positions at this rate. Not every autopilot sends the last three."""
+    """Request all messages that a trial uses, positions at this rate. Not every autopilot sends the last four."""
     return (
         _request(target, _LOCAL_POSITION_NED, telemetry_hz),
         _request(target, _SYS_STATUS, _STATUS_HZ),
         _request(target, _EXTENDED_SYS_STATE, _STATUS_HZ, needed=False),
         _request(target, _FENCE_STATUS, _STATUS_HZ, needed=False),
         _request(target, _VFR_HUD, _THROTTLE_HZ, needed=False),
+        _request(target, _ATTITUDE, _ATTITUDE_HZ, needed=False),
     )
 
 

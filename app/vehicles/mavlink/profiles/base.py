@@ -22,12 +22,15 @@ from app.vehicles.mavlink.dialects import (
 from app.vehicles.mavlink.events import (
     Action,
     AltitudeError,
+    Attitude,
     Battery,
     CommandReply,
     FenceBreach,
     Heartbeat,
+    InvalidPosition,
     LandedState,
     Measurement,
+    ModeParameter,
     Parameter,
     Position,
     Setting,
@@ -308,6 +311,11 @@ class Profile(Protocol):
         ...
 
     @property
+    def mode_parameter(self) -> ModeParameter | None:
+        """Its mode as a parameter, if its heartbeats do not distinguish all modes."""
+        ...
+
+    @property
     def requirements(self) -> tuple[Requirement, ...]: ...
     @property
     def set_point_requirements(self) -> tuple[Requirement, ...]:
@@ -438,6 +446,11 @@ def position(message: Message) -> Position:
         north_m=number(message, "x"),
         east_m=number(message, "y"),
     )
+
+
+def attitude(message: Message) -> Attitude:
+    """Read ATTITUDE."""
+    return Attitude(math.hypot(number(message, "roll"), number(message, "pitch")))
 
 
 def heartbeat(message: Message, mode: str) -> Heartbeat | None:
@@ -583,6 +596,7 @@ Readers = Mapping[str, Callable[[Message], Measurement | None]]
 
 READERS: Final[Readers] = MappingProxyType(
     {
+        "ATTITUDE": attitude,
         "LOCAL_POSITION_NED": position,
         "SYS_STATUS": battery,
         "VFR_HUD": throttle,
@@ -598,10 +612,13 @@ READERS: Final[Readers] = MappingProxyType(
 
 
 def read(readers: Readers, message: Message) -> Measurement | None:
-    """Read a message; None if it contains no measurement, or a value that is not finite."""
+    """Read a message; None if it contains no measurement, or a value that is not finite. Of a position with such a
+    value, the time is read."""
     reader = readers.get(message.get_type())
     measurement = None if reader is None else reader(message)
-    return measurement if measurement is not None and _is_finite(measurement) else None
+    if measurement is None or _is_finite(measurement):
+        return measurement
+    return InvalidPosition(measurement.time_boot_s) if isinstance(measurement, Position) else None
 
 
 def _is_finite(measurement: Measurement) -> bool:

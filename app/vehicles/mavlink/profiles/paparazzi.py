@@ -14,6 +14,7 @@ from app.vehicles.mavlink.events import (
     BlockEntered,
     CommandReply,
     Measurement,
+    ModeParameter,
     Setting,
     Version,
 )
@@ -74,6 +75,9 @@ class Paparazzi:
         ),
     )
     stop_settings: Final = ("kil_thr", "aut_kil_thr")
+    mode_parameter: Final = ModeParameter(
+        "aut_mod", 13.0, MappingProxyType({0.0: "0", 1.0: "0", 2.0: _HOME, 19.0: "8"})
+    )
     requirements: Final[tuple[Requirement, ...]] = ()
     set_point_requirements: Final[tuple[Requirement, ...]] = ()
     may_lack: Final[frozenset[str]] = frozenset()

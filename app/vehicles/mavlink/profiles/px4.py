@@ -86,6 +86,7 @@ class Px4:
         ),
     )
     stop_settings: Final[tuple[str, ...]] = ()
+    mode_parameter: Final = None
     requirements: Final = (
         Requirement("NAV_DLL_ACT", "3 (land when the ground station is lost)", frozenset({3.0})),
         Requirement("COM_DL_LOSS_T", "15 s or less (until it lands)", most=15.0),
