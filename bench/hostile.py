@@ -18,12 +18,13 @@ from pathlib import Path
 from typing import Final
 
 from bench.hazards.cases import Case
+from bench.hazards.hostile_checks import LOST
 from bench.hazards.hostile_table import HAZARDS
 from bench.hazards.hostile_trial import HostileResult, cases, run_trial
 
-STRIDE: Final = 37
+STRIDE: Final = 47
 """Step between the cases of the sample, chosen so that it covers hazards, states and autopilots."""
-VERDICTS: Final = ("completed", "aborted", "invalid", "refused", "lost")
+VERDICTS: Final = ("completed", "aborted", "invalid", "refused", LOST)
 VEHICLE_STATES: Final = ("safe", "quarantined", "unopened")
 
 
@@ -50,13 +51,15 @@ def fly_all(chosen: Sequence[Case], processes: int) -> Iterator[tuple[Case, Host
 
 
 def table(flown: Sequence[tuple[Case, HostileResult]]) -> Iterator[str]:
-    yield f"| hazard | runs | {' | '.join((*VERDICTS, *VEHICLE_STATES))} | failed |"
-    yield "| --- |" + " --- |" * (len(VERDICTS) + len(VEHICLE_STATES) + 2)
+    yield f"| hazard | runs | {' | '.join((*VERDICTS, *VEHICLE_STATES))} | failures | wrong |"
+    yield "| --- |" + " --- |" * (len(VERDICTS) + len(VEHICLE_STATES) + 3)
     for name in HAZARDS:
         ended = [each for case, each in flown if case.faults[0].kind == name]
         verdicts, left = Counter(each.outcome for each in ended), Counter(each.vehicle for each in ended)
         counts = [*(verdicts[each] for each in VERDICTS), *(left[each] for each in VEHICLE_STATES)]
-        cells = " | ".join(str(count or "") for count in (len(ended), *counts, sum(bool(each.wrong) for each in ended)))
+        failures = ", ".join(sorted({each.failure for each in ended if each.failure}))
+        wrong = sum(bool(each.wrong) for each in ended)
+        cells = " | ".join(str(cell or "") for cell in (len(ended), *counts, failures, wrong))
         yield f"| {name} | {cells} |"
 
 
@@ -108,31 +111,38 @@ delivers something false:
 - messages of another component, which may pose as the autopilot;
 - a second vehicle with the same ids, whose clock is ahead by the time in the table, on the ground or flying beside it
   (`flying twin`), or answering in its place (`replaced`); positions that show the ground after a gap;
-- packets that are late, later and later, duplicated, or from the future; commands that arrive late;
+- packets that are late, later and later, lost, duplicated, or from the future; commands that arrive late;
+- positions whose time is ahead or behind, one or all of them, and the vehicle's clock returning to 0 after 2³² ms;
+- a packet from another port, and the vehicle's own change of port;
 - a false heartbeat or position in the vehicle's name, once or every second;
 - no messages of one kind;
 - a second source of altitude that jumps, freezes, falls silent or sends values that are not numbers.
 
 In the others the link is honest, and something happens to the vehicle: a pilot takes over, permanently or for some
-seconds; it receives nothing (`deaf`); wind carries it away.
+seconds; it receives nothing (`deaf`); wind carries it away; another ground station stops its motors; it flies home by
+itself; its altitude drifts or is stuck, with and without a report of its landing; its attitude oscillates; it restarts.
+Or Gainline's own process is killed (`process killed`, the flight is lost), and another one connects 3 s later.
 
-Each hazard begins once in each state of a trial and stays, and once in each state in the air for a second and a half,
-under each autopilot. As in [faults.md](faults.md) the trials run in lockstep, so a repeated run gives the same result.
+Each hazard begins once in each state of a trial in which it applies and stays, and once in each state in the air for a
+second and a half, under each autopilot that it concerns. As in [faults.md](faults.md) the trials run in lockstep, so a
+repeated run gives the same result.
 
 The checks use the packets at the vehicle's antenna, its true height, and the hazard itself. These are violations:
 
 - motors off above 0.15 m; a height of more than a metre above the altitude limit;
 - a vehicle that is not on the ground a minute after its trial, while Gainline attends to it; one that is armed and
-  heard and stays up for eight seconds without Land; anything but Land sent to a vehicle in the air after its trial;
+  heard and stays up for eight seconds without Land, or fifteen after the process was killed; anything but Land sent
+  to a vehicle in the air after its trial;
 - anything sent to a vehicle that a pilot flies, once two heartbeats must have shown it. From then on the pilot is
   responsible, also after switching back, so the landing is not checked;
 - a vehicle taken from a pilot whom a heartbeat has shown;
-- a vehicle reported as *safe* that is armed or holds other gains; no concern reported about one that is armed or in the
-  air;
+- a vehicle reported as *safe* that is armed, fell or holds other gains; no concern reported about one that is armed or
+  in the air;
 - a trial reported as *not flown* that left the ground; one reported as *completed* that was aborted, or that met a
   hazard which must end it;
-- a reason that does not name the hazard; an abort counted against the gains for something else; an unnecessary
-  quarantine (`bench/hazards/hostile_expectations.py` lists the permitted consequences of each hazard);
+- a failure that is not the hazard's (the numbers of [real-flight.md](real-flight.md#failures-and-reactions); *failures*
+  in the table); an abort counted against the gains for something else; an unnecessary refusal or quarantine
+  (`bench/hazards/hostile_table.py` lists the permitted consequences of each hazard);
 - a valid record that is incomplete, or differs from the true height by more than 0.35 m.
 
 {right} of {runs} runs ({autopilots}) passed.{wrong}

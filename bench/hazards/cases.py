@@ -28,6 +28,14 @@ WILD_GAINS: Final = "wild-gains"
 """The trial's gains are so bad that the vehicle exceeds its limits."""
 MOCAP: Final = ("mocap-lost", "mocap-frozen", "mocap-drift")
 """Faults of the second source of altitude, which only trials with one of these faults have."""
+FOREIGN_KILL: Final = "foreign-kill"
+"""Another ground station stops the motors."""
+FLIES_HOME: Final = "flies-home"
+"""The vehicle flies home by itself."""
+FALSE_ALTITUDES: Final = ("stuck-altitude", "drifting-altitude", "creeping-altitude")
+"""Faults in which the vehicle's altitude and climb rate are wrong, and agree with each other."""
+LEAN_OSCILLATION: Final = "lean-oscillation"
+"""The vehicle's attitude oscillates."""
 FAULT_KINDS: Final = (
     "no-heartbeat",
     "param-unconfirmed",
@@ -41,6 +49,11 @@ FAULT_KINDS: Final = (
     "duplicated-packets",
     "reordered-packets",
     "wrong-system",
+    "silent-witness",
+    FOREIGN_KILL,
+    FLIES_HOME,
+    *FALSE_ALTITUDES,
+    LEAN_OSCILLATION,
     *MOCAP,
     ABORT,
     MOTORS_OFF,
@@ -53,7 +66,9 @@ FAULT_KINDS: Final = (
     WILD_GAINS,
 )
 """Faults of the simulated drone, and those that only the bench can cause."""
-_ACTS: Final = frozenset({ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, OTHER_TARGET, OTHER_GAIN, WILD_GAINS})
+_ACTS: Final = frozenset(
+    {ABORT, MOTORS_OFF, OTHER_LANDING, OTHER_MODE, OTHER_TARGET, OTHER_GAIN, WILD_GAINS, FOREIGN_KILL}
+)
 """Faults without a duration."""
 CELLS: Final = tuple(product(FAULT_KINDS, State))
 
@@ -148,7 +163,7 @@ def draw(seed: int) -> Case:
         autopilot=autopilot,
         faults=faults,
         gains=_gains(chance, autopilot, wild=any(each.kind == WILD_GAINS for each in faults)),
-        powered_s=chance.uniform(4.0, 6.0),
+        powered_s=chance.uniform(14.0, 16.0),
         staged_s=chance.choice((0.0, chance.uniform(0.0, 8.0))),
         pinned=chance.random() < 0.5,
     )

@@ -12,6 +12,10 @@ from typing import Final
 
 from bench.hazards.cases import (
     ABORT,
+    FALSE_ALTITUDES,
+    FLIES_HOME,
+    FOREIGN_KILL,
+    LEAN_OSCILLATION,
     MOCAP,
     MOTORS_OFF,
     OTHER_GAIN,
@@ -33,11 +37,11 @@ GROUND: Final = (State.PREFLIGHT, State.SET_GAINS)
 STEPPING: Final = (State.ARM, *AIR)
 """States in which set points may be sent; the first is sent to Paparazzi before it takes off."""
 SILENT: Final = ("link-lost", "wrong-system", "reboot")
-UNSEEN: Final = ("frozen-position", "jumping-position", *MOCAP)
+UNSEEN: Final = ("frozen-position", "jumping-position", *FALSE_ALTITUDES, *MOCAP)
 """Faults in which the position of the vehicle is not known."""
 DEAF: Final = ("link-lost", "reboot")
 """Faults in which the vehicle receives nothing either."""
-GAIN_FAILURES: Final = (ABORT, WILD_GAINS, "no-lift-off", OTHER_TARGET)
+GAIN_FAILURES: Final = (ABORT, WILD_GAINS, "no-lift-off", OTHER_TARGET, LEAN_OSCILLATION, FLIES_HOME, *FALSE_ALTITUDES)
 JUST_SHOWN_S: Final = 0.15
 """Time in which a command may meet a pilot who has just taken over."""
 HEARTBEAT_S: Final[Mapping[str, float]] = {"paparazzi": 0.5, "ardupilot": 1.0, "px4": 1.0}
@@ -46,6 +50,8 @@ LIFT_OFF_S: Final[Mapping[str, float]] = {"paparazzi": 1.5, "ardupilot": 6.0, "p
 
 IMPACT_M_S: Final = 1.9
 """Speed of ground contact above which the vehicle has fallen."""
+FELL_M_S: Final = 2.2
+"""The same for a vehicle that has certainly fallen."""
 LAND_AGAIN_S: Final[Mapping[str, float]] = {"paparazzi": 6.0, "ardupilot": 1.0, "px4": 1.0}
 """Interval of Land after five seconds: under Paparazzi each Land restarts the landing."""
 DRIFT_M_S: Final = 0.1
@@ -141,6 +147,7 @@ class _Checker:
             ("F2", ("param-unconfirmed",), 0.0),
             ("F10", ("reboot", OTHER_MODE, TAKEN_OVER), 0.0),
             ("F2", (OTHER_GAIN,), 0.0),
+            ("preflight", ("silent-witness", FLIES_HOME, *FALSE_ALTITUDES, LEAN_OSCILLATION), 0.0),
         ):
             if self.within(self.of(*kinds), *GROUND) > shortest_s:
                 yield Cause(failure, "refused")
@@ -161,7 +168,9 @@ class _Checker:
             yield Cause("F7", "refused")
         if self.within(self.of("frozen-position", *MOCAP), *arming) > 0.15:
             yield Cause("F9a", "refused")
-        if any(self.began_in(kind, *arming) for kind in ("reboot", OTHER_MODE, OTHER_GAIN)):
+        if self.within(self.of(*FALSE_ALTITUDES), *arming) > 0.15:
+            yield Cause("F9", "refused")
+        if any(self.began_in(kind, *arming) for kind in ("reboot", OTHER_MODE, OTHER_GAIN, FOREIGN_KILL, FLIES_HOME)):
             yield Cause("F10", "refused")
         if self.within(self.of(TAKEN_OVER), *arming) > 0.0:
             yield Cause("F10", "refused")
@@ -203,8 +212,23 @@ class _Checker:
         jumped_s = total(self.of("jumping-position"), self.states.spans(State.ARM, *AIR))
         if jumped_s > 1.3:
             yield Cause("F9b", "invalid", is_certain=jumped_s > 3.0)
+        yield from self._by_wrong_altitudes()
         yield from self._by_other_people()
         yield from self._counting_against_gains()
+
+    def _by_wrong_altitudes(self) -> Iterator[Cause]:
+        """Yield the failures of a vehicle that stays where it is while its altitude shows something else, or that is
+        not where it should be."""
+        if self.within(self.of(*FALSE_ALTITUDES), State.SET_GAINS, State.ARM, *AIR, State.LAND) > 0.0:
+            yield Cause("F9", "invalid")
+            yield Cause("F4/F6", "aborted")
+        home_s = self.within(self.of(FLIES_HOME), State.RECORD)
+        if self.within(self.of(FLIES_HOME), State.ARM, *AIR, State.LAND) > 0.0:
+            yield Cause("F10b", "invalid", is_certain=home_s > 2.0 * self.heartbeat_s + 2.0 + SLACK_S)
+            yield Cause("F4", "aborted")
+        leant_s = self.within(self.of(LEAN_OSCILLATION), *AIR)
+        if leant_s > 0.5:
+            yield Cause("F6", "aborted", is_certain=leant_s > 6.0)
 
     def _by_other_people(self) -> Iterator[Cause]:
         """Yield the failures that a pilot, another ground station or this computer causes."""
@@ -219,6 +243,8 @@ class _Checker:
             yield Cause("F10c", "invalid", is_certain=self._leads_astray(begun_s))
             if self.case.autopilot != "px4":
                 yield Cause("F6", "aborted")
+        if self.began_in(FOREIGN_KILL, *AIR, State.LAND):
+            yield Cause("F10b", "invalid", is_certain=self.began_in(FOREIGN_KILL, *AIR))
         stalled_s = self.within(self.of(STALL), State.RECORD)
         follows = bool(self.states.times_of(Command.FOLLOW))
         if self.within(self.of(STALL), *AIR) > 1.0 - SLACK_S:
@@ -278,20 +304,26 @@ class _Checker:
     def _vehicle(self) -> Iterator[str]:
         match self.result.vehicle:
             case "safe":
-                if not self.result.holds_safe and not self.began_in(OTHER_GAIN, State.RESTORE):
-                    yield f"reported as holding its safe gains, but holds {dict(self.result.held)}"
-                if self.result.armed or abs(self.result.height_m) > LIFTED_M:
-                    yield f"reported as safe, but is {'armed' if self.result.armed else 'off the ground'}"
-                if any(self.began_in(kind, *AIR) for kind in ("reboot",)):
-                    yield "the autopilot restarted in the air, but the vehicle was not quarantined"
-                if self._dropped_m() > DROP_M:
-                    yield f"its motors were stopped at {self._dropped_m():.2f} m, but the vehicle was not quarantined"
+                yield from self._reported_as_safe()
             case "quarantined":
                 if not any(self._reasons_for_quarantine()):
                     yield f"unnecessary quarantine ({self.result.reason})"
             case "unopened":
                 if self.result.armed or not self._holds_no_trial():
                     yield f"never connected, but holds {dict(self.result.held)}"
+
+    def _reported_as_safe(self) -> Iterator[str]:
+        result = self.result
+        if not result.holds_safe and not self.began_in(OTHER_GAIN, State.RESTORE):
+            yield f"reported as holding its safe gains, but holds {dict(result.held)}"
+        if result.armed or abs(result.height_m) > LIFTED_M:
+            yield f"reported as safe, but is {'armed' if result.armed else 'off the ground'}"
+        if self.began_in("reboot", *AIR):
+            yield "the autopilot restarted in the air, but the vehicle was not quarantined"
+        if result.impact_m_s > FELL_M_S:
+            yield f"it hit the ground at {result.impact_m_s:.1f} m/s, but the vehicle was not quarantined"
+        if self._dropped_m() > DROP_M:
+            yield f"its motors were stopped at {self._dropped_m():.2f} m, but the vehicle was not quarantined"
 
     def _dropped_m(self) -> float:
         """Return the height at which the operator's first motors off reached the vehicle; 0 if none did."""
@@ -314,6 +346,7 @@ class _Checker:
         yield self.began_in(OTHER_LANDING, State.TAKEOFF)  # on the ground, its autopilot disarms it at once (F10b)
         yield self.result.impact_m_s > IMPACT_M_S
         yield bool(self.of("mocap-drift"))  # motion capture still shows it in the air
+        yield bool(self.of("silent-witness", FOREIGN_KILL, FLIES_HOME, *FALSE_ALTITUDES))
         yield self._dropped_m() > RESTING_M
         for begun_s, _ in self.of(MOTORS_OFF):  # it was not seen on the ground when they were stopped
             yield any(covers(self.of(kind), (begun_s, begun_s)) for kind in (*SILENT, *UNSEEN))

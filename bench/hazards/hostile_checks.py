@@ -27,6 +27,8 @@ LAND_WITHIN_S: Final = 8.0
 """Longest time without Land for a vehicle that does not descend; Land is repeated every six seconds under Paparazzi."""
 LAND_AFTER_DEATH_S: Final = 15.0
 """The same from the death of the process on, of which 3 s pass until another one has connected."""
+LOST: Final = "lost"
+"""Outcome of a trial whose process was killed."""
 FELL_M_S: Final = 2.2
 """Speed of ground contact of a vehicle that certainly fell."""
 SEEN_S: Final = 2.3
@@ -52,8 +54,8 @@ class TrueState:
 
 @dataclass(frozen=True, slots=True)
 class ReportedOutcome:
-    """Outcome of a trial and state of the vehicle (safe, quarantined, unopened) as reported by the program; a trial
-    whose process was killed is "lost", and its concern is the next process's.
+    """Outcome of a trial and state of the vehicle (safe, quarantined, unopened) as reported by the program; of a trial
+    whose process was killed, by the next process.
 
     `concern` is the program's concern about the vehicle at the end of the trial, `final_concern` that after attending
     to the vehicle.
@@ -65,8 +67,8 @@ class ReportedOutcome:
     concern: str = ""
     final_concern: str = ""
     record: Trajectory | None = None
-    failure: str | None = None
-    """Code of the failure; empty without one, None if it is not known."""
+    failure: str = ""
+    """Number of the failure in docs/real-flight.md; empty without one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +148,7 @@ def _vehicle(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
     if reported.vehicle == "unopened":
         return
     over = truth.after[0] if truth.after else None
-    if over is not None and (over.armed or over.flies) and not reported.concern:
+    if over is not None and (over.armed or over.flies) and not reported.concern and reported.outcome != LOST:
         yield "armed or in the air after its trial, but no concern was reported"
     if (truth.armed or truth.flies) and not reported.final_concern:
         yield "armed or in the air at the end, but no concern was reported"
@@ -208,7 +210,7 @@ def _verdict(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
 
 def _failure(reported: ReportedOutcome, known: set[str]) -> Iterator[str]:
     is_known = reported.failure in known and (reported.failure != NOT_SEEN or reported.vehicle == "quarantined")
-    if reported.failure is not None and not is_known:
+    if not is_known:
         yield f"{reported.outcome} as {reported.failure or 'no failure'}, which did not occur ({reported.reason})"
 
 

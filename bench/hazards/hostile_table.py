@@ -115,7 +115,7 @@ _UNSEEN: Final = Expected(codes=frozenset({"F9a", "F9c"}), refuses=True, ends_in
 _PILOT: Final = _may("F10a", "F10b", "F10c", "F4a", ends_in=AIR, aborts=ALL)
 _DRIFTING: Final = _may("F9a", "F9d", "F4a", "F6", "F10b", "F10c", NOT_SEEN, ends_in=AIR, aborts=PAPARAZZI)
 _STUCK: Final = _may("F9a", "F9d", "F10c", "F4a", NOT_SEEN, ends_in=(State.TAKEOFF,), aborts=PAPARAZZI)
-_AHEAD: Final = Expected(codes=frozenset({"F9a", "F9d"}), refuses=True)
+_AHEAD: Final = _may("F9a", "F9d")
 _BEHIND: Final = _may("F9a", "F9d", "F10b")
 
 _NUMBERS: Final[Mapping[str, Hazard]] = {
@@ -211,7 +211,7 @@ _TIMES: Final[Mapping[str, Hazard]] = {
             is_always=True,
             states=(State.CONNECT,),
         )
-        for elapsed_s in (6.0, 9.0, 10.3, 20.0, 46.0)
+        for elapsed_s in (16.0, 19.0, 20.3, 30.0, 56.0)
     },
     **{f"commands {late_s:g} s late": Hazard(late_s=late_s, expected=_COMMANDS_DELAYED) for late_s in (0.6, 1.2, 2.0)},
 }

@@ -15,7 +15,7 @@ from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
 from bench.hazards.cases import ABORT, FOR_GOOD_S, SAFE, Case, PlannedFault, tuned_gains
 from bench.hazards.fault_trial import outcome_of
-from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, TrueState, find_violations
+from bench.hazards.hostile_checks import LOST, GroundTruth, ReportedOutcome, TrueState, find_violations
 from bench.hazards.hostile_links import POSITION, LinkHazard, MessageForger
 from bench.hazards.hostile_table import HAZARDS, PILOTS, PROCESS_KILLED
 from bench.hazards.rig import InjectedFault, Rig
@@ -23,6 +23,8 @@ from bench.hazards.trial_states import State
 from bench.hazards.wire import DIALECTS
 
 SHORT_S: Final = 1.5
+POWERED_S: Final = 15.0
+"""Time from switching on to the connection, in which Paparazzi reaches "Holding point"."""
 COMES_DOWN_WITHIN_S: Final = 60.0
 """Time to land after the trial, while the program attends to the vehicle."""
 ATTENDED_S: Final = 5.0
@@ -36,13 +38,14 @@ _AIR: Final = (State.TAKEOFF, State.RECORD, State.LAND)
 
 @dataclass(frozen=True, slots=True)
 class HostileResult:
-    """Result of a case; `wrong` lists the violations."""
+    """Result of a case; `failure` is its number in docs/real-flight.md, `wrong` lists the violations."""
 
     outcome: str
     vehicle: str
     reason: str
     injected: str
     wrong: tuple[str, ...]
+    failure: str = ""
 
 
 def cases(first: int = 0) -> list[Case]:
@@ -70,7 +73,7 @@ def _case(seed: int, autopilot: str, name: str, state: State, duration_s: float)
         autopilot=autopilot,
         faults=(hostile, *([causes[state]] if state in causes else [])),
         gains=tuned_gains(chance, autopilot),
-        powered_s=5.0,
+        powered_s=POWERED_S,
         staged_s=0.0,
         pinned=chance.random() < 0.5,
     )
@@ -263,11 +266,11 @@ def _go_on_after_death(rig: HostileRig) -> HostileResult:
     try:
         vehicle = _reconnect(rig)
     except VehicleError as error:
-        return _result(rig, ReportedOutcome("lost", "unopened", str(error)))
+        return _result(rig, ReportedOutcome(LOST, "unopened", str(error)))
     _attend(rig, vehicle)
     concern = vehicle.concern
     left = _restore_safe_gains(rig, vehicle)
-    return _result(rig, ReportedOutcome("lost", left, concern, concern, vehicle.concern))
+    return _result(rig, ReportedOutcome(LOST, left, concern, concern, vehicle.concern))
 
 
 def _reconnect(rig: HostileRig) -> MavlinkVehicle:
@@ -277,13 +280,13 @@ def _reconnect(rig: HostileRig) -> MavlinkVehicle:
 
 def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
     record: FlightRecord | None = None
-    outcome, failure = "refused", None
+    outcome, failure = "refused", ""
     try:
         held = vehicle.stage(rig.case.gains)
         if held != rig.case.gains:
             raise VehicleError(f"it holds {held}", hint="")
         record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
-        outcome, reason, failure = outcome_of(record), record.reason, _failure_of(record)
+        outcome, reason, failure = outcome_of(record), record.reason, record.failure
     except VehicleError as error:
         reason = str(error)
     rig.states.ended_s, concern = rig.drone.time_s, vehicle.concern
@@ -292,11 +295,6 @@ def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
     trajectory = None if record is None else record.trajectory
     reported = ReportedOutcome(outcome, left, reason, concern or vehicle.concern, vehicle.concern, trajectory, failure)
     return _result(rig, reported)
-
-
-def _failure_of(record: FlightRecord) -> str | None:
-    """Return the code of the failure; None if records do not have it."""
-    return getattr(record, "failure", None)
 
 
 def _attend(rig: HostileRig, vehicle: MavlinkVehicle) -> None:
@@ -321,9 +319,8 @@ def _restore_safe_gains(rig: HostileRig, vehicle: MavlinkVehicle) -> str:
 def _result(rig: HostileRig, reported: ReportedOutcome) -> HostileResult:
     first = rig.case.faults[0]
     injected = f"{first.kind} from {first.state}, for {first.duration_s:g} s"
-    return HostileResult(
-        reported.outcome, reported.vehicle, reported.reason, injected, find_violations(rig.truth, reported)
-    )
+    wrong = find_violations(rig.truth, reported)
+    return HostileResult(reported.outcome, reported.vehicle, reported.reason, injected, wrong, reported.failure)
 
 
 def _ignore_sample(_sample: Sample) -> None:

@@ -9,11 +9,10 @@ import pytest
 
 from app.core.records.trajectory import Trajectory
 from app.simdrone.faults import FAULTS
-from bench.hazards.cases import SAFE, TUNED, Case, PlannedFault
+from bench.hazards.cases import TUNED, Case, PlannedFault
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, TrueState, find_violations
-from bench.hazards.hostile_expectations import EXPECTED
-from bench.hazards.hostile_links import HAZARDS, VEHICLE_HAZARDS
-from bench.hazards.hostile_trial import cases, run_trial
+from bench.hazards.hostile_table import HAZARDS
+from bench.hazards.hostile_trial import POWERED_S, cases, run_trial
 from bench.hazards.rig import InjectedFault, MotorStop
 from bench.hazards.trial_states import State, TrialStates
 from bench.hazards.wire import Command
@@ -25,52 +24,73 @@ def case(autopilot: str, what: str, state: State, delay_s: float = 5.0, duration
         autopilot=autopilot,
         faults=(PlannedFault(what, state, delay_s, duration_s),),
         gains=TUNED[autopilot],
-        powered_s=5.0,
+        powered_s=POWERED_S,
         staged_s=0.0,
         pinned=True,
     )
 
 
 SEEN = [
-    ("paparazzi", "z nan", State.RECORD, "invalid", "froze while packets still arrived"),
-    ("ardupilot", "reboot once", State.RECORD, "completed", ""),
-    ("paparazzi", "twin 0.4 s older", State.LAND, "invalid", "Two vehicles use the same system id"),
-    ("paparazzi", "pilot", State.RECORD, "invalid", "A pilot took manual control"),
+    # flights of real autopilots, and an attacker on the link
+    ("paparazzi", "foreign kill", State.RECORD, "invalid", "F10b", "quarantined"),
+    ("paparazzi", "drifts by 0.5 m/s", State.LAND, "completed", "", "safe"),
+    ("px4", "drifts by 0.5 m/s unwitnessed", State.LAND, "completed", "", "safe"),
+    ("paparazzi", "no SCRIPT_CURRENT", State.RECORD, "completed", "", "quarantined"),
+    ("paparazzi", "process killed", State.RECORD, "lost", "", "quarantined"),
+    ("px4", "left in OFFBOARD", State.PREFLIGHT, "completed", "", "safe"),
+    ("ardupilot", "stuck altitude", State.SET_GAINS, "invalid", "F9a", "safe"),
+    ("ardupilot", "copy from another port", State.RECORD, "completed", "", "safe"),
+    ("px4", "moves to another port", State.RECORD, "completed", "", "safe"),
+    ("paparazzi", "one stamp +2 s", State.RECORD, "completed", "", "safe"),
+    ("paparazzi", "copies of all after 3 s", State.RECORD, "completed", "", "safe"),
+    ("px4", "clock wraps after 30 s", State.CONNECT, "completed", "", "safe"),
+    ("paparazzi", "x inf for 0.3 s", State.RECORD, "completed", "", "safe"),
+    ("paparazzi", "flies home", State.RECORD, "invalid", "F10b", "quarantined"),
+    ("paparazzi", "lean oscillation", State.RECORD, "aborted", "F6", "safe"),
+    # defects found before
+    ("paparazzi", "z nan", State.RECORD, "invalid", "F9d", "quarantined"),
+    ("paparazzi", "pilot", State.RECORD, "invalid", "F10a", "quarantined"),
 ]
 SEEN_ALIKE = [
-    ("paparazzi", "companion as autopilot", State.RECORD, "completed", ""),
-    ("paparazzi", "disarmed once", State.RECORD, "completed", ""),
-    ("paparazzi", "carried away", State.RECORD, "aborted", "m from its start"),
-    ("paparazzi", "vz nan", State.RECORD, "invalid", "froze while packets still arrived"),
-    ("paparazzi", "x nan", State.RECORD, "invalid", "froze while packets still arrived"),
-    ("ardupilot", "companion as autopilot", State.RECORD, "completed", ""),
-    ("px4", "companion as autopilot", State.RECORD, "completed", ""),
-    ("px4", "an hour ahead", State.RECORD, "completed", ""),
-    ("ardupilot", "deaf", State.RECORD, "invalid", "The vehicle began to land by itself"),
-    ("px4", "mocap nan", State.RECORD, "invalid", "The second source of altitude did not track it"),
-    ("px4", "pilot for 1 s", State.RECORD, "invalid", "The flight may have been interrupted"),
-    ("ardupilot", "twin 3600 s older", State.RECORD, "invalid", "Two vehicles use the same system id"),
+    ("ardupilot", "foreign kill", State.LAND, "invalid", "F10b", "quarantined"),
+    ("ardupilot", "process killed", State.RECORD, "lost", "", "quarantined"),
+    ("paparazzi", "stuck altitude", State.RECORD, "invalid", "F9a", "quarantined"),
+    ("paparazzi", "30 % are lost", State.PREFLIGHT, "refused", "", "safe"),
+    ("paparazzi", "twin 0.4 s older", State.LAND, "invalid", "F12", "quarantined"),
+    ("ardupilot", "twin 3600 s older", State.RECORD, "invalid", "F12", "quarantined"),
+    ("ardupilot", "reboot once", State.RECORD, "completed", "", "safe"),
+    ("paparazzi", "companion as autopilot", State.RECORD, "completed", "", "safe"),
+    ("ardupilot", "companion as autopilot", State.RECORD, "completed", "", "safe"),
+    ("px4", "companion as autopilot", State.RECORD, "completed", "", "safe"),
+    ("paparazzi", "disarmed once", State.RECORD, "completed", "", "safe"),
+    ("paparazzi", "carried away", State.RECORD, "aborted", "F6", "safe"),
+    ("px4", "an hour ahead", State.RECORD, "completed", "", "safe"),
+    ("ardupilot", "deaf", State.RECORD, "invalid", "F11", "quarantined"),
+    ("px4", "mocap nan", State.RECORD, "invalid", "F9a", "safe"),
+    ("px4", "pilot for 1 s", State.RECORD, "invalid", "F10c", "safe"),
 ]
 """Further ones, for the complete ring."""
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "what", "state", "outcome", "reason"),
+    ("autopilot", "what", "state", "outcome", "failure", "vehicle"),
     [*SEEN, *(pytest.param(*one, marks=pytest.mark.complete) for one in SEEN_ALIKE)],
 )
-def test_a_hazard_has_its_required_outcome(autopilot: str, what: str, state: State, outcome: str, reason: str) -> None:
+def test_a_hazard_has_its_required_outcome(
+    autopilot: str, what: str, state: State, outcome: str, failure: str, vehicle: str
+) -> None:
     ended = run_trial(case(autopilot, what, state, delay_s=2.0))
     assert ended.wrong == ()
-    assert (ended.outcome, reason in ended.reason) == (outcome, True)
+    assert (ended.outcome, ended.failure, ended.vehicle) == (outcome, failure, vehicle)
 
 
 DROPPED = [
     ("paparazzi", "later and later, to 2 s", State.ARM, 1.2),
-    ("paparazzi", "commands 1.2 s late", State.ARM, 0.9),
-    ("paparazzi", "on the ground after 0.6 s", State.RECORD, 6.0),
     ("px4", "replaced after 1.3 s", State.RECORD, 6.0),
 ]
 DROPPED_ALIKE = [
+    ("paparazzi", "commands 1.2 s late", State.ARM, 0.9),
+    ("paparazzi", "on the ground after 0.6 s", State.RECORD, 6.0),
     ("paparazzi", "later and later, to 1 s", State.ARM, 0.8),
     ("paparazzi", "commands 2 s late", State.ARM, 0.9),
     ("paparazzi", "on the ground after 0 s", State.ARM, 0.5),
@@ -91,7 +111,9 @@ def test_what_once_stopped_motors_in_the_air_does_not_any_more(
     assert run_trial(case(autopilot, what, state, delay_s=delay_s)).wrong == ()
 
 
-@pytest.mark.parametrize("autopilot", SAFE)
+@pytest.mark.parametrize(
+    "autopilot", ["paparazzi", *(pytest.param(each, marks=pytest.mark.complete) for each in ("ardupilot", "px4"))]
+)
 def test_nothing_is_written_while_another_vehicle_with_its_ids_flies(autopilot: str) -> None:
     """Seen: the safe gains, and then the trial's, went to the one that flew."""
     ended = run_trial(case(autopilot, "flying twin", State.CONNECT, delay_s=0.0))
@@ -99,16 +121,22 @@ def test_nothing_is_written_while_another_vehicle_with_its_ids_flies(autopilot: 
     assert ended.outcome == "refused"
 
 
-def test_every_hazard_sets_in_in_every_state_under_every_autopilot_in_more_than_2000_runs() -> None:
-    drawn = [(each.autopilot, each.faults[0].kind, each.faults[0].state) for each in cases()]
-    assert len(drawn) >= 2000
-    assert set(drawn) == {(autopilot, kind, state) for autopilot in SAFE for kind in HAZARDS for state in State}
-    assert len({each.seed for each in cases()}) == len(drawn)
+def test_every_hazard_sets_in_in_every_state_and_under_every_autopilot_that_it_concerns() -> None:
+    drawn = {(each.autopilot, each.faults[0].kind, each.faults[0].state) for each in cases()}
+    assert drawn == {
+        (autopilot, kind, state)
+        for kind, hazard in HAZARDS.items()
+        for autopilot in hazard.autopilots
+        for state in hazard.states
+    }
+    assert len({each.seed for each in cases()}) == len(cases()) >= 3500
 
 
-def test_every_hazard_has_its_permitted_consequences() -> None:
-    assert set(EXPECTED) == set(HAZARDS)
-    assert {fault for fault, _ in VEHICLE_HAZARDS.values()} <= set(FAULTS)
+def test_every_hazard_has_one_cause_and_uses_faults_that_exist() -> None:
+    for hazard in HAZARDS.values():
+        causes = (hazard.link, hazard.faults, hazard.late_s, hazard.act)
+        assert sum(bool(cause) for cause in causes) == 1
+        assert set(hazard.faults) <= set(FAULTS)
 
 
 # ---- checks
@@ -121,7 +149,9 @@ UP = tuple(replace(each, height_m=3.0, armed=True) if each.time_s >= 10.0 else e
 DOWN = tuple(replace(each, height_m=0.0, armed=False) if each.time_s > 48.0 else each for each in UP)
 WHOLE = Trajectory(np.arange(0.0, 33.5, 0.5), {"altitude_m": np.full(67, 3.0)}, "mavlink", "vehicle")
 SAFE_AND_SOUND = ReportedOutcome("completed", "safe", "", record=WHOLE)
-QUARANTINED = ReportedOutcome("invalid", "quarantined", "A pilot took manual control.", "It flies.", "It flies.")
+QUARANTINED = ReportedOutcome(
+    "invalid", "quarantined", "A pilot took manual control.", "It flies.", "It flies.", failure="F10a"
+)
 LANDED_ON = tuple((at_s, Command.LAND) for at_s in np.arange(45.0, 70.0, 6.0))
 
 
@@ -151,7 +181,7 @@ def test_a_trial_reported_as_it_happened_has_no_violations() -> None:
 
 def test_land_must_be_repeated_to_a_vehicle_in_the_air_after_its_trial() -> None:
     """Land during the trial does not count."""
-    left = replace(QUARANTINED, reason="It did not confirm.")
+    left = replace(QUARANTINED, failure="")
     assert find_violations(happened(UP, "deaf", sent=LANDED_ON), left) == ("the vehicle was left at 3.00 m",)
     assert find_violations(happened(UP, "deaf", sent=LANDED_ON[:1]), left) == (
         "the vehicle was left at 3.00 m",
@@ -204,15 +234,22 @@ def test_motors_stopped_in_the_air_and_excess_height_are_found() -> None:
         (
             "z nan",
             DOWN,
-            ReportedOutcome("invalid", "safe", "Low."),
-            "reported as invalid for a reason that did not occur (Low.)",
+            ReportedOutcome("invalid", "safe", "Low.", failure="F7"),
+            "invalid as F7, which did not occur (Low.)",
         ),
         (
             "z nan",
             DOWN,
-            ReportedOutcome("aborted", "safe", "It stood still."),
+            ReportedOutcome("invalid", "safe", "Not landed."),
+            "invalid as no failure, which did not occur (Not landed.)",
+        ),
+        (
+            "z nan",
+            DOWN,
+            ReportedOutcome("aborted", "safe", "It stood still.", failure="F9d"),
             "counted against the gains, but the cause was z nan (It stood still.)",
         ),
+        ("disarmed once", ON_GROUND, ReportedOutcome("refused", "safe", "Why."), "refused for a reason that did not"),
         (
             "disarmed once",
             DOWN,
@@ -225,13 +262,30 @@ def test_motors_stopped_in_the_air_and_excess_height_are_found() -> None:
 def test_a_report_that_differs_from_what_happened_is_found(
     kind: str, true_states: Sequence[TrueState], reported: ReportedOutcome, wrong: str
 ) -> None:
-    assert wrong in find_violations(happened(true_states, kind), reported)
+    assert any(each.startswith(wrong) for each in find_violations(happened(true_states, kind), reported))
 
 
 def test_a_hazard_that_never_began_is_not_a_valid_reason() -> None:
-    reported = ReportedOutcome("invalid", "safe", "Its position was lost.")
+    reported = ReportedOutcome("invalid", "safe", "Its position was lost.", failure="F9d")
     assert find_violations(happened(kind="z nan", injected=[]), reported) == (
-        "reported as invalid for a reason that did not occur (Its position was lost.)",
+        "invalid as F9d, which did not occur (Its position was lost.)",
+    )
+
+
+def test_a_vehicle_that_fell_is_not_safe() -> None:
+    reported = ReportedOutcome("invalid", "safe", "", failure="F10b")
+    assert find_violations(happened(kind="foreign kill", impact_m_s=6.5), reported) == (
+        "reported as safe, but it hit the ground at 6.5 m/s",
+    )
+
+
+def test_after_the_death_of_the_process_a_vehicle_may_wait_fifteen_seconds_for_land() -> None:
+    left = ReportedOutcome("lost", "quarantined", "It is armed.", "It is armed.", "It is armed.")
+    waiting = happened(UP, "process killed", sent=[(64.5, Command.LAND)])
+    assert find_violations(waiting, left) == ("the vehicle was left at 3.00 m",)
+    assert find_violations(happened(UP, "process killed"), left) == (
+        "the vehicle was left at 3.00 m",
+        "the vehicle was left in the air for 19 s without Land",
     )
 
 
