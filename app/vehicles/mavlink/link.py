@@ -146,6 +146,7 @@ class Link:
         self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
+        self._plan: dict[float, bytes] = {}
         self._received = self._bad = self._foreign = self._overrun = self._sent = self._unsent = 0
         self._last_packet_s: float | None = None
         self._last_heartbeat_s: float | None = None
@@ -233,10 +234,13 @@ class Link:
         return messages
 
     def log_to(self, path: Path | None) -> None:
-        """Record all packets from now on in another telemetry log, or in none; return once the previous log is stored.
-        Raises LinkError if the file cannot be opened; the previous log then continues."""
+        """Record all packets from now on in another telemetry log, which begins with the vehicle's plan as last
+        received, or in none; return once the previous log is stored. Raises LinkError if the file cannot be opened; the
+        previous log then continues."""
         following = TlogWriter(path) if path else None
         before, self._tlog = self._tlog, following
+        for frame in list(self._plan.values()):
+            self._record(frame)
         if before:
             before.close()
 
@@ -405,6 +409,8 @@ class Link:
         if not is_known(message):  # neither its checksum nor its signature was checked
             return False
         self._received += 1
+        if message.get_type() == self._dialect.plan:
+            self._plan[number(message, "seq")] = frame
         if self._vehicle_component in (None, source_component(message)):
             self._last_packet_s = now_s
             if not message.get_type().startswith(self._dialect.uncounted):
