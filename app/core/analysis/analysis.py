@@ -111,7 +111,7 @@ class Analysis:
 
     @property
     def _about_usual(self) -> str:
-        """The sets that are set without a log and within the interval of the proposed one: no flight would tell them
+        """The sets that are set without a log and not above the interval of the proposed one: no flight would tell them
         apart."""
         proposed = self.proposed
         assert proposed is not None

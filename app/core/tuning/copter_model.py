@@ -194,7 +194,7 @@ class CopterModel:
 
     def _rules_note(self, gains: Vector) -> str:
         """What the likeliest vehicle would fly with the sets that are set without a model. Those are as good that are
-        within the interval of `gains`: no flight would tell them apart."""
+        not above the interval of `gains`: no flight would tell them apart."""
         as_good_m = _interval(self._all.predict(self._loop(gains))).upper
         found = [self._rule_note(*rule, as_good_m=as_good_m) for rule in self._rules]
         return f"For comparison, the model predicts {'; '.join(found)}."
