@@ -509,7 +509,7 @@ def test_an_identity_that_was_pinned_before_hardware_ids_were_looked_at_is_read(
         row.identity = {"system_id": 1, "autopilot": "paparazzi", "version": "5.18"}
     assert seen(client, vehicle)["identity"]["uid"] == ""
     with database.write() as session:
-        assert commands._linked(session.get_one(VehicleRow, vehicle["id"])).identity == IDENTITY
+        assert commands._linked(session, session.get_one(VehicleRow, vehicle["id"])).identity == IDENTITY
         commands.pin_identity(
             session, vehicle["id"], Identity(system_id=1, autopilot="paparazzi", version="", uid="0a")
         )

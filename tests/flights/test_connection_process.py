@@ -91,9 +91,10 @@ def take_the_place_of_every_vehicle(one: AnsweringRig, monkeypatch: pytest.Monke
     def connect(
         options: Options,
         safe_gains: Mapping[str, float],
-        identity: Identity | None,
         trial_parameters: Path,
+        identity: Identity | None,
         on_wait: Callable[[], None],
+        was_flying: bool,
     ) -> MavlinkVehicle:
         return MavlinkVehicle(
             options,
@@ -104,6 +105,7 @@ def take_the_place_of_every_vehicle(one: AnsweringRig, monkeypatch: pytest.Monke
             identity=identity,
             observes=True,
             decided=identity is not None,
+            was_flying=was_flying,
             trial_parameters=trial_parameters,
             on_wait=on_wait,
         )

@@ -8,6 +8,7 @@ from typing import Final
 from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
 from app.vehicles.mavlink import addresses, signing
+from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.failures import HELP, Limits
 from app.vehicles.mavlink.link import Link, Received
@@ -22,6 +23,16 @@ MAX_UNSCALED_SPEED: Final = 4.0
 clock, because the pauses of a busy computer are in wall time."""
 
 
+class _Link(Link):
+    """A link that sends no heartbeats while `is_silent` returns true, which its own thread calls."""
+
+    is_silent: Callable[[], bool] = staticmethod(lambda: False)
+
+    def _write(self, message: Message) -> None:
+        if message.get_type() != "HEARTBEAT" or not self.is_silent():
+            super()._write(message)
+
+
 def timeout_factor_of(options: Options) -> float:
     """Return the factor on the timeouts of a real vehicle."""
     return max(1.0, float(options["clock_speed"]) / MAX_UNSCALED_SPEED)
@@ -33,18 +44,20 @@ def open_radio(
     *,
     on_message: Callable[[Received], None] | None,
     on_wait: Callable[[list[PacketReceived]], None] = lambda _packets: None,
+    is_silent: Callable[[], bool] = lambda: False,
     transport: Transport | None = None,
 ) -> AutopilotLink:
     """Open the link to a vehicle.
 
     `clock` is the vehicle's time, by default that of its options; for `on_message` and `on_wait` see AutopilotLink;
-    `transport` replaces the address and the thread that reads it. Raises LinkError if the link or its log cannot be
-    opened, InputError for a signing key that cannot be read or used.
+    no heartbeats are sent while `is_silent` returns true; `transport` replaces the address and the thread that reads
+    it. Raises LinkError if the link or its log cannot be opened, InputError for a signing key that cannot be read or
+    used.
     """
     profile = PROFILES[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
     key_file = str(options["signing_key_file"])
-    link = Link(
+    link = _Link(
         addresses.parse(str(options["address"])),
         profile.dialect,
         clock=clock,
@@ -54,6 +67,7 @@ def open_radio(
         signing_key=signing.read_key(Path(key_file)) if key_file else None,
         transport=transport,
     )
+    link.is_silent = is_silent
     target = Target(
         system=0,
         aircraft=int(options["aircraft_id"]),
