@@ -183,9 +183,11 @@ def finish_connect(
 ) -> None:
     """Record an open link as `record_connected`, and the outcome of its act.
 
-    In this order: connecting wrote gains only to a vehicle that was pinned before.
+    In this order: connecting wrote gains only to a vehicle that was pinned before. The act keeps the `concern` as its
+    reason.
     """
     finish_act(session, task.act_id, read_back=held)
+    repository.get_act(session, task.act_id).reason = concern
     record_connected(session, task.vehicle.vehicle_id, identity, concern=concern, held=held)
 
 
@@ -234,7 +236,9 @@ def record_reconnected(
     read_back = dict(held) or None
     given = dict(row.safe_gains) if _was_given(row, read_back) else None
     record_connected(session, vehicle_id, identity, concern=concern, held=read_back)
-    act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is reachable again", asked=given)
+    act = record_act(
+        session, row, ActKind.CONNECT, by=BY_WORKER, reason=concern or "it is reachable again", asked=given
+    )
     act.read_back = read_back
     return True
 

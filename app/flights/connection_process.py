@@ -155,16 +155,9 @@ class VehicleProcess(FlightLoop):
 
     def _connect(self) -> ConnectedVehicle:
         call = self._call
-        connect = get_kind(call.kind).connect
+        connect, folder = get_kind(call.kind).connect, trial_parameters_folder(call.data_dir)
         assert connect is not None, call.kind
-        return connect(
-            call.options,
-            call.safe_gains,
-            trial_parameters_folder(call.data_dir),
-            call.identity,
-            self._while_waiting,
-            call.was_flying,
-        )
+        return connect(call.options, call.safe_gains, folder, call.identity, self._while_waiting, call.was_flying)
 
     def _next(self) -> ToVehicleProcess:
         """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""

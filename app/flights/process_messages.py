@@ -128,9 +128,9 @@ FlightMessage = (
 class ConnectionRequest:
     """What the process needs to connect to a vehicle.
 
-    `identity` is the pinned one, None before the first connection. `keep_retrying`: retry until the vehicle answers.
-    `was_flying`: a process that flew it may have ended in flight.
-    The vehicle's lock, its telemetry logs and the parameters that a trial changes are in `data_dir`.
+    `identity` is the pinned one, None before the first connection. `was_flying`: an earlier process may have left it in
+    the air. `keep_retrying`: retry until the vehicle answers. The vehicle's lock, its telemetry logs and the parameters
+    that a trial changes are in `data_dir`.
     """
 
     vehicle_id: int

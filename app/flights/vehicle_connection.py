@@ -59,9 +59,8 @@ class VehicleConnection(FlightProcess):
     """The worker's handle of such a process: a FlightProcess with a link to the vehicle between flights.
 
     `hear` is called on a thread of the connection with the vehicle's status and the outcome of commands, that of motors
-    off once the vehicle has confirmed it or has not in time; while the
-    process does not answer, every two seconds with a status that says so. One flight or act at a time; commands may be
-    sent at any moment, from any thread.
+    off once the vehicle has confirmed it or has not in time; while the process does not answer, every two seconds with
+    a status that says so. One flight or act at a time; commands may be sent at any moment, from any thread.
     """
 
     _take_off_timeout_s = TAKE_OFF_TIMEOUT_S

@@ -9,10 +9,11 @@ from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
 from app.common.states import ActKind, VehicleState
-from app.db.models import VehicleActRow, VehicleRow
+from app.db.models import TrialRow, VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import commands
+from app.flights import flight_rows
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot
 from app.flights.process_messages import ConnectionOpened
@@ -333,6 +334,47 @@ def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebo
     with database.read() as session:
         assert commands.list_vehicles_to_reconnect(session) == []
     assert seen(client, known)["state"] == "disconnected"
+
+
+def test_a_vehicle_may_be_in_the_air_after_a_flight_until_its_gains_are_read_or_no_battery_lasts_any_longer(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    trial = create_trial(client, create_campaign_on(client, database, vehicle)["id"])
+    assert client.post(f"/api/trials/{trial['id']}/fly").status_code == 202
+
+    def may_fly() -> bool:
+        with database.write() as session:
+            commands.withdraw_acts(session)
+            commands.forget_connections(session)
+            (found,) = commands.list_vehicles_to_reconnect(session)
+        return found.was_flying
+
+    with database.write() as session:
+        request = flight_rows.claim_flight(session, WORKER)
+        assert request is not None
+        flight_rows.record_staged(session, request.flight_id, dict(request.gains))
+    with database.write() as session:
+        flight_rows.record_lift_off(session, request.flight_id)
+    with database.write() as session:
+        flight_rows.lose_running_flights(session)
+    assert may_fly()
+    with database.write() as session:
+        assert commands.record_reconnected(session, vehicle["id"], IDENTITY, concern="It is armed.", held={})
+        commands.record_disconnected(session, vehicle["id"])
+    assert newest(client, vehicle)["reason"] == "It is armed."
+    assert may_fly(), "no gains were read of an armed vehicle"
+    with database.write() as session:
+        flown = session.get_one(TrialRow, trial["id"])
+        flown.flown_at = utc_now() - timedelta(hours=1)
+    assert not may_fly()
+    with database.write() as session:
+        session.get_one(TrialRow, trial["id"]).flown_at = utc_now()
+    assert may_fly()
+    connect(client, database, vehicle)
+    with database.write() as session:
+        commands.record_disconnected(session, vehicle["id"])
+    assert not may_fly(), "it was on the ground, with its safe gains"
 
 
 def test_the_ledger_names_no_gains_for_a_pinned_vehicle_that_was_armed_or_absent_when_it_was_connected(

@@ -390,17 +390,20 @@ class MavlinkVehicle:
         preflight.await_vehicle(self._radio, str(self._options["address"]), self._pinned)
         self._plan_problem = preflight.read_vehicle_info(self._radio)
         self._enter(State.PREFLIGHT)
-        self._identify()
-        self._take_up_landing()
+        self._listen(0.0)
+        if self._was_flying:
+            self._take_up_landing()
         if self._state in QUARANTINE_STATES:
             return
         if self._has_set_safe_gains():
             self._enter(State.SET_GAINS)
             self._enter(State.IDLE)
+            self._requested, self._repeated, self._was_flying = "", None, False
 
     def _take_up_landing(self) -> None:
         """Repeat Land to a vehicle that the process that flew it left in the air, unless it may be another vehicle."""
-        self._was_flying = self._was_flying and not preflight.is_another(self._radio, self._pinned)
+        self._identify()
+        self._was_flying = not preflight.is_another(self._radio, self._pinned)
         if self._was_flying and not preflight.find_missing_uid(self._radio, self._pinned):
             self._requested = _LEFT
             self._repeated = RepeatedCommand(self._radio, Action.LAND, by_person=False, is_withheld=True)
@@ -501,11 +504,7 @@ class MavlinkVehicle:
     @property
     def _is_at_rest(self) -> bool:
         """Whether it is disarmed, may be commanded, and is not being landed or stopped."""
-        return (
-            self._state not in QUARANTINE_STATES
-            and self._radio.is_disarmed
-            and (self._repeated is None or self._repeated.is_over)
-        )
+        return self._state not in QUARANTINE_STATES and self._radio.is_disarmed and self._repeated is None
 
     def _require_uid(self) -> None:
         """Raise VehicleError if the pinned hardware id is known, and this vehicle has not reported its own."""
@@ -545,7 +544,7 @@ class MavlinkVehicle:
         if (repeated := self._repeated) is None:
             return
         repeated.proceed(packets)
-        if repeated.action is Action.KILL and repeated.is_over and self.has_stopped is None and self._flight is None:
+        if self.has_stopped is None and self._flight is None and repeated.action is Action.KILL and repeated.is_over:
             self.has_stopped = repeated.has_stopped
             if not repeated.has_stopped:
                 self._doubt_stop(_NOT_STOPPED)
@@ -657,7 +656,8 @@ class MavlinkVehicle:
         finally:
             self._datum_m, self._flight = self._flight.datum_m, None
         self._state, self._why = flown.trial.state, flown.trial.why
-        self.has_stopped = self._radio.is_disarmed or flown.trial.has_confirmed_stop
+        if self._repeated is None:  # else it is of a request during the restoring of the safe gains
+            self.has_stopped = self._radio.is_disarmed or flown.trial.has_confirmed_stop
         if self._state is State.QUARANTINE:
             self._keep_landing(flown.trial)
         return flown
@@ -748,12 +748,11 @@ class MavlinkVehicle:
             both = add_secondary_altitude(
                 both.trajectory, self._secondary.seen, name=name, zero_s=zero_s, scored=self._scored
             )
+        lands = self._repeated is not None and self._repeated.action is Action.LAND
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
-            reason=" ".join(
-                part for part in (reason, _LAND_WAS_REPEATED if self._repeated is not None else "", both.remark) if part
-            ),
+            reason=" ".join(part for part in (reason, _LAND_WAS_REPEATED if lands else "", both.remark) if part),
             has_flown=records.has_flown(trial),
             settings={**self._options, **self._loop, **both.settings, **records.contact_of(trial)},
         )

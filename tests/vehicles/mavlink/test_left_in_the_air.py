@@ -2,15 +2,17 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Final
 
 import pytest
 
-from app.vehicles.base import Identity
+from app.vehicles.base import FlightOptions, Identity, StopRequest
 from app.vehicles.mavlink.events import Action
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Target
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
+from tests.vehicles.flying import unwatched
 from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, copter_of
 from tests.vehicles.mavlink.test_connected import LAND_HERE, START_ENGINE, TAKE_OFF, blocks_told, enter_block
 
@@ -136,7 +138,21 @@ def test_a_person_who_decides_ends_the_landing_that_no_person_asked_for() -> Non
         assert "Motors off was requested: people below." in vehicle.concern
 
 
-def test_a_vehicle_that_has_landed_meanwhile_is_given_its_safe_gains_and_is_ready() -> None:
-    with LockstepRig() as rig, found(rig) as vehicle:
-        vehicle.attend(5.0)
-        assert (vehicle.concern, vehicle.condition().held, lands_told(rig)) == ("", SAFE["paparazzi"], 0)
+def test_a_vehicle_that_has_landed_meanwhile_is_ready_and_hears_the_heartbeats_that_it_flies_with() -> None:
+    def stop() -> StopRequest | None:
+        return StopRequest("enough") if rig.drone.body.altitude_m > 1.0 else None
+
+    with LockstepRig("ardupilot") as rig:
+        rig.switch_on_failsafes()
+        rig.wait_s(10.0)  # until its estimator is ready
+        with found(rig) as vehicle:
+            assert (vehicle.concern, vehicle.condition().held, lands_told(rig)) == ("", SAFE["ardupilot"], 0)
+            vehicle.stage(SAFE["ardupilot"])
+            rig.heard.clear()
+            assert vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=stop).has_flown
+            heartbeats_s = [at_s for at_s, message in rig.heard if message.get_type() == "HEARTBEAT"]
+            assert len(heartbeats_s) > 5
+            assert max(later_s - at_s for at_s, later_s in pairwise(heartbeats_s)) < 1.1
+            rig.drone.autopilot._arm(force=True)  # type: ignore[attr-defined]  # by somebody else
+            vehicle.attend(3.0)
+            assert "The process that flew it" not in vehicle.concern
