@@ -218,6 +218,21 @@ def test_a_check_says_nothing_of_a_vehicle_that_has_restarted_since(
     assert checks_after([0, 0, 1]) is None
 
 
+def test_the_newest_concern_of_a_vehicle_is_the_one_that_is_kept(
+    settings: Settings, client: TestClient, database: Database
+) -> None:
+    vehicle = connect(client, database, register(client), concern="it was met armed")
+    manager = VehicleConnectionManager(
+        database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
+    )
+    status = VehicleStatus(vehicle_id=vehicle["id"], state="connected", at=status_time(), step="")
+    slot = VehicleSlot(concern="it was met armed")
+    for concern in ("it was met armed", "its motors did not stop"):
+        manager._on_message(slot, vehicle["id"], replace(status, concern=concern))
+    manager._record_executor.submit(lambda: None).result()
+    assert seen(client, vehicle)["concern"] == "its motors did not stop"
+
+
 def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: TestClient, database: Database) -> None:
     vehicle = connect(client, database, register(client), concern="it was met armed")
     assert (vehicle["state"], vehicle["concern"]) == ("quarantined", "it was met armed")
