@@ -33,7 +33,7 @@ from app.vehicles.base import CheckItem, Identity, OptionValue
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
 AIRBORNE_FOR: Final = timedelta(hours=1)
-"""A vehicle that took off earlier than this is not in the air any more: no battery of a copter lasts as long."""
+"""A flight that began longer ago than this is not taken for one that may be in the air: most batteries are empty."""
 BY_WORKER: Final = "the worker"
 
 _WITHDRAWN: Final = {

@@ -169,6 +169,7 @@ def flights_of(session: Session, vehicle_id: int) -> Sequence[FlightRow]:
 
 
 def has_taken_off(session: Session, vehicle_id: int, *, since: datetime) -> bool:
+    """Whether a flight of the vehicle took off after that time, and was not found unflown."""
     flown = select(FlightRow.id).join(TrialRow).where(FlightRow.vehicle_id == vehicle_id, TrialRow.flown_at > since)
     return session.scalar(flown.limit(1)) is not None
 

@@ -406,7 +406,7 @@ class MavlinkVehicle:
         self._was_flying = not preflight.is_another(self._radio, self._pinned)
         if self._was_flying and not preflight.find_missing_uid(self._radio, self._pinned):
             self._requested = _LEFT
-            self._repeated = RepeatedCommand(self._radio, Action.LAND, by_person=False, is_withheld=True)
+            self._repeated = RepeatedCommand(self._radio, Action.LAND, is_withheld=True)
 
     def _is_silent(self) -> bool:
         """Whether a vehicle that was left in the air gets no heartbeats of a ground station, so that the failsafe that

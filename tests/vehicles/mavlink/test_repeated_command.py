@@ -39,7 +39,7 @@ class Ordered:
         )
         self.told(HEARTBEAT)
         self.clock.wait_s(0.1)
-        self.order = RepeatedCommand(self.radio, action, by_person=not is_withheld, is_withheld=is_withheld)
+        self.order = RepeatedCommand(self.radio, action, is_withheld=is_withheld)
         self.first = len(self.sent) or 1
 
     def told(self, *measurements: Measurement) -> list[PacketReceived]:
