@@ -8,6 +8,7 @@ without waiting in the thread of the caller: passed to the link's thread, they w
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -108,7 +109,8 @@ class Link:
     `target_system` is the vehicle's system id, None for the first autopilot received; `make` is its MAV_AUTOPILOT, None
     for any. Messages of its other components are received, too, but do not count as packets of the autopilot. With
     `tlog`, both directions are appended to that file. With `signing_key`, everything is signed. With `transport`, no
-    thread is started: `receive` reads the transport and advances the clock while nothing arrives.
+    thread is started: `receive` reads the transport and advances the clock while nothing arrives. No heartbeats are
+    sent while `is_silent` returns true, which the link's own thread calls.
     """
 
     def __init__(
@@ -124,11 +126,12 @@ class Link:
         tlog: Path | None = None,
         signing_key: bytes | None = None,
         transport: Transport | None = None,
+        is_silent: Callable[[], bool] = lambda: False,
     ) -> None:
         """Open the link. Raises LinkError if the address or the file cannot be opened, InputError if the dialect cannot
         be signed."""
         self._address, self._dialect, self._clock = address, dialect, clock
-        self._identity = (system, component, signing_key)
+        self._identity, self._is_silent = (system, component, signing_key), is_silent
         self._codec = self._new_codec()
         self._heartbeat = dialect.message("HEARTBEAT", _GROUND_STATION)
         self._transport = transport or open_transport(address)
@@ -306,7 +309,7 @@ class Link:
             return
         self._next_heartbeat_s = now_s + HEARTBEAT_EVERY_S
         is_attended = self._listeners > 0 or now_s - self._attended_s < UNATTENDED_AFTER_S
-        if self._dialect.uses_gcs_heartbeats and is_attended:
+        if self._dialect.uses_gcs_heartbeats and is_attended and not self._is_silent():
             with self._sending:
                 self._write(self._heartbeat)
 
