@@ -113,8 +113,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.LOST_POSITION: Response(
             "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
-            "an altitude that jumps by 0.5 m, stays 0.5 m behind the climb rate during takeoff, drifts by more than 1 m, "
-            "or contradicts the vehicle's landed state",
+            "an altitude that jumps by 0.5 m, stays 0.5 m behind the climb rate during takeoff, drifts by more than "
+            "1 m, or contradicts the vehicle's landed state",
             "land",
             "invalid",
             "The vehicle's position was lost.",
