@@ -1,43 +1,37 @@
 """Bundles over HTTP: export of a campaign as one file, and import."""
 
 import tempfile
-from pathlib import Path
+from contextlib import ExitStack
+from typing import Final
 
 from fastapi import APIRouter, status
-from fastapi.responses import FileResponse
-from starlette.background import BackgroundTask
+from fastapi.responses import StreamingResponse
 
 from app.bundles.export import write_bundle
 from app.bundles.importer import store_bundle
 from app.bundles.reader import Bundle
 from app.campaigns.schemas import Campaign
 from app.web.dependencies import FILE_BODY, CurrentDatabase, CurrentSettings, Id, Record
+from app.web.downloads import download
 
 router = APIRouter(prefix="/api", tags=["bundles"])
+
+_ZIP: Final = "application/zip"
 
 
 @router.get(
     "/campaigns/{campaign_id}/bundle",
-    response_class=FileResponse,
-    responses={200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}},
+    response_class=StreamingResponse,
+    responses={200: {"content": {_ZIP: {"schema": {"type": "string", "format": "binary"}}}}},
 )
-def get_bundle(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> FileResponse:
+def get_bundle(database: CurrentDatabase, settings: CurrentSettings, campaign_id: Id) -> StreamingResponse:
     """Export the whole campaign as one file: definition, trials, proposals, every record, photo and telemetry log."""
-    with tempfile.NamedTemporaryFile(prefix="gainline-bundle-", suffix=".zip", delete=False) as file:
-        path = Path(file.name)
-        try:
-            with database.read() as session:
-                name = write_bundle(session, campaign_id, settings.data_dir, file)
-        except BaseException:
-            path.unlink(missing_ok=True)
-            raise
-    return FileResponse(
-        path,
-        media_type="application/zip",
-        filename=name,
-        headers={"Content-Encoding": "identity"},  # it is compressed already
-        background=BackgroundTask(path.unlink, missing_ok=True),
-    )
+    with ExitStack() as until_made:
+        file = until_made.enter_context(tempfile.TemporaryFile())
+        with database.read() as session:
+            name = write_bundle(session, campaign_id, settings.data_dir, file)
+        until_made.pop_all()
+    return download(file, name, media_type=_ZIP)
 
 
 @router.post("/bundles", status_code=status.HTTP_201_CREATED, openapi_extra=FILE_BODY)

@@ -211,6 +211,7 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
     tilted = f" ({commands.tilted} of them tilted by up to {commands.largest_tilt_deg:.1f}°)" if commands.tilted else ""
     rows = [
         ("bit-exact commands", f"{commands.exact} of {commands.rows}{tilted}"),
+        ("of them with an r33 rounded to one count above level", str(commands.rounded)),
         *((f"exact with the {name} one step apart", str(count)) for name, count in commands.stale.items()),
         ("different commands", _different(commands)),
     ]
@@ -227,7 +228,9 @@ def _print(out: Console, file: Path, checked: LogCheck) -> None:
             )
             for name, value in simulation.largest_difference.items()
         ]
-    out.print(table(("", ""), rows, title=f"{file.name}, {format_gains(checked.gains)} ({checked.gains_from})"))
+    out.print(table(("", ""), rows, title=f"{file.name}, {checked.gains_text}"))
+    for note in checked.gain_notes:
+        out.print(note)
     if checked.better_gains is not None:
         out.print(f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?")
     out.print("The replica agrees." if checked.passed else "[bold]The replica differs.[/]")
@@ -242,7 +245,8 @@ def _as_json(file: Path, checked: LogCheck) -> dict[str, object]:
     return {
         "file": str(file),
         "passed": checked.passed,
-        "gains": dict(checked.gains),
+        "gains": checked.gains,
+        "flown": [asdict(each) for each in checked.flown],
         "gains_from": checked.gains_from,
         "commands": {**asdict(checked.commands), "stale": dict(checked.commands.stale)},
         "simulation": None if checked.simulation is None else asdict(checked.simulation),

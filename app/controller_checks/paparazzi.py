@@ -1,6 +1,6 @@
 """Paparazzi's entry in the registry: its log of a flight, `.data` with VERT_LOOP, and traces with a row per step."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import BinaryIO, Final
@@ -25,11 +25,11 @@ from app.core.control.loop_log import (
     TOLERANCES,
     UNITS,
     CommandCheck,
+    FlownGains,
     Overlay,
     SimulationCheck,
     compare_commands,
     compare_simulation,
-    infer_gains,
 )
 from app.core.control.paparazzi import INPUTS, OUTPUTS, RATE_HZ, LoopTrace, replayed
 from app.core.errors import InputError, Problem
@@ -67,13 +67,14 @@ _DOWN: Final = "z and its speed and acceleration point down: 3 m up is z = −3 
 class LogCheck:
     """Result of checking a log.
 
-    Its gains and their source, the gains inferred from its commands, and both parts of the comparison with their
-    overlays.
+    Its gains, their source and notes on them; other gains from which more of the commands follow; both parts of the
+    comparison with their overlays.
     """
 
-    gains: Mapping[str, float]
+    flown: Sequence[FlownGains]
     gains_from: str
-    inferred: Mapping[str, float] | None
+    better_gains: Mapping[str, float] | None
+    gain_notes: Sequence[str]
     commands: CommandCheck
     simulation: SimulationCheck | None
     overlays: tuple[Overlay, ...]
@@ -83,9 +84,16 @@ class LogCheck:
         return self.commands.passed and (self.simulation is None or self.simulation.passed)
 
     @property
-    def better_gains(self) -> Mapping[str, float] | None:
-        """The inferred gains, if they differ: more of the commands follow from these."""
-        return None if self.inferred is None or dict(self.inferred) == dict(self.gains) else self.inferred
+    def gains(self) -> Mapping[str, float] | None:
+        """None if they change."""
+        return self.flown[0].gains if len(self.flown) == 1 else None
+
+    @property
+    def gains_text(self) -> str:
+        """`kp 283, ki 13, kd 82; after 94.9 s kp 300, ki 13, kd 82 (of the log)`."""
+        texts = [format_gains(each.gains) if each.gains else "unknown" for each in self.flown]
+        changes = [f"after {each.after_s:.1f} s {text}" for each, text in zip(self.flown, texts, strict=True)]
+        return f"{'; '.join([*texts[:1], *changes[1:]])} ({self.gains_from})"
 
 
 def check_log(
@@ -93,23 +101,23 @@ def check_log(
 ) -> LogCheck:
     """Check a .data file of Paparazzi.
 
-    The gains are those given, else the log's own, else those inferred from its commands. Raises InputError when it has
-    no VERT_LOOP, or its gains cannot be determined.
+    The gains are those given, else those that its commands follow from. Raises InputError when it has no VERT_LOOP, or
+    its gains cannot be determined.
     """
-    log, logged = read_loop_log(stream, companion)
-    inferred = infer_gains(log)
-    for gains, source in ((given, "given"), (logged, "of the log"), (inferred, "computed from the commands")):
-        if gains is not None:
-            commands, drawn = compare_commands(log, gains)
-            simulated = compare_simulation(log)
-            if simulated is None:
-                return LogCheck(gains, source, inferred, commands, None, (drawn,))
-            return LogCheck(gains, source, inferred, commands, simulated[0], (simulated[1], drawn))
-    raise InputError(
-        f"{name} does not contain the gains flown, and its motion is too small to compute them.",
-        problems=(Problem("gains", "are needed"),),
-        hint="Add the .log file that was written with it, or give the gains (on the command line: --gains KP,KI,KD).",
-    )
+    read = read_loop_log(stream, companion)
+    flown = read.flown if given is None else [FlownGains(0.0, given)]
+    if not any(each.gains for each in flown):
+        raise InputError(
+            f"{name} does not contain the gains flown, and its motion is too small to compute them.",
+            problems=(Problem("gains", "are needed"),),
+            hint="Add the .log file written with it, or give the gains (on the command line: --gains KP,KI,KD).",
+        )
+    source = "given" if given is not None else "of the log" if read.are_logged else "computed from the commands"
+    commands, drawn = compare_commands(read.log, flown)
+    simulated = compare_simulation(read.log)
+    simulation, overlays = (None, (drawn,)) if simulated is None else (simulated[0], (simulated[1], drawn))
+    better = read.flown[0].gains if len(read.flown) == 1 and given not in (None, read.flown[0].gains) else None
+    return LogCheck(flown, source, better, read.notes, commands, simulation, overlays)
 
 
 def parse_gains(given: str, *, field: str = "gains") -> dict[str, float]:
@@ -177,7 +185,7 @@ def _result_of_log(checked: LogCheck) -> Result:
         passed=checked.passed,
         sentence=_log_sentence(checked),
         rows=commands.rows,
-        gains=dict(checked.gains),
+        gains=checked.gains,
         gains_from=checked.gains_from,
         better_gains=checked.better_gains,
         notes=(*_notes(checked), _DOWN),
@@ -210,6 +218,9 @@ def _log_sentence(checked: LogCheck) -> str:
 
 
 def _notes(checked: LogCheck) -> Iterable[str]:
+    if checked.gains is None:
+        yield f"The gains changed: {checked.gains_text}."
+    yield from (f"{note[0].upper()}{note[1:]}." for note in checked.gain_notes)
     if checked.better_gains is not None:
         yield f"More commands match with {format_gains(checked.better_gains)}: were other gains flown?"
     yield from _notes_on(checked.commands)
@@ -226,6 +237,8 @@ def _notes_on(commands: CommandCheck) -> Iterable[str]:
     if commands.tilted:
         tilt = f"{commands.largest_tilt_deg:.1f}°"
         yield f"Commands reproduced under a tilt of up to {tilt}: {grouped(commands.tilted)}."
+    if commands.rounded:
+        yield f"Commands reproduced with an r33 rounded to one count above level: {grouped(commands.rounded)}."
     for fields, count in commands.stale.items():
         if count:
             yield f"Commands reproduced only with the {fields} one step apart: {grouped(count)}."

@@ -1,17 +1,21 @@
 """A consistent copy of the database, taken while other connections read and write."""
 
+import fcntl
+import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 
 from app.common.errors import StorageError
 from app.db.session import translated
 
-_SUFFIX: Final = "gainline.sqlite3"
+_COPY: Final = "gainline.sqlite3"
+_PREFIX: Final = ".gainline-partial-copy-"
+"""Of folders that are deleted; nobody names a folder of their own like that."""
 SPARE_BYTES: Final = 2**28
 """Disk space that a copy must leave free for flights that take place meanwhile."""
 
@@ -24,12 +28,14 @@ def take_backup(database_file: Path, require_intact: Callable[[Path], None]) -> 
     it. While it is made it is stored beside the database and needs as much space. Raises StorageError, before anything
     is written, when there is too little space.
     """
+    discard_partial_copies(database_file.parent)
     _require_room(database_file)
     with (
         translated(database_file),
-        tempfile.TemporaryDirectory(prefix="backup-", dir=database_file.parent) as folder,
+        _locked(database_file.parent, fcntl.LOCK_SH),
+        tempfile.TemporaryDirectory(prefix=_PREFIX, dir=database_file.parent) as folder,
     ):
-        copied = Path(folder) / _SUFFIX
+        copied = Path(folder) / _COPY
         with closing(sqlite3.connect(database_file)) as source, closing(sqlite3.connect(copied)) as copy:
             copy.execute("PRAGMA synchronous = OFF")  # after a power cut the copy is worthless anyway
             source.backup(copy)
@@ -38,6 +44,25 @@ def take_backup(database_file: Path, require_intact: Callable[[Path], None]) -> 
         with closing(sqlite3.connect(copied)) as copy:
             copy.execute("PRAGMA journal_mode = DELETE")  # one file, readable without -wal beside it
         return copied.open("rb")
+
+
+def discard_partial_copies(folder: Path) -> None:
+    """Delete the copies in a database's folder whose process was killed while it made them; none while another process
+    is making one."""
+    with suppress(BlockingIOError), _locked(folder, fcntl.LOCK_EX | fcntl.LOCK_NB):
+        for left in folder.glob(f"{_PREFIX}*"):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+@contextmanager
+def _locked(folder: Path, kind: int) -> Iterator[None]:
+    """Hold a lock of the folder itself, which ends with its process, however that ends."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, kind)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _require_sound(copy: sqlite3.Connection) -> None:

@@ -32,6 +32,8 @@ from app.vehicles.base import CheckItem, Identity, OptionValue
 
 REQUEST_TIMEOUT: Final = timedelta(seconds=10)
 """Maximum age of a request when a worker claims it."""
+AIRBORNE_FOR: Final = timedelta(hours=1)
+"""A flight that began longer ago than this is not taken for one that may be in the air: most batteries are empty."""
 BY_WORKER: Final = "the worker"
 
 _WITHDRAWN: Final = {
@@ -45,7 +47,8 @@ _READ_ONLY_ACTS: Final = frozenset({ActKind.CHECK, ActKind.PARAMETERS})
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkedVehicle:
     """What a worker needs to open the link to a vehicle; `identity` is the pinned one, None before the first
-    connection."""
+    connection. `was_flying`: a process of Gainline may have left it in the air, because its gains, which are only
+    read on the ground, have not been read since its last takeoff."""
 
     vehicle_id: int
     name: str
@@ -54,6 +57,7 @@ class LinkedVehicle:
     options: dict[str, OptionValue]
     safe_gains: dict[str, float]
     identity: Identity | None
+    was_flying: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,7 +148,7 @@ def claim_act(session: Session, worker: str) -> ActTask | None:
         if utc_now() - act.requested_at <= REQUEST_TIMEOUT:
             _move(act, ActState.RUNNING)
             act.worker, act.claimed_at = worker, utc_now()
-            return ActTask(act_id=act.id, kind=act.kind, reason=act.reason, vehicle=_linked(act.vehicle))
+            return ActTask(act_id=act.id, kind=act.kind, reason=act.reason, vehicle=_linked(session, act.vehicle))
         _end(act, problem=f"It could not be started within {REQUEST_TIMEOUT.total_seconds():g} s. Request it again.")
     return None
 
@@ -179,9 +183,11 @@ def finish_connect(
 ) -> None:
     """Record an open link as `record_connected`, and the outcome of its act.
 
-    In this order: connecting wrote gains only to a vehicle that was pinned before.
+    In this order: connecting wrote gains only to a vehicle that was pinned before. The act keeps the `concern` as its
+    reason.
     """
     finish_act(session, task.act_id, read_back=held)
+    repository.get_act(session, task.act_id).reason = concern
     record_connected(session, task.vehicle.vehicle_id, identity, concern=concern, held=held)
 
 
@@ -209,7 +215,7 @@ def request_reconnections(session: Session) -> list[int]:
 def list_vehicles_to_reconnect(session: Session) -> list[LinkedVehicle]:
     """Vehicles that are wanted connected and have neither an act nor a flight under way."""
     rows = _wanted(session)
-    return [_linked(row) for row in rows if repository.flight_under_way(session, row.id) is None]
+    return [_linked(session, row) for row in rows if repository.flight_under_way(session, row.id) is None]
 
 
 def _wanted(session: Session) -> list[VehicleRow]:
@@ -230,7 +236,9 @@ def record_reconnected(
     read_back = dict(held) or None
     given = dict(row.safe_gains) if _was_given(row, read_back) else None
     record_connected(session, vehicle_id, identity, concern=concern, held=read_back)
-    act = record_act(session, row, ActKind.CONNECT, by=BY_WORKER, reason="it is reachable again", asked=given)
+    act = record_act(
+        session, row, ActKind.CONNECT, by=BY_WORKER, reason=concern or "it is reachable again", asked=given
+    )
     act.read_back = read_back
     return True
 
@@ -309,7 +317,8 @@ def record_command(session: Session, vehicle_id: int, kind: ActKind, reason: str
         act.state, act.problem = ActState.FAILED, problem
 
 
-def _linked(row: VehicleRow) -> LinkedVehicle:
+def _linked(session: Session, row: VehicleRow) -> LinkedVehicle:
+    since = utc_now() - AIRBORNE_FOR
     return LinkedVehicle(
         vehicle_id=row.id,
         name=row.name,
@@ -318,6 +327,7 @@ def _linked(row: VehicleRow) -> LinkedVehicle:
         options=settings_of(row),
         safe_gains=dict(row.safe_gains),
         identity=_pinned(row),
+        was_flying=repository.has_taken_off(session, row.id, since=max(since, row.held_at or since)),
     )
 
 

@@ -1,6 +1,7 @@
 """Queries on vehicles, their acts and their flights."""
 
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Final
 
 from sqlalchemy import ColumnElement, String, and_, delete, func, literal, null, or_, select, tuple_, union_all
@@ -17,7 +18,7 @@ from app.common.states import (
     ActState,
     VehicleState,
 )
-from app.db.models import CampaignRow, FlightRow, VehicleActRow, VehicleRow
+from app.db.models import CampaignRow, FlightRow, TrialRow, VehicleActRow, VehicleRow
 from app.db.types import UtcDateTime
 
 RESTORE_AFTER_FLIGHT: Final = "restore after flight"
@@ -165,6 +166,12 @@ def flights_of(session: Session, vehicle_id: int) -> Sequence[FlightRow]:
     """Flights that lifted off and have ended, oldest first."""
     wanted = select(FlightRow).where(FlightRow.vehicle_id == vehicle_id, FlightRow.state.in_(FLOWN_FLIGHT_STATES))
     return session.scalars(wanted.order_by(FlightRow.id)).all()
+
+
+def has_taken_off(session: Session, vehicle_id: int, *, since: datetime) -> bool:
+    """Whether a flight of the vehicle took off after that time, and was not found unflown."""
+    flown = select(FlightRow.id).join(TrialRow).where(FlightRow.vehicle_id == vehicle_id, TrialRow.flown_at > since)
+    return session.scalar(flown.limit(1)) is not None
 
 
 def safe_gains_acts(session: Session, vehicle_id: int) -> Sequence[VehicleActRow]:

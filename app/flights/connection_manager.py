@@ -287,6 +287,7 @@ class VehicleConnectionManager:
             safe_gains=vehicle.safe_gains,
             identity=vehicle.identity,
             data_dir=self._data_dir,
+            was_flying=vehicle.was_flying,
             keep_retrying=patient,
             clock=self._clock,
         )
@@ -320,7 +321,7 @@ class VehicleConnectionManager:
                 if slot.restarts is not None and restarts > slot.restarts:
                     self._record_in_background(lambda t: commands.discard_checks(t, vehicle_id))
                 slot.restarts = restarts
-                if concern and not slot.concern:
+                if concern and concern != slot.concern:
                     self._record_in_background(lambda t: commands.quarantine_vehicle(t, vehicle_id, concern))
                 slot.concern = concern
             case CommandForwarded(order=order, reason=reason, problem=problem):

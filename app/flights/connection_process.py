@@ -68,6 +68,7 @@ LOCK_TIMEOUT_S: Final = 120.0
 STANDING_ORDER_TIMEOUT_S: Final = 60.0
 """How long the process repeats a command after its worker's end; shorter than the next connection's wait for the
 lock."""
+_NOT_STOPPED: Final = "The vehicle has not confirmed that its motors stopped."
 _EXPIRED: Final = "The command reached the vehicle's process too late and was not sent; the caller was notified."
 
 
@@ -106,6 +107,7 @@ class VehicleProcess(FlightLoop):
         self._is_open = self._may_interrupt = False
         self._staging: Staging = "none"
         self._take_off_by_s: float | None = None
+        self._stops: list[CommandForwarded] = []
         self._vehicle = self._open_vehicle()
         self._is_open = True
         self._show_due_s = 0.0
@@ -153,11 +155,9 @@ class VehicleProcess(FlightLoop):
 
     def _connect(self) -> ConnectedVehicle:
         call = self._call
-        connect = get_kind(call.kind).connect
+        connect, folder = get_kind(call.kind).connect, trial_parameters_folder(call.data_dir)
         assert connect is not None, call.kind
-        return connect(
-            call.options, call.safe_gains, call.identity, trial_parameters_folder(call.data_dir), self._while_waiting
-        )
+        return connect(call.options, call.safe_gains, folder, call.identity, self._while_waiting, call.was_flying)
 
     def _next(self) -> ToVehicleProcess:
         """Return the worker's next message that is not a command; attend to the vehicle meanwhile."""
@@ -244,8 +244,21 @@ class VehicleProcess(FlightLoop):
                 act(ordered.reason)
             except VehicleError as error:
                 problem = str(error)
-        self._line.send(CommandForwarded(ordered.number, ordered.order, ordered.reason, problem))
+        self._report(ordered, problem)
         return not problem
+
+    def _report(self, ordered: VehicleCommand, problem: str = "") -> None:
+        """Report a command that was forwarded to the vehicle, which must confirm that its motors have stopped."""
+        is_awaited = ordered.order == "motors off" and not problem
+        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.reason, problem, is_awaited)
+        self._line.send(forwarded)
+        self._stops += [forwarded] * is_awaited
+
+    def _report_stops(self) -> None:
+        if self._stops and (has_stopped := self._vehicle.has_stopped) is not None:
+            for each in self._stops:
+                self._line.send(replace(each, problem="" if has_stopped else _NOT_STOPPED, is_awaited=False))
+            self._stops.clear()
 
     def _publish_status(self) -> VehicleStatus | None:
         """Publish the status if it is due; return what was published."""
@@ -253,6 +266,7 @@ class VehicleProcess(FlightLoop):
         if now_s < self._show_due_s:
             return None
         self._show_due_s = max(self._show_due_s + STATUS_INTERVAL_S, now_s)
+        self._report_stops()
         status = self._status()
         self._line.send_if_ready(status)
         return status
@@ -377,13 +391,13 @@ class VehicleProcess(FlightLoop):
     def _note(self, message: ToVehicleProcess) -> None:
         """Note a reason to end the flight: the first one counts, but motors off overrides it."""
         match message:
-            case VehicleCommand(number, order, reason) if _has_expired(message):
-                self._line.send(CommandForwarded(number, order, reason, _EXPIRED))
-            case VehicleCommand(number, order, reason):
+            case VehicleCommand() if _has_expired(message):
+                self._report(message, _EXPIRED)
+            case VehicleCommand(order=order, reason=reason):
                 if order == "motors off":
                     self._stop = StopRequest(reason, motors_off=True)
                 self._stop = self._stop or StopRequest(reason)
-                self._line.send(CommandForwarded(number, order, reason))
+                self._report(message)
             case _:
                 super()._note(message)
 

@@ -128,8 +128,9 @@ FlightMessage = (
 class ConnectionRequest:
     """What the process needs to connect to a vehicle.
 
-    `identity` is the pinned one, None before the first connection. `keep_retrying`: retry until the vehicle answers.
-    The vehicle's lock, its telemetry logs and the parameters that a trial changes are in `data_dir`.
+    `identity` is the pinned one, None before the first connection. `was_flying`: an earlier process may have left it in
+    the air. `keep_retrying`: retry until the vehicle answers. The vehicle's lock, its telemetry logs and the parameters
+    that a trial changes are in `data_dir`.
     """
 
     vehicle_id: int
@@ -139,6 +140,7 @@ class ConnectionRequest:
     safe_gains: Mapping[str, float]
     identity: Identity | None
     data_dir: Path
+    was_flying: bool = False
     keep_retrying: bool = False
     clock: Clock = REAL_TIME
 
@@ -187,12 +189,14 @@ class VehicleCommand:
 
 @dataclass(frozen=True, slots=True)
 class CommandForwarded:
-    """From the process: a command was forwarded to the vehicle; `problem` when it could not be."""
+    """From the process: a command was forwarded to the vehicle; `problem` when it could not be, or when the vehicle did
+    not confirm it. `is_awaited`: another such message tells whether the vehicle has confirmed it."""
 
     number: int
     order: VehicleCommandKind
     reason: str
     problem: str = ""
+    is_awaited: bool = False
 
 
 FromVehicleProcess = ConnectionOpened | VehicleResponse | CommandForwarded | VehicleStatus | StagingLost | FlightMessage

@@ -39,6 +39,7 @@ _ENDED: Final = (
     "The process that had the vehicle's link ended; it is unknown whether the command was sent. Use the vehicle's "
     "own remote control now."
 )
+_UNCONFIRMED: Final = "The process that had the vehicle's link ended before the vehicle confirmed it."
 NOT_ANSWERING: Final = (
     "Gainline's connection to the vehicle is not responding: commands do not reach the vehicle. If it is flying, use "
     "its own remote control now."
@@ -57,9 +58,9 @@ MessageHandler = Callable[[VehicleStatus | CommandForwarded], None]
 class VehicleConnection(FlightProcess):
     """The worker's handle of such a process: a FlightProcess with a link to the vehicle between flights.
 
-    `hear` is called on a thread of the connection with the vehicle's status and the outcome of commands; while the
-    process does not answer, every two seconds with a status that says so. One flight or act at a time; commands may be
-    sent at any moment, from any thread.
+    `hear` is called on a thread of the connection with the vehicle's status and the outcome of commands, that of motors
+    off once the vehicle has confirmed it or has not in time; while the process does not answer, every two seconds with
+    a status that says so. One flight or act at a time; commands may be sent at any moment, from any thread.
     """
 
     _take_off_timeout_s = TAKE_OFF_TIMEOUT_S
@@ -74,6 +75,8 @@ class VehicleConnection(FlightProcess):
         self._numbers = itertools.count(1)
         self._orders: dict[int, Future[str]] = {}
         """Commands that the process has not answered, by their numbers."""
+        self._awaited: dict[int, CommandForwarded] = {}
+        """Commands that the vehicle has not confirmed."""
         self._ended = threading.Event()
         self._open = False
         threading.Thread(target=self._listen, name=f"session {call.name}", daemon=True).start()
@@ -126,6 +129,18 @@ class VehicleConnection(FlightProcess):
         if (answer := self._orders.pop(number, None)) is not None:
             answer.set_result(problem)
 
+    def _note_forwarded(self, forwarded: CommandForwarded) -> None:
+        self._answer_order(forwarded.number, forwarded.problem)
+        self._awaited[forwarded.number] = forwarded
+        if not forwarded.is_awaited:
+            self._hear_of(self._awaited.pop(forwarded.number))
+
+    def _end_orders(self) -> None:
+        for number in tuple(self._orders):
+            self._answer_order(number, _ENDED)
+        for forwarded in self._awaited.values():
+            self._hear_of(replace(forwarded, problem=_UNCONFIRMED, is_awaited=False))
+
     def request_close(self) -> None:
         """Let the process end. It is never killed: a vehicle in the air is landed first, however long that takes."""
         with suppress(OSError), socket.socket(fileno=os.dup(self._child.pipe.fileno())) as end:
@@ -153,9 +168,8 @@ class VehicleConnection(FlightProcess):
                 match self._child.pipe.recv():
                     case VehicleStatus() as status:
                         self._hear_of(status)
-                    case CommandForwarded(number, problem=problem) as forwarded:
-                        self._answer_order(number, problem)
-                        self._hear_of(forwarded)
+                    case CommandForwarded() as forwarded:
+                        self._note_forwarded(forwarded)
                     case StagingLost(why):
                         self.staging_lost = why
                     case ConnectionOpened(concern=concern) as opened:
@@ -168,8 +182,7 @@ class VehicleConnection(FlightProcess):
         finally:
             self._ended.set()
             self._messages.put(None)
-            for number in tuple(self._orders):
-                self._answer_order(number, _ENDED)
+            self._end_orders()
             with self._sending:
                 self._child.pipe.close()
 

@@ -21,7 +21,7 @@ from app.log_analyses.schemas import (
     ParameterFile,
     TakeoffNumbers,
 )
-from app.logs.takeoffs import Takeoff
+from app.logs.takeoffs import NOT_COMMANDED, Takeoff
 
 _IDENTIFIED_SHARE: Final = 0.5
 """A log identifies a parameter whose standard error is less than this share of the prior's."""
@@ -31,16 +31,20 @@ _POINTS: Final = 1500
 
 
 def logged_takeoffs(found: Sequence[Takeoff], *, name: str) -> list[LoggedTakeoff]:
-    """The takeoffs whose gains the log contains. Raises TrajectoryError if there is none."""
+    """The takeoffs whose command and gains the log contains. Raises TrajectoryError if there is none."""
     known = [
-        LoggedTakeoff(number=each.number, gains=each.gains, trajectory=each.trajectory) for each in found if each.gains
+        LoggedTakeoff(number=each.number, gains=each.gains, trajectory=each.trajectory)
+        for each in found
+        if each.is_commanded and each.gains
     ]
     if not known:
+        without_gains = f"does not contain the values of {', '.join(Experiment.space.names)}"
+        is_commanded = any(each.is_commanded for each in found)
         raise TrajectoryError(
             f"{name} cannot be analysed.",
             hint="Add the .log file of the same name to Paparazzi's .data file; start a telemetry log before the "
             "ground station connects.",
-            problems=(Problem("file", f"does not contain the values of {', '.join(Experiment.space.names)}"),),
+            problems=(Problem("file", without_gains if is_commanded else NOT_COMMANDED),),
         )
     return known
 

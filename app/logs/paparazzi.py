@@ -7,15 +7,17 @@ contains the complete state of the vertical loop, in its own integers; without i
 
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice, pairwise, product
 from typing import BinaryIO, Final
 from xml.parsers import expat
 
 import numpy as np
 
-from app.core.control.loop_log import FIELDS, GAINS, LoopLog, infer_gains
+from app.core.control.loop_log import FIELDS, GAINS, FlownGains, LoopLog, flown_gains
 from app.core.control.paparazzi import FULL_THRUST, INT32_MAX, INT32_MIN
+from app.core.policy import Gains
 from app.core.records.trajectory import Samples
 from app.logs.base import PAPARAZZI_SETS, refused
 from app.logs.takeoffs import FlightLog, LogEvent, Setting
@@ -26,6 +28,8 @@ _MAX_LINE_BYTES: Final = 4096
 _LINE: Final = re.compile(rb"\s*\d+(?:\.\d*)?\s+\S{1,32}\s+[A-Z][A-Z0-9_]{1,63}(?:\s|$)")
 _GAIN: Final = re.compile(r"guidance_v[._]k([pid])", re.IGNORECASE)
 _AIRFRAME_GAIN: Final = re.compile(r"(?:GUIDANCE_V_)?HOVER_K([PID])")
+_SETTINGS: Final = 256
+_MOST_CANDIDATES: Final = 32
 _PLATEAU_S: Final = 2.0
 
 _WANTED: Final = frozenset({b"VERT_LOOP", b"ROTORCRAFT_FP", b"DL_VALUE"})
@@ -38,26 +42,17 @@ def is_paparazzi(head: bytes) -> bool:
 
 
 def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> FlightLog:
-    """Read a .data file, and the gains from the airframe and settings in its companion, if given.
+    """Read a .data file and its companion, if given. The gains are those that the loop's commands follow from; without
+    VERT_LOOP those in the companion, as far as they are certain.
 
-    Without a companion, the gains are inferred from the loop's own commands. Raises TrajectoryError if there is no
-    altitude, or the companion cannot be read.
+    Raises TrajectoryError if there is no altitude, or the companion cannot be read.
     """
     lines = _read(stream)
-    configuration = _Configuration()
-    if companion is not None:
-        configuration.read(companion)
-    settings = configuration.settings(lines.values)
-    notes = []
-    starts: list[LogEvent] = []
-    ends: list[LogEvent] = []
-    if len(lines.loop_time_s):
-        log = lines.loop_log()
-        starts, ends = _starts(log), _ends(log)
-        if not set(GAINS) <= {setting.name for setting in settings} and (inferred := infer_gains(log)):
-            settings = [Setting(-np.inf, name, value) for name, value in inferred.items()]
-            notes.append("gains computed from the loop's commands")
+    configuration = _configuration(companion, lines)
     time_s, channels = _altitude(lines)
+    loop = lines.loop_log() if lines.loop_time_s else None
+    flown = [] if loop is None else flown_gains(loop, configuration.candidates)
+    notes = list(configuration.notes(flown))
     if lines.others:
         notes.append(f"other aircraft in the log left out: {', '.join(sorted(lines.others)[:5])}")
     return FlightLog(
@@ -67,27 +62,32 @@ def read_paparazzi(stream: BinaryIO, companion: BinaryIO | None = None) -> Fligh
         channels=channels,
         from_ground=False,
         gain_sets=PAPARAZZI_SETS,
-        settings=settings,
-        starts=starts,
-        ends=ends,
+        settings=list(configuration.settings(flown)),
+        starts=[] if loop is None else _starts(loop),
+        ends=[] if loop is None else _ends(loop),
         notes=tuple(notes),
     )
 
 
-def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> tuple[LoopLog, dict[str, float] | None]:
-    """Read the samples of the vertical loop and its last gains, from companion and messages.
+@dataclass(frozen=True, slots=True)
+class LoggedLoop:
+    """Samples of the vertical loop, the gains flown, and notes on these; `are_logged`: all are in the log's files."""
 
-    The gains are None if incomplete. Raises TrajectoryError if there is no VERT_LOOP.
-    """
+    log: LoopLog
+    flown: Sequence[FlownGains]
+    are_logged: bool
+    notes: Sequence[str]
+
+
+def read_loop_log(stream: BinaryIO, companion: BinaryIO | None = None) -> LoggedLoop:
+    """Read the samples of the vertical loop, and find the gains flown. Raises TrajectoryError if there is no
+    VERT_LOOP."""
     lines = _read(stream)
     if not len(lines.loop_time_s):
         raise refused("contains no VERT_LOOP, the loop's inputs and commands", _HINT)
-    configuration = _Configuration()
-    if companion is not None:
-        configuration.read(companion)
-    gains = {setting.name: setting.value for setting in configuration.settings(lines.values)}
-    complete = set(GAINS) <= gains.keys()
-    return lines.loop_log(), {name: gains[name] for name in GAINS} if complete else None
+    configuration, log = _configuration(companion, lines), lines.loop_log()
+    flown = flown_gains(log, configuration.candidates)
+    return LoggedLoop(log, flown, configuration.contains(flown), list(configuration.notes(flown)))
 
 
 @dataclass(slots=True)
@@ -141,7 +141,7 @@ def _take(lines: _Lines, time: bytes, aircraft: str, message: bytes, fields: Seq
             lines.up.append(numbers[2])
             lines.up_speed.append(numbers[5])
             lines.aircraft = aircraft
-    elif message == b"DL_VALUE" and len(fields) == 2 and len(lines.values) < _MAX_SAMPLES:
+    elif message == b"DL_VALUE" and lines.aircraft and len(fields) == 2 and len(lines.values) < _MAX_SAMPLES:
         number, value = _whole(fields, 1), _float(fields[1])
         if number is not None and np.isfinite(value):
             lines.values.append((time_s, number[0], value))
@@ -212,20 +212,68 @@ def _ends(log: LoopLog) -> list[LogEvent]:
     return moments
 
 
+def _configuration(companion: BinaryIO | None, lines: _Lines) -> "_Configuration":
+    configuration = _Configuration(lines.aircraft)
+    if companion is not None:
+        configuration.read(companion, lines.values)
+    return configuration
+
+
 @dataclass(slots=True)
 class _Configuration:
-    """Gains in the .log companion: those of the airframe, and the numbers by which DL_VALUE identifies settings."""
+    """Gains of one aircraft in a .log companion, which may describe several.
 
-    _built_in: dict[str, float] = field(default_factory=dict)
-    _numbers: dict[int, str] = field(default_factory=dict)
-    _count: int = 0
+    `known` are all values of each gain with the time from which they are known: built in, then reported (DL_VALUE) by
+    the setting's number, which counts all settings in the order of the generated file. Newer releases append that to
+    the .log. In other logs, some settings are missing and files are in another order, but each group has its own: there
+    the numbers of the gains are those whose first values are the gains built in. `is_certain`: the numbers are.
+    """
 
-    def read(self, companion: BinaryIO) -> None:
+    aircraft: str
+    known: dict[str, list[tuple[float, float]]] = field(default_factory=lambda: {gain: [] for gain in GAINS})
+    is_certain: bool = True
+    is_described: bool = True
+    _is_mine: bool = False
+    _groups: list[list[str]] = field(default_factory=lambda: [[]])
+    _generated: list[str] | None = None
+
+    @property
+    def candidates(self) -> list[Gains]:
+        """Gain sets of all values."""
+        sets = product(*({value for _, value in self.known[gain]} for gain in GAINS))
+        return [dict(zip(GAINS, each, strict=True)) for each in islice(sets, _MOST_CANDIDATES)]
+
+    def contains(self, flown: Sequence[FlownGains]) -> bool:
+        return all(each.gains is None or each.gains in self.candidates for each in flown)
+
+    def settings(self, flown: Sequence[FlownGains]) -> Iterator[Setting]:
+        """The gains flown, or else those reported. A report is late by up to one cycle of all settings, so a gain that
+        changed is unknown between the reports of two values, and after the last one."""
+        for change, gain in product(flown, GAINS):
+            yield Setting(change.after_s, gain, change.gains[gain] if change.gains else np.nan)
+        for gain, known in self.known.items() if self.is_certain and not flown else ():
+            yield from (Setting(since_s, gain, value) for since_s, value in known[:1])
+            for (before_s, before), (now_s, now) in pairwise(known):
+                if now != before:
+                    yield from (Setting(before_s, gain, np.nan), Setting(now_s, gain, now))
+            if len({value for _, value in known}) > 1:
+                yield Setting(known[-1][0], gain, np.nan)
+
+    def notes(self, flown: Sequence[FlownGains]) -> Iterator[str]:
+        if not self.is_described:
+            yield "the .log file does not describe this aircraft"
+        elif not self.is_certain and not flown:
+            yield "the .log file does not establish which settings the vehicle reported"
+        if not self.contains(flown):
+            yield "gains computed from the loop's commands"
+
+    def read(self, companion: BinaryIO, values: Sequence[tuple[float, int, float]]) -> None:
         """Parse the companion. Raises TrajectoryError if it is not a .log file, or larger than 16 MiB."""
         companion.seek(0)
         text = companion.read(MAX_COMPANION_BYTES + 1)
         if len(text) > MAX_COMPANION_BYTES:
             raise refused("has a companion file of more than 16 MiB", "Add the .log file that was written with it.")
+        self.is_described = False
         parser = expat.ParserCreate()
         parser.StartElementHandler = self._element
         parser.EntityDeclHandler = _no_entities
@@ -235,22 +283,44 @@ class _Configuration:
             raise refused(
                 f"has a companion file that is not XML: {error}", "Add the .log file that was written with it, or none."
             ) from error
+        numbers = self._numbers({number: value for _, number, value in reversed(values)})
+        self.is_certain = bool(numbers) or not values
+        for time_s, number, value in values:
+            if number in numbers:
+                self.known[numbers[number]].append((time_s, value))
 
-    def settings(self, values: Sequence[tuple[float, int, float]]) -> list[Setting]:
-        """The built-in gains, and every value that the vehicle reported later."""
-        found = [Setting(-np.inf, name, value) for name, value in self._built_in.items()]
-        found += [Setting(time_s, self._numbers[n], value) for time_s, n, value in values if n in self._numbers]
-        return found
+    def _numbers(self, first: Mapping[int, float]) -> dict[int, str]:
+        """The numbers of the gains, from the first value reported of each setting; empty if they are not certain."""
+        if self._generated is not None and max(first, default=0) < len(self._generated):
+            return {number: gain for number, gain in enumerate(self._generated) if gain}
+        built_in = {gain: known[0][1] for gain, known in self.known.items() if known}
+        groups = [each for each in self._groups if sorted(filter(None, each)) == sorted(GAINS) == sorted(built_in)]
+        found = []
+        for group, start in product(groups, range(_SETTINGS)):
+            numbers = {number: gain for number, gain in enumerate(group, start) if gain}
+            if all(first.get(number) == built_in[gain] for number, gain in numbers.items()):
+                found.append(numbers)
+        return found[0] if found and all(each == found[0] for each in found) else {}
 
     def _element(self, tag: str, attributes: dict[str, str]) -> None:
-        if tag == "dl_setting":
-            if match := _GAIN.fullmatch(attributes.get("var", "")):
-                self._numbers[self._count] = f"k{match[1].lower()}"
-            self._count += 1
-        elif tag == "define" and (match := _AIRFRAME_GAIN.fullmatch(attributes.get("name", ""))):
-            value = _float(attributes.get("value", "").encode())
+        given, kind = {name.lower(): value for name, value in attributes.items()}, tag.lower()
+        if kind == "aircraft":
+            self._is_mine = given.get("ac_id") == self.aircraft
+            self.is_described |= self._is_mine
+        elif not self._is_mine:
+            return
+        elif kind == "generated_settings":
+            self._generated = []
+        elif kind == "dl_settings":
+            self._groups.append([])
+        elif kind == "dl_setting":
+            match = _GAIN.fullmatch(given.get("var", "")) or _AIRFRAME_GAIN.fullmatch(given.get("param", ""))
+            group = self._groups[-1] if self._generated is None else self._generated
+            group.append(f"k{match[1].lower()}" if match else "")
+        elif kind == "define" and (match := _AIRFRAME_GAIN.fullmatch(given.get("name", ""))):
+            value = _float(given.get("value", "").encode())
             if np.isfinite(value):
-                self._built_in[f"k{match[1].lower()}"] = abs(value)
+                self.known[f"k{match[1].lower()}"] = [(-np.inf, abs(value))]
 
 
 def _no_entities(*_declared: object) -> None:

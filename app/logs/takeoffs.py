@@ -7,7 +7,7 @@ armed if that is known: off the ground by 0.15 m and on to at least 0.5 m. A fli
 the log contains one, else at lift-off; it ends with the landing command, a change of a gain, or on the ground.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -25,6 +25,7 @@ LONGEST_S: Final = 600.0
 MIN_SAMPLES: Final = 20
 MAX_SAMPLES: Final = 200_000
 MAX_TAKEOFFS: Final = 200
+NOT_COMMANDED: Final = "not comparable: it begins at lift-off, because the log does not contain the takeoff command"
 
 _RISE_S: Final = (0.5, 1.0, 2.0, 3.0)
 _STOOD_M: Final = 0.05
@@ -46,7 +47,7 @@ class LogEvent:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A gain that the vehicle used from this time on."""
+    """A gain that the vehicle used from this time on; NaN if it is unknown from then on."""
 
     time_s: float
     name: str
@@ -70,7 +71,8 @@ class FlightLog:
     applies. `from_ground`: measure the altitude from where the vehicle stood. `starts` (takeoff commands),
     `ends` (commands that end the flight) and `landings` (reported by the autopilot) may be empty. `in_air` are the
     intervals from lift-off to touchdown, `armed` those with the motors armed, both as reported by the autopilot and in
-    order; None if the log does not report them.
+    order; None if the log does not report them. `blocks` are the intervals in blocks of a flight plan, each from the
+    command that activated it: without a takeoff command, the block in which the vehicle lifts off was one.
     """
 
     title: str
@@ -85,6 +87,7 @@ class FlightLog:
     landings: Sequence[LogEvent] = ()
     in_air: Sequence[Span] | None = None
     armed: Sequence[Span] | None = None
+    blocks: Sequence[Span] = ()
     notes: Sequence[str] = ()
 
 
@@ -94,7 +97,8 @@ class Takeoff:
 
     `trajectory` is its record, with time counted from its beginning; `gains` are those used then, empty if not in the
     log; `gain_names` are those of its autopilot, empty if the format has none; `notes` explain how both were read.
-    `start_s` is in seconds since the log's first sample.
+    `start_s` is in seconds since the log's first sample. A takeoff that is not `is_commanded` begins at lift-off: its
+    error is over another window than that of a commanded one, and not comparable with it.
     """
 
     number: int
@@ -104,6 +108,7 @@ class Takeoff:
     gains: Gains
     gain_names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    is_commanded: bool = True
 
     @property
     def summary(self) -> str:
@@ -150,6 +155,19 @@ def find_takeoffs(log: FlightLog) -> tuple[Takeoff, ...]:
             ),
         )
     return tuple(found)
+
+
+def spans_of(states: Iterable[tuple[float, bool]]) -> list[Span]:
+    """Intervals in which a condition held, from timed reports of it."""
+    spans: list[Span] = []
+    since_s: float | None = None
+    for time_s, holds in states:
+        if holds and since_s is None:
+            since_s = time_s
+        elif not holds and since_s is not None:
+            spans.append(Span(since_s, time_s))
+            since_s = None
+    return spans if since_s is None else [*spans, Span(since_s, np.inf)]
 
 
 def choose(takeoffs: Sequence[Takeoff], number: int | None) -> Takeoff:
@@ -252,9 +270,13 @@ def _beginning(log: FlightLog, stood_s: float, free_from_s: float) -> tuple[LogE
     """The event from which time counts, and whether it is a command: the first one, since later ones repeat it."""
     ahead_s = max(free_from_s, stood_s - _COMMAND_AHEAD_S)
     commands = [start for start in log.starts if ahead_s < start.time_s <= stood_s + _RISE_S[-1]]
-    if not commands:
-        return LogEvent(stood_s, "lift-off"), False
-    return min(commands, key=lambda start: start.time_s), True
+    blocks = [
+        LogEvent(each.begin_s, "the block in which it lifted off")
+        for each in log.blocks
+        if ahead_s < each.begin_s <= stood_s < each.end_s
+    ]
+    begin = min(commands or blocks, key=lambda start: start.time_s, default=None)
+    return (LogEvent(stood_s, "lift-off"), False) if begin is None else (begin, True)
 
 
 def _kept(
@@ -300,11 +322,12 @@ class _GainsAt:
         self.learned_late = sorted(set(names) - set(gains))
         for each in settings:
             gains.setdefault(each.name, each.value)
-        self.gains: Gains = {gain.gain: gain.value(gains[gain.name]) for gain in logged}
+        is_known = not any(map(np.isnan, gains.values()))
+        self.gains: Gains = {gain.gain: gain.value(gains[gain.name]) for gain in logged if is_known}
         self.changes = [
-            LogEvent(each.time_s, f"{each.name} becoming {each.value:g}")
+            LogEvent(each.time_s, f"{each.name} becoming {'unknown' if np.isnan(each.value) else f'{each.value:g}'}")
             for each in settings
-            if each.time_s > at_s and each.value != gains[each.name]
+            if is_known and each.time_s > at_s and each.value != gains[each.name]
         ]
 
 
@@ -337,11 +360,12 @@ class _Record:
             gains=self.held.gains,
             gain_names=tuple(gain.gain for gain in next(iter(self.log.gain_sets), ())),
             notes=notes,
+            is_commanded=self.is_commanded,
         )
 
     def _notes(self, left_out: Sequence[str]) -> Iterator[str]:
         if not self.is_commanded:
-            yield "no takeoff command in the log, so the delay before lift-off is not in the record"
+            yield NOT_COMMANDED
         if self.log.from_ground:
             yield f"altitude relative to the ground, which is at {self.ground_m:.2f} m in the log"
         if self.held.learned_late:

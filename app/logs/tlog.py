@@ -1,7 +1,8 @@
 """Reader of telemetry logs (.tlog): both directions of a MAVLink connection, each frame preceded by its time in µs.
 
 Altitude and time come from LOCAL_POSITION_NED and the vehicle's own clock, the takeoff from the ground station's
-command (a block with such a name, NAV_TAKEOFF, the takeoff mode), the gains from the vehicle's replies.
+command (a block with such a name, or else the one in which it lifted off; NAV_TAKEOFF, the takeoff mode), the gains
+from the vehicle's replies.
 """
 
 import importlib
@@ -27,7 +28,7 @@ from app.logs.base import (
     refused,
 )
 from app.logs.flight_parts import held
-from app.logs.takeoffs import FlightLog, LogEvent, Setting
+from app.logs.takeoffs import FlightLog, LogEvent, Setting, Span, spans_of
 from app.logs.tlog_frames import frames, is_whole, payload_of
 
 _POSITION: Final = struct.Struct("<I6f")
@@ -149,6 +150,7 @@ class _Telemetry:
     _throttle: list[tuple[float, float]] = field(default_factory=list)
     _blocks: dict[int, str] = field(default_factory=dict)
     _activated: list[tuple[float, int]] = field(default_factory=list)
+    _entered: list[tuple[float, int]] = field(default_factory=list)
     _settings: list[Setting] = field(default_factory=list)
     _asked: dict[str, float] = field(default_factory=dict)
     _sent: dict[int, _Sent] = field(default_factory=dict)
@@ -156,6 +158,8 @@ class _Telemetry:
     _ends: list[LogEvent] = field(default_factory=list)
     _landings: list[LogEvent] = field(default_factory=list)
     _armed: bool = False
+    _arming: list[tuple[float, bool]] = field(default_factory=list)
+    _heard_s: float = -np.inf
     _mode: int | None = None
 
     def __post_init__(self) -> None:
@@ -170,6 +174,7 @@ class _Telemetry:
             "COMMAND_LONG": self._command,
             "COMMAND_ACK": self._answer,
             "SCRIPT_ITEM": self._block,
+            "SCRIPT_CURRENT": self._block_entered,
         }
         dialect = self.autopilot.dialect
         numbers = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", None) for name in by_name}
@@ -208,6 +213,8 @@ class _Telemetry:
             starts=self._starts,
             ends=[*self._ends, *self._landings],
             landings=self._landings,
+            armed=spans_of(self._arming) or None,
+            blocks=list(self._commanded_blocks()),
             notes=tuple(self._notes()),
         )
 
@@ -231,14 +238,15 @@ class _Telemetry:
         return message.get_srcSystem() == self.system
 
     def _heartbeat(self, message: _Message) -> None:
-        if not self._is_vehicle(message):
+        if not self._is_vehicle(message) or _AUTOPILOTS.get(int(message.autopilot)) is not self.autopilot:
             return
         armed, mode = bool(int(message.base_mode) & _ARMED), int(message.custom_mode)
         if self._armed and not armed:
             self._landings.append(LogEvent(self._now_s, "motors off"))
         if self._mode not in {None, mode} and self._armed:
             self._mode_changed(mode)
-        self._armed, self._mode = armed, mode
+        self._arming.append((self._heard_s if armed else self._now_s, armed))  # it armed since the heartbeat before
+        self._armed, self._mode, self._heard_s = armed, mode, self._now_s
 
     def _mode_changed(self, mode: int) -> None:
         main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
@@ -303,6 +311,20 @@ class _Telemetry:
             self._blocks[int(message.seq)] = str(message.name)
         else:
             self._activated.append((self._now_s, int(message.seq)))
+
+    def _block_entered(self, message: _Message) -> None:
+        if self._is_vehicle(message):
+            self._entered.append((self._now_s, int(message.seq)))
+
+    def _commanded_blocks(self) -> Iterator[Span]:
+        """Every stay in a block that the vehicle entered on command, from the command to that of another one."""
+        before_s = -np.inf
+        for entered_s, number in self._entered:
+            sent_s = [at_s for at_s, sent in self._activated if sent == number and before_s < at_s <= entered_s]
+            others_s = (at_s for at_s, other in (*self._entered, *self._activated) if other != number)
+            if sent_s:
+                yield Span(sent_s[-1], min((at_s for at_s in others_s if at_s >= entered_s), default=np.inf))
+            before_s = entered_s
 
 
 def _command_name(command: int) -> str:

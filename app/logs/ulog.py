@@ -12,7 +12,7 @@ import numpy as np
 
 from app.core.records.trajectory import Samples
 from app.logs.base import PX4_SETS, Table, names_in, numbers, refused, rows_of
-from app.logs.takeoffs import FlightLog, LogEvent, Span
+from app.logs.takeoffs import FlightLog, LogEvent, Span, spans_of
 from app.logs.ulog_tables import HINT, read_ulog_tables, seconds
 
 _POSITION, _SET_POINT, _THRUST = "vehicle_local_position", "vehicle_local_position_setpoint", "vehicle_thrust_setpoint"
@@ -122,7 +122,7 @@ def _in_air(topics: Mapping[str, Table]) -> list[Span] | None:
     mode = _at(rows_of(topics.get(_STATUS, {}), "timestamp", "nav_state"))
     is_landed, is_armed = _at(landed), _at(arming)
     times = sorted({time_s for time_s, _ in (*landed, *arming)})
-    spans = _spans((time_s, is_landed(time_s) == 0.0 and is_armed(time_s) in {_ARMED, None}) for time_s in times)
+    spans = spans_of((time_s, is_landed(time_s) == 0.0 and is_armed(time_s) in {_ARMED, None}) for time_s in times)
     touched_s = [-np.inf, *(span.end_s for span in spans)]
     return [
         span
@@ -134,20 +134,7 @@ def _in_air(topics: Mapping[str, Table]) -> list[Span] | None:
 def _armed(topics: Mapping[str, Table]) -> list[Span] | None:
     """Intervals with the motors armed; None if the log does not report them."""
     arming = list(rows_of(topics.get(_STATUS, {}), "timestamp", "arming_state"))
-    return _spans((time_s, state == _ARMED) for time_s, state in arming) if arming else None
-
-
-def _spans(states: Iterable[tuple[float, bool]]) -> list[Span]:
-    """Intervals in which a condition held, from timed reports of it."""
-    spans: list[Span] = []
-    since_s: float | None = None
-    for time_s, holds in states:
-        if holds and since_s is None:
-            since_s = time_s
-        elif not holds and since_s is not None:
-            spans.append(Span(since_s, time_s))
-            since_s = None
-    return spans if since_s is None else [*spans, Span(since_s, np.inf)]
+    return spans_of((time_s, state == _ARMED) for time_s, state in arming) if arming else None
 
 
 def _at(rows: Iterable[tuple[float, ...]]) -> Callable[[float], float | None]:

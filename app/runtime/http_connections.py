@@ -1,5 +1,6 @@
 """Connections of the web server: how many are allowed, how long they may take, and which is closed first; and the HTTP
-protocol, Uvicorn's own, that reports each connection's phase and refuses headers that are too large.
+protocol, Uvicorn's own, that reports each connection's phase, refuses headers and trailers that are too large, and does
+not read a body to its end once the request is answered.
 
 Descriptors are limited, while opening a connection costs a client nothing. So a new connection is always accepted: at
 the limit the one that has waited longest for its client is closed, whether idle, partly sent, or an event stream, which
@@ -24,6 +25,9 @@ from app.core.clock import Clock
 
 HEAD_WITHIN_S: Final = 10.0
 """From the connection, or the end of the last response, to the end of a request's headers."""
+ANSWERED_WITHIN_S: Final = 2.0
+"""From a response that was sent before its request was complete, such as a refusal, to the end of the request: closing
+the connection at once would reset it, and the client might not see the response."""
 BODY_SILENCE_S: Final = 20.0
 BODY_WITHIN_S: Final = 1800.0
 STREAM_AFTER_S: Final = 10.0
@@ -42,11 +46,12 @@ MAX_CONNECTIONS_PER_DEVICE: Final = 64
 class Phase(IntEnum):
     """Phase of a connection; at the limit, those in the lowest phase are closed first."""
 
-    IDLE = 0
-    HEAD = 1
-    BODY = 2
-    STREAM = 3
-    BUSY = 4
+    ANSWERED = 0
+    IDLE = 1
+    HEAD = 2
+    BODY = 3
+    STREAM = 4
+    BUSY = 5
 
 
 @dataclass(slots=True, eq=False)
@@ -141,6 +146,8 @@ def _standing(connection: Connection, now_s: float) -> Phase:
 
 def _is_overdue(connection: Connection, now_s: float) -> bool:
     match connection.phase:
+        case Phase.ANSWERED:
+            return now_s - connection.since_s > ANSWERED_WITHIN_S
         case Phase.IDLE | Phase.HEAD:
             return now_s - connection.since_s > HEAD_WITHIN_S
         case Phase.BODY:
@@ -151,7 +158,10 @@ def _is_overdue(connection: Connection, now_s: float) -> bool:
 
 
 MAX_HEAD_BYTES: Final = 64 * 1024
-"""Maximum size of the request line and the headers together."""
+"""Maximum size of the request line and the headers together, and of anything else that is not body: trailers, chunk
+extensions."""
+MAX_PIPELINED: Final = 16
+"""Requests that may wait for the one before them on the same connection."""
 _STOPPING: Final = (b"/abort", b"/land", b"/motors-off")
 _ANSWER: Final = (
     "HTTP/1.1 {status.value} {status.phrase}\r\nContent-Type: application/problem+json\r\nContent-Length: {size}\r\n"
@@ -173,8 +183,10 @@ class LimitedProtocol(HttpToolsProtocol):
         super().__init__(config, server_state, app_state, _loop)
         self._all = connections
         self._own: Connection | None = None
-        self._head_bytes = self._parsed_bytes = 0
-        self._refused = False
+        self._bare_bytes = self._parsed_bytes = 0
+        """Received since the parser last came to the end of headers, some body, or the end of a message; and parsed of
+        the present headers."""
+        self._in_body = self._got_on = self._has_request = self._refused = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as Uvicorn has it
         super().connection_made(transport)
@@ -195,14 +207,11 @@ class LimitedProtocol(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         if self._own is None or self._refused:
             return
-        was_head = self._own.phase in {Phase.IDLE, Phase.HEAD}
         self._all.hear(self._own)
+        self._got_on = False
         super().data_received(data)
-        if was_head and self._own.phase in {Phase.IDLE, Phase.HEAD} and not self._refused:
-            # Part of a head; the parser reports it only line by line.
-            self._head_bytes += len(data)
-            self._all.enter(self._own, Phase.HEAD)
-            self._refuse_long_head()
+        self._bare_bytes = 0 if self._got_on else self._bare_bytes + len(data)
+        self._refuse_long_head(self._bare_bytes)
 
     def on_message_begin(self) -> None:
         super().on_message_begin()
@@ -214,13 +223,18 @@ class LimitedProtocol(HttpToolsProtocol):
         self._parsed_bytes += len(url)
 
     def on_header(self, name: bytes, value: bytes) -> None:
+        if self._in_body:
+            return  # a trailer: Uvicorn would keep it as one more header
         super().on_header(name, value)
         self._parsed_bytes += len(name) + len(value) + len(b": \r\n")
 
     def on_headers_complete(self) -> None:
-        self._head_bytes = max(self._parsed_bytes, self._head_bytes)
-        self._refuse_long_head()
-        self._head_bytes = 0
+        self._got_on = True
+        self._refuse_long_head(max(self._parsed_bytes, self._bare_bytes))
+        self._in_body = True
+        if len(self.pipeline) >= MAX_PIPELINED:
+            self._refused = True
+            self.transport.abort()
         if self._refused:
             return
         if self._own is not None and self._own.for_stopping and not self.url.partition(b"?")[0].endswith(_STOPPING):
@@ -231,38 +245,49 @@ class LimitedProtocol(HttpToolsProtocol):
             )
             return
         self._enter(Phase.BODY)
+        self._has_request = True
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
+        self._got_on = True
         if not self._refused:
             super().on_body(body)
 
     def on_message_complete(self) -> None:
+        self._got_on = True
+        self._in_body = False
         if not self._refused:
-            self._enter(Phase.BUSY)
+            self._enter(Phase.IDLE if self.cycle.response_complete else Phase.BUSY)
             super().on_message_complete()
 
     def on_response_complete(self) -> None:
-        if not self.cycle.more_body:
-            self._enter(Phase.IDLE)
+        if self.cycle.response_complete:  # otherwise it is not the last that has arrived
+            self._enter(Phase.ANSWERED if self.cycle.more_body else Phase.IDLE)
         super().on_response_complete()
 
     def _enter(self, phase: Phase) -> None:
-        if self._own is not None:
+        if self._own is not None and not self._refused:
             self._all.enter(self._own, phase)
 
-    def _refuse_long_head(self) -> None:
-        if self._head_bytes > MAX_HEAD_BYTES:
+    def _refuse_long_head(self, size_bytes: int) -> None:
+        if size_bytes > MAX_HEAD_BYTES and not self.transport.is_closing():
             self._refuse(
                 HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE,
-                f"The headers are larger than {MAX_HEAD_BYTES // 1024} KiB; the request was rejected.",
+                f"The headers or trailers are larger than {MAX_HEAD_BYTES // 1024} KiB; the request was rejected.",
                 "Send smaller headers; put large data into the body.",
             )
 
     def _refuse(self, status: HTTPStatus, detail: str, hint: str) -> None:
-        """Send an error without the application, and close the connection."""
+        """Send an error without the application, unless it is responding already, and read no more."""
+        self._enter(Phase.ANSWERED)
         self._refused = True
+        if self._has_request and not self.cycle.response_complete:
+            if self.cycle.response_started or self.pipeline:
+                self.transport.abort()
+                return
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
         problem = {"type": "about:blank", "title": status.phrase, "status": status, "detail": detail, "hint": hint}
         body = json.dumps({**problem, "problems": []}).encode()
         self.transport.write(_ANSWER.format(status=status, size=len(body)).encode() + body)
-        self.transport.close()
+        self.transport.write_eof()

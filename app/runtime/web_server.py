@@ -17,6 +17,7 @@ import uvicorn
 from app.accounts.keys_and_links import Keyring
 from app.common.settings import Settings, is_loopback
 from app.core.clock import REAL_TIME
+from app.db.backup import discard_partial_copies
 from app.db.outbox import latest_event_id
 from app.main import create_app
 from app.runtime.http_connections import Connections, LimitedProtocol, room_for_connections
@@ -107,6 +108,7 @@ def run(settings: Settings, listener: socket.socket, announce: Callable[[str], N
 
     Raises StorageError when the database or the secret of the data folder cannot be read.
     """
+    discard_partial_copies(settings.data_dir)
     application = create_app(settings)
     with application.state.database.read() as session:
         latest_event_id(session)  # a start-up error is raised here, and not in the event loop

@@ -19,7 +19,7 @@ DEFAULT_ALTITUDE_M: Final = 2.0
 MAX_DISTANCE_M: Final = 50.0
 """max_dist_from_home: greatest distance from HOME, the origin, at which blocks are flown."""
 HOME_HEIGHT_M: Final = 1.0
-"""home_mode_height: height at which it flies back to HOME and stays."""
+"""Height of the waypoint HOME, to which it flies back and where it stays."""
 
 CLIMB: Final = 2
 WAYPOINTS: Final = ("dummy", "HOME", "CLIMB", "STDBY", "p1", "p2", "p3", "p4", "CAM", "TD")

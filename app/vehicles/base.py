@@ -224,8 +224,11 @@ class ConnectedVehicle(Vehicle, Protocol):
 
     A vehicle that is armed on connection, or whose state could not be verified, is only observed: `concern` gives the
     reason, and `stage`, `fly` and `parameters` raise SafeGainsError until `release`. `check` only reads; `land` and
-    `motors_off` are always possible; `restore` once the vehicle is disarmed.
+    `motors_off` are always possible; `restore` once the vehicle is disarmed. `has_stopped`: the vehicle has confirmed
+    that its motors stopped, after the last `motors_off` or flight; None while that is awaited.
     """
+
+    has_stopped: bool | None
 
     @property
     def identity(self) -> Identity: ...

@@ -42,11 +42,11 @@ class VehicleKind:
     depends on them.
     `open(options, safe_gains, trial_parameters)` receives complete, checked options and returns a vehicle that holds
     its safe gains.
-    `connect(options, safe_gains, identity, trial_parameters, on_wait)` opens a link that stays open between flights;
-    None: vehicles of this kind are opened for each flight. `on_wait` is called at least twice a second while waiting
-    for the vehicle on the ground; an exception from it ends the operation. `connect` raises VehicleError if no vehicle
-    answers, or one other than `identity` (None: any vehicle). An armed vehicle is returned with its `concern` set, and
-    nothing is written to it.
+    `connect(options, safe_gains, trial_parameters, identity, on_wait, was_flying)` opens a link that stays open between
+    flights; None: vehicles of this kind are opened for each flight. `on_wait` is called at least twice a second while
+    waiting for the vehicle on the ground; an exception from it ends the operation. `connect` raises VehicleError if no
+    vehicle answers, or one other than `identity` (None: any vehicle). An armed vehicle is returned with its `concern`
+    set, and no gains are written to it; one that `was_flying` when an earlier process ended is commanded to land.
     In the folder `trial_parameters` both keep the parameters that a trial changes in addition to the gains, so that
     they are restored even if this process dies.
     `find_conflicts(options, hosts)` names options whose text cannot be used, or that are valid one by one but not
@@ -66,7 +66,7 @@ class VehicleKind:
     experiments: tuple[str, ...]
     options: tuple[VehicleOption, ...]
     open: Callable[[Options, Gains, Path | None], Vehicle]
-    connect: Callable[[Options, Gains, Identity | None, Path, Callable[[], None]], ConnectedVehicle] | None = None
+    connect: Callable[[Options, Gains, Path, Identity | None, Callable[[], None], bool], ConnectedVehicle] | None = None
     find_conflicts: Callable[[Options, Hosts], tuple[Problem, ...]] = _no_conflicts
     is_simulation: Callable[[Options, Hosts], bool] = _never
     experiments_for: Callable[[Options], tuple[str, ...]] | None = None

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,9 +14,7 @@ from app.vehicles.base import (
     HIGHEST_SET_POINT_M,
     LAND_COMMAND_S,
     RECORDED_BEYOND_S,
-    ConnectedVehicle,
     Identity,
-    Vehicle,
     VehicleOption,
 )
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
@@ -42,37 +41,15 @@ def _may_simulate(address: addresses.Address, simulation_hosts: Hosts) -> bool:
     )
 
 
-def _open(options: Options, safe_gains: Gains, trial_parameters: Path | None) -> Vehicle:
-    return _vehicle(options, safe_gains, None, observes=False, decided=False, trial_parameters=trial_parameters)
-
-
-def _connect(
+def _open(
     options: Options,
     safe_gains: Gains,
-    identity: Identity | None,
-    trial_parameters: Path,
-    on_wait: Callable[[], None],
-) -> ConnectedVehicle:
-    return _vehicle(
-        options,
-        safe_gains,
-        identity,
-        observes=True,
-        decided=identity is not None,
-        trial_parameters=trial_parameters,
-        on_wait=on_wait,
-    )
-
-
-def _vehicle(
-    options: Options,
-    safe_gains: Gains,
-    identity: Identity | None,
-    *,
-    observes: bool,
-    decided: bool,
-    trial_parameters: Path | None = None,
+    trial_parameters: Path | None,
+    identity: Identity | None = None,
     on_wait: Callable[[], None] = lambda: None,
+    was_flying: bool = False,
+    *,
+    observes: bool = False,
 ) -> "MavlinkVehicle":
     """Open the vehicle. It counts as REAL unless it is on this computer: other simulation hosts are not known here.
 
@@ -92,7 +69,8 @@ def _vehicle(
             clock=clock,
             identity=identity,
             observes=observes,
-            decided=decided,
+            decided=identity is not None,
+            was_flying=was_flying,
             trial_parameters=trial_parameters,
             source=source,
             on_wait=on_wait,
@@ -246,7 +224,7 @@ MAVLINK: Final = VehicleKind(
         ),
     ),
     open=_open,
-    connect=_connect,
+    connect=partial(_open, observes=True),
     find_conflicts=_conflicts,
     is_simulation=is_simulated,
     experiments_for=_experiments,

@@ -143,6 +143,7 @@ class BodyLimitMiddleware:
             await self._refuse(_too_large(limit))(scope, receive, send)
             return
         received = 0
+        has_started = False
 
         async def receive_bounded() -> Message:
             nonlocal received
@@ -152,7 +153,15 @@ class BodyLimitMiddleware:
                 raise _too_large(limit)
             return message
 
-        await self._app(scope, receive_bounded, send)
+        async def send_unless_too_large(message: Message) -> None:
+            nonlocal has_started
+            if has_started or received <= limit.size_bytes:
+                has_started = True
+                await send(message)
+
+        await self._app(scope, receive_bounded, send_unless_too_large)
+        if not has_started and received > limit.size_bytes:  # whatever the framework made of the error above
+            await self._refuse(_too_large(limit))(scope, receive, send)
 
 
 def _too_large(limit: _Limit) -> TooLargeError:

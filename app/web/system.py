@@ -1,9 +1,8 @@
 """This server: the addresses where other devices reach it, its data, and a backup."""
 
 import shutil
-from collections.abc import Iterator
 from datetime import UTC, datetime
-from typing import Annotated, BinaryIO, Final, Literal
+from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
@@ -17,11 +16,11 @@ from app.db.migrate import revision_of
 from app.db.trajectories import require_intact
 from app.web.addresses import EXPOSES, addresses_elsewhere, exposure, is_in_container, qr_svg
 from app.web.dependencies import CurrentDatabase, CurrentSettings, Live
+from app.web.downloads import download
 
 router = APIRouter(prefix="/api/system", tags=["system"])
 
 _SQLITE: Final = "application/vnd.sqlite3"
-_CHUNK_BYTES: Final = 2**20
 
 
 class AddressInfo(Schema):
@@ -101,26 +100,10 @@ def get_backup(database: CurrentDatabase) -> StreamingResponse:
     page of another site cannot request it.
     """
     copy = take_backup(database.file, require_intact)
-    size = copy.seek(0, 2)
-    copy.seek(0)
-    name = f"gainline-{datetime.now(UTC):%Y-%m-%dT%H%MZ}.sqlite3"
-    headers = {
-        "Content-Disposition": f'attachment; filename="{name}"',
-        "Content-Length": str(size),
-        # Not compressed: its records are compressed already, and with a length the browser shows the progress.
-        "Content-Encoding": "identity",
-        "Cross-Origin-Resource-Policy": "same-origin",
-    }
-    return StreamingResponse(_chunks(copy), media_type=_SQLITE, headers=headers)
+    return download(copy, f"gainline-{datetime.now(UTC):%Y-%m-%dT%H%MZ}.sqlite3", media_type=_SQLITE)
 
 
 def _addresses(request: Request, settings: CurrentSettings) -> list[AddressInfo]:
     _, port = request.scope["server"]
     found = addresses_elsewhere(settings.host, port)
     return [AddressInfo(url=each.url, interface=each.interface) for each in found]
-
-
-def _chunks(file: BinaryIO) -> Iterator[bytes]:
-    with file:
-        while chunk := file.read(_CHUNK_BYTES):
-            yield chunk

@@ -9,10 +9,11 @@ from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
 from app.common.states import ActKind, VehicleState
-from app.db.models import VehicleActRow, VehicleRow
+from app.db.models import TrialRow, VehicleActRow, VehicleRow
 from app.db.session import Database
 from app.db.types import utc_now
 from app.fleet import commands
+from app.flights import flight_rows
 from app.flights.abort import AbortRegistry
 from app.flights.connection_manager import VehicleConnectionManager, VehicleSlot
 from app.flights.process_messages import ConnectionOpened
@@ -217,6 +218,21 @@ def test_a_check_says_nothing_of_a_vehicle_that_has_restarted_since(
     assert checks_after([0, 0, 1]) is None
 
 
+def test_the_newest_concern_of_a_vehicle_is_the_one_that_is_kept(
+    settings: Settings, client: TestClient, database: Database
+) -> None:
+    vehicle = connect(client, database, register(client), concern="it was met armed")
+    manager = VehicleConnectionManager(
+        database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
+    )
+    status = VehicleStatus(vehicle_id=vehicle["id"], state="connected", at=status_time(), step="")
+    slot = VehicleSlot(concern="it was met armed")
+    for concern in ("it was met armed", "its motors did not stop"):
+        manager._on_message(slot, vehicle["id"], replace(status, concern=concern))
+    manager._record_executor.submit(lambda: None).result()
+    assert seen(client, vehicle)["concern"] == "its motors did not stop"
+
+
 def test_a_vehicle_met_armed_is_quarantined_until_a_person_releases_it(client: TestClient, database: Database) -> None:
     vehicle = connect(client, database, register(client), concern="it was met armed")
     assert (vehicle["state"], vehicle["concern"]) == ("quarantined", "it was met armed")
@@ -333,6 +349,47 @@ def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebo
     with database.read() as session:
         assert commands.list_vehicles_to_reconnect(session) == []
     assert seen(client, known)["state"] == "disconnected"
+
+
+def test_a_vehicle_may_be_in_the_air_after_a_flight_until_its_gains_are_read_or_no_battery_lasts_any_longer(
+    client: TestClient, database: Database
+) -> None:
+    vehicle = create_connected(client, database)
+    trial = create_trial(client, create_campaign_on(client, database, vehicle)["id"])
+    assert client.post(f"/api/trials/{trial['id']}/fly").status_code == 202
+
+    def may_fly() -> bool:
+        with database.write() as session:
+            commands.withdraw_acts(session)
+            commands.forget_connections(session)
+            (found,) = commands.list_vehicles_to_reconnect(session)
+        return found.was_flying
+
+    with database.write() as session:
+        request = flight_rows.claim_flight(session, WORKER)
+        assert request is not None
+        flight_rows.record_staged(session, request.flight_id, dict(request.gains))
+    with database.write() as session:
+        flight_rows.record_lift_off(session, request.flight_id)
+    with database.write() as session:
+        flight_rows.lose_running_flights(session)
+    assert may_fly()
+    with database.write() as session:
+        assert commands.record_reconnected(session, vehicle["id"], IDENTITY, concern="It is armed.", held={})
+        commands.record_disconnected(session, vehicle["id"])
+    assert newest(client, vehicle)["reason"] == "It is armed."
+    assert may_fly(), "no gains were read of an armed vehicle"
+    with database.write() as session:
+        flown = session.get_one(TrialRow, trial["id"])
+        flown.flown_at = utc_now() - timedelta(hours=1)
+    assert not may_fly()
+    with database.write() as session:
+        session.get_one(TrialRow, trial["id"]).flown_at = utc_now()
+    assert may_fly()
+    connect(client, database, vehicle)
+    with database.write() as session:
+        commands.record_disconnected(session, vehicle["id"])
+    assert not may_fly(), "it was on the ground, with its safe gains"
 
 
 def test_the_ledger_names_no_gains_for_a_pinned_vehicle_that_was_armed_or_absent_when_it_was_connected(
@@ -509,7 +566,7 @@ def test_an_identity_that_was_pinned_before_hardware_ids_were_looked_at_is_read(
         row.identity = {"system_id": 1, "autopilot": "paparazzi", "version": "5.18"}
     assert seen(client, vehicle)["identity"]["uid"] == ""
     with database.write() as session:
-        assert commands._linked(session.get_one(VehicleRow, vehicle["id"])).identity == IDENTITY
+        assert commands._linked(session, session.get_one(VehicleRow, vehicle["id"])).identity == IDENTITY
         commands.pin_identity(
             session, vehicle["id"], Identity(system_id=1, autopilot="paparazzi", version="", uid="0a")
         )

@@ -44,7 +44,7 @@ def test_a_vehicle_that_an_earlier_version_stored_has_the_later_settings_at_thei
         row.options = {**kept, "given_up": 3.0}
     assert seen(client, vehicle)["options"] == vehicle["options"]
     with database.read() as session:
-        assert commands._linked(session.get_one(VehicleRow, vehicle["id"])).options == vehicle["options"]
+        assert commands._linked(session, session.get_one(VehicleRow, vehicle["id"])).options == vehicle["options"]
 
 
 def test_a_vehicle_is_real_unless_it_is_registered_as_simulated_on_this_computer_or_a_named_host(

@@ -91,9 +91,10 @@ def take_the_place_of_every_vehicle(one: AnsweringRig, monkeypatch: pytest.Monke
     def connect(
         options: Options,
         safe_gains: Mapping[str, float],
-        identity: Identity | None,
         trial_parameters: Path,
+        identity: Identity | None,
         on_wait: Callable[[], None],
+        was_flying: bool,
     ) -> MavlinkVehicle:
         return MavlinkVehicle(
             options,
@@ -104,6 +105,7 @@ def take_the_place_of_every_vehicle(one: AnsweringRig, monkeypatch: pytest.Monke
             identity=identity,
             observes=True,
             decided=identity is not None,
+            was_flying=was_flying,
             trial_parameters=trial_parameters,
             on_wait=on_wait,
         )
@@ -287,7 +289,7 @@ def test_a_command_is_executed_at_once_and_ends_the_act_in_progress(
     ordered_s, told = order_when(rig, line, while_it_hears, MOTORS_OFF), len(stops_told_s(rig))
     answered = process._act(VehicleRequest(kind=kind, safe_gains=SAFE))
     assert "interrupted: motors off was commanded (people below)" in answered.problem
-    assert line.said[-1] == CommandForwarded(7, "motors off", "people below")
+    assert line.said[-1] == CommandForwarded(7, "motors off", "people below", is_awaited=True)
     assert stops_told_s(rig)[told] - ordered_s[0] < 0.5
 
 
@@ -300,7 +302,8 @@ def test_an_order_is_carried_out_at_once_while_changed_safe_gains_are_written(
     ordered_s = order_when(rig, line, "PARAM_SET", ordered)
     told = len(rig.heard)
     answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
-    assert line.said[-1] == CommandForwarded(ordered.number, ordered.order, ordered.reason)
+    forwarded = CommandForwarded(ordered.number, ordered.order, ordered.reason, is_awaited=ordered is MOTORS_OFF)
+    assert forwarded in line.said
     kind = "COMMAND_LONG" if ordered is MOTORS_OFF else "SCRIPT_ITEM"
     assert next(at_s for at_s, message in rig.heard[told:] if message.get_type() == kind) - ordered_s[0] < 0.5
     assert (answered.problem, answered.held) == ("", dict(TUNED))
@@ -332,7 +335,10 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
     order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
     process._fly(flight_of(rig, tmp_path))
     answers = [said for said in line.said if isinstance(said, CommandForwarded)]
-    assert [(said.order, said.problem) for said in answers] == [("land", ""), ("motors off", "")]
+    assert [(said.order, said.problem, said.is_awaited) for said in answers[:2]] == [
+        ("land", "", False),
+        ("motors off", "", True),
+    ]
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]
     assert ("interrupted: land was commanded (it drifts)" in failure.what, failure.unsafe) == (True, False)
     assert SafeGainsRestored(dict(SAFE)) in line.said
@@ -363,11 +369,48 @@ def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_o
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_SET", MOTORS_OFF, nth=2)
     process._fly(flight_of(rig, tmp_path))
-    assert CommandForwarded(7, "motors off", "people below") in line.said
+    assert stop_outcomes(process, line) == [""]
     assert not any(isinstance(said, FlightFailure) for said in line.said)
     assert any(isinstance(said, FlightLanded) for said in line.said)
     assert SafeGainsRestored(dict(SAFE)) in line.said
     assert process._vehicle.concern == ""
+
+
+def stop_outcomes(process: VehicleProcess, line: RecordingPipe) -> list[str]:
+    """The problems of the commands to stop the motors, seven seconds later, when all are known."""
+    for _ in range(7):
+        process._vehicle.attend(1.0)
+        process._publish_status()
+    said = [each for each in line.said if isinstance(each, CommandForwarded) and each.order == "motors off"]
+    assert len([each for each in said if each.is_awaited]) == len(said) / 2
+    return [each.problem for each in said if not each.is_awaited]
+
+
+@pytest.mark.parametrize("is_confirmed", [True, False])
+@pytest.mark.parametrize("in_flight", [True, False])
+def test_motors_off_is_done_only_once_the_vehicle_has_confirmed_it(
+    rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_confirmed: bool, in_flight: bool
+) -> None:
+    """Seen: it was recorded as done though the vehicle had never confirmed it, and the vehicle was ready."""
+    line = RecordingPipe()
+    process = started(rig, line, tmp_path)
+
+    def fall_silent(message: Message) -> None:
+        rig.muted = rig.muted or (message.get_type() == "COMMAND_LONG" and not is_confirmed)
+
+    rig.on_heard = fall_silent
+    if in_flight:
+        ordered, receive = [MOTORS_OFF], line.receive
+        line.workers_end.send(TakeOffCommand(by_s=math.inf))
+        monkeypatch.setattr(
+            line, "receive", lambda: ordered.pop() if ordered and rig.drone.body.altitude_m > 1.0 else receive()
+        )
+        process._fly(flight_of(rig, tmp_path))
+    else:
+        process._forward_command(MOTORS_OFF)
+    problem = "" if is_confirmed else "The vehicle has not confirmed that its motors stopped."
+    assert stop_outcomes(process, line) == [problem]
+    assert (process._vehicle.concern == "") == (is_confirmed and not in_flight)
 
 
 def in_the_air(rig: AnsweringRig, process: VehicleProcess) -> None:

@@ -6,6 +6,7 @@ import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -45,6 +46,18 @@ def is_busy(pipe: Connection, _call: ConnectionRequest) -> None:
 def dies_of_it(pipe: Connection, _call: ConnectionRequest) -> None:
     pipe.send(OPENED)
     pipe.recv()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def dies_before_it_is_confirmed(pipe: Connection, _call: ConnectionRequest) -> None:
+    """Tells of the first order that the vehicle has confirmed it, and dies before it can of the second."""
+    pipe.send(OPENED)
+    for is_last in (False, True):
+        ordered = pipe.recv()
+        forwarded = CommandForwarded(ordered.number, ordered.order, ordered.reason, is_awaited=True)
+        pipe.send(forwarded)
+        if not is_last:
+            pipe.send(replace(forwarded, is_awaited=False))
     os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -127,6 +140,22 @@ def test_orders_to_a_process_that_dies_of_them_are_answered(tmp_path: Path) -> N
     with session(dies_of_it, tmp_path) as (one, _):
         assert "it is unknown whether the command was sent" in told(one.send_command("land", "it drifts", 1.0))
         assert one.send_command("motors off", "again", 1.0).done()
+
+
+def test_a_command_whose_confirmation_the_process_did_not_live_to_see_is_told_as_unconfirmed(tmp_path: Path) -> None:
+    with session(dies_before_it_is_confirmed, tmp_path) as (one, heard):
+        for reason in ("to be sure", "people below"):
+            assert told(one.send_command("motors off", reason, 1.0)) == ""
+        outcomes = [heard.get(timeout=PATIENCE_S) for _ in range(2)]
+        assert outcomes == [
+            CommandForwarded(1, "motors off", "to be sure"),
+            CommandForwarded(
+                2,
+                "motors off",
+                "people below",
+                "The process that had the vehicle's link ended before the vehicle confirmed it.",
+            ),
+        ]
 
 
 def test_a_process_that_stands_still_is_shown_again_and_again_until_it_goes_on(

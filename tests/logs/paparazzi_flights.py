@@ -16,12 +16,12 @@ COMPANION = """<?xml version="1.0"?>
   <airframe name="ardrone2"><section name="GUIDANCE_V" prefix="GUIDANCE_V_">
    <define name="HOVER_KP" value="283"/><define name="HOVER_KD" value="82"/><define name="HOVER_KI" value="13"/>
   </section></airframe>
-  <settings><dl_settings><dl_settings NAME="control">
+  <generated_settings><dl_settings><dl_settings NAME="control">
    <dl_setting var="autopilot_mode_auto2" min="0" step="1" max="19"/>
    <dl_setting var="guidance_v_kp" min="0" step="1" max="600"/>
    <dl_setting var="guidance_v_kd" min="0" step="1" max="600"/>
    <dl_setting var="guidance_v_ki" min="0" step="1" max="300"/>
-  </dl_settings></dl_settings></settings>
+  </dl_settings></dl_settings></generated_settings>
  </aircraft></conf>
 </configuration>
 """
@@ -47,8 +47,7 @@ def data_of(flight: Flight, *, start_s: float = 12.0) -> str:
     kp, ki, kd = (flight.gains[name] for name in ("kp", "ki", "kd"))
     up_m, climb_m_s, thrust = GROUND_M, 0.0, 0
     lines = [f"{start_s:.3f} 31 ALIVE 153,27,52"]
-    if flight.setting:
-        lines += [f"{start_s:.3f} 31 DL_VALUE {n} {v}.000000" for n, v in ((1, kp), (2, kd), (3, ki))]
+    reports = [f"31 DL_VALUE {n} {v}.000000" for n, v in ((1, kp), (2, kd), (3, ki))] if flight.setting else []
     state = loop.new_state(*_state(up_m, climb_m_s))
     for step in range(round((flight.wait_s + flight.fly_s) * loop.RATE_HZ)):
         z, zd = _state(up_m, climb_m_s)
@@ -66,6 +65,7 @@ def data_of(flight: Flight, *, start_s: float = 12.0) -> str:
         if step % flight.every == 0:
             now_s = start_s + step / loop.RATE_HZ
             seen = _state(up_m, climb_m_s) if flight.stale else (z, zd)
+            lines += [f"{now_s:.3f} {report}" for report in reports]
             lines += _messages(flight, state, now_s, flying, *seen, round(-acceleration * 2**10), thrust)
     return "\n".join(lines) + "\n"
 

@@ -13,6 +13,8 @@ TLOGS = {
     "paparazzi_283_13_82": {"kp": 283.0, "ki": 13.0, "kd": 82.0},
     "paparazzi_1624_1356_195": {"kp": 1624.0, "ki": 1356.0, "kd": 195.0},
 }
+SCRIPT_CURRENT_4 = bytes([31, 190, 184, 4, 0])
+"""Sender, number and payload of the message that the recorded vehicle had entered the block of its takeoff."""
 BEGAN_US = 1_795_222_159_000_000
 
 

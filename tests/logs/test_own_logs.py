@@ -1,4 +1,4 @@
-"""A telemetry log that our own vehicle wrote gives the flight back that it recorded."""
+"""A flight's telemetry log, begun after the connection, gives the flight back that our own vehicle recorded."""
 
 import io
 from pathlib import Path
@@ -15,6 +15,8 @@ ONE_SAMPLE_M = 0.002
 """What 20 ms more or less under a set point of 3 m make of the error over 32.6 s: the sample that is in the log before
 the command may not have been looked at by the ground yet when it sent that."""
 
+COMMANDS = {"paparazzi": "the block Takeoff", "ardupilot": "the command NAV_TAKEOFF", "px4": "the command DO_SET_MODE"}
+
 
 @pytest.mark.parametrize(
     "autopilot", ["paparazzi", *(pytest.param(other, marks=pytest.mark.complete) for other in ("ardupilot", "px4"))]
@@ -26,12 +28,13 @@ def test_the_log_of_a_flight_is_the_flight(autopilot: str, tmp_path: Path) -> No
     with LockstepRig(autopilot) as rig:
         if autopilot != "paparazzi":
             rig.switch_on_failsafes()
-        vehicle = rig.vehicle(log_folder=str(tmp_path))
+        vehicle = rig.vehicle()
+        vehicle.log_to(tmp_path / "flight.tlog")
         vehicle.stage(gains)
         record = vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
         vehicle.close()
-    [log] = tmp_path.glob("*.tlog")
-    flown = read_takeoff(io.BytesIO(log.read_bytes()))
+    flown = read_takeoff(io.BytesIO((tmp_path / "flight.tlog").read_bytes()))
+    assert flown.begins_with == COMMANDS[autopilot]
     assert flown.gains == pytest.approx(gains)
     assert TAKEOFF.error(flown.trajectory) == pytest.approx(TAKEOFF.error(record.trajectory), abs=ONE_SAMPLE_M)
     assert len(flown.trajectory) == pytest.approx(len(record.trajectory), abs=100)

@@ -11,7 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega, common
 from app.core.errors import TrajectoryError
 from app.logs.readers import read_takeoff, read_takeoffs
 from app.logs.takeoff_csv import read_takeoff_csv
-from tests.logs.recorded import TAKEOFFS, TLOGS, Telemetry, recorded
+from app.logs.takeoffs import NOT_COMMANDED
+from tests.logs.recorded import SCRIPT_CURRENT_4, TAKEOFFS, TLOGS, Telemetry, recorded
 from tests.vehicles.flying import TAKEOFF
 
 
@@ -32,6 +33,55 @@ def test_the_record_begins_a_second_before_the_command_and_ends_with_the_landing
     assert flown.trajectory.time_s[[0, -1]].tolist() == pytest.approx([-0.996, 33.042], abs=1e-6)
     assert 0.0 in flown.trajectory.time_s
     assert flown.notes == ("ends after 33.0 s with the block land here",)
+
+
+def test_without_the_names_of_the_blocks_the_one_in_which_it_lifted_off_was_the_command() -> None:
+    """Recorded; the campaign had 0.3240 m. From its lift-off on, the same flight is 0.3123 m."""
+    flown = read_takeoff(io.BytesIO(recorded("paparazzi_takeoff_no_block_list.tlog")))
+    assert TAKEOFF.error(flown.trajectory) == pytest.approx(0.3240, abs=0.0001)
+    assert (flown.is_commanded, flown.begins_with) == (True, "the block in which it lifted off")
+    assert flown.trajectory.time_s[[0, -1]].tolist() == pytest.approx([-0.98, 33.0], abs=0.03)
+
+
+def test_a_block_that_the_vehicle_did_not_say_to_have_entered_is_no_command() -> None:
+    silent = recorded("paparazzi_takeoff_no_block_list.tlog").replace(SCRIPT_CURRENT_4, bytes(5))
+    flown = read_takeoff(io.BytesIO(silent))
+    assert (flown.is_commanded, flown.begins_with) == (False, "lift-off")
+    assert TAKEOFF.error(flown.trajectory) == pytest.approx(0.3123, abs=0.0001)
+
+
+@pytest.mark.parametrize(("entered", "is_commanded"), [((4,), True), ((4, 6), False), ((6,), False), ((), False)])
+def test_the_vehicle_must_lift_off_in_the_very_block_that_was_commanded(
+    entered: tuple[int, ...], is_commanded: bool
+) -> None:
+    log = paparazzi_log()
+    log.fly(1.0, to_m=0.0)
+    log.ground("script_item", 31, 0, 4, b"")
+    for block in entered:
+        log.fly(0.1, to_m=0.0)
+        log.vehicle("script_current", block)
+    log.fly(0.5, to_m=0.0)
+    log.fly(5.0, to_m=3.0)
+    flown = read_takeoff(io.BytesIO(log.content))
+    assert flown.is_commanded is is_commanded
+    assert flown.start_s == pytest.approx(0.98 if is_commanded else 1.5, abs=0.25)
+
+
+def test_motors_stopped_in_the_air_end_the_only_takeoff_and_the_fall_is_none() -> None:
+    """Recorded: the estimate jumps and rises again by more than half a metre once the vehicle lies on the ground."""
+    flown = read_takeoff(io.BytesIO(recorded("paparazzi_motors_stopped_in_the_air.tlog")))
+    assert "ends after 8.0 s with motors off" in flown.notes
+    assert flown.trajectory["altitude_m"][-1] == pytest.approx(3.352, abs=0.001)
+
+
+def test_heartbeats_of_other_components_neither_disarm_the_vehicle_nor_change_its_mode() -> None:
+    log = Telemetry(ardupilotmega, autopilot=3)
+    log.heartbeat(mode=4)
+    log.ground("command_long", 31, 1, 22, 0, 0, 0, 0, 0, 0, 0, 3.0)
+    for _ in range(10):
+        log.fly(1.0, to_m=3.0)
+        log.component("heartbeat", 18, 8, 0, 0, 4)
+    assert read_takeoff(io.BytesIO(log.content)).trajectory.time_s[-1] == pytest.approx(10.0, abs=0.05)
 
 
 def test_two_flights_in_one_log_are_listed_to_choose_from() -> None:
@@ -94,7 +144,8 @@ def test_without_a_command_time_counts_from_lift_off_which_is_said() -> None:
     flown = read_takeoff(io.BytesIO(log.content))
     assert flown.begins_with == "lift-off"
     assert flown.gains == {}
-    assert any("no takeoff command in the log" in note for note in flown.notes)
+    assert not flown.is_commanded
+    assert NOT_COMMANDED in flown.notes
     assert abs(flown.trajectory["altitude_m"][flown.trajectory.time_s == 0.0][0]) <= 0.05
 
 

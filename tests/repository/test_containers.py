@@ -1,5 +1,6 @@
 """The container files, as far as they can be checked without Docker; .ci/compose-run starts the processes."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -28,6 +29,26 @@ def test_the_compose_file_keeps_to_the_compose_specification() -> None:
 
 def test_the_dockerfile_passes_its_linter() -> None:
     run("hadolint", "--no-color", "Dockerfile")
+
+
+def test_every_stage_begins_with_the_base_image_of_one_digest() -> None:
+    lines = (ROOT / "Dockerfile").read_text(encoding="utf-8").splitlines()
+    [base] = [line for line in lines if line.startswith("ARG BASE=")]
+    assert re.fullmatch(r"ARG BASE=python:3\.13-slim-trixie@sha256:[0-9a-f]{64}", base)
+    stages = [line.split()[1] for line in lines if line.startswith("FROM ")]
+    assert len(stages) == 2
+    assert set(stages) == {"${BASE}"}
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_a_container_writes_its_volume_only_gains_no_rights_and_has_a_limit_of_memory(name: str) -> None:
+    service = SERVICES[name]
+    assert service["read_only"] is True
+    assert [mount.partition(":")[0] for mount in service["tmpfs"]] == ["/tmp"]
+    assert service["cap_drop"] == ["ALL"]
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert service["mem_limit"] == "${GAINLINE_MEMORY:-4g}"
+    assert not {"privileged", "cap_add", "devices", "pid", "ipc"} & set(service)
 
 
 def test_one_service_serves_one_works_and_one_is_a_simulated_drone_for_who_asks() -> None:

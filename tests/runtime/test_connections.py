@@ -1,10 +1,12 @@
 """A real server while its connections are all taken, and what it takes no more of; how soon an abort is answered then:
 bench/abort.py."""
 
+import re
 import resource
 import socket
+import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final
 
@@ -117,6 +119,46 @@ def test_headers_without_end_are_refused(serving: Serving, parts: tuple[bytes, .
     answer = answered(serving, *parts)
     assert answer.startswith(b"HTTP/1.1 431 ")
     assert b"larger than 64 KiB" in answer
+
+
+def memory_mib(serving: Serving) -> float:
+    status = Path(f"/proc/{serving.process.pid}/status").read_text()
+    found = re.search(r"VmRSS:\s+(\d+) kB", status)
+    assert found is not None
+    return int(found.group(1)) / 1024
+
+
+def test_trailers_without_end_are_not_kept(serving: Serving) -> None:
+    """20 MiB of them once took 390 MiB of memory, and stayed as long as the connection."""
+    before_mib = memory_mib(serving)
+    with connected(serving) as connection:
+        connection.sendall(
+            b"POST /api/campaigns HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+            b"Transfer-Encoding: chunked\r\n\r\n1\r\n{\r\n0\r\n"
+        )
+        for _ in range(20):
+            connection.sendall(2**18 * b"a:\r\n")
+        assert connection.recv(2**16).startswith(b"HTTP/1.1 431 ")
+        assert memory_mib(serving) - before_mib < 40.0
+
+
+@pytest.mark.complete
+@pytest.mark.parametrize("length", ["Content-Length: 1100000000", "Transfer-Encoding: chunked"])
+def test_an_upload_that_is_too_large_is_not_read_to_its_end(serving: Serving, length: str) -> None:
+    """As a client sends it that looks for the answer afterwards; at 50 MB/s it once took 22 s."""
+    chunk = b"100000\r\n" + 2**20 * b"a" + b"\r\n"
+    begun_s = time.monotonic()
+    with connected(serving) as connection:
+        connection.sendall(b"POST /api/trials/1/trajectory HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: text/csv\r\n")
+        connection.sendall(f"{length}\r\n\r\n".encode())
+        with suppress(ConnectionError):
+            for number in range(1000):
+                connection.sendall(chunk)
+                time.sleep(max(0.0, number / 50.0 - (time.monotonic() - begun_s)))
+        answer = connection.recv(2**16)
+    assert time.monotonic() - begun_s < 10.0
+    assert answer.startswith(b"HTTP/1.1 413 ")
+    assert b"is larger than 48 MiB" in answer
 
 
 @pytest.mark.complete

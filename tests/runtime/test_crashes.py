@@ -2,9 +2,11 @@
 
 import os
 import signal
+import socket
 import sqlite3
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -119,6 +121,22 @@ def test_a_web_process_killed_in_mid_flight_costs_nothing(tmp_path: Path) -> Non
         wait_for("the new worker", lambda: second.worker_pid() != worker)
         second.trial(second.fly(campaign_id), "valid")
         require_sound_database(second.data_dir)
+
+
+@pytest.mark.complete
+def test_a_server_killed_during_a_backup_leaves_no_copy_once_it_runs_again(tmp_path: Path) -> None:
+    first = Serving(tmp_path / "data", "--no-worker")
+    with closing(sqlite3.connect(first.data_dir / "gainline.sqlite3")) as connection, connection:
+        connection.execute("CREATE TABLE filler AS SELECT zeroblob(100000000) AS data")
+    host, port = first.url.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port))) as asking:
+        asking.sendall(b"GET /api/system/backup HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        (copy,) = wait_for("the copy", lambda: list(first.data_dir.glob("*copy*/*.sqlite3")))
+        first.process.kill()
+        assert first.stop() == -signal.SIGKILL
+    assert copy.exists()
+    with Serving(tmp_path / "data", "--no-worker") as second:
+        assert list(second.data_dir.glob("*copy*")) == []
 
 
 @pytest.mark.complete

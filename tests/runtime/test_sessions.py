@@ -106,7 +106,9 @@ def test_a_vehicle_that_falls_silent_is_shown_as_gone_and_comes_back_by_itself(s
 
 
 @pytest.mark.complete
-def test_a_vehicle_whose_process_is_killed_in_the_air_is_found_armed_and_only_gets_land(serving: Serving) -> None:
+def test_a_vehicle_whose_process_is_killed_in_the_air_is_landed_by_the_next_which_stops_no_motor(
+    serving: Serving,
+) -> None:
     with connected(serving, "Orphan") as (vehicle, _):
         trial_id = vehicle.planned(vehicle.campaign())
         vehicle.in_the_air(trial_id)
@@ -120,17 +122,15 @@ def test_a_vehicle_whose_process_is_killed_in_the_air_is_found_armed_and_only_ge
         assert "stage" not in found["actions"]
         refused = vehicle.act("restore")
         assert (refused["state"], "armed" in refused["problem"]) == ("failed", True), "nothing is written to it"
-        assert serving.post(f"/vehicles/{vehicle.id}/land", {"reason": "nobody flies it"})["accepted"]
-        vehicle.status(lambda status: status["altitude_m"] < 0.15)
+        down = vehicle.status(lambda status: status["altitude_m"] < 0.15)
+        assert (down["armed"], vehicle.orders()) == (True, []), "nobody has ordered it"
+        told = "The process that flew it ended in flight. Land is repeated"
+        assert (told in down["concern"], told in vehicle.seen()["concern"]) == (True, True)
+        assert next(act for act in vehicle.acts() if act["kind"] == "connect")["reason"] in down["concern"]
         assert serving.post(f"/vehicles/{vehicle.id}/motors-off", {"reason": "it is down"})["accepted"]
         vehicle.status(lambda status: status["armed"] is False)
-        orders = wait_for(
-            "the orders in the database", lambda: vehicle.orders() if len(vehicle.orders()) == 2 else None
-        )
-        assert [(act["kind"], act["reason"], act["state"]) for act in orders] == [
-            ("motors off", "it is down", "done"),
-            ("land", "nobody flies it", "done"),
-        ]
+        orders = wait_for("the order in the database", lambda: vehicle.orders() if len(vehicle.orders()) == 1 else None)
+        assert [(act["kind"], act["reason"], act["state"]) for act in orders] == [("motors off", "it is down", "done")]
         serving.post(f"/vehicles/{vehicle.id}/release", {"statement": "Ada has looked at it"})
         assert vehicle.in_state("ready")["held"] == SAFE
 

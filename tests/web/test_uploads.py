@@ -3,17 +3,23 @@
 import hashlib
 import resource
 from collections.abc import Iterator
+from typing import Final
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.common.settings import Settings
 from app.db.models import TrajectoryRow
 from app.db.session import Database
+from app.main import create_app
+from app.web import headers
 from tests.builders import Json, create_climb, create_csv, create_ready_campaign, create_trial, csv_of, get, problems_of
 from tests.builders import upload as send
+from tests.unlocking import client_here
 
 HEADER = b"time_s,altitude_m\n"
+FORM: Final = "multipart/form-data"
 
 
 @pytest.fixture
@@ -107,6 +113,47 @@ def test_a_stated_length_beyond_the_limit_is_refused_before_anything_arrives(cli
         headers={"Content-Type": "text/csv", "Content-Length": str(10**10)},
     )
     assert answer.status_code == 413
+
+
+SMALL: Final = 2**16
+"""Limit of every upload in the tests below, and a part of what is sent beyond it."""
+
+
+@pytest.fixture
+def strict(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    for name in ("PHOTO_BYTES", "BUNDLE_BYTES"):
+        monkeypatch.setattr(headers, name, SMALL)
+    application = create_app(settings.model_copy(update={"max_upload_bytes": SMALL}))
+    with client_here(application) as client:
+        yield client
+
+
+def of_no_stated_length(first: bytes, parts: int) -> Iterator[bytes]:
+    yield first
+    for _ in range(parts):
+        yield SMALL * b"a"
+
+
+def uploads_of(client: TestClient) -> dict[str, list[str]]:
+    """Types that each route for files accepts, by its path."""
+    operations = {path: at["post"] for path, at in get(client, "/api/openapi.json")["paths"].items() if "post" in at}
+    accepted = {path: list(each.get("requestBody", {}).get("content", {})) for path, each in operations.items()}
+    return {path.format(campaign_id=1, trial_id=1): kinds for path, kinds in accepted.items() if FORM in kinds}
+
+
+def test_every_route_for_files_refuses_what_is_too_large_whatever_its_length_says(strict: TestClient) -> None:
+    uploads = uploads_of(strict)
+    assert len(uploads) == 7
+    part = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a"\r\n\r\n'
+    sent = [(path, kind, part if kind == FORM else b"") for path, kinds in uploads.items() for kind in kinds]
+    for path, kind, first in [*sent, ("/api/campaigns", "application/json", b'"')]:
+        content = of_no_stated_length(first, 1 + (2**20 if kind == "application/json" else SMALL) // SMALL)
+        stated = strict.post(path, content=b"x", headers={"Content-Type": kind, "Content-Length": str(2**21)})
+        chunked = strict.post(path, content=content, headers={"Content-Type": f"{kind}; boundary=b"})
+        for answer in (stated, chunked):
+            assert (answer.status_code, answer.json()["title"]) == (413, "Too large"), (path, kind, answer.text)
+            assert answer.headers["content-type"] == "application/problem+json"
+            assert "Send at most" in answer.json()["hint"]
 
 
 def test_a_record_may_come_as_a_form(client: TestClient, trial: Json) -> None:

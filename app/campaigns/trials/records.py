@@ -38,7 +38,7 @@ from app.db.models import CampaignRow, TrialRow
 from app.db.types import utc_now
 from app.fleet import service as fleet
 from app.fleet.control import require_may
-from app.logs.takeoffs import Takeoff
+from app.logs.takeoffs import NOT_COMMANDED, Takeoff
 from app.processes.sandbox import FILE, run_limited
 
 _SINGLE_PRECISION: Final = 1e-6
@@ -222,15 +222,18 @@ def read_upload(content: bytes, *, name: str, takeoff: int | None, companion: by
     return run_limited(FILE, read_content, content, name=name, number=takeoff, companion=companion)
 
 
-def _require_scorable(campaign: CampaignRow, trajectory: Trajectory) -> None:
-    """Raise UnconfirmedError for a record that nobody's judgement can make valid, such as one that ends too early."""
-    refusal = score(experiment_of_campaign(campaign), trajectory, accept_gaps=True).refusal
-    if refusal:
+def _capture_import(session: Session, campaign: CampaignRow, row: TrialRow, flown: Takeoff, *, invalid: bool) -> None:
+    """Capture the record, as an invalid one if it begins at lift-off. Unless `invalid`, raises UnconfirmedError for a
+    record that nobody's judgement can make valid, such as one that ends too early."""
+    refusal = "" if flown.is_commanded else NOT_COMMANDED
+    unscorable = refusal or score(experiment_of_campaign(campaign), flown.trajectory, accept_gaps=True).refusal
+    if unscorable and not invalid:
         raise UnconfirmedError(
-            f"The record cannot be scored: {refusal}.",
+            f"The record is {refusal}." if refusal else f"The record cannot be scored: {unscorable}.",
             hint="Choose the complete log of this flight, or confirm that it is stored as an invalid flight.",
-            problems=(Problem("invalid", refusal),),
+            problems=(Problem("invalid", unscorable),),
         )
+    capture(session, campaign, row, flown.trajectory, ending="invalid" if refusal else "completed", reason=refusal)
 
 
 def import_record(
@@ -255,9 +258,7 @@ def import_record(
     if row.state == TrialState.LOST:
         check_action(CAMPAIGN_ACTIONS, "judge", campaign.state, f"Campaign {campaign.id}")
         settle_gains(session, campaign, row, flown, confirmed=confirmed)
-        if not invalid:
-            _require_scorable(campaign, flown.trajectory)
-        capture(session, campaign, row, flown.trajectory)
+        _capture_import(session, campaign, row, flown, invalid=invalid)
         proposals.history_changed(session, campaign)
         return trial_view(session, campaign, row)
     if fleet.can_fly(campaign.vehicle):
@@ -267,11 +268,9 @@ def import_record(
         )
     require_open(session, campaign, HISTORY_TRIAL_STATES)
     settle_gains(session, campaign, row, flown, confirmed=confirmed)
-    if not invalid:
-        _require_scorable(campaign, flown.trajectory)
     proposals.start_flying(campaign)
     row.flown_at = utc_now()
-    capture(session, campaign, row, flown.trajectory)
+    _capture_import(session, campaign, row, flown, invalid=invalid)
     proposals.finish_flying(session, campaign)
     return trial_view(session, campaign, row)
 

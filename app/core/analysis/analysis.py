@@ -109,8 +109,23 @@ class Analysis:
         low, high = (f"{1e3 * each:.1f}" for each in (proposed.prediction.low_m, proposed.prediction.high_m))
         return (
             f"{measured} The model predicts {_mm(flown.prediction.error_m)} for the gains flown, and "
-            f"{_mm(proposed.prediction.error_m)} ({low} … {high} mm) for the proposed ones."
+            f"{_mm(proposed.prediction.error_m)} ({low} … {high} mm) for the proposed ones.{self._about_usual}"
         )
+
+    @property
+    def _about_usual(self) -> str:
+        """The sets that are set without a log and not above the interval of the proposed one: no flight would tell them
+        apart."""
+        proposed = self.proposed
+        assert proposed is not None
+        found = [
+            f" {', '.join(f'{value:g}' for value in each.gains.values())} is predicted as good: "
+            f"{_mm(each.prediction.error_m)}, with {each.activity:.1f} times the throttle activity of the gains flown."
+            for each in self.assessments[1:]
+            if each.prediction.error_m <= proposed.prediction.high_m and each.margin >= REQUIRED_MARGIN
+            if each.gains != proposed.gains
+        ]
+        return "".join(found)
 
     def parameter_file(self, file_name: str) -> str | None:
         """The proposed gains and hover throttle as a ground station loads them, with those flown as comments; None if

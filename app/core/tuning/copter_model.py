@@ -190,20 +190,28 @@ class CopterModel:
             f"{margin:.1f} times the {texts.fast_gains}; {REQUIRED_MARGIN:g} times is required."
         )
         hover = () if self._hover is None else (self._hover.reason,)
-        return (*hover, moves, rings, self._rules_note)
+        return (*hover, moves, rings, self._rules_note(gains))
 
-    @cached_property
-    def _rules_note(self) -> str:
-        """What the likeliest vehicle would fly with the sets that are set without a model."""
-        log = self._log
-        found = [self._rule_note(name, gains) for name, gains in log.loop.rules(log.throttle_mean).items()]
+    def _rules_note(self, gains: Vector) -> str:
+        """What the likeliest vehicle would fly with the sets that are set without a model. Those are as good that are
+        not above the interval of `gains`: no flight would tell them apart."""
+        as_good_m = _interval(self._all.predict(self._loop(gains))).upper
+        found = [self._rule_note(*rule, as_good_m=as_good_m) for rule in self._rules]
         return f"For comparison, the model predicts {'; '.join(found)}."
 
-    def _rule_note(self, name: str, gains: Mapping[str, float]) -> str:
-        loop = self._log.loop.with_gains(gains)
-        error_m, margin = self._likeliest.fly(loop)[0], gain_margin(loop, self._copters[0])
-        lacks = ", which lacks the margin" if margin < REQUIRED_MARGIN else ""
-        return f"{short(error_m)} {self._experiment.error_unit} with {name.removeprefix(_COMPARED)}{lacks}"
+    def _rule_note(self, name: str, error_m: float, margin: float, *, as_good_m: float) -> str:
+        remark = ", which is predicted as good" if error_m <= as_good_m else ""
+        remark = ", which lacks the margin" if margin < REQUIRED_MARGIN else remark
+        return f"{short(error_m)} {self._experiment.error_unit} with {name.removeprefix(_COMPARED)}{remark}"
+
+    @cached_property
+    def _rules(self) -> Sequence[tuple[str, float, float]]:
+        """Name, predicted error and margin of each of these sets."""
+        rules = self._log.loop.rules(self._log.throttle_mean)
+        loops = {name: self._log.loop.with_gains(gains) for name, gains in rules.items()}
+        return [
+            (name, self._likeliest.fly(loop)[0], gain_margin(loop, self._copters[0])) for name, loop in loops.items()
+        ]
 
 
 def _unlike(number: int, reason: str) -> TrajectoryError:

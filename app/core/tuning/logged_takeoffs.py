@@ -15,7 +15,7 @@ from app.core.definition import Definition, Flight, StopRule, best_flight
 from app.core.errors import Problem, TrajectoryError
 from app.core.experiments.base import FittedParameter
 from app.core.experiments.takeoff import WINDOW_S, Takeoff
-from app.core.formatting import interval_text, short
+from app.core.formatting import format_gains, interval_text, short
 from app.core.policy import Gains
 from app.core.records.step_response import StepResponse, step_response
 from app.core.records.trajectory import Trajectory
@@ -152,8 +152,10 @@ def comparable_takeoffs(takeoffs: Sequence[LoggedTakeoff]) -> tuple[list[LoggedT
     shortest of them. Raises TrajectoryError if none is long enough."""
     used = [each for each in takeoffs if each.trajectory.time_s[-1] >= SHORTEST_S][-MOST_TAKEOFFS:]
     if not used:
-        longest_s = max((float(each.trajectory.time_s[-1]) for each in takeoffs), default=0.0)
-        raise _unanswered(f"has takeoffs of at most {longest_s:.1f} s; {SHORTEST_S:g} s are needed")
+        flown = (
+            f"{each.trajectory.time_s[-1]:.1f} s with {format_gains(each.gains)}" for each in takeoffs[-MOST_TAKEOFFS:]
+        )
+        raise _unanswered(f"has only takeoffs of {'; of '.join(flown)}; at least {SHORTEST_S:g} s are needed")
     return used, min(WINDOW_S, *(math.floor(10.0 * each.trajectory.time_s[-1]) / 10.0 for each in used))
 
 

@@ -92,6 +92,8 @@ class Dialect:
     """Whether this autopilot needs heartbeats of a ground station."""
     uncounted: tuple[str, ...] = ()
     """Prefixes of the names of messages that have a separate sequence counter."""
+    plan: str = ""
+    """Name of the message that describes an item, numbered `seq`, of the plan that the vehicle's commands refer to."""
 
     @property
     def can_sign(self) -> bool:
@@ -182,6 +184,7 @@ PAPARAZZI: Final = Dialect(
     mavlink=1,
     uses_gcs_heartbeats=False,
     uncounted=("SCRIPT_", "MISSION_", *_MOCAP_MESSAGES),
+    plan="SCRIPT_ITEM",
 )
 ARDUPILOTMEGA: Final = Dialect(
     name="ardupilotmega",

@@ -96,8 +96,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.OPERATOR: Response("requested by the operator", "land, gains first", "aborted", "Aborted."),
         Failure.FROZEN: Response(
-            "packets arrive, but the vehicle's clock stands still for 0.25 s or jumps by more than 0.3 s, or its altitude "
-            "and climb rate stand still for 1 s",
+            "packets arrive, but the vehicle's clock stands still for 0.25 s or jumps by more than 0.3 s, or its "
+            "altitude and climb rate stand still for 1 s",
             "land",
             "invalid",
             "The vehicle's position froze while packets still arrived.",
@@ -113,8 +113,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
         ),
         Failure.LOST_POSITION: Response(
             "no plausible position for 0.5 s, or only late ones; more than 15 implausible ones a second; "
-            "an altitude that jumps by 0.5 m, stays 0.5 m behind the climb rate during takeoff, drifts by more than 1 m, or "
-            "contradicts the vehicle's landed state",
+            "an altitude that jumps by 0.5 m, stays 0.5 m behind the climb rate during takeoff, drifts by more than 1 m, "
+            "or contradicts the vehicle's landed state",
             "land",
             "invalid",
             "The vehicle's position was lost.",
@@ -132,8 +132,8 @@ RESPONSES: Final[Mapping[Failure, Response]] = MappingProxyType(
             "A pilot took manual control; no further commands were sent.",
         ),
         Failure.UNEXPECTED: Response(
-            "another mode or block, a disarming or a reboot that was not commanded, in messages that agree, also when it "
-            "is found during the landing",
+            "another mode or block, a disarming or a reboot that was not commanded, in messages that agree, also when "
+            "it is found during the landing",
             "land",
             "quarantine",
             "The vehicle changed its state without a command. It was commanded to land; its motors were not stopped.",

@@ -8,6 +8,7 @@ without waiting in the thread of the caller: passed to the link's thread, they w
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -108,7 +109,8 @@ class Link:
     `target_system` is the vehicle's system id, None for the first autopilot received; `make` is its MAV_AUTOPILOT, None
     for any. Messages of its other components are received, too, but do not count as packets of the autopilot. With
     `tlog`, both directions are appended to that file. With `signing_key`, everything is signed. With `transport`, no
-    thread is started: `receive` reads the transport and advances the clock while nothing arrives.
+    thread is started: `receive` reads the transport and advances the clock while nothing arrives. No heartbeats are
+    sent while `is_silent` returns true, which the link's own thread calls.
     """
 
     def __init__(
@@ -124,11 +126,12 @@ class Link:
         tlog: Path | None = None,
         signing_key: bytes | None = None,
         transport: Transport | None = None,
+        is_silent: Callable[[], bool] = lambda: False,
     ) -> None:
         """Open the link. Raises LinkError if the address or the file cannot be opened, InputError if the dialect cannot
         be signed."""
         self._address, self._dialect, self._clock = address, dialect, clock
-        self._identity = (system, component, signing_key)
+        self._identity, self._is_silent = (system, component, signing_key), is_silent
         self._codec = self._new_codec()
         self._heartbeat = dialect.message("HEARTBEAT", _GROUND_STATION)
         self._transport = transport or open_transport(address)
@@ -146,6 +149,7 @@ class Link:
         self._duplicate_s = float("-inf")
         self._other_makes: set[int] = set()
         self._losses = LossCounter(dialect.uncounted)
+        self._plan: dict[float, bytes] = {}
         self._received = self._bad = self._foreign = self._overrun = self._sent = self._unsent = 0
         self._last_packet_s: float | None = None
         self._last_heartbeat_s: float | None = None
@@ -233,10 +237,13 @@ class Link:
         return messages
 
     def log_to(self, path: Path | None) -> None:
-        """Record all packets from now on in another telemetry log, or in none; return once the previous log is stored.
-        Raises LinkError if the file cannot be opened; the previous log then continues."""
+        """Record all packets from now on in another telemetry log, which begins with the vehicle's plan as last
+        received, or in none; return once the previous log is stored. Raises LinkError if the file cannot be opened; the
+        previous log then continues."""
         following = TlogWriter(path) if path else None
         before, self._tlog = self._tlog, following
+        for frame in list(self._plan.values()):
+            self._record(frame)
         if before:
             before.close()
 
@@ -302,7 +309,7 @@ class Link:
             return
         self._next_heartbeat_s = now_s + HEARTBEAT_EVERY_S
         is_attended = self._listeners > 0 or now_s - self._attended_s < UNATTENDED_AFTER_S
-        if self._dialect.uses_gcs_heartbeats and is_attended:
+        if self._dialect.uses_gcs_heartbeats and is_attended and not self._is_silent():
             with self._sending:
                 self._write(self._heartbeat)
 
@@ -405,6 +412,8 @@ class Link:
         if not is_known(message):  # neither its checksum nor its signature was checked
             return False
         self._received += 1
+        if message.get_type() == self._dialect.plan:
+            self._plan[number(message, "seq")] = frame
         if self._vehicle_component in (None, source_component(message)):
             self._last_packet_s = now_s
             if not message.get_type().startswith(self._dialect.uncounted):

@@ -33,13 +33,15 @@ def open_radio(
     *,
     on_message: Callable[[Received], None] | None,
     on_wait: Callable[[list[PacketReceived]], None] = lambda _packets: None,
+    is_silent: Callable[[], bool] = lambda: False,
     transport: Transport | None = None,
 ) -> AutopilotLink:
     """Open the link to a vehicle.
 
     `clock` is the vehicle's time, by default that of its options; for `on_message` and `on_wait` see AutopilotLink;
-    `transport` replaces the address and the thread that reads it. Raises LinkError if the link or its log cannot be
-    opened, InputError for a signing key that cannot be read or used.
+    no heartbeats are sent while `is_silent` returns true; `transport` replaces the address and the thread that reads
+    it. Raises LinkError if the link or its log cannot be opened, InputError for a signing key that cannot be read or
+    used.
     """
     profile = PROFILES[str(options["autopilot"])]
     clock = clock or ScaledClock(float(options["clock_speed"]))
@@ -53,6 +55,7 @@ def open_radio(
         tlog=_log_path(str(options["log_folder"])),
         signing_key=signing.read_key(Path(key_file)) if key_file else None,
         transport=transport,
+        is_silent=is_silent,
     )
     target = Target(
         system=0,

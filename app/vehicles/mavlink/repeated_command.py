@@ -1,7 +1,7 @@
 """Land and motors off outside a trial, repeated until telemetry confirms them."""
 
 from itertools import takewhile
-from typing import Final
+from typing import Final, Literal
 
 from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.events import Action, Heartbeat, PacketReceived, confirms_motors_off
@@ -17,32 +17,42 @@ LANDED_WITHIN_S: Final = 20.0
 UNHEARD_S: Final = 60.0
 """Time for which a command is repeated to a vehicle of which nothing is received, after the worker's end."""
 
+_Flown = Literal["by a pilot", "as in a trial", "otherwise"]
+"""How a vehicle is flown, by its mode and block. A pilot flies it in every mode that is not known to be automatic."""
+
 
 class RepeatedCommand:
     """Land or motors off, sent again until telemetry confirms it.
 
     Motors off ends once the motors have stopped, or after some seconds. Land ends once the motors have stopped, a pilot
-    flies the vehicle, or it has had the time to land; while the vehicle is landing, nothing is sent.
+    flies the vehicle, or it has had the time to land; while the vehicle is landing, nothing is sent. `is_withheld`:
+    it waits until two heartbeats agree that the vehicle is flown as in a trial. `has_stopped`: the vehicle has
+    confirmed that its motors have stopped.
     """
 
-    def __init__(self, radio: AutopilotLink, action: Action, *, by_person: bool = True) -> None:
-        """Send the command; if it is not `by_person`, wait while the newest heartbeat shows a manual mode. Raises
-        VehicleError if it needs a block of the flight plan that is unknown."""
-        self._radio, self._action = radio, action
+    def __init__(
+        self, radio: AutopilotLink, action: Action, *, by_person: bool = True, is_withheld: bool = False
+    ) -> None:
+        """Send the command, unless it `is_withheld`; if it is not `by_person`, wait while the newest heartbeat shows a
+        manual mode. Raises VehicleError if it needs a block of the flight plan that is unknown."""
+        self._radio, self.action = radio, action
         self._requested_s = radio.clock.now_s()
         self._answered = False
-        self._by_hand_since_s: float | None = None
+        self._flown: _Flown = "otherwise"
+        self._flown_since_s = self._requested_s
         self._landing_since_s: float | None = None
-        self.is_over = False
+        self.is_withheld = is_withheld
+        self.is_over = self.has_stopped = False
         self._sent_s = float("-inf")
-        if by_person or not self._is_in_pilots_mode():
+        if not is_withheld and (by_person or not self._is_in_pilots_mode()):
             self._send()
 
     @property
     def trouble(self) -> str:
         """Message that the vehicle does not land although commanded to; otherwise empty."""
-        waits = self._action is Action.LAND and self._radio.clock.now_s() - self._requested_s > NOT_DESCENDING_AFTER_S
-        return NOT_DESCENDING if waits and not self.is_over and self._landing_since_s is None else ""
+        waits = self.action is Action.LAND and self._radio.clock.now_s() - self._requested_s > NOT_DESCENDING_AFTER_S
+        is_done = self.is_withheld or self.is_over or self._landing_since_s is not None
+        return NOT_DESCENDING if waits and not is_done else ""
 
     @property
     def is_unheard(self) -> bool:
@@ -56,39 +66,46 @@ class RepeatedCommand:
         for each in packets:
             self._note(each)
         now_s = self._radio.clock.now_s()
-        is_late = self._action is Action.KILL and now_s - self._requested_s > STOPPING_S
-        self.is_over = self.is_over or is_late or self._has_stopped() or self._has_landed(now_s)
+        is_late = self.action is Action.KILL and now_s - self._requested_s > STOPPING_S
+        self.has_stopped = self.has_stopped or self._has_stopped()
+        self.is_over = self.is_over or is_late or self.has_stopped or self._has_landed(now_s)
         is_due = now_s - self._sent_s >= self._every_s(now_s)
-        held_up = self._landing_since_s is not None or self._may_be_by_hand(now_s)
+        held_up = self.is_withheld or self._landing_since_s is not None or self._may_be_by_hand(now_s)
         if is_due and not held_up and not self.is_over:
             self._send()
 
     def _is_in_pilots_mode(self) -> bool:
         heartbeat = self._radio.seen.heartbeat
-        return heartbeat is not None and self._is_pilots(heartbeat)
+        return heartbeat is not None and self._flown_by(heartbeat) == "by a pilot"
 
-    def _is_pilots(self, heartbeat: Heartbeat) -> bool:
-        return heartbeat.mode not in self._radio.profile.automatic_modes
+    def _flown_by(self, heartbeat: Heartbeat) -> _Flown:
+        """Return how the vehicle is flown. A block that it entered before the link was opened is not known."""
+        profile, block = self._radio.profile, self._radio.block
+        if heartbeat.mode not in profile.automatic_modes:
+            return "by a pilot"
+        is_trials_mode = heartbeat.mode in profile.flying_modes | profile.following_modes | profile.landing_modes
+        is_trials_block = not block or block in profile.flying_blocks | profile.landing_blocks
+        return "as in a trial" if heartbeat.armed and is_trials_mode and is_trials_block else "otherwise"
 
     def _may_be_by_hand(self, now_s: float) -> bool:
         """Whether the newest heartbeat shows a manual mode and is not overdue: Land would override the pilot."""
         is_recent = now_s - self._radio.seen.heartbeat_s < self._radio.confirmation_s
-        return self._action is Action.LAND and is_recent and self._is_in_pilots_mode()
+        return self.action is Action.LAND and is_recent and self._is_in_pilots_mode()
 
     def _note(self, packet: PacketReceived) -> None:
         profile = self._radio.profile
-        if self._action is Action.KILL:
+        if self.action is Action.KILL:
             self._answered = self._answered or confirms_motors_off(packet.measurement, profile.stop_settings)
         elif isinstance(packet.measurement, Heartbeat):
-            if not self._is_pilots(packet.measurement):
-                self._by_hand_since_s = None
-            elif self._by_hand_since_s is None:
-                self._by_hand_since_s = packet.now_s
-            elif packet.now_s - self._by_hand_since_s >= self._radio.confirmation_s:
-                self.is_over = True
+            if (flown := self._flown_by(packet.measurement)) != self._flown:
+                self._flown, self._flown_since_s = flown, packet.now_s
+            elif packet.now_s - self._flown_since_s >= self._radio.confirmation_s:
+                self.is_over = self.is_over or flown == "by a pilot"
+                if self.is_withheld and flown == "as in a trial":
+                    self.is_withheld, self._requested_s = False, packet.now_s
 
     def _every_s(self, now_s: float) -> float:
-        if self._action is Action.LAND:
+        if self.action is Action.LAND:
             return land_every_s(now_s - self._requested_s, self._radio.profile.land_again_s)
         return REPEAT_S
 
@@ -96,10 +113,10 @@ class RepeatedCommand:
         """Send every message once, without waiting for a reply."""
         self._sent_s = self._radio.clock.now_s()
         try:
-            steps = self._radio.profile.steps(self._action, self._radio.target)
+            steps = self._radio.profile.steps(self.action, self._radio.target)
         except KeyError as error:
             raise VehicleError(
-                f"Gainline cannot command the vehicle to {self._action}: its flight plan listed no block {error}.",
+                f"Gainline cannot command the vehicle to {self.action}: its flight plan listed no block {error}.",
                 hint="Land it with the remote control or its own ground station.",
             ) from error
         for step in steps:
@@ -121,7 +138,7 @@ class RepeatedCommand:
 
     def _is_landing(self, now_s: float) -> bool:
         """Whether the vehicle is landing, by the newest messages since the command; if it flies again, Land is sent."""
-        if self._action is Action.KILL:
+        if self.is_withheld or self.action is Action.KILL:
             return False
         seen, profile = self._radio.seen, self._radio.profile
         if seen.block_s > self._requested_s and self._radio.block in profile.landing_blocks:

@@ -150,13 +150,14 @@ def _check_settings(trial: Trial, measurement: Measurement | None) -> Step:
         return trial, ()
     mode, name, value = trial.plan.mode_parameter, measurement.name, measurement.value
     held = {setting.parameter: setting.value for setting in trial.plan.trial_gains}
-    held |= {} if mode is None else {mode.name: mode.flying}
+    if mode is not None and value in mode.modes:  # heartbeats show the others
+        held[mode.name] = mode.flying
     if math.isclose(held.get(name, value), value, rel_tol=1e-6):
         return replace(trial, suspects=trial.suspects - {name}) if name in trial.suspects else trial, ()
     if name not in trial.suspects:
         return replace(trial, suspects=trial.suspects | {name}), (RequestGain(name),)
     if mode is not None and name == mode.name:
-        entered = limit_checks.named(mode.modes.get(value, f"{name} {value:g}"), trial.plan.limits)
+        entered = limit_checks.named(mode.modes[value], trial.plan.limits)
         return note(trial, Finding(failure=Failure.UNEXPECTED, why=f"The vehicle entered mode {entered}.")), ()
     why = f"{name} changed to {value:g} by a command that was not Gainline's."
     return note(trial, Finding(failure=Failure.INTERRUPTED, why=why)), ()

@@ -420,9 +420,10 @@ def stop_motors(trial: Trial, reason: str, now_s: float) -> Step:
 
 def _find_drop(trial: Trial, now_s: float) -> str:
     """Return why a vehicle whose motors are stopped now may have fallen; empty if every source shows it on the ground,
-    or it has not been commanded to take off."""
+    or it has not been commanded to take off and nothing shows that it moved."""
     watch, ground_m = trial.watch, trial.plan.ground_m
-    if trial.commanded_s is None:
+    is_still = trial.state is State.ARM or watching.stands_by_own_account(watch, now_s, ground_m)
+    if trial.commanded_s is None and is_still:
         return ""
     if watch.last is not None and watching.is_airborne(watch, now_s, ground_m):
         height_m = watch.last.altitude_m - ground_m

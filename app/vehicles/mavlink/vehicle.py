@@ -37,7 +37,7 @@ from app.vehicles.mavlink.parameters import GainStore, TrialParameters, files_fo
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.radio import StatusReader
 from app.vehicles.mavlink.records import AlignedRecord, Scored, add_secondary_altitude
-from app.vehicles.mavlink.repeated_command import RepeatedCommand
+from app.vehicles.mavlink.repeated_command import STOPPING_S, RepeatedCommand
 from app.vehicles.mavlink.set_point_schedule import referred_from_s, with_hold
 from app.vehicles.mavlink.transports import LinkError, Transport
 from app.vehicles.mavlink.trial import TrialResult, TrialRunner
@@ -53,6 +53,12 @@ _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
 _ANOTHER: Final = "Check which vehicle it is, then try again."
 _LAND_REPEATED: Final = f"Land is still being repeated. If the vehicle does not descend, {HELP}."
+_LEFT: Final = (
+    "The process that flew it ended in flight. Land is repeated if it still flies as in a trial; otherwise it is only "
+    f"observed. If it does not descend, {HELP}."
+)
+_NOT_STOPPED: Final = f"The vehicle has not confirmed within {STOPPING_S:g} s that its motors stopped."
+_DROPPED: Final = "The vehicle was not known to be on the ground: inspect it before it flies again."
 _LAND_WAS_REPEATED: Final = "Land was still being repeated when this record ended."
 _RESTARTED: Final = "It restarted: its gains have not been read since."
 _STAGE_AGAIN: Final = "Press Stage gains so that they are written and read back again."
@@ -78,6 +84,7 @@ class MavlinkVehicle:
         identity: Identity | None = None,
         observes: bool = False,
         decided: bool = True,
+        was_flying: bool = False,
         trial_parameters: Path | None = None,
         source: AltitudeSource | None = None,
         transport: Transport | None = None,
@@ -86,6 +93,9 @@ class MavlinkVehicle:
         """Connect, wait for the vehicle (with a given `identity`, for that one), and write the safe gains once it is
         known to be disarmed. Unless a person has `decided` on these safe gains for this very vehicle, they are only
         compared with those that it holds, which may be its owner's; if they differ, nothing is written.
+
+        A vehicle that `was_flying` in a trial when the process that flew it ended gets Land while it is flown as in a
+        trial, and no heartbeats of a ground station until then.
 
         `clock` is the vehicle's time, by default that of its options; `source` is a second source of altitude, which is
         closed with the vehicle; `transport` replaces the address and the thread that reads it. The folder
@@ -106,14 +116,14 @@ class MavlinkVehicle:
         self._flight: TrialRunner | None = None
         self._repeated: RepeatedCommand | None = None
         self._is_restoring = self._is_starting = False
+        self.has_stopped: bool | None = False
+        self._was_flying = was_flying
         self._loop: dict[str, float] = {}
         self._hover_throttle: float | None = None
         self._secondary = None if source is None else AlignedAltitudeSource(source)
-        on_message = None if source is None else source.on_message
+        hear, wait, silent = None if source is None else source.on_message, self._while_waiting, self._is_silent
         self._on_wait = on_wait
-        self._radio = open_radio(
-            options, clock, on_message=on_message, on_wait=self._while_waiting, transport=transport
-        )
+        self._radio = open_radio(options, clock, on_message=hear, on_wait=wait, is_silent=silent, transport=transport)
         self._status_reader = StatusReader(self._radio)
         self._telemetry_requested_s = self._radio.clock.now_s()
         try:
@@ -169,7 +179,7 @@ class MavlinkVehicle:
         or no longer holds the staged gains, or could not be commanded to take off. An exception from `on_sample` or
         `should_stop` lands the vehicle, and is raised again once it is on the ground.
         """
-        self._is_starting = True
+        self._is_starting, self.has_stopped = True, None
         try:
             self._require_not_quarantined()
             self._require_staged()
@@ -190,6 +200,7 @@ class MavlinkVehicle:
         finally:
             self._is_starting = False
         if stop is not None:
+            self.has_stopped = self._radio.is_disarmed
             self._restore_or_quarantine()
             return self._not_begun(ground, stop.reason, has_flown=False)
         flown = self._fly(ground, order, reference, on_sample, should_stop)
@@ -226,7 +237,9 @@ class MavlinkVehicle:
         """Whether a command of `land` or `motors_off` is still being repeated to a vehicle that may be armed, and was
         not repeated for a minute without a packet from it."""
         repeated = self._repeated
-        return repeated is not None and not (repeated.is_over or repeated.is_unheard or self._radio.is_disarmed)
+        if repeated is None or repeated.is_withheld:
+            return False
+        return not (repeated.is_over or repeated.is_unheard or self._radio.is_disarmed)
 
     def condition(self) -> Condition:
         """Return the state last received, without waiting. Altitude counts as in a record."""
@@ -324,13 +337,20 @@ class MavlinkVehicle:
 
     def land(self, reason: str) -> None:
         """Command the vehicle to land at once, in any state. Raises VehicleError if it cannot be commanded."""
-        self._requested = requested("Land", reason)
+        self._requested, self.has_stopped = requested("Land", reason), bool(self.has_stopped)
         self._repeated = RepeatedCommand(self._radio, Action.LAND)
 
     def motors_off(self, reason: str) -> None:
-        """Stop the motors at once, at any height."""
-        self._requested = motors_off_requested(reason)
+        """Stop the motors at once, at any height. A vehicle that may have been in the air, or that does not confirm it,
+        is only observed from then on."""
+        self._requested, self.has_stopped = motors_off_requested(reason), None
         self._repeated = RepeatedCommand(self._radio, Action.KILL)
+        if self._flight is None and not self._radio.is_disarmed:
+            self._doubt_stop(_DROPPED)
+
+    def _doubt_stop(self, why: str) -> None:
+        self._requested = f"{self._requested} {why}"
+        self._observe(self._why if self._state in QUARANTINE_STATES else "")
 
     def log_to(self, path: Path | None) -> None:
         """Record all packets from now on, in both directions, in this telemetry log; None ends the log. Raises
@@ -362,7 +382,7 @@ class MavlinkVehicle:
         if self._state in QUARANTINE_STATES:
             self._enter(State.IDLE)
         self._why = self._requested = ""
-        self._repeated = None
+        self._repeated, self._was_flying = None, False
 
     # ---- connecting
 
@@ -371,11 +391,28 @@ class MavlinkVehicle:
         self._plan_problem = preflight.read_vehicle_info(self._radio)
         self._enter(State.PREFLIGHT)
         self._listen(0.0)
+        if self._was_flying:
+            self._take_up_landing()
         if self._state in QUARANTINE_STATES:
             return
         if self._has_set_safe_gains():
             self._enter(State.SET_GAINS)
             self._enter(State.IDLE)
+            self._requested, self._repeated, self._was_flying = "", None, False
+
+    def _take_up_landing(self) -> None:
+        """Repeat Land to a vehicle that the process that flew it left in the air, unless it may be another vehicle."""
+        self._identify()
+        self._was_flying = not preflight.is_another(self._radio, self._pinned)
+        if self._was_flying and not preflight.find_missing_uid(self._radio, self._pinned):
+            self._requested = _LEFT
+            self._repeated = RepeatedCommand(self._radio, Action.LAND, is_withheld=True)
+
+    def _is_silent(self) -> bool:
+        """Whether a vehicle that was left in the air gets no heartbeats of a ground station, so that the failsafe that
+        its preflight checks have read back lands it: until Land is repeated, it is down, or somebody decides."""
+        repeated = self._repeated
+        return self._was_flying and (repeated is None or (repeated.is_withheld and not repeated.is_over))
 
     def _has_set_safe_gains(self) -> bool:
         """Write or compare the safe gains; return whether the vehicle holds them and nothing else was found. Otherwise
@@ -504,8 +541,13 @@ class MavlinkVehicle:
                 raise
 
     def _repeat_command(self, packets: list[PacketReceived]) -> None:
-        if self._repeated is not None:
-            self._repeated.proceed(packets)
+        if (repeated := self._repeated) is None:
+            return
+        repeated.proceed(packets)
+        if self.has_stopped is None and self._flight is None and repeated.action is Action.KILL and repeated.is_over:
+            self.has_stopped = repeated.has_stopped
+            if not repeated.has_stopped:
+                self._doubt_stop(_NOT_STOPPED)
 
     # ---- flying
 
@@ -614,6 +656,8 @@ class MavlinkVehicle:
         finally:
             self._datum_m, self._flight = self._flight.datum_m, None
         self._state, self._why = flown.trial.state, flown.trial.why
+        if self._repeated is None:  # else it is of a request during the restoring of the safe gains
+            self.has_stopped = self._radio.is_disarmed or flown.trial.has_confirmed_stop
         if self._state is State.QUARANTINE:
             self._keep_landing(flown.trial)
         return flown
@@ -705,15 +749,12 @@ class MavlinkVehicle:
             both = add_secondary_altitude(
                 both.trajectory, self._secondary.seen, name=name, zero_s=zero_s, scored=self._scored
             )
+        lands = self._repeated is not None and self._repeated.action is Action.LAND
         return FlightRecord(
             trajectory=both.trajectory,
             ending=records.ending_of(trial),
             failure="" if trial.failure is None else trial.failure.value,
-            reason=" ".join(
-                part
-                for part in (reason, _LAND_WAS_REPEATED if self._requested == _LAND_REPEATED else "", both.remark)
-                if part
-            ),
+            reason=" ".join(part for part in (reason, _LAND_WAS_REPEATED if lands else "", both.remark) if part),
             has_flown=records.has_flown(trial),
             settings={**self._options, **self._loop, **both.settings, **records.contact_of(trial)},
         )
@@ -741,7 +782,7 @@ class MavlinkVehicle:
             )
         if self._state is State.OBSERVE:
             raise SafeGainsError(
-                f"The vehicle is only observed. {self._why}",
+                f"The vehicle is only observed. {self.concern}",
                 hint="Check that it is on the ground with its motors stopped, then release it.",
             )
 

@@ -9,7 +9,7 @@ from app.db.models import TrajectoryRow, TrialRow
 from app.db.session import Database
 from tests.builders import Json, create_ready_campaign, create_trial, get, problems_of, run_jobs
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
-from tests.logs.recorded import TLOGS, recorded
+from tests.logs.recorded import SCRIPT_CURRENT_4, TLOGS, recorded
 
 ANY = {"Content-Type": "application/octet-stream"}
 DEFAULT, TUNED = TLOGS
@@ -273,10 +273,29 @@ def test_the_same_key_with_another_question_is_another_request(client: TestClien
 
 
 def test_a_paparazzi_log_comes_with_its_companion_in_a_form(client: TestClient, trial: Json) -> None:
-    data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False))
+    data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}))
     answer = client.post(path_of(trial), files={"file": ("a.data", data), "companion": ("a.log", COMPANION)})
     assert answer.status_code == 201, answer.text
     assert answer.json()["read_back"] == TLOGS[DEFAULT]
+
+
+def test_a_record_from_lift_off_is_not_comparable_and_stored_only_as_invalid(client: TestClient, trial: Json) -> None:
+    """The same flight, 0.3240 m from the command on, is 0.3123 m from its lift-off."""
+    log = recorded("paparazzi_takeoff_no_block_list.tlog")
+    silent = log.replace(SCRIPT_CURRENT_4, bytes(len(SCRIPT_CURRENT_4)))
+    refused = client.post(path_of(trial), content=silent, headers=ANY)
+    assert (refused.status_code, set(problems_of(refused))) == (409, {"invalid"})
+    assert "not comparable: it begins at lift-off" in refused.json()["detail"]
+    stored = client.post(f"{path_of(trial)}?invalid=true", content=silent, headers=ANY).json()
+    assert (stored["state"], stored["error"]) == ("invalid", None)
+    assert "not comparable: it begins at lift-off" in stored["reason"]
+
+
+def test_motors_stopped_in_the_air_are_no_flight_to_score(client: TestClient, trial: Json) -> None:
+    log = recorded("paparazzi_motors_stopped_in_the_air.tlog")
+    assert set(problems_of(client.post(path_of(trial), content=log, headers=ANY))) == {"invalid"}
+    stored = client.post(f"{path_of(trial)}?invalid=true", content=log, headers=ANY).json()
+    assert (stored["state"], stored["error"]) == ("invalid", None)
 
 
 def test_a_log_without_gains_is_refused_and_says_where_they_can_be_found(client: TestClient, trial: Json) -> None:

@@ -5,13 +5,16 @@ import io
 import numpy as np
 import pytest
 
+from app.core.control import paparazzi as loop
 from app.core.control.loop_log import (
     FIELDS,
     CommandCheck,
+    FlownGains,
     LoopLog,
     SimulationCheck,
     compare_commands,
     compare_simulation,
+    flown_gains,
     infer_gains,
 )
 from app.core.policy import Gains
@@ -23,7 +26,7 @@ TUNED = {"kp": 1624, "ki": 1356, "kd": 195}
 
 
 def check_commands(log: LoopLog, gains: Gains) -> CommandCheck:
-    return compare_commands(log, gains)[0]
+    return compare_commands(log, [FlownGains(0.0, gains)])[0]
 
 
 def check_simulation(log: LoopLog) -> SimulationCheck | None:
@@ -32,7 +35,7 @@ def check_simulation(log: LoopLog) -> SimulationCheck | None:
 
 
 def log_of(flight: Flight) -> LoopLog:
-    return read_loop_log(io.BytesIO(data_of(flight).encode()))[0]
+    return read_loop_log(io.BytesIO(data_of(flight).encode())).log
 
 
 def changed(log: LoopLog, name: str, rows: slice, by: int) -> LoopLog:
@@ -151,3 +154,63 @@ def test_neither_do_a_handful_of_samples_or_commands_beyond_any_gains() -> None:
     values = log.values.copy()
     values[:, FIELDS.index("fb_cmd")] *= 2**16
     assert infer_gains(LoopLog(log.time_s, values)) is None
+
+
+def test_an_attitude_rounded_to_one_count_above_level_is_exact() -> None:
+    """As in flights of the real autopilot: r33 is computed from a quaternion whose elements are rounded."""
+    checked = check_commands(log_of(Flight(DEFAULT, tilt=loop.LEVEL + 1, fly_s=8.0)), DEFAULT)
+    assert (checked.exact, checked.tilted) == (checked.rows, 0)
+    assert checked.rounded > 100
+    assert not check_commands(log_of(Flight(DEFAULT, tilt=loop.LEVEL + 8, fly_s=8.0)), DEFAULT).passed
+
+
+def flights_of(*gains: dict[str, int]) -> LoopLog:
+    """Flights of 8 s one after another, the first at 15 s, then every 20 s."""
+    texts = [
+        data_of(Flight(each, fly_s=8.0), start_s=12.0 + 20.0 * number).splitlines()[1:]
+        for number, each in enumerate(gains)
+    ]
+    return read_loop_log(io.BytesIO("\n".join(line for text in texts for line in text).encode())).log
+
+
+def test_every_flight_has_the_gains_that_its_commands_follow_from() -> None:
+    log = flights_of(DEFAULT, TUNED, DEFAULT)
+    flown = flown_gains(log, [])
+    assert [each.gains for each in flown] == [DEFAULT, TUNED, DEFAULT]
+    assert [each.after_s for each in flown[1:]] == pytest.approx([35.0, 55.0], abs=0.06)
+    assert compare_commands(log, flown)[0].exact == int((~log.idle).sum())
+
+
+def test_a_gain_that_shows_late_in_a_flight_counts_from_its_beginning() -> None:
+    """The integrator is held at zero for the first second: until then, commands follow from either ki."""
+    flown = flown_gains(flights_of(DEFAULT, {**DEFAULT, "ki": 200}), [])
+    assert [each.after_s for each in flown] == pytest.approx([12.0, 35.0], abs=0.06)
+
+
+def test_gains_changed_in_flight_count_from_the_first_sample_that_shows_them() -> None:
+    log, other = (log_of(Flight(gains)) for gains in (DEFAULT, TUNED))
+    changed_at = log.time_s >= 40.0
+    values = np.where(changed_at[:, np.newaxis], other.values, log.values)
+    flown = flown_gains(LoopLog(log.time_s, values), [DEFAULT, TUNED, {**TUNED, "ki": 13}])
+    assert [each.gains for each in flown] == [DEFAULT, TUNED]
+    assert flown[1].after_s == log.time_s[~changed_at][-1]
+
+
+def test_commands_that_follow_from_no_gains_are_those_of_unknown_ones() -> None:
+    log = flights_of(DEFAULT, DEFAULT, TUNED)
+    second = np.flatnonzero((log.time_s > 34.0) & (log.time_s < 52.0))
+    spoilt = changed(log, "fb_cmd", slice(int(second[0]), int(second[-1])), 777)
+    flown = flown_gains(spoilt, [])
+    assert [each.gains for each in flown] == [DEFAULT, None, TUNED]
+    checked = compare_commands(spoilt, flown)[0]
+    assert checked.different == int((~spoilt.idle)[second[:-1]].sum()) > 100
+
+
+def test_a_loop_that_was_never_in_control_has_no_gains() -> None:
+    log = log_of(Flight(DEFAULT, fly_s=8.0))
+    assert flown_gains(log.part(log.idle), [DEFAULT]) == []
+
+
+def test_a_log_of_other_commands_from_its_first_sample_on_has_no_gains() -> None:
+    log = changed(log_of(Flight(DEFAULT, fly_s=8.0)), "fb_cmd", slice(None), 777)
+    assert [each.gains for each in flown_gains(log, [DEFAULT])] == [None]

@@ -1,6 +1,7 @@
 """Campaigns of altitude steps under ArduCopter and PX4: the model from flights over a link, and what it proposes."""
 
 import pickle
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -26,6 +27,11 @@ from bench.copters.campaign_flights import RIGS, CampaignRig
 from tests.core.analysis.px4_flights import CALM
 from tests.core.tuning.flying import compiled_only
 
+AS_GOOD: Final = {
+    "ArduCopter": {"2, 7, 1, 2": False, "3, 8, 0.5, 3": True},
+    "PX4": {"PX4's default gains": False, "1.5, 8, 3, 0": True, "1.5, 6, 3, 0.3": True},
+}
+"""Whether a set that needs no model is as good as the proposal, by what it flies on this vehicle."""
 OPTIONS: Final = {"steps": 2, "step_window_s": 3.0}
 
 
@@ -77,6 +83,11 @@ def test_the_second_flight_is_better_and_where_it_was_predicted(autopilot: str) 
     assert "2 times is required" in explanation.notes[1]
     assert explanation.notes[2].startswith("For comparison, the model predicts ")
     assert f" m with {autopilot}'s default gains; " in explanation.notes[2]
+    as_good = [gains for gains, is_as_good in AS_GOOD[autopilot].items() if is_as_good]
+    for gains in AS_GOOD[autopilot]:
+        said = f" m with {gains}, which is predicted as good" in explanation.notes[2]
+        errors = re.findall(rf"([\d.]+) m with {re.escape(gains)}", explanation.notes[2])
+        assert (said, [float(each) <= proposal.interval.upper for each in errors]) == (gains in as_good, [said])
 
 
 @compiled_only

@@ -486,6 +486,50 @@ def test_motors_off_is_repeated_too_until_the_vehicle_says_so() -> None:
             assert rig.writes.count("kil_thr") == stopped
 
 
+def test_motors_off_that_no_message_confirms_leaves_the_vehicle_only_observed() -> None:
+    """Seen: it was shown as ready, and the command as done."""
+    with LockstepRig() as rig, connected(rig) as vehicle:
+        vehicle.attend(2.0)
+        rig.muted = True
+        vehicle.motors_off("it stands among people")
+        vehicle.attend(4.0)
+        assert (vehicle.has_stopped, vehicle.concern) == (None, "")
+        vehicle.attend(2.0)
+        assert vehicle.has_stopped is False
+        assert vehicle.concern == (
+            "Motors off was requested: it stands among people. "
+            "The vehicle has not confirmed within 5 s that its motors stopped."
+        )
+        with pytest.raises(SafeGainsError, match="has not confirmed"):
+            vehicle.stage(TUNED)
+        rig.muted = False
+        vehicle.attend(2.0)
+        vehicle.release()
+        assert vehicle.concern == ""
+
+
+def test_motors_off_that_the_vehicle_confirms_on_the_ground_leaves_it_ready() -> None:
+    with LockstepRig() as rig, connected(rig) as vehicle:
+        vehicle.attend(2.0)
+        vehicle.motors_off("to be sure")
+        vehicle.attend(2.0)
+        assert (vehicle.has_stopped, vehicle.concern) == (True, "")
+
+
+def test_motors_off_that_may_have_dropped_the_vehicle_leaves_it_only_observed() -> None:
+    """Somebody else has just armed it, as one heartbeat tells."""
+    with LockstepRig() as rig, connected(rig) as vehicle:
+        vehicle.attend(2.0)
+        rig.drone.autopilot._enter(START_ENGINE)  # type: ignore[attr-defined]  # as by remote control
+        attend_until(vehicle, lambda: vehicle.condition().armed is True)
+        vehicle.motors_off("nobody is to fly")
+        attend_until(vehicle, lambda: vehicle.has_stopped is True)
+        assert vehicle.concern == (
+            "Motors off was requested: nobody is to fly. "
+            "The vehicle was not known to be on the ground: inspect it before it flies again."
+        )
+
+
 def test_a_vehicle_that_somebody_else_arms_is_only_observed_from_then_on() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)

@@ -257,7 +257,7 @@ def test_a_vehicle_that_is_connected_as_the_program_does_it_keeps_that_file(tmp_
     with UdpRig("px4", speed=3.0) as rig:
         options = rig.options()
         identity = Identity(system_id=1, autopilot="px4", version="")
-        vehicle = MAVLINK.connect(options, SAFE["px4"], identity, folder, lambda: None)
+        vehicle = MAVLINK.connect(options, SAFE["px4"], folder, identity, lambda: None, False)
         with closing(vehicle):
             assert f"The file {folder}/udp-127.0.0.1-" in vehicle.concern
 

@@ -14,9 +14,9 @@ from app.vehicles.mavlink.radio import AutopilotLink
 from app.vehicles.mavlink.repeated_command import RepeatedCommand
 from tests.clocks import SimulatedClock
 
-GUIDED, STABILIZE, LAND = "4", "0", "9"
+GUIDED, STABILIZE, LAND, BRAKE = "4", "0", "9", "17"
 HEARTBEAT = Heartbeat(autopilot=3, armed=True, mode=GUIDED, system=1, component=1)
-LANDED_BLOCK = 14
+LANDED_BLOCK, TAKE_OFF_BLOCK, STANDBY_BLOCK = 14, 4, 5
 
 
 class Sent(list[str]):
@@ -29,7 +29,9 @@ class Sent(list[str]):
 class Ordered:
     """A vehicle in the air at whose own link a person has ordered something; each `second` it says this."""
 
-    def __init__(self, action: Action = Action.LAND, autopilot: str = "ardupilot") -> None:
+    def __init__(
+        self, action: Action = Action.LAND, autopilot: str = "ardupilot", *, is_withheld: bool = False
+    ) -> None:
         self.clock, self.sent = SimulatedClock(), Sent()
         blocks = {"land here": 13, "land": LANDED_BLOCK, "Takeoff": 4}
         self.radio = AutopilotLink(
@@ -37,8 +39,8 @@ class Ordered:
         )
         self.told(HEARTBEAT)
         self.clock.wait_s(0.1)
-        self.order = RepeatedCommand(self.radio, action)
-        self.first = len(self.sent)
+        self.order = RepeatedCommand(self.radio, action, is_withheld=is_withheld)
+        self.first = len(self.sent) or 1
 
     def told(self, *measurements: Measurement) -> list[PacketReceived]:
         for measurement in measurements:
@@ -120,6 +122,41 @@ def test_land_that_is_given_without_a_person_waits_for_the_second_heartbeat_of_a
     ordered.order = RepeatedCommand(ordered.radio, Action.LAND, by_person=False)
     assert not ordered.sent
     assert sum(ordered.seconds(4, HEARTBEAT)) >= 3
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "mode", "block", "is_landed"),
+    [
+        ("ardupilot", GUIDED, None, True),
+        ("ardupilot", LAND, None, True),
+        ("ardupilot", BRAKE, None, False),
+        ("ardupilot", STABILIZE, None, False),
+        ("px4", "4.2", None, True),
+        ("px4", "6.0", None, True),
+        ("px4", "4.5", None, False),
+        ("paparazzi", "4", None, True),
+        ("paparazzi", "4", TAKE_OFF_BLOCK, True),
+        ("paparazzi", "4", STANDBY_BLOCK, False),
+        ("paparazzi", "home", None, False),
+    ],
+)
+def test_land_that_is_withheld_begins_once_two_heartbeats_agree_that_the_vehicle_flies_as_in_a_trial(
+    autopilot: str, mode: str, block: int | None, is_landed: bool
+) -> None:
+    """Paparazzi tells its block when it changes only, so that of a flight before is not known."""
+    ordered = Ordered(autopilot=autopilot, is_withheld=True)
+    ordered.radio.seen.block = block
+    assert (ordered.order.is_withheld, ordered.sent) == (True, [])
+    assert ordered.seconds(2, flying(mode=mode), flying(mode="4.3"))[0] == 0, "one packet decides nothing"
+    assert (sum(ordered.seconds(5, flying(mode=mode))) > 0) == is_landed
+    assert (ordered.order.is_withheld, ordered.order.trouble != "") == (not is_landed, False)
+
+
+def test_land_that_is_withheld_is_over_for_good_with_a_pilot_or_with_the_motors() -> None:
+    for heartbeat in (flying(mode=STABILIZE), flying(armed=False)):
+        ordered = Ordered(is_withheld=True)
+        ordered.seconds(3, heartbeat)
+        assert (ordered.order.is_over, sum(ordered.seconds(5, HEARTBEAT))) == (True, 0)
 
 
 def test_a_vehicle_that_flies_again_long_after_it_was_landing_is_somebody_elses() -> None:

@@ -186,7 +186,7 @@ def follow(plan: Plan, packets: list[PacketReceived], armed_s: float) -> tuple[T
 def test_a_recorded_fall_whose_altitude_steps_is_a_fall_and_not_the_gains() -> None:
     """Another station stopped the motors at 3.3 m: 8 steps of its altitude, up to 0.65 m, and -6.5 m/s at the ground.
     It was aborted for its climb rate of -4.1 m/s, and ready."""
-    packets = heard("paparazzi_motors_stopped_in_the_air.tlog", "paparazzi")
+    packets = heard("paparazzi_motors_stopped_in_the_air.tlog.gz", "paparazzi")
     limits = replace(LIMITS, landed_blocks=PAPARAZZI.landed_blocks)
     plan = Plan(safe_gains=SAFE_GAINS, limits=limits, ground_m=0.1, lift_off_s=PAPARAZZI.lift_off_s)
     trial, actions = follow(plan, packets, 1.5)

@@ -75,7 +75,7 @@ def test_mavsdks_vehicle_passes_every_check_and_tells_all_its_parameters(tmp_pat
     assert MAVLINK.connect is not None
     with MavsdkVehicle(port):
         options = MAVLINK.check(options_at(port), field="options")
-        ours = MAVLINK.connect(options, SAFE, None, tmp_path / "parameters.json", lambda: None)
+        ours = MAVLINK.connect(options, SAFE, tmp_path / "parameters.json", None, lambda: None, False)
         try:
             assert (ours.identity.system_id, ours.concern) == (1, "")
             assert {item.title: item.found for item in ours.check() if not item.passed} == {}
