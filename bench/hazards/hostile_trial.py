@@ -245,6 +245,7 @@ def _connect(rig: HostileRig) -> MavlinkVehicle:
         source=source,
         transport=rig,
         observes=True,
+        was_flying=rig.is_flying,
     )
 
 
