@@ -172,10 +172,12 @@ def _commands(truth: GroundTruth) -> Iterator[str]:
 
 
 def _waits(truth: GroundTruth) -> Iterator[float]:
-    """Yield the times since the last Land while the vehicle, armed and heard, did not descend after its trial."""
+    """Yield the times since the last Land while the vehicle, armed and heard, did not descend, from its first Land or
+    the end of its trial on."""
     lands = [at_s for at_s, command in truth.sent if command is Command.LAND]
+    from_s = min([truth.states.ended_s, *lands])
     since_s: float | None = None
-    for now in truth.after:
+    for now in (each for each in truth.true_states if each.time_s > from_s):
         if not (now.armed and now.flies and now.heard and now.climb_rate_m_s > SINKS_M_S):
             since_s = None
             continue

@@ -9,7 +9,7 @@ from itertools import product
 from typing import Final
 
 from app.simdrone.copter import Copter
-from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, Sample, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, Identity, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mocap.opening import open_source
@@ -92,6 +92,9 @@ class HostileRig(Rig):
         self._delay_s, self._delayed_until_s = 0.0, 0.0
         self._under_way: list[tuple[float, bytes]] = []
         self._copies_next_position = False
+        self.identity: Identity | None = None
+        self.is_flying = False
+        """What the program has stored: which vehicle it connected, and that it flies."""
         self.process: threading.Thread | None = None
         """Stands for the process of a vehicle that may be killed."""
         self.is_process_dead = False
@@ -231,10 +234,18 @@ def _run(rig: HostileRig) -> HostileResult:
 
 
 def _connect(rig: HostileRig) -> MavlinkVehicle:
-    case = rig.case
-    source = open_source("odometry", rig) if case.has_second_source else None
+    """Connect as a process does, which knows what the program has stored."""
+    source = open_source("odometry", rig) if rig.case.has_second_source else None
     return MavlinkVehicle(
-        rig.options(), case.safe, is_real=False, clock=rig, source=source, transport=rig, observes=True
+        rig.options(),
+        rig.case.safe,
+        is_real=False,
+        clock=rig,
+        identity=rig.identity,
+        source=source,
+        transport=rig,
+        observes=True,
+        was_flying=rig.is_flying,
     )
 
 
@@ -264,18 +275,13 @@ def _go_on_after_death(rig: HostileRig) -> HostileResult:
     rig.states.ended_s = rig.drone.time_s
     rig.wait_s(KILLED_FOR_S)
     try:
-        vehicle = _reconnect(rig)
+        vehicle = _connect(rig)
     except VehicleError as error:
         return _result(rig, ReportedOutcome(LOST, "unopened", str(error)))
     _attend(rig, vehicle)
     concern = vehicle.concern
     left = _restore_safe_gains(rig, vehicle)
     return _result(rig, ReportedOutcome(LOST, left, concern, concern, vehicle.concern))
-
-
-def _reconnect(rig: HostileRig) -> MavlinkVehicle:
-    """Connect as a new process does, which knows what the program has stored."""
-    return _connect(rig)
 
 
 def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
@@ -285,6 +291,7 @@ def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
         held = vehicle.stage(rig.case.gains)
         if held != rig.case.gains:
             raise VehicleError(f"it holds {held}", hint="")
+        rig.identity, rig.is_flying = vehicle.identity, True
         record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
         outcome, reason, failure = outcome_of(record), record.reason, record.failure
     except VehicleError as error:

@@ -156,6 +156,11 @@ Number of runs in which each fault began in each state:
 - `taken-over`: a pilot switches to a manual mode, and back at the end.
 - `motors-off`: the operator stops the motors.
 - `wild-gains`: the gains of the trial do not fly.
+- `silent-witness`: what the autopilot itself reports of its landing is not received.
+- `foreign-kill`: another ground station stops the motors. `flies-home`: the drone flies home by itself.
+- `stuck-altitude`, `drifting-altitude`, `creeping-altitude`: altitude and climb rate agree with each other, and are
+  wrong. A Paparazzi has no other source that could show it in flight, so the flight may count against its gains.
+- `lean-oscillation`: the attitude oscillates, with a standard deviation of 28°.
 - `mocap-…`: faults of a second source of altitude, which only these trials have.
 
 Outcomes of runs with a single kind of fault:
