@@ -35,7 +35,7 @@ SETTLED_S: Final = 5.0
 SKETCH_EVERY: Final = 4
 """Only every fourth step of a sketch is evaluated."""
 _NEAR_M: Final = 0.6
-_STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
+STATE: Final = ("altitude_m", "climb_rate_m_s")
 
 
 def _gain(name: str, title: str, upper: int, default: int) -> Gain:
@@ -112,7 +112,6 @@ class VerticalLoop(OwnModel, ABC):
     difference: Final = 0.1
     simulated_as: ClassVar[str] = "flight"
     """What the gate calls a simulated flight."""
-    least_model_error: ClassVar[float] = 0.0
     held_s: ClassVar[float] = 0.0
     """Time that the gate simulates beyond the window, at the last set point."""
 
@@ -166,30 +165,30 @@ class VerticalLoop(OwnModel, ABC):
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""
         parameters = np.ascontiguousarray(np.broadcast_to(model, (len(self.model_parameters),)))
-        channels, _ = fly(_counts(gains), parameters, self.set_points, self._samples)
+        channels, _ = fly(counts(gains), parameters, self.set_points, self._samples)
         time_s = self.grid_s
         named = dict(zip(CHANNELS, channels, strict=True)) | {"set_point_m": self.set_point(time_s)}
         return Trajectory(time_s, named, "model", "simulation")
 
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
         """Altitude of many policies, each on its own model or all on one: gains (k, 3) → (k, n)."""
-        return fly_batch(_counts(gains), self._models(model, len(gains)), self.set_points, self._samples)
+        return fly_batch(counts(gains), self._models(model, len(gains)), self.set_points, self._samples)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
         """Difference of altitude and climb rate from the model's in every step of a flight, shape (n, 3).
 
         The third column marks when the loop is entered. None if the record lacks the climb rate or the thrust command.
         """
-        if any(name not in trajectory.channels for name in _STATE_AND_COMMAND):
+        if any(name not in trajectory.channels for name in (*STATE, "thrust")):
             return None
         altitude, climb_rate, thrust = (
-            np.interp(self.grid_s, trajectory.time_s, trajectory[name]) for name in _STATE_AND_COMMAND
+            np.interp(self.grid_s, trajectory.time_s, trajectory[name]) for name in (*STATE, "thrust")
         )
         return observe(altitude, climb_rate, thrust, self._models(model, 1)[0])
 
     def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
         """`outputs` with `disturbances` added to the state after each step: gains (k, 3) → (k, n)."""
-        return fly_disturbed(_counts(gains), self._models(model, len(gains)), self.set_points, disturbances)
+        return fly_disturbed(counts(gains), self._models(model, len(gains)), self.set_points, disturbances)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """Check for products that can wrap, exactly, and simulate flights.
@@ -212,7 +211,7 @@ class VerticalLoop(OwnModel, ABC):
         """Simulate every policy on every model until `until_s`, which must exceed 5 s, or to the end of the window:
         gains (c, 3), models (k, m)."""
         until_s = min(until_s, self.window_s)
-        runs = np.repeat(_counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
+        runs = np.repeat(counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
         altitude = fly_batch(*runs, self.set_points, round(until_s * RATE_HZ))[:, ::SKETCH_EVERY]
         return Sketches(
             errors=_by_policy(self.sketch_errors(altitude, until_s), gains),
@@ -233,7 +232,8 @@ def _by_policy(runs: Vector, gains: Matrix) -> Matrix:
     return runs.reshape(len(gains), -1)
 
 
-def _counts(gains: Vector) -> Counts:
+def counts(gains: Vector | Matrix) -> Counts:
+    """The gains as the loop's integers."""
     return np.ascontiguousarray(np.rint(gains), dtype=np.int64)
 
 
@@ -246,9 +246,9 @@ def _hazards(
     parameters: tuple[ModelParameter, ...],
     manoeuvre: Manoeuvre,
 ) -> tuple[Check, ...]:
-    counts, safe_counts, vehicles = _counts(np.array(gains)), _counts(np.array(safe_gains)), np.array(models)
+    own, safe, vehicles = counts(np.array(gains)), counts(np.array(safe_gains)), np.array(models)
     baseline = gains == tuple(VerticalLoop.space.default.tolist())
     return (
-        *check_wrapping(counts, vehicles[0], manoeuvre.set_points),
-        *check_flights(counts, safe_counts, baseline, parameters, vehicles, ceiling_m, manoeuvre),
+        *check_wrapping(own, vehicles[0], manoeuvre.set_points),
+        *check_flights(own, safe, baseline, parameters, vehicles, ceiling_m, manoeuvre),
     )

@@ -304,7 +304,7 @@ def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> Fli
     errors = experiment.errors(outputs)
     weather = _GUST_VARIATION * float(np.mean(errors - experiment.errors(clean)))
     error = float(np.mean(errors))
-    model_error = float(np.hypot(_MODEL_ERROR * error, experiment.least_model_error))
+    model_error = float(np.hypot(_MODEL_ERROR * error, experiment.least_model_error(base.trajectory)))
     sd = float(np.sqrt(np.var(errors) + weather**2 + model_error**2))
     curve = outputs.mean(axis=0)
     noise = float(np.sqrt(np.mean(bias**2)))
@@ -343,8 +343,7 @@ def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> M
     """The same for many gain sets: (c, n) → (c, samples)."""
     experiment = calibration.experiment
     flown = experiment.space.vector(base.gains)
-    own = calibration.own_models[calibration.numbers.index(base.number)]
-    disturbances = experiment.disturbances(base.trajectory.as_stored(), flown, own)
+    own, disturbances = weather_of(calibration, base)
     if disturbances is None:
         return np.stack([calibration.residual * _similarity(experiment, some, flown) for some in gains])
     calm = np.zeros_like(disturbances)
@@ -352,6 +351,12 @@ def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> M
     disturbed, undisturbed = (experiment.disturbed_outputs(gains, own, acting) for acting in (disturbances, calm))
     beyond: Matrix = disturbed - undisturbed
     return beyond
+
+
+def weather_of(calibration: Calibration, base: Flight) -> tuple[Vector, Matrix | None]:
+    """The own model of a calibrated flight, shape (m,), and the disturbances relative to it, if its record has them."""
+    experiment, own = calibration.experiment, calibration.own_models[calibration.numbers.index(base.number)]
+    return own, experiment.disturbances(base.trajectory.as_stored(), experiment.space.vector(base.gains), own)
 
 
 def _similarity(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:

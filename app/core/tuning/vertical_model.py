@@ -6,27 +6,36 @@ from typing import Final
 
 import numpy as np
 
+from app.core.analysis.loop import GainSpace
+from app.core.analysis.paparazzi_loop import PaparazziLoop
+from app.core.analysis.proposal import search
 from app.core.definition import Flight, best_flight
+from app.core.experiments.altitude_steps import AltitudeSteps
 from app.core.experiments.base import FittedParameter, Matrix, ModelledExperiment, ParameterDistribution
+from app.core.experiments.copter_steps_hazards import COPTERS
 from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.policy import Vector
 from app.core.tuning.calibration import Calibration, calibrate
-from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
+from app.core.tuning.limited_model import LimitedModel
+from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight, weather_of
 from app.core.tuning.trust_region import Box, find_robust_optimum, merit
 
 MODELS: Final = 8
 ROBUSTNESS_SD: Final = 0.75
 """Distance of the models from the fit in the robust optimisation, in standard deviations. A larger value increases the
 error on vehicles that match the fit, a smaller one on those that do not."""
+_ZEROS: Final = {"kp": 40.0, "ki": 10.0, "kd": 4.0}
+_STARTS: Final = (0.25, 0.5, 0.75, 1.0)
+"""Where the search may start between the lowest and the highest gains: the best ones are often near the highest."""
 
 
 class VerticalModel:
     """A `CampaignModel`. The optimum is the robust one over a few plausible models (`trust_region`)."""
 
-    least_improvement: Final = 0.005
+    least_improvement: float = 0.005
 
     def __init__(self, experiment: VerticalLoop, flights: Sequence[Flight]) -> None:
-        self._experiment: Final = experiment
+        self._experiment = experiment
         self._calibration: Final[Calibration] = calibrate(experiment, flights)
         self.numbers: Final = self._calibration.numbers
         self.base: Final = best_flight([flight for flight in flights if flight.number in self.numbers])
@@ -69,6 +78,52 @@ class VerticalModel:
 
     def notes(self, gains: Vector) -> tuple[str, ...]:  # noqa: ARG002 - the gate's checks say what limits them
         return ()
+
+
+class StepsModel(LimitedModel[Vector], VerticalModel):
+    """A `CampaignModel` of altitude steps, whose gains are searched as those of ArduCopter and PX4: error and throttle
+    activity are those of the best flight's own model, with the disturbances of that flight."""
+
+    def __init__(self, experiment: AltitudeSteps, flights: Sequence[Flight]) -> None:
+        super().__init__(experiment, flights)
+        self._steps: Final = experiment
+        first = next(flight for flight in flights if flight.outcome == "valid")
+        self.first_gains = experiment.space.vector(first.gains)
+        self._own, found = weather_of(self._calibration, self.base)
+        self._weather: Final = experiment.still_air if found is None else found
+
+    @cached_property
+    def vehicles(self) -> Sequence[Vector]:
+        return list(self.spread.sample(self._steps, COPTERS))
+
+    def loop(self, gains: Vector) -> PaparazziLoop:
+        return PaparazziLoop(gains)
+
+    def flown(self, gains: Vector) -> tuple[float, float]:
+        return self._steps.flown(gains, self._own, self._weather)
+
+    def optimum(self, box: Box) -> Vector | None:
+        space = self._steps.space
+        ends = zip(space.names, zip(box.low.tolist(), box.high.tolist(), strict=True), strict=True)
+        along = [space.mapping(box.low + share * (box.high - box.low)) for share in _STARTS]
+        found = search(
+            GainSpace(bounds=dict(ends), gentle=space.mapping(space.default), zeros=_ZEROS),
+            [self.base.gains, *along],
+            space.mapping(self.first_gains),
+            fly=lambda gains: self.flown(space.vector(gains)),
+            loop_of=lambda gains: self.loop(space.vector(gains)),
+            vehicles=self.vehicles,
+        )
+        return None if found is None else space.vector(found)
+
+    def notes(self, gains: Vector) -> tuple[str, ...]:
+        return self.limits(gains)
+
+
+def fit_steps(experiment: ModelledExperiment, flights: Sequence[Flight]) -> StepsModel:
+    """The model of these flights; at least one must be valid."""
+    assert isinstance(experiment, AltitudeSteps)
+    return StepsModel(experiment, flights)
 
 
 def fit_vertical(experiment: ModelledExperiment, flights: Sequence[Flight]) -> VerticalModel:
