@@ -164,9 +164,7 @@ def least_damping(vehicle: SteppedVehicle, gains: Gains, *, factor: float = 1.0,
 
 def within_margin(vehicle: SteppedVehicle, gains: Gains) -> float:
     """The same with 30 ms more delay, and 0.7 to twice the gains."""
-    return min(
-        least_damping(vehicle, gains, factor=factor, late_s=_EXTRA_DELAY_S) for factor in (0.7, 1.0, 1.4, 2.0)
-    )
+    return min(least_damping(vehicle, gains, factor=factor, late_s=_EXTRA_DELAY_S) for factor in (0.7, 1.0, 1.4, 2.0))
 
 
 def _fast(throttle: Samples) -> Samples:
