@@ -97,6 +97,7 @@ def fly(steps: AltitudeSteps, vehicle: SteppedVehicle, gains: Gains, seed: int) 
     """The stored record of a flight, and its throttle activity over the scored time."""
     weather, altitude, climb, times = streams(seed, 4)
     count = round((steps.window_s + _BEYOND_S) * RATE_HZ)
+    time_s: Samples = np.arange(count, dtype=np.float64) * STEP_S
     late_s = times.uniform(0.0, _LATEST_S, len(steps.set_points.times_s) - 1)
     known_s = np.maximum(late_s + times.uniform(-1.0, 1.0, len(late_s)) * _ROW_STEPS * STEP_S, 0.0)
     disturbances = np.column_stack(
@@ -106,7 +107,7 @@ def fly(steps: AltitudeSteps, vehicle: SteppedVehicle, gains: Gains, seed: int) 
             gusts(climb, count, sd=vehicle.noise_m_s, correlation_s=_CLIMB_NOISE_S),
         )
     )
-    targets = np.rint(_late(steps.set_points, late_s).at(np.arange(count) * STEP_S) * (1 << POSITION_BITS))
+    targets = np.rint(_late(steps.set_points, late_s).at(time_s) * (1 << POSITION_BITS))
     flown = np.zeros((count, 3))
     values = np.array([gains["kp"], gains["ki"], gains["kd"]], dtype=np.int64)
     _fly(
@@ -119,7 +120,6 @@ def fly(steps: AltitudeSteps, vehicle: SteppedVehicle, gains: Gains, seed: int) 
         flown,
     )
     rows, known = slice(None, None, _ROW_STEPS), _late(steps.set_points, known_s)
-    time_s = np.arange(count) * STEP_S
     channels = {
         "altitude_m": flown[rows, 0],
         "climb_rate_m_s": flown[rows, 1],

@@ -49,9 +49,9 @@ def damping_within_margin(loop: LinearLoop[_V], vehicle: _V) -> float:
 
 
 def robust_damping(loop: LinearLoop[_V], vehicles: Sequence[_V]) -> float:
-    """Least damping ratio that decides on gains: of the first vehicle, which is the likeliest, within the margin; of the
-    others that are likely, with `REQUIRED_MARGIN` times the loop's fast gains. Their lags differ already, so that none
-    is added."""
+    """Least damping ratio that decides on gains: of the first vehicle, which is the likeliest, within the margin; of
+    the others that are likely, with `REQUIRED_MARGIN` times the loop's fast gains. Their lags differ already, so that
+    none is added."""
     likeliest, *others = vehicles
     return min(
         damping_within_margin(loop, likeliest),
@@ -64,8 +64,8 @@ def _slower_damping(loop: LinearLoop[_V], vehicle: _V, factor: float) -> float:
 
 
 def least_damping(loop: LinearLoop[_V], vehicle: _V, *, late_s: float = 0.0) -> float:
-    """Damping ratio of the least damped oscillation about hover, with a vehicle that follows `late_s` later; negative if
-    one grows, 1 if there is none."""
+    """Damping ratio of the least damped oscillation about hover, with a vehicle that follows `late_s` later; negative
+    if one grows, 1 if there is none."""
     modes = np.linalg.eigvals(loop.transition(vehicle, late_s=late_s))
     poles = np.log(modes[np.abs(modes) > _FORGOTTEN]) / loop.step_s
     oscillations = poles[np.abs(poles.imag) > _SLOWEST_OSCILLATION_RAD_S]

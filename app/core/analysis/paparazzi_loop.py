@@ -20,8 +20,8 @@ from app.core.policy import Vector
 from app.core.records.trajectory import Samples
 
 _COUNTS: Final = np.array([2.0, 2.0, 8.0])
-"""Thrust counts per m of altitude error, per m·s of its integral, and per m/s of the climb rate error, for gains kp, ki,
-kd of 1: what the fractional bits and the shifts of the loop leave."""
+"""Thrust counts per m of altitude error, per m·s of its integral, and per m/s of the climb rate error, for gains kp,
+ki, kd of 1: what the fractional bits and the shifts of the loop leave."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

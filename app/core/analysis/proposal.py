@@ -36,22 +36,17 @@ _V = TypeVar("_V")
 
 
 def propose(
-    flight: LoggedFlight,
-    copters: Sequence[Copter],
-    starts: Sequence[Mapping[str, float]],
-    *,
-    space: GainSpace | None = None,
-    usual: Mapping[str, float] | None = None,
+    flight: LoggedFlight, copters: Sequence[Copter], starts: Sequence[Mapping[str, float]]
 ) -> dict[str, float] | None:
-    """Gains of the loop's space, or of a narrower one (`search`) that move the throttle little more than those of the
-    flight, or the `usual` ones; the first of `copters` is the likeliest."""
-    model, with_gains = FlightModel(flight, copters[:1]), flight.loop.with_gains
+    """Gains of the loop's space (`search`) that move the throttle little more than those of the flight; the first of
+    `copters` is the likeliest."""
+    model, loop = FlightModel(flight, copters[:1]), flight.loop
     return search(
-        flight.loop.space if space is None else space,
+        loop.space,
         starts,
-        flight.loop.gains if usual is None else usual,
-        fly=lambda gains: model.fly(with_gains(gains)),
-        loop_of=with_gains,
+        loop.gains,
+        fly=lambda gains: model.fly(loop.with_gains(gains)),
+        loop_of=loop.with_gains,
         vehicles=copters,
     )
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Final, Self
 
 import numpy as np
@@ -13,9 +12,9 @@ from app.core.definition import OptionValue
 from app.core.experiments.base import Check, Envelope, Matrix, ModelParameter, ParameterDistribution, Scatter
 from app.core.experiments.copter_steps_hazards import COPTERS, check_margin
 from app.core.experiments.step_sequence import REFERENCE, StepSequence, step_options
-from app.core.experiments.vertical_loop import MODEL_PARAMETERS, SKETCH_EVERY, STATE, VerticalLoop, counts
+from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
 from app.core.models.copter import filtered, motor_filter
-from app.core.models.vertical import COLUMNS, ENTERED, START_LATENCY_S, commanded, fly_recorded
+from app.core.models.vertical import START_LATENCY_S, commanded, fly_recorded, observe
 from app.core.models.vertical_batch import reference_altitude
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -50,7 +49,6 @@ class AltitudeSteps(VerticalLoop):
         super().__init__(model_parameters, sequence.set_points, sequence.ends_s)
         self.sequence: Final = sequence
         self.measure = str(sequence)
-        self._first: Final = self.set_points.steps[1]
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The experiment with another sequence; itself if that is its own."""
@@ -61,17 +59,6 @@ class AltitudeSteps(VerticalLoop):
         """The same sequence on another model."""
         return type(self)(model_parameters, sequence=self.sequence)
 
-    @property
-    def sketches_s(self) -> tuple[float, float]:
-        """The first two steps, which differ in their direction; then the whole flight."""
-        return CLIMB_S + 2.0 * self.sequence.step_window_s, self.window_s
-
-    def sketch_errors(self, altitude: Matrix, until_s: float) -> Vector:  # noqa: ARG002
-        """Mean distance from the reference after the first step."""
-        first = -(-self._first // SKETCH_EVERY)
-        reference = self.reference[::SKETCH_EVERY][first : altitude.shape[1]]
-        return np.asarray(np.abs(altitude[:, first:] - reference).mean(axis=1))
-
     def least_model_error(self, base: Trajectory) -> float:
         """The loop rounds the altitude to 1/256 m, and the time at which a step took effect is known to a row of the
         record, by which the reference is early or late; both are uniformly distributed."""
@@ -79,25 +66,19 @@ class AltitudeSteps(VerticalLoop):
         row_m = np.abs(np.diff(base[REFERENCE][scored])).mean()
         return math.hypot((1 / (1 << POSITION_BITS)) / math.sqrt(12.0), float(row_m) / math.sqrt(3.0))
 
-    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
+    def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix:
         """As of all flights under this loop; a thrust command that a link does not record is what the replica commands
         for the recorded altitude, climb rate and set points."""
-        if "thrust" not in trajectory.channels and "climb_rate_m_s" in trajectory.channels:
-            rows = np.maximum(np.searchsorted(trajectory.time_s, self.grid_s, side="right") - 1, 0)
+        grid_s, time_s = self.grid_s, trajectory.time_s
+        altitude, climb = (np.interp(grid_s, time_s, trajectory[name]) for name in ("altitude_m", "climb_rate_m_s"))
+        if "thrust" in trajectory.channels:
+            thrust = np.interp(grid_s, time_s, trajectory["thrust"])
+        else:
+            rows = np.maximum(np.searchsorted(time_s, grid_s, side="right") - 1, 0)
             targets = np.rint(trajectory["set_point_m"][rows] * (1 << POSITION_BITS)).astype(np.int64)
-            altitude, climb = (np.interp(self.grid_s, trajectory.time_s, trajectory[name]) for name in STATE)
             entered_step = round(float(model[START_LATENCY_S]) * RATE_HZ)
             thrust = commanded(counts(gains), targets, altitude, climb, entered_step)
-            flown = dict(zip((*STATE, "thrust"), (altitude, climb, thrust), strict=True))
-            trajectory = replace(trajectory, time_s=self.grid_s, channels=flown)
-        return super().disturbances(trajectory, gains, model)
-
-    @property
-    def still_air(self) -> Matrix:
-        """Disturbances of a flight whose record tells none."""
-        disturbances = np.zeros((self._samples, COLUMNS))
-        disturbances[:, ENTERED] = 1.0
-        return disturbances
+        return observe(altitude, climb, thrust, self._models(model, 1)[0])
 
     def flown(self, gains: Vector, model: Vector, disturbances: Matrix) -> tuple[float, float]:
         """Error, m, and throttle activity, share of full, of a flight with these disturbances: the standard deviation

@@ -4,7 +4,6 @@ parameters, and the hazards. An experiment adds its set points and its performan
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, Final, Self
 
@@ -30,12 +29,7 @@ from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 
-SETTLED_S: Final = 5.0
-"""A vehicle should be near its first set point from this time on."""
-SKETCH_EVERY: Final = 4
-"""Only every fourth step of a sketch is evaluated."""
-_NEAR_M: Final = 0.6
-STATE: Final = ("altitude_m", "climb_rate_m_s")
+_STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
 
 
 def _gain(name: str, title: str, upper: int, default: int) -> Gain:
@@ -70,18 +64,6 @@ MODEL_PARAMETERS: Final = (
 )
 """The data sheet gives mass and thrust only: every other nominal value is zero. The expected values of the others are
 typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sketches:
-    """Shortened flights of c policies on k models; all of shape (c, k).
-
-    The errors are estimates of those of the whole flights; `lowest_m` is taken from 5 s after the command on.
-    """
-
-    errors: Matrix
-    highest_m: Matrix
-    lowest_m: Matrix
 
 
 class VerticalLoop(OwnModel, ABC):
@@ -140,15 +122,6 @@ class VerticalLoop(OwnModel, ABC):
     def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
         """The same experiment on another model."""
 
-    @property
-    @abstractmethod
-    def sketches_s(self) -> tuple[float, float]:
-        """Times until which the robust optimum simulates: a coarse look, then a finer one; above `SETTLED_S`."""
-
-    @abstractmethod
-    def sketch_errors(self, altitude: Matrix, until_s: float) -> Vector:
-        """Estimated errors of flights known until `until_s`, at every `SKETCH_EVERY`-th step: (k, s) → (k,)."""
-
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The experiment with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
         return self.with_parameters(informed_parameters(self.model_parameters, mean, sd))
@@ -179,10 +152,10 @@ class VerticalLoop(OwnModel, ABC):
 
         The third column marks when the loop is entered. None if the record lacks the climb rate or the thrust command.
         """
-        if any(name not in trajectory.channels for name in (*STATE, "thrust")):
+        if any(name not in trajectory.channels for name in _STATE_AND_COMMAND):
             return None
         altitude, climb_rate, thrust = (
-            np.interp(self.grid_s, trajectory.time_s, trajectory[name]) for name in (*STATE, "thrust")
+            np.interp(self.grid_s, trajectory.time_s, trajectory[name]) for name in _STATE_AND_COMMAND
         )
         return observe(altitude, climb_rate, thrust, self._models(model, 1)[0])
 
@@ -207,29 +180,8 @@ class VerticalLoop(OwnModel, ABC):
             Manoeuvre(self.set_points, steps, self.simulated_as),
         )
 
-    def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
-        """Simulate every policy on every model until `until_s`, which must exceed 5 s, or to the end of the window:
-        gains (c, 3), models (k, m)."""
-        until_s = min(until_s, self.window_s)
-        runs = np.repeat(counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
-        altitude = fly_batch(*runs, self.set_points, round(until_s * RATE_HZ))[:, ::SKETCH_EVERY]
-        return Sketches(
-            errors=_by_policy(self.sketch_errors(altitude, until_s), gains),
-            highest_m=_by_policy(altitude.max(axis=1), gains),
-            lowest_m=_by_policy(altitude[:, round(SETTLED_S * RATE_HZ / SKETCH_EVERY) :].min(axis=1), gains),
-        )
-
-    @property
-    def expected_m(self) -> tuple[float, float]:
-        """Altitudes between which a sketch should stay, m; they keep a margin from what is unsafe."""
-        return min(self.set_points.altitudes_m) - _NEAR_M, max(self.set_points.altitudes_m) + _NEAR_M
-
     def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
         return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
-
-
-def _by_policy(runs: Vector, gains: Matrix) -> Matrix:
-    return runs.reshape(len(gains), -1)
 
 
 def counts(gains: Vector | Matrix) -> Counts:

@@ -18,7 +18,6 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.loop import AltitudeLoop, GainSpace
 from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
-from app.core.analysis.proposal import propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
 from app.core.definition import Flight, best_flight
 from app.core.errors import InputError, Problem, TrajectoryError
@@ -57,7 +56,7 @@ class CopterModel(LimitedModel[Copter]):
         Raises TrajectoryError naming the flight whose record does not suffice, or whose autopilot had a parameter
         with which its replica does not hold."""
         used = fitted_flights(flights)
-        self.base: Final = best_flight(used)
+        self.base = best_flight(used)
         self.numbers: Final = tuple(flight.number for flight in used)
         self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
         self._experiment: Final = experiment.exactly_under(self.base.parameters)
@@ -67,6 +66,7 @@ class CopterModel(LimitedModel[Copter]):
             raise _unlike(worst, why)
         self._hover: Final = experiment.advise_hover(self._estimate.mean.hover_throttle)
         first = next(flight for flight in flights if flight.outcome == "valid")
+        self.policy_space = experiment.space
         self.first_gains = experiment.space.vector(first.gains)
 
     @cached_property
@@ -126,16 +126,9 @@ class CopterModel(LimitedModel[Copter]):
                 f"deviates by {1e3 * flown_m:.1f} mm, where its gains make the fitted vehicle deviate by "
                 f"{1e3 * modelled_m:.1f} mm: it flew with other gains or parameters",
             )
-        space, here = self._experiment.space, space_within(self._log.loop.space, self._experiment, box)
+        here = space_within(self._log.loop.space, self._experiment, box)
         rules = self._log.loop.rules(self._log.throttle_mean)
-        found = propose(
-            self._log,
-            self.vehicles,
-            [self._log.loop.gains, *rules.values()],
-            space=here,
-            usual=self.loop(self.first_gains).gains,
-        )
-        return None if found is None else space.vector({**self.base.gains, **found})
+        return self.found(here, list(rules.values()))
 
     def errors(self, gains: Matrix) -> Vector:
         return self.merits(gains)

@@ -343,7 +343,8 @@ def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> M
     """The same for many gain sets: (c, n) → (c, samples)."""
     experiment = calibration.experiment
     flown = experiment.space.vector(base.gains)
-    own, disturbances = weather_of(calibration, base)
+    own = calibration.own_models[calibration.numbers.index(base.number)]
+    disturbances = experiment.disturbances(base.trajectory.as_stored(), flown, own)
     if disturbances is None:
         return np.stack([calibration.residual * _similarity(experiment, some, flown) for some in gains])
     calm = np.zeros_like(disturbances)
@@ -351,12 +352,6 @@ def remaining_biases(calibration: Calibration, base: Flight, gains: Matrix) -> M
     disturbed, undisturbed = (experiment.disturbed_outputs(gains, own, acting) for acting in (disturbances, calm))
     beyond: Matrix = disturbed - undisturbed
     return beyond
-
-
-def weather_of(calibration: Calibration, base: Flight) -> tuple[Vector, Matrix | None]:
-    """The own model of a calibrated flight, shape (m,), and the disturbances relative to it, if its record has them."""
-    experiment, own = calibration.experiment, calibration.own_models[calibration.numbers.index(base.number)]
-    return own, experiment.disturbances(base.trajectory.as_stored(), experiment.space.vector(base.gains), own)
 
 
 def _similarity(experiment: ModelledExperiment, gains: Vector, flown: Vector) -> float:

@@ -134,8 +134,8 @@ def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flig
     if numbers:
         aborted = f"{named_flights(numbers).capitalize()} {'was' if len(numbers) == 1 else 'were'} aborted"
         return (
-            f"{aborted} because of the vehicle's behaviour with these gains: {source}. {TUNE_FIRST}. Fly them again only "
-            "if you know the cause; otherwise use custom gains"
+            f"{aborted} because of the vehicle's behaviour with these gains: {source}. {TUNE_FIRST}. Fly them again "
+            "only if you know the cause; otherwise use custom gains"
         )
     return f"The {'next' if flights else 'first'} flight uses {source}"
 

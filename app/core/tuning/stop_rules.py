@@ -15,8 +15,8 @@ FAILURES_ALLOWED: Final = 2
 ABORTS_ALLOWED: Final = 2
 """Flights with the same gains that may be aborted because of them."""
 TUNE_FIRST: Final = (
-    "Often another loop is the cause: oscillating rate loops make a vehicle climb, drift or lean with any gains of this "
-    "campaign. Look at its attitude in the flight, and tune attitude first"
+    "Often another loop is the cause: oscillating rate loops make a vehicle climb, drift or lean with any gains of "
+    "this campaign. Look at its attitude in the flight, and tune attitude first"
 )
 """What it may mean that a limit aborted a flight, without a full stop."""
 
@@ -47,8 +47,9 @@ def evaluate_stop_rule(
     """Apply the campaign's stop rule to its flights and the proposal computed from them.
 
     With any rule, gains are not proposed once more after `ABORTS_ALLOWED` flights were aborted because of them. Flights
-    that repeat earlier gains count towards the budget only: they are not expected to improve. `battery_v` is the voltage, V, at which the last flight ended, whether or not that flight counts. Up to `open_until_flight` flights
-    no rule ends the campaign, because it was reopened for them; a low battery is still reported.
+    that repeat earlier gains count towards the budget only: they are not expected to improve. `battery_v` is the
+    voltage, V, at which the last flight ended, whether or not that flight counts. Up to `open_until_flight` flights no
+    rule ends the campaign, because it was reopened for them; a low battery is still reported.
     """
     verdict = decide_stop(
         definition.stop,
@@ -61,9 +62,9 @@ def evaluate_stop_rule(
     aborted = [] if proposal.kind in ("none", "manual") else aborted_by_gains(flights, proposal.gains)
     if len(aborted) >= ABORTS_ALLOWED:
         why = (
-            f"{named_flights([flight.number for flight in aborted]).capitalize()} were aborted because of the vehicle's "
-            f"behaviour with the same gains ({format_gains(proposal.gains)}). {TUNE_FIRST}, then start a new campaign; "
-            "or reopen this one for custom gains."
+            f"{named_flights([flight.number for flight in aborted]).capitalize()} were aborted because of the "
+            f"vehicle's behaviour with the same gains ({format_gains(proposal.gains)}). {TUNE_FIRST}, then start a new "
+            "campaign; or reopen this one for custom gains."
         )
         verdict = replace(verdict, stop=True, reason="aborted again", why=why)
     if not verdict.stop or len(flights) >= open_until_flight:

@@ -124,7 +124,9 @@ def test_start_gains_that_a_limit_aborted_are_advised_against_and_after_a_second
     experiment: str, rule: StopRule
 ) -> None:
     """With a model and without one. Reported were four proposals of the same gains, one after the other."""
-    definition = Definition(experiment=experiment, strategy="gradient" if experiment == "takeoff" else "manual", stop=rule)
+    definition = Definition(
+        experiment=experiment, strategy="gradient" if experiment == "takeoff" else "manual", stop=rule
+    )
     gains = next_proposal(definition, []).gains
     record = fly(1, {"kp": 283, "ki": 13, "kd": 82}).trajectory
     first = Flight(number=1, gains=gains, trajectory=record, error=None, outcome="aborted")

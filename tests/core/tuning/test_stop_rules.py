@@ -62,7 +62,11 @@ def test_gains_that_were_aborted_twice_are_not_proposed_a_third_time_whatever_th
     again = replace(valid, number=2, outcome="aborted", error=None)
     other = replace(again, gains={"a": 1.0, "b": 1.0})
     repeat = Proposal(
-        kind="repeat", gains=dict(valid.gains), predicted=None, predicted_error=None, explanation=Explanation(summary="")
+        kind="repeat",
+        gains=dict(valid.gains),
+        predicted=None,
+        predicted_error=None,
+        explanation=Explanation(summary=""),
     )
 
     def reason(*flights: Flight, proposal: Proposal = repeat, open_until_flight: int = 0) -> str | None:
