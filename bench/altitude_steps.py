@@ -188,9 +188,10 @@ def measure_links(count: int) -> bool:
     second = np.array([np.mean(each.errors) for each in scored])
     activity = np.array([each.activity for each in scored])
     low, high = np.quantile([each.ratio for each in scored], (0.05, 0.95)).tolist()
+    first = float(np.median([each.first for each in scored]))
     rings = sum(each.damping < RINGING_DAMPING for each in scored)
     print(
-        f"over a link: {len(scored)} of {count} scored; median flight 1 {mm(float(np.median([each.first for each in scored])))}, "
+        f"over a link: {len(scored)} of {count} scored; median flight 1 {mm(first)}, "
         f"flight 2 {mm(float(np.median(second)))}, 95 % below {mm(float(np.quantile(second, 0.95)))}; {inside:.0%} of "
         f"{LINKED_FLIGHTS * len(scored)} flights inside the 90 % interval; flown over predicted: median "
         f"{np.median([each.ratio for each in scored]):.2f}, 5 … 95 % {low:.2f} … {high:.2f}; throttle activity: median "
