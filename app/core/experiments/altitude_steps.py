@@ -14,7 +14,16 @@ from app.core.experiments.copter_steps_hazards import COPTERS, check_margin
 from app.core.experiments.step_sequence import REFERENCE, StepSequence, step_options
 from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
 from app.core.models.copter import filtered, motor_filter
-from app.core.models.vertical import START_LATENCY_S, commanded, fly_recorded, observe
+from app.core.models.vertical import (
+    ALTITUDE,
+    CHANNELS,
+    COLUMNS,
+    ENTERED,
+    START_LATENCY_S,
+    commanded,
+    fly_recorded,
+    observe,
+)
 from app.core.models.vertical_batch import reference_altitude
 from app.core.policy import Vector
 from app.core.records.trajectory import Samples, Trajectory
@@ -23,6 +32,7 @@ CLIMB_S: Final = 10.0
 """Time from the command to the first step: the reference needs 4 s for the climb."""
 
 _SCATTER_M: Final = 0.005
+_THRUST: Final = CHANNELS.index("thrust")
 _SLOW_S: Final = 1.0 / (2.0 * math.pi * 2.0)
 _SEQUENCE: Final = StepSequence(climb_s=CLIMB_S)
 
@@ -80,13 +90,16 @@ class AltitudeSteps(VerticalLoop):
             thrust = commanded(counts(gains), targets, altitude, climb, entered_step)
         return observe(altitude, climb, thrust, self._models(model, 1)[0])
 
-    def flown(self, gains: Vector, model: Vector, disturbances: Matrix) -> tuple[float, float]:
-        """Error, m, and throttle activity, share of full, of a flight with these disturbances: the standard deviation
-        of the commanded thrust about its own 2 Hz low-pass, over the windows of the steps."""
-        altitude, *_, thrust, _, _ = fly_recorded(counts(gains), model, self.set_points, disturbances)
-        fast = thrust - filtered(thrust, motor_filter(_SLOW_S, STEP_S))
+    def flown(self, gains: Vector, models: Matrix, own: Vector, disturbances: Matrix) -> tuple[float, float]:
+        """Mean error, m, of models, (k, m), to which is added what the disturbances cause on their `own` model, (m,),
+        and the throttle activity there, share of full: the standard deviation of the commanded thrust about its own
+        2 Hz low-pass, over the windows of the steps."""
+        calm = disturbances * (np.arange(COLUMNS) == ENTERED)
+        disturbed, still = (fly_recorded(counts(gains), own, self.set_points, each) for each in (disturbances, calm))
+        outputs = self.outputs(np.tile(gains, (len(models), 1)), models) + disturbed[ALTITUDE] - still[ALTITUDE]
+        fast = disturbed[_THRUST] - filtered(disturbed[_THRUST], motor_filter(_SLOW_S, STEP_S))
         scored = self.grid_s >= self.scored_from_s
-        return float(self.errors(altitude[np.newaxis])[0]), float(fast[scored].std())
+        return float(np.abs(outputs - self.reference)[:, scored].mean()), float(fast[scored].std())
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """As of all flights under this loop, and the margin from ringing."""

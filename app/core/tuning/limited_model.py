@@ -46,7 +46,7 @@ class LimitedModel(ABC, Generic[_V]):
 
     @abstractmethod
     def flown(self, gains: Vector) -> tuple[float, float]:
-        """Error, m, and throttle activity of the likeliest vehicle in the weather of the best flight."""
+        """Predicted error, m, and throttle activity of the likeliest vehicle, in the weather of the best flight."""
 
     def merits(self, gains: Matrix) -> Vector:
         """Errors of many gain sets: (c, n) → (c,)."""

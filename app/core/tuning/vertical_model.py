@@ -17,6 +17,7 @@ from app.core.experiments.vertical_loop import VerticalLoop
 from app.core.policy import Vector
 from app.core.tuning.calibration import Calibration, calibrate
 from app.core.tuning.limited_model import LimitedModel
+from app.core.tuning.predictions import MODELS as PLAUSIBLE
 from app.core.tuning.predictions import FlightPrediction, predict_errors, predict_flight
 from app.core.tuning.trust_region import Box, find_robust_optimum, merit
 
@@ -89,8 +90,9 @@ class TakeoffModel(VerticalModel[Takeoff]):
 
 
 class StepsModel(VerticalModel[AltitudeSteps], LimitedModel[Vector]):
-    """A `CampaignModel`, whose gains are searched as those of ArduCopter and PX4: error and throttle activity are those
-    of the best flight's own model, with the disturbances of that flight."""
+    """A `CampaignModel`, whose gains are searched as those of ArduCopter and PX4, with the disturbances of the best
+    flight. The error is the mean over plausible vehicles in another flight: the likeliest alone could do without
+    integral gain."""
 
     def __init__(self, experiment: AltitudeSteps, flights: Sequence[Flight]) -> None:
         super().__init__(experiment, flights)
@@ -106,11 +108,12 @@ class StepsModel(VerticalModel[AltitudeSteps], LimitedModel[Vector]):
         return PaparazziLoop(gains)
 
     @cached_property
-    def _weather(self) -> tuple[Vector, Matrix]:
-        """The best flight's own model, and its disturbances."""
+    def _weather(self) -> tuple[Matrix, Vector, Matrix]:
+        """Plausible models, the best flight's own one, and its disturbances."""
         own = self._calibration.own_models[self.numbers.index(self.base.number)]
         gains = self._experiment.space.vector(self.base.gains)
-        return own, self._experiment.disturbances(self.base.trajectory.as_stored(), gains, own)
+        models = self._calibration.plausible(runs=PLAUSIBLE, next_flight=True)
+        return models, own, self._experiment.disturbances(self.base.trajectory.as_stored(), gains, own)
 
     def flown(self, gains: Vector) -> tuple[float, float]:
         return self._experiment.flown(gains, *self._weather)
