@@ -30,6 +30,7 @@ from app.jobs import service as jobs
 PROPOSAL_JOB: Final = "proposal"
 _COMPUTED_IN: Final = frozenset(CampaignState) - {CampaignState.ARCHIVED}
 _OUTCOMES: Final[dict[Reason, Outcome]] = {
+    "aborted again": Outcome.STOPPED,
     "flight budget": Outcome.BUDGET,
     "not improving": Outcome.CONVERGED,
     "nothing better": Outcome.CONVERGED,

@@ -29,7 +29,7 @@ _BUNDLE: Final = "report/plotly-cartesian.min.js"
 _OUTCOMES: Final = {
     "converged": "Converged",
     "budget": "Flight budget used",
-    "stopped": "Stopped by the operator",
+    "stopped": "Stopped",
 }
 _STATES: Final = {
     "draft": "Not flown yet",

@@ -3,13 +3,46 @@ linear model in hover, and its words."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, Self
+from typing import Literal, Protocol, Self, TypeVar
 
 import numpy as np
 
 from app.core.analysis.segment import Segment, Steps
 from app.core.models.copter import BODY_SIZE, Copter, Filter
 from app.core.records.trajectory import Samples
+
+_V_contra = TypeVar("_V_contra", contravariant=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarginTexts:
+    """`fast_gains` are those that a margin scales, and `lateness` is what it adds to the vehicle."""
+
+    fast_gains: str
+    lateness: str
+
+
+class LinearLoop(Protocol[_V_contra]):
+    """What a margin asks of a loop, about hover on a model of its vehicle; immutable."""
+
+    @property
+    def texts(self) -> MarginTexts:
+        """Its names and sentences."""
+        ...
+
+    @property
+    def step_s(self) -> float:
+        """Duration of a step."""
+        ...
+
+    def with_fast_gains(self, factor: float) -> Self:
+        """The loop with this factor on the gains that all feedback passes through."""
+        ...
+
+    def transition(self, vehicle: _V_contra, /, *, late_s: float = 0.0) -> Samples:
+        """Derivative of the state of loop and vehicle after a step in hover with respect to that before, shape
+        (k, k); the vehicle follows `late_s` later than it does."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,14 +84,13 @@ class GainSpace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoopTexts:
+class LoopTexts(MarginTexts):
     """Names and sentences about a loop.
 
     `prefix` is that of its parameters. `hover_parameter` holds the hover throttle that it assumes, within
     `hover_range`; `hover_use` says what for, and `hover_deviation` names the parameter of how far an estimate may be
-    from it, if there is one. `fast_gains` are those that a margin scales, and `lateness` is what it adds to the
-    vehicle. `what_to_fly` answers a log that does not suffice, `lags` say what to reduce if no gains do,
-    `other_controller` what may have flown instead of this loop.
+    from it, if there is one. `what_to_fly` answers a log that does not suffice, `lags` say what to reduce if no gains
+    do, `other_controller` what may have flown instead of this loop.
     """
 
     autopilot: Literal["ArduCopter", "PX4"]
@@ -66,8 +98,6 @@ class LoopTexts:
     hover_parameter: str
     hover_range: tuple[float, float]
     hover_use: str
-    fast_gains: str
-    lateness: str
     what_to_fly: str
     lags: str
     other_controller: str
@@ -86,8 +116,8 @@ class Run:
     start: tuple[float, float, float, float]
 
 
-class AltitudeLoop(Protocol):
-    """An autopilot's altitude loop with the parameters of a flight; immutable."""
+class AltitudeLoop(LinearLoop[Copter], Protocol):
+    """An autopilot's altitude loop with the parameters of a flight."""
 
     @property
     def texts(self) -> LoopTexts:
@@ -97,11 +127,6 @@ class AltitudeLoop(Protocol):
     @property
     def space(self) -> GainSpace:
         """The gains to choose."""
-        ...
-
-    @property
-    def step_s(self) -> float:
-        """Duration of a step."""
         ...
 
     @property
@@ -180,10 +205,6 @@ class AltitudeLoop(Protocol):
         """The loop with another value of the parameter for the throttle in hover."""
         ...
 
-    def with_fast_gains(self, factor: float) -> Self:
-        """The loop with this factor on the gains that all feedback passes through."""
-        ...
-
     def climb_rate_targets(self, segment: Segment) -> Samples:
         """What the climb rate target of each row must be, shape (n,)."""
         ...
@@ -203,11 +224,6 @@ class AltitudeLoop(Protocol):
 
     def fly(self, run: Run) -> Samples:
         """Fly a run, shape (m, 6) as `FLOWN`."""
-        ...
-
-    def transition(self, copter: Copter, *, late_s: float = 0.0) -> Samples:
-        """Derivative of the state of loop and copter after a step in hover with respect to that before, shape
-        (k, k); the copter follows `late_s` later than it does."""
         ...
 
 

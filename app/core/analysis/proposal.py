@@ -4,12 +4,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from itertools import product
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
 from app.core.analysis.flight import LoggedFlight
-from app.core.analysis.loop import AltitudeLoop, GainSpace
+from app.core.analysis.loop import GainSpace, LinearLoop
 from app.core.analysis.margin import RINGING_DAMPING, gain_margin, robust_damping
 from app.core.analysis.prediction import FlightModel
 from app.core.models.copter import Copter
@@ -32,36 +32,52 @@ _ROUNDING: Final = 0.005
 _Point = tuple[float, ...]
 """Coordinates of the gains in the loop's space."""
 
+_V = TypeVar("_V")
+
 
 def propose(
-    flight: LoggedFlight,
-    copters: Sequence[Copter],
-    starts: Sequence[Mapping[str, float]],
-    *,
-    space: GainSpace | None = None,
-    usual: Mapping[str, float] | None = None,
+    flight: LoggedFlight, copters: Sequence[Copter], starts: Sequence[Mapping[str, float]]
 ) -> dict[str, float] | None:
-    """Gains of the loop's space, or of a narrower one, with three digits, searched for from the best allowed one of
-    `starts`, its gentle set and a lattice; None if none is allowed. Of what is found and these starts, those within 5 %
-    of the best error, the one with the largest margin.
+    """Gains of the loop's space (`search`) that move the throttle little more than those of the flight; the first of
+    `copters` is the likeliest."""
+    model, loop = FlightModel(flight, copters[:1]), flight.loop
+    return search(
+        loop.space,
+        starts,
+        loop.gains,
+        fly=lambda gains: model.fly(loop.with_gains(gains)),
+        loop_of=loop.with_gains,
+        vehicles=copters,
+    )
 
-    The first of `copters` is the likeliest: error, throttle activity and margin are its. Allowed are gains within the
-    space with which no copter rings (`robust_damping`), and that move the throttle at most `LARGEST_ACTIVITY` times as
-    much as those of the flight, or the `usual` ones.
+
+def search(
+    space: GainSpace,
+    starts: Sequence[Mapping[str, float]],
+    usual: Mapping[str, float],
+    *,
+    fly: Callable[[Mapping[str, float]], tuple[float, float]],
+    loop_of: Callable[[Mapping[str, float]], LinearLoop[_V]],
+    vehicles: Sequence[_V],
+) -> dict[str, float] | None:
+    """Gains of a space with three digits, searched for from the best allowed one of `starts`, its gentle set and a
+    lattice; None if none is allowed. Of what is found and these starts, those within 5 % of the best error, the one
+    with the largest margin.
+
+    The first of `vehicles` is the likeliest: error, m, and throttle activity, which `fly` returns, and margin are its.
+    Allowed are gains within the space with which no vehicle rings (`robust_damping`), and that move the throttle at
+    most `LARGEST_ACTIVITY` times as much as the `usual` ones.
     """
-    space = flight.loop.space if space is None else space
-    likeliest = copters[0]
-    model = FlightModel(flight, [likeliest])
-    _, usual_activity = model.fly(flight.loop if usual is None else flight.loop.with_gains(usual))
+    _, usual_activity = fly(usual)
 
     @cache
-    def loop_at(point: _Point) -> AltitudeLoop:
-        return flight.loop.with_gains(space.gains_at(np.array(point)))
+    def loop_at(point: _Point) -> LinearLoop[_V]:
+        return loop_of(space.gains_at(np.array(point)))
 
     @cache
     def flown(point: _Point) -> tuple[float, float]:
-        """Logarithms of the predicted error, and of the throttle activity relative to that of the flight."""
-        error_m, activity = model.fly(loop_at(point))
+        """Logarithms of the predicted error, and of the throttle activity relative to the usual one."""
+        error_m, activity = fly(space.gains_at(np.array(point)))
         return math.log(error_m), math.log(activity / usual_activity)
 
     def cost(point: _Point) -> float:
@@ -73,7 +89,7 @@ def propose(
         """How far the point is beyond what is allowed: in damping, activity, and the order of gains; allowed if none is
         positive."""
         return (
-            RINGING_DAMPING - robust_damping(loop_at(point), copters),
+            RINGING_DAMPING - robust_damping(loop_at(point), vehicles),
             flown(point)[1] - math.log(LARGEST_ACTIVITY),
             *space.disorder(np.array(point)),
         )
@@ -83,7 +99,7 @@ def propose(
         return flown(point)[1] <= math.log(LARGEST_ACTIVITY) and max(excess(point)) <= 0.0
 
     def margin(point: _Point) -> float:
-        return gain_margin(loop_at(point), likeliest)
+        return gain_margin(loop_at(point), vehicles[0])
 
     low, high = (space.coordinates({name: ends[end] for name, ends in space.bounds.items()}) for end in (0, 1))
     points = [tuple(space.coordinates(start).tolist()) for start in (*starts, space.gentle)]

@@ -332,6 +332,10 @@ class OwnModel:
         """Parameters before the first flight, shape (m,)."""
         return np.array([parameter.nominal for parameter in self.model_parameters])
 
+    def least_model_error(self, base: Trajectory) -> float:  # noqa: ARG002 - not without a resolution of its own
+        """None."""
+        return 0.0
+
     def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
         """The experiment itself."""
         return self
@@ -367,10 +371,9 @@ class ModelledExperiment(Experiment, Protocol):
         """Nominal parameters, shape (m,), in the order of `model_parameters`."""
         ...
 
-    @property
-    def least_model_error(self) -> float:
-        """Standard deviation, in the error's unit, by which the prediction of even a fitted model is wrong, beside a
-        relative error."""
+    def least_model_error(self, base: Trajectory) -> float:
+        """Standard deviation, in the error's unit, by which a prediction of even a fitted model is wrong, beside a
+        relative error, for flights recorded as `base` was."""
         ...
 
     @property

@@ -95,7 +95,6 @@ class CopterSteps(OwnModel, ABC):
     scored_from_s: Final = CLIMB_S
     target_channel: Final = REFERENCE
     reference: Final = None
-    least_model_error: Final = 0.0
     search: Final = SimplexSearch(of_scale=0.5, evaluations=200)
     difference: Final = 0.05
 

@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, TypeVar
 
 from app.core.analysis.hover import HoverAdvice
-from app.core.analysis.loop import AltitudeLoop
+from app.core.analysis.loop import LinearLoop
 from app.core.analysis.margin import EXTRA_LAG_S, REQUIRED_MARGIN, RINGING_DAMPING, robust_damping
 from app.core.errors import Problem
 from app.core.experiments.base import Check, Matrix
 from app.core.formatting import number
-from app.core.models.copter import Copter
 from app.core.models.set_points import SetPoints
 
+_V = TypeVar("_V")
+
 COPTERS: Final = 5
-"""Copters of a distribution that are checked, and for which gains are searched."""
+"""Vehicles of a distribution that are checked, and for which gains are searched."""
 _KNOWN_TO: Final = 0.03
 """Standard deviation of a hover throttle that flights have shown; the data sheet's is larger."""
 
@@ -70,15 +71,15 @@ def check_hover(advice: HoverAdvice | None, hover_throttle: float, deviation: fl
     return (Check("hover throttle", True, sentence, worst=hover_throttle, limit=advice.found),)
 
 
-def check_margin(loop: AltitudeLoop, copters: Sequence[Copter]) -> Check:
-    """Whether the loop rings with none of the copters (`robust_damping`), of which the first is the likeliest."""
-    damping = robust_damping(loop, copters)
+def check_margin(loop: LinearLoop[_V], vehicles: Sequence[_V]) -> Check:
+    """Whether the loop rings with none of the vehicles (`robust_damping`), of which the first is the likeliest."""
+    damping = robust_damping(loop, vehicles)
     passed = damping >= RINGING_DAMPING
     return Check(
         "margin",
         passed,
         f"With up to {REQUIRED_MARGIN:g} times the {loop.texts.fast_gains}, and {1e3 * EXTRA_LAG_S:.0f} ms more "
-        f"{loop.texts.lateness} for the likeliest vehicle, the least damped of {len(copters)} likely vehicles has a "
+        f"{loop.texts.lateness} for the likeliest vehicle, the least damped of {len(vehicles)} likely vehicles has a "
         f"damping ratio of {damping:.2f}; {'at least ' if passed else ''}{RINGING_DAMPING:g} is needed.",
         worst=damping,
         limit=RINGING_DAMPING,

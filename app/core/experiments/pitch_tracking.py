@@ -101,7 +101,6 @@ class PitchTracking(OwnModel):
     target_channel: Final = None
     reference: Final = None
     set_points: Final = None
-    least_model_error: Final = 0.0
     scatter: Final = Scatter(sd=0.001, degrees_of_freedom=4.0)
     search: Final = SimplexSearch(of_scale=0.5, iterations=300, bounded=False)
     difference: Final = 0.001

@@ -6,6 +6,7 @@ vehicle.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final, Self
 
 import numpy as np
@@ -13,8 +14,9 @@ import numpy as np
 from app.core.control.paparazzi import RATE_HZ
 from app.core.definition import Option, OptionValue, with_defaults
 from app.core.experiments.base import Matrix, ModelParameter, Scatter
-from app.core.experiments.vertical_loop import MODEL_PARAMETERS, SKETCH_EVERY, VerticalLoop
+from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
 from app.core.models.set_points import SetPoints
+from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.records.metrics import mean_absolute_error, mean_absolute_errors, require_scorable
 from app.core.records.trajectory import Samples, Trajectory
@@ -35,6 +37,10 @@ OPTIONS: Final = (
 )
 
 _SKETCH_END_S: Final = 2.0
+_SKETCH_EVERY: Final = 4
+"""Only every fourth step of a sketch is evaluated."""
+_SETTLED_S: Final = 5.0
+"""A vehicle should be near the set point from this time on."""
 _SCATTER_M: Final = 0.0105
 SET_POINTS: Final = SetPoints((0.0,), (TARGET_M,))
 
@@ -49,6 +55,18 @@ def _scatter(window_s: float, degrees_of_freedom: float, *, measured: bool = Tru
     return Scatter(_SCATTER_M * max(1.0, WINDOW_S / window_s), degrees_of_freedom, measured)
 
 
+@dataclass(frozen=True, slots=True)
+class Sketches:
+    """Shortened flights of c policies on k models; all of shape (c, k).
+
+    The errors are estimates of those of the whole flights; `lowest_m` is taken from 5 s after the command on.
+    """
+
+    errors: Matrix
+    highest_m: Matrix
+    lowest_m: Matrix
+
+
 class Takeoff(VerticalLoop):
     """Takeoff with the paper's autopilot, scored over the first `window_s` from the command on.
 
@@ -61,7 +79,10 @@ class Takeoff(VerticalLoop):
     options = OPTIONS
     scored_from_s = 0.0
     target_channel = None
-    sketches_s = (8.0, 12.0)
+    sketches_s: Final = (8.0, 12.0)
+    """Times until which the robust optimum simulates: a coarse look, then a finer one."""
+    expected_m: Final = (TARGET_M - 0.6, TARGET_M + 0.6)
+    """Altitudes between which a sketch should stay, m; they keep a margin from what is unsafe."""
     simulated_as = "takeoff"
 
     def __init__(
@@ -80,9 +101,20 @@ class Takeoff(VerticalLoop):
         """The takeoff on another model."""
         return type(self)(model_parameters, window_s=self.window_s)
 
-    def sketch_errors(self, altitude: Matrix, until_s: float) -> Vector:
-        """The mean deviation of the last two seconds is extrapolated over the rest of the flight."""
-        rate_hz = RATE_HZ / SKETCH_EVERY
+    def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
+        """Simulate every policy on every model until `until_s`, which must exceed 5 s, or to the end of the window:
+        gains (c, 3), models (k, m)."""
+        until_s = min(until_s, self.window_s)
+        runs = np.repeat(counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
+        altitude = fly_batch(*runs, self.set_points, round(until_s * RATE_HZ))[:, ::_SKETCH_EVERY]
+        settled = altitude[:, round(_SETTLED_S * RATE_HZ / _SKETCH_EVERY) :]
+        each = (self._sketch_errors(altitude, until_s), altitude.max(axis=1), settled.min(axis=1))
+        return Sketches(*(runs_of.reshape(len(gains), -1) for runs_of in each))
+
+    def _sketch_errors(self, altitude: Matrix, until_s: float) -> Vector:
+        """Estimated errors of flights known until `until_s`: the mean deviation of the last two seconds is extrapolated
+        over the rest of the flight."""
+        rate_hz = RATE_HZ / _SKETCH_EVERY
         deviations = np.abs(TARGET_M - altitude)
         end = deviations[:, -round(_SKETCH_END_S * rate_hz) :].mean(axis=1) * (self.window_s - until_s)
         return np.asarray((deviations.sum(axis=1) / rate_hz + end) / self.window_s)

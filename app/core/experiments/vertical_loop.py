@@ -4,7 +4,6 @@ parameters, and the hazards. An experiment adds its set points and its performan
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, Final, Self
 
@@ -30,11 +29,6 @@ from app.core.models.vertical_batch import fly_batch
 from app.core.policy import Gain, PolicySpace, Vector
 from app.core.records.trajectory import Samples, Trajectory
 
-SETTLED_S: Final = 5.0
-"""A vehicle should be near its first set point from this time on."""
-SKETCH_EVERY: Final = 4
-"""Only every fourth step of a sketch is evaluated."""
-_NEAR_M: Final = 0.6
 _STATE_AND_COMMAND: Final = ("altitude_m", "climb_rate_m_s", "thrust")
 
 
@@ -72,18 +66,6 @@ MODEL_PARAMETERS: Final = (
 typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sketches:
-    """Shortened flights of c policies on k models; all of shape (c, k).
-
-    The errors are estimates of those of the whole flights; `lowest_m` is taken from 5 s after the command on.
-    """
-
-    errors: Matrix
-    highest_m: Matrix
-    lowest_m: Matrix
-
-
 class VerticalLoop(OwnModel, ABC):
     """An experiment under Paparazzi's vertical loop, with its simple model; a run has n samples.
 
@@ -112,7 +94,6 @@ class VerticalLoop(OwnModel, ABC):
     difference: Final = 0.1
     simulated_as: ClassVar[str] = "flight"
     """What the gate calls a simulated flight."""
-    least_model_error: ClassVar[float] = 0.0
     held_s: ClassVar[float] = 0.0
     """Time that the gate simulates beyond the window, at the last set point."""
 
@@ -141,15 +122,6 @@ class VerticalLoop(OwnModel, ABC):
     def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:
         """The same experiment on another model."""
 
-    @property
-    @abstractmethod
-    def sketches_s(self) -> tuple[float, float]:
-        """Times until which the robust optimum simulates: a coarse look, then a finer one; above `SETTLED_S`."""
-
-    @abstractmethod
-    def sketch_errors(self, altitude: Matrix, until_s: float) -> Vector:
-        """Estimated errors of flights known until `until_s`, at every `SKETCH_EVERY`-th step: (k, s) → (k,)."""
-
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The experiment with another vehicle's fitted model: mean and standard deviation, shape (m,)."""
         return self.with_parameters(informed_parameters(self.model_parameters, mean, sd))
@@ -166,14 +138,14 @@ class VerticalLoop(OwnModel, ABC):
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One run of the simple model, for any integer gains, inside the bounds or not."""
         parameters = np.ascontiguousarray(np.broadcast_to(model, (len(self.model_parameters),)))
-        channels, _ = fly(_counts(gains), parameters, self.set_points, self._samples)
+        channels, _ = fly(counts(gains), parameters, self.set_points, self._samples)
         time_s = self.grid_s
         named = dict(zip(CHANNELS, channels, strict=True)) | {"set_point_m": self.set_point(time_s)}
         return Trajectory(time_s, named, "model", "simulation")
 
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
         """Altitude of many policies, each on its own model or all on one: gains (k, 3) → (k, n)."""
-        return fly_batch(_counts(gains), self._models(model, len(gains)), self.set_points, self._samples)
+        return fly_batch(counts(gains), self._models(model, len(gains)), self.set_points, self._samples)
 
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:  # noqa: ARG002
         """Difference of altitude and climb rate from the model's in every step of a flight, shape (n, 3).
@@ -189,7 +161,7 @@ class VerticalLoop(OwnModel, ABC):
 
     def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
         """`outputs` with `disturbances` added to the state after each step: gains (k, 3) → (k, n)."""
-        return fly_disturbed(_counts(gains), self._models(model, len(gains)), self.set_points, disturbances)
+        return fly_disturbed(counts(gains), self._models(model, len(gains)), self.set_points, disturbances)
 
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """Check for products that can wrap, exactly, and simulate flights.
@@ -208,32 +180,12 @@ class VerticalLoop(OwnModel, ABC):
             Manoeuvre(self.set_points, steps, self.simulated_as),
         )
 
-    def sketches(self, gains: Matrix, models: Matrix, until_s: float) -> Sketches:
-        """Simulate every policy on every model until `until_s`, which must exceed 5 s, or to the end of the window:
-        gains (c, 3), models (k, m)."""
-        until_s = min(until_s, self.window_s)
-        runs = np.repeat(_counts(gains), len(models), axis=0), np.tile(models, (len(gains), 1))
-        altitude = fly_batch(*runs, self.set_points, round(until_s * RATE_HZ))[:, ::SKETCH_EVERY]
-        return Sketches(
-            errors=_by_policy(self.sketch_errors(altitude, until_s), gains),
-            highest_m=_by_policy(altitude.max(axis=1), gains),
-            lowest_m=_by_policy(altitude[:, round(SETTLED_S * RATE_HZ / SKETCH_EVERY) :].min(axis=1), gains),
-        )
-
-    @property
-    def expected_m(self) -> tuple[float, float]:
-        """Altitudes between which a sketch should stay, m; they keep a margin from what is unsafe."""
-        return min(self.set_points.altitudes_m) - _NEAR_M, max(self.set_points.altitudes_m) + _NEAR_M
-
     def _models(self, model: Matrix | Vector, runs: int) -> Matrix:
         return np.ascontiguousarray(np.broadcast_to(model, (runs, len(self.model_parameters))))
 
 
-def _by_policy(runs: Vector, gains: Matrix) -> Matrix:
-    return runs.reshape(len(gains), -1)
-
-
-def _counts(gains: Vector) -> Counts:
+def counts(gains: Vector | Matrix) -> Counts:
+    """The gains as the loop's integers."""
     return np.ascontiguousarray(np.rint(gains), dtype=np.int64)
 
 
@@ -246,9 +198,9 @@ def _hazards(
     parameters: tuple[ModelParameter, ...],
     manoeuvre: Manoeuvre,
 ) -> tuple[Check, ...]:
-    counts, safe_counts, vehicles = _counts(np.array(gains)), _counts(np.array(safe_gains)), np.array(models)
+    own, safe, vehicles = counts(np.array(gains)), counts(np.array(safe_gains)), np.array(models)
     baseline = gains == tuple(VerticalLoop.space.default.tolist())
     return (
-        *check_wrapping(counts, vehicles[0], manoeuvre.set_points),
-        *check_flights(counts, safe_counts, baseline, parameters, vehicles, ceiling_m, manoeuvre),
+        *check_wrapping(own, vehicles[0], manoeuvre.set_points),
+        *check_flights(own, safe, baseline, parameters, vehicles, ceiling_m, manoeuvre),
     )

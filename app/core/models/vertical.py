@@ -319,6 +319,30 @@ def fly_disturbed(gains: Counts, models: Samples, set_points: SetPoints, disturb
     return fly_each(gains, prompt, set_points, len(disturbances), disturbances)
 
 
+def fly_recorded(gains: Counts, model: Samples, set_points: SetPoints, disturbances: Samples) -> Samples:
+    """The same for one flight with every channel, shape (6, n): gains (3,), model (8,)."""
+    prompt = model.copy()
+    prompt[[START_LATENCY_S, MEASUREMENT_DELAY_S]] = 0.0
+    channels = np.empty((len(CHANNELS), len(disturbances)))
+    rollout(gains, prompt, set_points.targets, disturbances, channels)
+    return channels
+
+
+@kernel
+def commanded(gains: Counts, targets: Counts, altitude: Samples, climb: Samples, entered_step: int) -> Samples:
+    """Share of full thrust that the loop commands in a flight recorded at 512 Hz, from the step in which it is entered
+    on; all of shape (n,), targets as in `rollout`."""
+    state, thrust, command = np.zeros(STATE_SIZE, dtype=np.int64), np.zeros(len(altitude)), 0
+    for i in range(entered_step, len(altitude)):
+        z, zd = measured(-altitude[i], POSITION_BITS), measured(-climb[i], SPEED_BITS)
+        if i == entered_step:
+            start(state, z, zd)
+        in_flight = detect_flight(state, command)
+        command = step(state, ALT, targets[i], gains[0], gains[1], gains[2], z, zd, LEVEL, in_flight)
+        thrust[i] = command / FULL_THRUST
+    return thrust
+
+
 @kernel
 def observe(altitude: Samples, climb: Samples, thrust: Samples, model: Samples) -> Samples:
     """Disturbances of a flight recorded at 512 Hz, channels of shape (n,): (n, 3), see `COLUMNS`.

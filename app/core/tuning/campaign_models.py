@@ -9,12 +9,12 @@ from app.core.errors import InputError, TrajectoryError
 from app.core.experiments.base import Experiment, ModelledExperiment, ParameterDistribution, prior_distribution
 from app.core.tuning.campaign_model import CampaignModel
 from app.core.tuning.copter_model import fit_copter_steps
-from app.core.tuning.vertical_model import fit_vertical
+from app.core.tuning.vertical_model import fit_steps, fit_takeoff
 
 MODELS: Final[Mapping[str, Callable[[ModelledExperiment, Sequence[Flight]], CampaignModel]]] = MappingProxyType(
     {
-        "takeoff": fit_vertical,
-        "altitude-steps": fit_vertical,
+        "takeoff": fit_takeoff,
+        "altitude-steps": fit_steps,
         "altitude-steps-ardupilot": fit_copter_steps,
         "altitude-steps-px4": fit_copter_steps,
     }
@@ -24,7 +24,7 @@ MODELS: Final[Mapping[str, Callable[[ModelledExperiment, Sequence[Flight]], Camp
 
 def is_calibrated(experiment: ModelledExperiment) -> bool:
     """Whether the parameters of its model are found by `app.core.tuning.calibration`."""
-    return MODELS.get(experiment.name) is fit_vertical
+    return MODELS.get(experiment.name) in (fit_takeoff, fit_steps)
 
 
 def known_distribution(experiment: Experiment, flights: Sequence[Flight]) -> ParameterDistribution:

@@ -16,16 +16,8 @@ import numpy as np
 from app.core.analysis.analysis import find_unexplained, is_alike
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.loop import AltitudeLoop, GainSpace
-from app.core.analysis.margin import (
-    EXTRA_LAG_S,
-    LARGEST_MARGIN,
-    REQUIRED_MARGIN,
-    RINGING_DAMPING,
-    gain_margin,
-    robust_damping,
-)
+from app.core.analysis.margin import REQUIRED_MARGIN, gain_margin
 from app.core.analysis.prediction import FlightModel, Prediction
-from app.core.analysis.proposal import LARGEST_ACTIVITY, propose
 from app.core.analysis.vehicle_fit import CopterEstimate, fit_copter
 from app.core.definition import Flight, best_flight
 from app.core.errors import InputError, Problem, TrajectoryError
@@ -43,6 +35,7 @@ from app.core.models.copter import Copter
 from app.core.policy import Vector
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.calibration import fitted_flights
+from app.core.tuning.limited_model import LimitedModel
 from app.core.tuning.predictions import CONFIDENCE, FlightPrediction, interval_reach
 from app.core.tuning.strategy import Interval, band_channels
 from app.core.tuning.trust_region import Box
@@ -54,10 +47,8 @@ _MODEL_ERROR: Final = 0.04
 90 % interval."""
 
 
-class CopterModel:
+class CopterModel(LimitedModel[Copter]):
     """A `CampaignModel`."""
-
-    least_improvement: Final = 0.05
 
     def __init__(self, experiment: CopterSteps, flights: Sequence[Flight]) -> None:
         """`experiment` has the autopilot's parameters of the last flight.
@@ -65,7 +56,7 @@ class CopterModel:
         Raises TrajectoryError naming the flight whose record does not suffice, or whose autopilot had a parameter
         with which its replica does not hold."""
         used = fitted_flights(flights)
-        self.base: Final = best_flight(used)
+        self.base = best_flight(used)
         self.numbers: Final = tuple(flight.number for flight in used)
         self._logs: Final = {flight.number: _read(experiment, flight) for flight in used}
         self._experiment: Final = experiment.exactly_under(self.base.parameters)
@@ -75,7 +66,8 @@ class CopterModel:
             raise _unlike(worst, why)
         self._hover: Final = experiment.advise_hover(self._estimate.mean.hover_throttle)
         first = next(flight for flight in flights if flight.outcome == "valid")
-        self._first: Final = self._loop(experiment.space.vector(first.gains))
+        self.policy_space = experiment.space
+        self.first_gains = experiment.space.vector(first.gains)
 
     @cached_property
     def _values(self) -> Matrix:
@@ -104,8 +96,7 @@ class CopterModel:
         )
 
     @cached_property
-    def _copters(self) -> Sequence[Copter]:
-        """Those of the gate, for which gains are searched: the likeliest one first."""
+    def vehicles(self) -> Sequence[Copter]:
         return [copter_of(model) for model in self.spread.sample(self._experiment, COPTERS)]
 
     @property
@@ -114,14 +105,17 @@ class CopterModel:
 
     @cached_property
     def _likeliest(self) -> FlightModel:
-        return FlightModel(self._log, self._copters[:1])
+        return FlightModel(self._log, self.vehicles[:1])
 
     @cached_property
     def _all(self) -> FlightModel:
         return FlightModel(self._log, self._estimate.draws)
 
-    def _loop(self, gains: Vector) -> AltitudeLoop:
+    def loop(self, gains: Vector) -> AltitudeLoop:
         return self._experiment.loop(gains)
+
+    def flown(self, gains: Vector) -> tuple[float, float]:
+        return self._likeliest.fly(self.loop(gains))
 
     def optimum(self, box: Box) -> Vector | None:
         """As in the interface. Raises TrajectoryError if the model does not fly as the best flight did."""
@@ -132,32 +126,18 @@ class CopterModel:
                 f"deviates by {1e3 * flown_m:.1f} mm, where its gains make the fitted vehicle deviate by "
                 f"{1e3 * modelled_m:.1f} mm: it flew with other gains or parameters",
             )
-        space, here = self._experiment.space, space_within(self._log.loop.space, self._experiment, box)
+        here = space_within(self._log.loop.space, self._experiment, box)
         rules = self._log.loop.rules(self._log.throttle_mean)
-        found = propose(
-            self._log, self._copters, [self._log.loop.gains, *rules.values()], space=here, usual=self._first.gains
-        )
-        return None if found is None else space.vector({**self.base.gains, **found})
+        return self.found(here, list(rules.values()))
 
-    def merits(self, gains: Matrix) -> Vector:
-        return np.array([self._likeliest.fly(self._loop(each))[0] for each in gains])
-
-    errors = merits
-
-    def is_worth_a_flight(self, here: Vector, there: Vector) -> bool:
-        now, then = self.merits(np.stack((here, there))).tolist()
-        return bool(then <= (1.0 - self.least_improvement) * now) or self._damping(
-            here
-        ) < RINGING_DAMPING <= self._damping(there)
-
-    def _damping(self, gains: Vector) -> float:
-        return robust_damping(self._loop(gains), self._copters)
+    def errors(self, gains: Matrix) -> Vector:
+        return self.merits(gains)
 
     def rounded(self, gains: Vector) -> Vector:
         return np.array([float(f"{value:.{_DIGITS}g}") for value in gains])
 
     def predict(self, gains: Vector) -> FlightPrediction:
-        experiment, loop = self._experiment, self._loop(gains)
+        experiment, loop = self._experiment, self.loop(gains)
         predicted = self._all.predict_curve(loop)
         grid_s = experiment.grid_s
         followed = experiment.followed_m
@@ -177,20 +157,8 @@ class CopterModel:
         )
 
     def notes(self, gains: Vector) -> tuple[str, ...]:
-        loop, texts = self._loop(gains), self._log.loop.texts
-        activity = self._likeliest.fly(loop)[1] / self._likeliest.fly(self._first)[1]
-        margin = gain_margin(loop, self._copters[0])
-        beyond = "at least " if margin == LARGEST_MARGIN else ""
-        moves = (
-            f"The throttle moves {activity:.2f} times as much as with the gains of the first flight; "
-            f"{LARGEST_ACTIVITY:g} times is allowed."
-        )
-        rings = (
-            f"With {1e3 * EXTRA_LAG_S:.0f} ms more {texts.lateness}, the altitude begins to ring with {beyond}"
-            f"{margin:.1f} times the {texts.fast_gains}; {REQUIRED_MARGIN:g} times is required."
-        )
         hover = () if self._hover is None else (self._hover.reason,)
-        return (*hover, moves, rings, self._rules_note(gains))
+        return (*hover, *self.limits(gains), self._rules_note(gains))
 
     def _rules_note(self, gains: Vector) -> str:
         """What the likeliest vehicle would fly with the sets that are set without a model. Those are as good that are
@@ -210,7 +178,7 @@ class CopterModel:
         rules = self._log.loop.rules(self._log.throttle_mean)
         loops = {name: self._log.loop.with_gains(gains) for name, gains in rules.items()}
         return [
-            (name, self._likeliest.fly(loop)[0], gain_margin(loop, self._copters[0])) for name, loop in loops.items()
+            (name, self._likeliest.fly(loop)[0], gain_margin(loop, self.vehicles[0])) for name, loop in loops.items()
         ]
 
 

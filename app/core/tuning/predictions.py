@@ -304,7 +304,7 @@ def predict_flight(calibration: Calibration, base: Flight, gains: Vector) -> Fli
     errors = experiment.errors(outputs)
     weather = _GUST_VARIATION * float(np.mean(errors - experiment.errors(clean)))
     error = float(np.mean(errors))
-    model_error = float(np.hypot(_MODEL_ERROR * error, experiment.least_model_error))
+    model_error = float(np.hypot(_MODEL_ERROR * error, experiment.least_model_error(base.trajectory)))
     sd = float(np.sqrt(np.var(errors) + weather**2 + model_error**2))
     curve = outputs.mean(axis=0)
     noise = float(np.sqrt(np.mean(bias**2)))

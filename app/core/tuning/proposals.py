@@ -17,7 +17,7 @@ from app.core.tuning.confirmation import NO_STEP, Confirmation, compare_winner, 
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
 from app.core.tuning.gate import GateResult, check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
-from app.core.tuning.stop_rules import StopVerdict
+from app.core.tuning.stop_rules import TUNE_FIRST, StopVerdict
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategies.manual import propose as by_hand
 from app.core.tuning.strategy import Explanation, Kind, Proposal
@@ -134,8 +134,8 @@ def _describe_start(definition: Definition, gains: Gains, flights: Sequence[Flig
     if numbers:
         aborted = f"{named_flights(numbers).capitalize()} {'was' if len(numbers) == 1 else 'were'} aborted"
         return (
-            f"{aborted} because of the vehicle's behaviour with these gains: {source}. Fly them again only if you know "
-            "the cause; otherwise use custom gains"
+            f"{aborted} because of the vehicle's behaviour with these gains: {source}. {TUNE_FIRST}. Fly them again "
+            "only if you know the cause; otherwise use custom gains"
         )
     return f"The {'next' if flights else 'first'} flight uses {source}"
 
@@ -217,9 +217,10 @@ def advise(
     """Recommend the next action.
 
     Under the stop rule `noise` the proposal already contains the recommendation. Under the other rules the advice is
-    only a recommendation: it advises against a step whose effect flights cannot distinguish from noise. Only gains
-    within the bounds are recommended, except when one of the other rules stops the campaign: that advice names the best
-    of all flights.
+    only a recommendation: it advises against a step whose effect flights cannot distinguish from noise. With any rule
+    it advises to stop once a flight was aborted because of the start gains, and none is valid. Only gains within the
+    bounds are recommended, except when one of the other rules stops the campaign: that advice names the best of all
+    flights.
     """
     tells_noise = definition.stop.kind == "noise"
     now = (compare_winner if verdict.stop and not tells_noise else standing_within_bounds)(
@@ -233,7 +234,8 @@ def advise(
         why = f"{proposal.explanation.summary} {ended}{_REPEAT_SHOWS}"
         return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
     if now is None or tells_noise:
-        kind = _MANUAL_KINDS.get(proposal.kind, "step")
+        is_refuted = proposal.kind == "start" and bool(aborted_by_gains(flights, proposal.gains))
+        kind = "stop" if is_refuted else _MANUAL_KINDS.get(proposal.kind, "step")
         return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)
     confirmation = confirm(definition, experiment, flights, proposal)
     kind = _kind(confirmation)

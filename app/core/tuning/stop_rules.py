@@ -4,14 +4,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from app.core.definition import Definition, Flight, StopRule
-from app.core.formatting import count, percent
+from app.core.definition import Definition, Flight, StopRule, aborted_by_gains
+from app.core.formatting import count, format_gains, named_flights, percent
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.strategy import Kind, Proposal
 
-Reason = Literal["not improving", "flight budget", "nothing better", "told from noise", "battery low"]
+Reason = Literal["aborted again", "not improving", "flight budget", "nothing better", "told from noise", "battery low"]
 
 FAILURES_ALLOWED: Final = 2
+ABORTS_ALLOWED: Final = 2
+"""Flights with the same gains that may be aborted because of them."""
+TUNE_FIRST: Final = (
+    "Often another loop is the cause: oscillating rate loops make a vehicle climb, drift or lean with any gains of "
+    "this campaign. Look at its attitude in the flight, and tune attitude first"
+)
+"""What it may mean that a limit aborted a flight, without a full stop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,9 +46,10 @@ def evaluate_stop_rule(
 ) -> StopVerdict:
     """Apply the campaign's stop rule to its flights and the proposal computed from them.
 
-    Flights that repeat earlier gains count towards the budget only: they are not expected to improve. `battery_v` is
-    the voltage, V, at which the last flight ended, whether or not that flight counts. Up to `open_until_flight` flights
-    no rule ends the campaign, because it was reopened for them; a low battery is still reported.
+    With any rule, gains are not proposed once more after `ABORTS_ALLOWED` flights were aborted because of them. Flights
+    that repeat earlier gains count towards the budget only: they are not expected to improve. `battery_v` is the
+    voltage, V, at which the last flight ended, whether or not that flight counts. Up to `open_until_flight` flights no
+    rule ends the campaign, because it was reopened for them; a low battery is still reported.
     """
     verdict = decide_stop(
         definition.stop,
@@ -51,6 +59,14 @@ def evaluate_stop_rule(
         because=proposal.explanation.summary,
         open_until_flight=open_until_flight,
     )
+    aborted = [] if proposal.kind in ("none", "manual") else aborted_by_gains(flights, proposal.gains)
+    if len(aborted) >= ABORTS_ALLOWED:
+        why = (
+            f"{named_flights([flight.number for flight in aborted]).capitalize()} were aborted because of the "
+            f"vehicle's behaviour with the same gains ({format_gains(proposal.gains)}). {TUNE_FIRST}, then start a new "
+            "campaign; or reopen this one for custom gains."
+        )
+        verdict = replace(verdict, stop=True, reason="aborted again", why=why)
     if not verdict.stop or len(flights) >= open_until_flight:
         return verdict
     left = count(open_until_flight - len(flights), "more flight")
@@ -162,6 +178,7 @@ def _sentence(
         "not improving": f"The last {failures} consecutive flights did not improve on the best before them by {by}.",
         "nothing better": "The model predicts no improvement over the best flight.",
         "told from noise": "",
+        "aborted again": "",
         "battery low": f"The last flight ended at {battery_v or 0.0:.2f} V; the minimum is {rule.min_battery_v} V.",
     }
     return f"{sentences[reason]} {because if rule.kind == 'noise' else ''}".strip()

@@ -2,10 +2,9 @@
 bounds on several plausible models at once.
 
 The merit of a policy is its mean error over the models, plus a penalty of one metre per metre by which it rises more
-than 0.6 m above the highest set point on any model, or stays that far below the lowest one after five seconds; both
-limits keep a margin from what is unsafe. A fixed set of points spread over the box is evaluated first, on shorter
-flights and on half the models; then Nelder–Mead on integer
-counts starts from the best two.
+than 0.6 m above the set point on any model, or stays that far below it after five seconds; both limits keep a margin
+from what is unsafe. A fixed set of points spread over the box is evaluated first, on shorter flights and on half the
+models; then Nelder–Mead on integer counts starts from the best two.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +16,7 @@ import numpy as np
 
 from app.core.definition import Flight
 from app.core.experiments.base import Matrix, halton
-from app.core.experiments.vertical_loop import VerticalLoop
+from app.core.experiments.takeoff import Takeoff
 from app.core.policy import Vector
 
 SHRINK: Final = 0.5
@@ -95,7 +94,7 @@ class Box:
         return np.clip(np.rint(gains), self.low, self.high)
 
 
-def merit(experiment: VerticalLoop, gains: Matrix, models: Matrix, until_s: float | None = None) -> Vector:
+def merit(experiment: Takeoff, gains: Matrix, models: Matrix, until_s: float | None = None) -> Vector:
     """Mean error, m, plus the penalty for unsafe flights: gains (c, 3), models (k, m) → (c,); lower is better.
 
     `until_s` is the time up to which flights are simulated, by default the finer of the experiment's.
@@ -106,7 +105,7 @@ def merit(experiment: VerticalLoop, gains: Matrix, models: Matrix, until_s: floa
     return np.asarray(np.round(sketches.errors.mean(axis=1) + beyond.max(axis=1), _DIGITS))
 
 
-def find_robust_optimum(experiment: VerticalLoop, box: Box, models: Matrix, known: Matrix) -> Vector:
+def find_robust_optimum(experiment: Takeoff, box: Box, models: Matrix, known: Matrix) -> Vector:
     """The best gains found in the box, shape (n,); `known` (c, n) are included in the first points."""
     spread = box.low + halton(len(box.low), _POINTS + 1)[1:] * (box.high - box.low)
     points = box.nearest(np.vstack((known, spread)))

@@ -21,7 +21,7 @@ const CAMPAIGN: Record<CampaignState, StateLabel> = {
 const OUTCOME: Record<string, StateLabel> = {
   converged: { word: "Converged", tone: "good" },
   budget: { word: "Flight budget used", tone: "good" },
-  stopped: { word: "Stopped by the operator", tone: "quiet" },
+  stopped: { word: "Stopped", tone: "quiet" },
 };
 
 /** Of a campaign that converged without other gains that compare better: its first gains are its best. */

@@ -107,6 +107,21 @@ def test_an_abort_at_a_limit_always_counts_against_the_gains(
     assert trust(client, campaign) == 0.5
 
 
+def test_a_campaign_whose_start_gains_a_limit_aborted_twice_stops_and_says_what_to_do(
+    client: TestClient, database: Database
+) -> None:
+    campaign = create_ready_campaign(client, database, definition=CALIBRATED)
+    aborted(client, database, campaign, on_request=False)
+    offered = proposal(client, campaign)
+    assert (offered["kind"], offered["recommended"], offered["stop_verdict"]["stop"]) == ("start", "stop", False)
+    assert "tune attitude first" in offered["advice"]["why"]
+    assert not any(choice["recommended"] for choice in offered["choices"])
+    aborted(client, database, campaign, on_request=False)
+    ended = get(client, f"/api/campaigns/{campaign['id']}")
+    assert (ended["state"], ended["outcome"]) == ("finished", "stopped")
+    assert ended["stop_reason"].startswith("Flights 1, 2 were aborted because of the vehicle's behaviour")
+
+
 def test_two_operators_do_not_overwrite_each_others_word(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

@@ -47,7 +47,6 @@ class QuadraticExperiment(OwnModel):
     target_channel: Final = None
     reference: Final = None
     set_points: Final = None
-    least_model_error: Final = 0.0
     grid_s: Final = np.linspace(0.0, 1.0, 11)
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:

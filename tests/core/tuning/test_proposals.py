@@ -1,6 +1,7 @@
 """Whole campaigns, and the rule above all: a proposal is a pure function of the definition and the flights."""
 
 import copy
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.definition import Definition, Flight, Start, StopRule
+from app.core.experiments import experiment_of
 from app.core.tuning.definition_checks import problems_of
 from app.core.tuning.gate import check_policy
-from app.core.tuning.proposals import next_proposal
+from app.core.tuning.proposals import advise, next_proposal
 from app.core.tuning.stop_rules import evaluate_stop_rule
 from app.core.tuning.strategies import STRATEGIES
 from app.core.tuning.strategy import Proposal
@@ -114,6 +116,38 @@ def test_without_a_valid_flight_the_start_gains_are_proposed() -> None:
     )
     excused = next_proposal(Definition(), [replace(aborted, against_gains=False)])
     assert excused.explanation.summary.startswith("The next flight uses the vehicle's default gains (")
+
+
+@pytest.mark.parametrize("rule", [StopRule(kind="noise"), StopRule(kind="paper"), StopRule(kind="budget")])
+@pytest.mark.parametrize("experiment", ["takeoff", "takeoff-px4"])
+def test_start_gains_that_a_limit_aborted_are_advised_against_and_after_a_second_abort_the_campaign_stops(
+    experiment: str, rule: StopRule
+) -> None:
+    """With a model and without one. Reported were four proposals of the same gains, one after the other."""
+    definition = Definition(
+        experiment=experiment, strategy="gradient" if experiment == "takeoff" else "manual", stop=rule
+    )
+    gains = next_proposal(definition, []).gains
+    record = fly(1, {"kp": 283, "ki": 13, "kd": 82}).trajectory
+    first = Flight(number=1, gains=gains, trajectory=record, error=None, outcome="aborted")
+    second, excused = replace(first, number=2), replace(first, against_gains=False)
+
+    def judged(flights: Sequence[Flight]) -> tuple[str, str | None, str]:
+        proposal = next_proposal(definition, flights)
+        verdict = evaluate_stop_rule(definition, flights, proposal)
+        advice = advise(definition, experiment_of(definition), flights, proposal, verdict)
+        return advice.kind, verdict.reason, advice.why
+
+    kind, reason, why = judged([first])
+    assert (kind, reason) == ("stop", None)
+    assert "oscillating rate loops" in why
+    assert "tune attitude first" in why
+    kind, reason, why = judged([first, second])
+    assert (kind, reason) == ("stop", "aborted again")
+    assert why.startswith("Flights 1, 2 were aborted because of the vehicle's behaviour with the same gains (")
+    assert judged([excused])[:2] == ("baseline", None)
+    other = replace(second, gains={**gains, next(iter(gains)): 0.9 * next(iter(gains.values()))})
+    assert judged([first, other])[:2] == ("stop", None)
 
 
 def test_given_start_gains_are_proposed_as_they_are() -> None:

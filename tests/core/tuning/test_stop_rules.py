@@ -4,7 +4,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from app.core.definition import Definition, StopRule
+from app.core.definition import Definition, Flight, StopRule
 from app.core.tuning.stop_rules import decide_stop, evaluate_stop_rule, landing_battery_v, starting_battery_v
 from app.core.tuning.strategy import Explanation, Proposal
 from tests.core.tuning.bowl import fly
@@ -55,6 +55,31 @@ def test_an_aborted_flight_neither_improves_nor_fails_but_uses_up_budget() -> No
     assert decide_stop(PAPER, [None, 0.5]).failures == 0
     assert decide_stop(PAPER, [None]).threshold is None
     assert decide_stop(PAPER, [None] * 7).reason == "flight budget"
+
+
+def test_gains_that_were_aborted_twice_are_not_proposed_a_third_time_whatever_they_flew_before() -> None:
+    valid = fly(1, 2.0, 1.0)
+    again = replace(valid, number=2, outcome="aborted", error=None)
+    other = replace(again, gains={"a": 1.0, "b": 1.0})
+    repeat = Proposal(
+        kind="repeat",
+        gains=dict(valid.gains),
+        predicted=None,
+        predicted_error=None,
+        explanation=Explanation(summary=""),
+    )
+
+    def reason(*flights: Flight, proposal: Proposal = repeat, open_until_flight: int = 0) -> str | None:
+        definition = Definition(stop=StopRule(kind="noise"))
+        return evaluate_stop_rule(definition, flights, proposal, open_until_flight=open_until_flight).reason
+
+    assert reason(valid, again) is None
+    assert reason(valid, again, other) is None
+    assert reason(valid, again, replace(again, against_gains=False)) is None
+    assert reason(valid, again, replace(again, number=3)) == "aborted again"
+    assert reason(valid, again, replace(again, number=3), open_until_flight=4) is None
+    manual = replace(repeat, kind="manual")
+    assert reason(valid, again, replace(again, number=3), proposal=manual) is None
 
 
 def test_a_line_without_anything_better_ends_the_paper_rule_only() -> None:

@@ -74,6 +74,7 @@ export function Reason({ proposal, chosen, isFirst }: ReasonProps) {
   if (isDoubtful(proposal)) {
     return (
       <Aside tone="warn" fz="small">
+        {kind === "stop" && <strong>Recommended: stop the campaign. </strong>}
         {why}
       </Aside>
     );

@@ -97,11 +97,9 @@ test("a repeat says of which flights it predicts the mean", () => {
 
 test("start gains that were aborted because of them are doubtful", () => {
   const baseline = { kind: "baseline", gains: {}, proposed: true, recommended: false } as const;
-  expect(isDoubtful({ kind: "start", recommended: "baseline", choices: [baseline] })).toBe(true);
-  expect(isDoubtful({ kind: "start", recommended: "baseline", choices: [{ ...baseline, recommended: true }] })).toBe(
-    false,
-  );
-  expect(isDoubtful({ kind: "step", recommended: "stop", choices: [baseline] })).toBe(false);
+  expect(isDoubtful({ kind: "start", choices: [baseline] })).toBe(true);
+  expect(isDoubtful({ kind: "start", choices: [{ ...baseline, recommended: true }] })).toBe(false);
+  expect(isDoubtful({ kind: "step", choices: [baseline] })).toBe(false);
 });
 
 test("a gain outside the bounds stands at their edge", () => {

@@ -28,12 +28,8 @@ export function preselected({ choices }: Proposal): ChoiceName {
 }
 
 /** Whether the start gains are offered again although a flight with them was aborted because of them. */
-export function isDoubtful({
-  kind,
-  recommended,
-  choices,
-}: Pick<Proposal, "kind" | "recommended" | "choices">): boolean {
-  return kind === "start" && recommended !== "stop" && !choices.some((choice) => choice.recommended);
+export function isDoubtful({ kind, choices }: Pick<Proposal, "kind" | "choices">): boolean {
+  return kind === "start" && !choices.some((choice) => choice.recommended);
 }
 
 /** The flights of these gains, whose mean is the prediction of a repeat. */
