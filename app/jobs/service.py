@@ -271,21 +271,11 @@ def job_views(session: Session, rows: Sequence[JobRow]) -> list[Job]:
 
 
 def _view(row: JobRow, campaign_name: str | None) -> Job:
-    return Job(
-        id=row.id,
-        kind=row.kind,
+    return Job.view_of(
+        row,
         name=_ordered(row),
-        state=row.state,
-        campaign_id=row.campaign_id,
         campaign_name=campaign_name,
-        problem=job_problem(row),
-        done_share=row.done_share,
-        doing=row.doing,
         remaining_s=_remaining_s(row),
-        attempts=row.attempts,
-        created_at=row.created_at,
-        started_at=row.started_at,
-        finished_at=row.finished_at,
         actions=allowed(JOB_ACTIONS, row.state),
     )
 

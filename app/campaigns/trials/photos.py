@@ -97,4 +97,4 @@ def _one(session: Session, trial_id: int, photo_id: int) -> TrialPhotoRow:
 
 
 def _view(row: TrialPhotoRow) -> TrialPhoto:
-    return TrialPhoto(id=row.id, trial_id=row.trial_id, media_type=row.media_type, added_at=row.added_at)
+    return TrialPhoto.view_of(row)
