@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
-from types import TracebackType
 from typing import Final, Generic, Self, TypeVar
 
 import structlog
@@ -44,9 +43,7 @@ class Supervisor(Generic[T]):
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stopping.set()
         self._thread.join()
         process = self._process
