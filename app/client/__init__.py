@@ -41,7 +41,7 @@ from app.campaigns.trials.schemas import (
 )
 from app.common.schemas import OptionValue, Page
 from app.common.schemas import Problem as ProblemDetails
-from app.common.states import FlightState, TrialState
+from app.common.states import UNFLOWN_TRIAL_STATES, FlightState, TrialState
 from app.core.errors import GainlineError, Problem
 from app.fleet.schemas import VehicleChoice
 
@@ -50,16 +50,7 @@ Record = Path | bytes | Mapping[str, Iterable[float]]
 
 _ATTEMPTS: Final = 3
 _PAUSE_S: Final = 0.2
-_LANDED: Final = frozenset(
-    {
-        TrialState.CAPTURED,
-        TrialState.VALID,
-        TrialState.ABORTED,
-        TrialState.INVALID,
-        TrialState.LOST,
-        TrialState.CANCELLED,
-    }
-)
+_LANDED: Final = frozenset(TrialState) - UNFLOWN_TRIAL_STATES - {TrialState.FLYING}
 _NOT_FLOWN: Final = frozenset({FlightState.FAILED, FlightState.CANCELLED})
 
 M = TypeVar("M", bound=BaseModel)
