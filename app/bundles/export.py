@@ -29,7 +29,7 @@ from app.bundles.contents import (
 )
 from app.campaigns import history
 from app.campaigns import service as campaigns
-from app.campaigns.trials.photos import ENDINGS, media_type_of
+from app.campaigns.trials.photos import ENDINGS, media_type_of, photos_of_campaign
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import BusyError, ConflictError, StorageError
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
@@ -42,16 +42,6 @@ def proposals_of(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
     """Proposals of a campaign, in the order in which they were made."""
     return session.scalars(
         select(ProposalRow).where(ProposalRow.campaign_id == campaign_id).order_by(ProposalRow.id)
-    ).all()
-
-
-def photos_of(session: Session, campaign_id: int) -> Sequence[TrialPhotoRow]:
-    """Photos of all its trials, without the picture data, in the order in which they were added."""
-    return session.scalars(
-        select(TrialPhotoRow)
-        .join(TrialPhotoRow.trial)
-        .where(TrialRow.campaign_id == campaign_id)
-        .order_by(TrialPhotoRow.id)
     ).all()
 
 
@@ -116,7 +106,7 @@ class Packer:
         places = {proposal.id: place for place, proposal in enumerate(proposals)}
         flights = dict(flight_ids_by_trial(self._session, row.id))
         photos: dict[int, list[TrialPhotoRow]] = {}
-        for photo in photos_of(self._session, row.id):
+        for photo, _ in photos_of_campaign(self._session, row.id):
             photos.setdefault(photo.trial_id, []).append(photo)
         return Campaign.view_of(
             row,
