@@ -29,7 +29,7 @@ from app.bundles.contents import (
 )
 from app.campaigns import history
 from app.campaigns import service as campaigns
-from app.campaigns.trials.photos import ENDINGS, media_type_of
+from app.campaigns.trials.photos import ENDINGS, media_type_of, photos_of_campaign
 from app.common.data_folder import log_of_trial, telemetry_log
 from app.common.errors import BusyError, ConflictError, StorageError
 from app.db.models import CampaignRow, FlightRow, ProposalRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
@@ -42,16 +42,6 @@ def proposals_of(session: Session, campaign_id: int) -> Sequence[ProposalRow]:
     """Proposals of a campaign, in the order in which they were made."""
     return session.scalars(
         select(ProposalRow).where(ProposalRow.campaign_id == campaign_id).order_by(ProposalRow.id)
-    ).all()
-
-
-def photos_of(session: Session, campaign_id: int) -> Sequence[TrialPhotoRow]:
-    """Photos of all its trials, without the picture data, in the order in which they were added."""
-    return session.scalars(
-        select(TrialPhotoRow)
-        .join(TrialPhotoRow.trial)
-        .where(TrialRow.campaign_id == campaign_id)
-        .order_by(TrialPhotoRow.id)
     ).all()
 
 
@@ -116,21 +106,11 @@ class Packer:
         places = {proposal.id: place for place, proposal in enumerate(proposals)}
         flights = dict(flight_ids_by_trial(self._session, row.id))
         photos: dict[int, list[TrialPhotoRow]] = {}
-        for photo in photos_of(self._session, row.id):
+        for photo, _ in photos_of_campaign(self._session, row.id):
             photos.setdefault(photo.trial_id, []).append(photo)
-        return Campaign(
-            id=row.id,
-            name=row.name,
-            state=row.state,
-            outcome=row.outcome,
-            stop_reason=row.stop_reason,
-            definition=row.definition,
-            definition_digest=row.definition_digest,
-            safe_gains=row.safe_gains,
-            open_until_flight=row.open_until_flight,
+        return Campaign.view_of(
+            row,
             vehicle=_vehicle(row.vehicle),
-            vehicle_options=row.vehicle_options,
-            created_at=row.created_at,
             trials=[
                 self._trial(
                     trial,
@@ -144,9 +124,8 @@ class Packer:
         )
 
     def _trial(self, row: TrialRow, proposal: int | None, photos: list[TrialPhotoRow], flight: int | None) -> Trial:
-        kept = {name: getattr(row, name) for name in Trial.model_fields.keys() & row.__mapper__.columns.keys()}
-        return Trial(
-            **kept,
+        return Trial.view_of(
+            row,
             proposal=proposal,
             record=self._flown(row),
             predicted=self._predicted(row.predicted, f"flight {row.number}", row.campaign_id),
@@ -155,8 +134,8 @@ class Packer:
         )
 
     def _proposal(self, row: ProposalRow) -> Proposal:
-        kept = {name: getattr(row, name) for name in Proposal.model_fields.keys() & row.__mapper__.columns.keys()}
-        return Proposal(**kept, predicted=self._predicted(row.predicted, f"proposal {row.id}", row.campaign_id))
+        predicted = self._predicted(row.predicted, f"proposal {row.id}", row.campaign_id)
+        return Proposal.view_of(row, predicted=predicted)
 
     def _predicted(self, row: TrajectoryRow | None, whose: str, campaign_id: int) -> Record | None:
         if row is not None and not is_intact(row):
@@ -176,11 +155,7 @@ class Packer:
             return None
         part = self._write(f"records/{row.id}.zst", row.data)
         self._session.expire(row, ["data"])
-        return Record(
-            part=part,
-            codec=1,
-            **{name: getattr(row, name) for name in Record.model_fields.keys() - {"part", "codec"}},
-        )
+        return Record.view_of(row, part=part, codec=1)
 
     def _photo(self, trial: TrialRow, row: TrialPhotoRow) -> Photo:
         if media_type_of(row.data) != row.media_type:
@@ -191,7 +166,7 @@ class Packer:
             )
         part = self._write(f"photos/{row.id}.{ENDINGS[row.media_type]}", row.data)
         self._session.expire(row, ["data"])
-        return Photo(part=part, media_type=row.media_type, added_at=row.added_at)
+        return Photo.view_of(row, part=part)
 
     def _telemetry(self, row: TrialRow, flight: int | None) -> str | None:
         """Telemetry log of the trial's last flight, or the one imported with an earlier bundle."""

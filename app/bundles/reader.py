@@ -11,7 +11,6 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from io import SEEK_END
-from types import TracebackType
 from typing import Any, BinaryIO, Final, NoReturn, Self, TypeVar
 
 import numpy as np
@@ -107,9 +106,7 @@ class Bundle:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._zip.close()
         self._unpacked.close()
 

@@ -134,53 +134,35 @@ async def get_health(live: Live) -> Health:
 @router.get("/catalogue")
 def get_catalogue() -> Catalogue:
     """Everything that a campaign can consist of."""
-    return Catalogue.model_validate(
-        {
-            "experiments": [
-                {
-                    "name": each.name,
-                    "title": each.title,
-                    "output": each.output,
-                    "output_unit": CHANNEL_UNITS[each.output],
-                    "error_unit": each.error_unit,
-                    "has_model": each.modelled is not None,
-                    "gains": each.space.gains,
-                    "options": each.options,
-                }
-                for each in EXPERIMENTS.values()
-            ],
-            "strategies": [_strategy(each) for each in STRATEGIES.values()],
-            "vehicle_kinds": [_kind(kind) for kind in VEHICLE_KINDS.values()],
-            "presets": [preset for preset in map(_preset, preset_names()) if _is_ready(preset)],
-        },
-        from_attributes=True,
+    return Catalogue(
+        experiments=[
+            ExperimentInfo.view_of(
+                each,
+                output_unit=CHANNEL_UNITS[each.output],
+                has_model=each.modelled is not None,
+                gains=each.space.gains,
+            )
+            for each in EXPERIMENTS.values()
+        ],
+        strategies=[_strategy(each) for each in STRATEGIES.values()],
+        vehicle_kinds=[_kind(kind) for kind in VEHICLE_KINDS.values()],
+        presets=[preset for preset in map(_preset, preset_names()) if _is_ready(preset)],
     )
 
 
 def _kind(kind: VehicleKind) -> VehicleKindInfo:
-    return VehicleKindInfo.model_validate(
-        {
-            "name": kind.name,
-            "title": kind.title,
-            "line": kind.line,
-            "is_real": kind.is_real,
-            "can_fly": kind.can_fly,
-            "registered": is_registered_one_by_one(kind),
-            "experiments": list(kind.experiments),
-            "options": kind.options,
-            "highest_set_point_m": kind.highest_set_point_m if math.isfinite(kind.highest_set_point_m) else None,
-        },
-        from_attributes=True,
+    return VehicleKindInfo.view_of(
+        kind,
+        registered=is_registered_one_by_one(kind),
+        experiments=list(kind.experiments),
+        highest_set_point_m=kind.highest_set_point_m if math.isfinite(kind.highest_set_point_m) else None,
     )
 
 
 def _strategy(strategy: Strategy) -> StrategyInfo:
-    return StrategyInfo(
-        name=strategy.name,
-        title=strategy.title,
-        line=strategy.line,
+    return StrategyInfo.view_of(
+        strategy,
         experiments=[each.name for each in EXPERIMENTS.values() if strategy.works_with(each)],
-        options=[OptionInfo.model_validate(option, from_attributes=True) for option in strategy.options],
     )
 
 

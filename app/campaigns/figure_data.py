@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
-from typing import Final, Literal, TypedDict, cast
+from typing import Final, Literal, cast
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -22,7 +22,7 @@ from app.core.statistics.comparisons import groups_of, pool_scatter, select_winn
 from app.core.tuning.predictions import is_informative
 from app.core.tuning.strategy import band_channels
 from app.db import trajectories
-from app.db.models import CampaignRow, JsonObject, TrialRow
+from app.db.models import CampaignRow, JsonObject, ProposalRow, TrialRow
 from app.figures import CAMPAIGN_FIGURES
 from app.figures.base import Card, card_of
 from app.figures.data import Band, Curve, FlightData, History, NextFlight, Noise, Outcome, Range, Repeats, curve_name
@@ -80,6 +80,9 @@ class FigureView:
 
 
 WHOLE_FLIGHT: Final = FigureView()
+
+_Predicted = tuple[Curve | None, Band | None]
+"""A predicted curve and its band."""
 
 
 def campaign_figure(
@@ -233,44 +236,27 @@ def _predicted_flight(
     is_asked = (lambda row: row.state in _UNFLOWN) if number is None else (lambda row: row.number == number)
     trial = next((row for row in rows if is_asked(row)), None)
     if trial is not None:
-        return _informative(
-            NextFlight(
-                number=trial.number,
-                gains=trial.gains,
-                predicted_error=trial.predicted_error,
-                interval=_interval(trial.predicted_interval),
-                **_predicted(session, _curve_id(session, trial), output),
-            ),
-            corrected=history.is_corrected(rows, trial.number),
-        )
+        curve_id, interval = _curve_id(session, trial), _interval(trial.predicted_interval)
+        corrected = history.is_corrected(rows, trial.number)
+        return _next_flight(trial.number, trial, interval, _predicted(session, curve_id, output), corrected=corrected)
     proposal = None if number is not None else repository.latest_proposal(session, campaign.id)
     if proposal is None or campaign.outcome is not None or is_stale(session, campaign, proposal, rows):
         return None
-    return _informative(
-        NextFlight(
-            number=max((row.number for row in rows), default=0) + 1,
-            gains=proposal.gains,
-            predicted_error=proposal.predicted_error,
-            interval=_interval(proposal.interval),
-            **_predicted(session, proposal.predicted_id, output),
-        ),
-        corrected=history.is_corrected(rows),
-    )
+    number, interval = max((row.number for row in rows), default=0) + 1, _interval(proposal.interval)
+    predicted = _predicted(session, proposal.predicted_id, output)
+    return _next_flight(number, proposal, interval, predicted, corrected=history.is_corrected(rows))
 
 
-def _informative(flight: NextFlight, *, corrected: bool) -> NextFlight:
+def _next_flight(
+    number: int, planned: TrialRow | ProposalRow, interval: Range | None, predicted: _Predicted, *, corrected: bool
+) -> NextFlight:
     """The flight without an error, interval and band that say nothing; the model's curve stays."""
-    if is_informative(None if flight.interval is None else flight.interval.low, corrected=corrected):
+    curve, band = predicted
+    error, gains = planned.predicted_error, planned.gains
+    flight = NextFlight(number=number, gains=gains, curve=curve, predicted_error=error, band=band, interval=interval)
+    if is_informative(None if interval is None else interval.low, corrected=corrected):
         return flight
     return replace(flight, predicted_error=None, interval=None, band=None)
-
-
-class _Predicted(TypedDict):
-    curve: Curve | None
-    band: Band | None
-
-
-_NOT_PREDICTED: Final[_Predicted] = {"curve": None, "band": None}
 
 
 def _curve_id(session: Session, row: TrialRow) -> int | None:
@@ -285,14 +271,14 @@ def _curve_id(session: Session, row: TrialRow) -> int | None:
 def _predicted(session: Session, curve_id: int | None, output: str) -> _Predicted:
     """A stored predicted curve and its band, where there are any."""
     if curve_id is None:
-        return _NOT_PREDICTED
+        return None, None
     predicted = trajectories.readable_of(session, [curve_id]).get(curve_id)
     if predicted is None:
-        return _NOT_PREDICTED
+        return None, None
     lower, upper = band_channels(output)
     has_band = lower in predicted.channels and upper in predicted.channels
     band = Band(lower=_curve(predicted, lower), upper=_curve(predicted, upper)) if has_band else None
-    return {"curve": _curve(predicted, output), "band": band}
+    return _curve(predicted, output), band
 
 
 def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) -> FlightRecordData:
@@ -304,7 +290,7 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
     glitches = _glitches(row)
     glitches_s = [glitch.low for glitch in glitches]
     other = best if best is not None and best.id != row.id and best.trajectory_id is not None else None
-    predicted = _predicted(session, _curve_id(session, row), experiment.output)
+    predicted, band = _predicted(session, _curve_id(session, row), experiment.output)
     predicts = _flight(row, corrected=history.is_corrected(trials, row.number)).predicted_error is not None
     return FlightRecordData(
         number=row.number,
@@ -313,9 +299,9 @@ def _flight_record(session: Session, row: TrialRow, trials: Sequence[TrialRow]) 
         set_point=set_point,
         reference=modelled if record is None else _recorded_reference(record) or modelled,
         curve=None if record is None else _curve(record, experiment.output),
-        predicted=predicted["curve"],
+        predicted=predicted,
         predicted_name=curve_name(predicts=predicts),
-        band=predicted["band"] if predicts else None,
+        band=band if predicts else None,
         glitches=glitches,
         best=None if other is None else _curve(history.record_of(session, other), experiment.output),
         best_number=None if other is None else other.number,

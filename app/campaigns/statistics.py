@@ -131,11 +131,8 @@ def _comparison(experiment: Experiment, now: ComparisonState) -> Comparison | No
     comparison = now.comparison
     if comparison is None:
         return None
-    return Comparison(
-        verdict=comparison.verdict,
-        confidence=comparison.confidence,
-        difference=comparison.difference,
-        standard_error=comparison.standard_error,
+    return Comparison.view_of(
+        comparison,
         further=None
         if comparison.further is None
         else FlightsToDecide(best=comparison.further.first, baseline=comparison.further.second),
@@ -154,12 +151,10 @@ def _drift(experiment: Experiment, now: ComparisonState) -> Drift | None:
         f"{found.last_number} the trend of the error with the same gains is {amount} "
         f"({confidence_text(found.confidence)} confidence)."
     )
-    return Drift(
+    return Drift.view_of(
+        found,
         first_trial=found.first_number,
         last_trial=found.last_number,
-        difference=found.difference,
-        standard_error=found.standard_error,
-        confidence=found.confidence,
         resolved=is_resolved,
         sentence=sentence,
     )
@@ -178,11 +173,9 @@ def _battery_trend(experiment: Experiment, group: Group, trials: Sequence[TrialR
         return None
     unit = f"{experiment.error_unit} per V"
     relation = "changes with" if found.is_resolved else "shows no dependence on"
-    return Trend(
+    return Trend.view_of(
+        found,
         unit=unit,
-        slope=found.slope,
-        lower=found.lower,
-        upper=found.upper,
         sentence=f"The error {relation} the battery voltage: {signed(found.slope)} {unit}, {percent(_SURE)} interval "
         f"{signed(found.lower)} … {signed(found.upper)} {unit}.",
     )

@@ -14,7 +14,6 @@ from app.campaigns.schemas import (
     Advice,
     Campaign,
     CampaignSummary,
-    Definition,
     FlightChoice,
     FlyingTrial,
     GainChange,
@@ -64,18 +63,9 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
     now = standing_of(row, trials)
     repeatable = standing_within_bounds_of(row, trials)
     rehearsal = rehearsal_of(session, row)
-    return Campaign(
-        id=row.id,
-        version=row.version,
-        name=row.name,
-        state=row.state,
-        outcome=row.outcome,
-        stop_reason=row.stop_reason,
-        definition=Definition.model_validate(row.definition),
-        definition_digest=row.definition_digest,
-        open_until_flight=row.open_until_flight,
+    return Campaign.view_of(
+        row,
         vehicle=fleet.campaign_vehicle(row),
-        parent_id=row.parent_id,
         rehearsal=rehearsal,
         rehearses=repository.rehearsed_id(session, row.id),
         best=best_trial(trials, now),
@@ -86,8 +76,6 @@ def campaign_view(session: Session, row: CampaignRow) -> Campaign:
         flying=_flying(flight, trials),
         next_action=_next_action(row, trials, rehearsal),
         actions=_actions(session, row, flight),
-        created_at=row.created_at,
-        updated_at=row.updated_at,
     )
 
 
@@ -109,14 +97,9 @@ def _summary(
 ) -> CampaignSummary:
     now = standing_of(row, trials)
     best = [] if now is None else [trial for trial in trials if trial.number in now.winner.numbers]
-    return CampaignSummary(
-        id=row.id,
-        name=row.name,
-        state=row.state,
-        outcome=row.outcome,
+    return CampaignSummary.view_of(
+        row,
         vehicle=fleet.campaign_vehicle(row),
-        experiment=row.experiment,
-        strategy=row.strategy,
         flights=_counts(trials).flown,
         best=best_trial(best, now),
         first_error=None if now is None else now.baseline.mean,
@@ -125,7 +108,6 @@ def _summary(
         has_passed_as_rehearsal=has_passed,
         next_action=_next_action(row, trials, rehearsal, has_passed=has_passed),
         spark=spark,
-        updated_at=row.updated_at,
     )
 
 

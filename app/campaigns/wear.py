@@ -124,18 +124,13 @@ def _fits(session: Session, campaigns: Sequence[CampaignRow], counts: dict[tuple
 
 def _estimate(row: ProposalRow, flight: int, number: int) -> Estimate:
     fitted = {each["name"]: each for each in row.explanation["fitted"]}
-    names = ("name", "title", "unit", "value", "standard_error")
     return Estimate(
         flight=flight,
         campaign_id=row.campaign_id,
         trial_number=number,
         proposal_id=row.id,
         at=row.computed_at,
-        fitted=[
-            FittedNumber.model_validate({field: fitted[name][field] for field in names})
-            for name in MONITORED_PARAMETERS
-            if name in fitted
-        ],
+        fitted=[FittedNumber.model_validate(fitted[name]) for name in MONITORED_PARAMETERS if name in fitted],
     )
 
 

@@ -23,7 +23,6 @@ import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Final, Literal, Self, TypeVar
 
 import httpx2
@@ -42,7 +41,7 @@ from app.campaigns.trials.schemas import (
 )
 from app.common.schemas import OptionValue, Page
 from app.common.schemas import Problem as ProblemDetails
-from app.common.states import FlightState, TrialState
+from app.common.states import UNFLOWN_TRIAL_STATES, FlightState, TrialState
 from app.core.errors import GainlineError, Problem
 from app.fleet.schemas import VehicleChoice
 
@@ -51,16 +50,7 @@ Record = Path | bytes | Mapping[str, Iterable[float]]
 
 _ATTEMPTS: Final = 3
 _PAUSE_S: Final = 0.2
-_LANDED: Final = frozenset(
-    {
-        TrialState.CAPTURED,
-        TrialState.VALID,
-        TrialState.ABORTED,
-        TrialState.INVALID,
-        TrialState.LOST,
-        TrialState.CANCELLED,
-    }
-)
+_LANDED: Final = frozenset(TrialState) - UNFLOWN_TRIAL_STATES - {TrialState.FLYING}
 _NOT_FLOWN: Final = frozenset({FlightState.FAILED, FlightState.CANCELLED})
 
 M = TypeVar("M", bound=BaseModel)
@@ -130,9 +120,7 @@ class Client:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

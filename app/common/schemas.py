@@ -11,7 +11,7 @@ import json
 import unicodedata
 from datetime import datetime
 from pathlib import PurePath
-from typing import Annotated, Final, Generic, Literal, TypeVar
+from typing import Annotated, Final, Generic, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
@@ -77,6 +77,15 @@ class Schema(BaseModel):
     """A part of the API; pydantic builds its validation when it is first needed, not as the program starts."""
 
     model_config = ConfigDict(defer_build=True)
+
+    @classmethod
+    def view_of(cls, source: object, **fields: object) -> Self:
+        """The part with these fields, and all others from the attributes of `source` with the same names.
+
+        Raises AttributeError for a field that `source` does not have.
+        """
+        own = {name: getattr(source, name) for name in cls.model_fields.keys() - fields.keys()}
+        return cls.model_validate(own | fields, from_attributes=True)
 
 
 class Request(Schema):

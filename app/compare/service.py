@@ -90,28 +90,19 @@ def _column(curve: Curve | None, grid: Samples) -> list[str]:
 
 def _flight(side: ComparisonFlight, settings: list[FlightSetting]) -> ComparedFlight:
     row, campaign, group = side.row, side.campaign, side.group
-    return ComparedFlight(
+    return ComparedFlight.view_of(
+        row,
         trial_id=row.id,
         label=side.label,
         name=side.name,
-        number=row.number,
-        campaign_id=campaign.id,
         campaign_name=campaign.name,
         vehicle=vehicle_name(campaign),
         is_real=campaign.vehicle.is_real,
         experiment=side.experiment.title,
-        state=row.state,
-        gains=row.gains,
-        error=row.error,
         group=None
         if group is None
         else GroupBrief(mean=group.mean, standard_error=group.known_error(side.scatter), n=group.size),
         scatter=side.scatter.reported,
-        rise_time_s=row.rise_time_s,
-        settling_time_s=row.settling_time_s,
-        overshoot_m=row.overshoot_m,
-        steady_state_error_m=row.steady_state_error_m,
-        flown_at=row.flown_at,
         settings=settings,
     )
 

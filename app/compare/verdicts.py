@@ -134,28 +134,11 @@ def _among(best: ComparisonFlight, policies: int) -> str:
 
 
 def _pair(
-    side: ComparisonFlight,
-    against: ComparisonFlight,
-    basis: Basis,
-    sentence: str,
-    *,
-    verdict: Verdict | None = None,
-    confidence: float | None = None,
-    difference: float | None = None,
-    standard_error: float | None = None,
-    further: FurtherFlights | None = None,
+    side: ComparisonFlight, against: ComparisonFlight, basis: Basis, sentence: str, **found: object
 ) -> FlightPair:
-    return FlightPair(
-        trial_id=side.row.id,
-        against_id=against.row.id,
-        basis=basis,
-        verdict=verdict,
-        confidence=confidence,
-        difference=difference,
-        standard_error=standard_error,
-        further=further,
-        sentence=sentence,
-    )
+    """The pair with what was `found` of it; null for the other fields."""
+    known = {"trial_id": side.row.id, "against_id": against.row.id, "basis": basis, "sentence": sentence, **found}
+    return FlightPair.model_validate(dict.fromkeys(FlightPair.model_fields) | known)
 
 
 def _apart(side: ComparisonFlight, own: Group, against: ComparisonFlight, other: Group) -> FlightPair:

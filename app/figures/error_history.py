@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Final
 from app.core import formatting
 from app.figures import theme
 from app.figures.base import Card, Cell, Column, Table, Trace, ready, scatter
-from app.figures.data import FlightData, History, Range, last_number
+from app.figures.data import FlightData, History, NextFlight, Range, last_number
 from app.figures.overlays import MANY, off_scale_traces
 from app.figures.scale import RobustRange, robust_range
 from app.figures.theme import PALETTES, Palette, ThemeName
@@ -224,12 +224,13 @@ class ErrorsFigure:
     def _next(self) -> dict[str, object]:
         return {} if self.history.proposal is None else {"next": self.history.proposal.number}
 
+    def _foreseen(self) -> list[FlightData | NextFlight]:
+        """The flights whose predictions are drawn."""
+        flown = () if self._is_crowded else self.history.flights
+        return [*flown, *([] if self.history.proposal is None else [self.history.proposal])]
+
     def _expected(self) -> list[tuple[int, Range]]:
-        flights = () if self._is_crowded else self.history.flights
-        pairs = [(flight.number, flight.interval) for flight in flights]
-        if self.history.proposal is not None:
-            pairs.append((self.history.proposal.number, self.history.proposal.interval))
-        return [(number, interval) for number, interval in pairs if interval is not None]
+        return [(each.number, each.interval) for each in self._foreseen() if each.interval is not None]
 
     def _labels(self, palette: Palette, top: float) -> list[dict[str, object]]:
         """The error beside each mark, clear of the steps; with many flights only the best."""
@@ -343,10 +344,7 @@ class ErrorsFigure:
 
     def _predictions(self) -> list[tuple[int, float]]:
         """Predicted errors by the number of their flight."""
-        flights = () if self._is_crowded else self.history.flights
-        pairs = [(flight.number, flight.predicted_error) for flight in flights]
-        if self.history.proposal is not None:
-            pairs.append((self.history.proposal.number, self.history.proposal.predicted_error))
+        pairs = [(each.number, each.predicted_error) for each in self._foreseen()]
         return [(number, round(value, 6)) for number, value in pairs if value is not None]
 
     def _summary(self) -> str:

@@ -114,7 +114,7 @@ class LandscapeFigure:
         if not flights:
             return []
         unit, texts = self.history.error_unit, self._texts(one)
-        stars = [flight is best for flight in flights]
+        stars, edge = [flight is best for flight in flights], {"width": 1.5, "color": palette.surface}
         path = _marks(
             index,
             one,
@@ -145,13 +145,7 @@ class LandscapeFigure:
             "best",
             f"Best, flight {best.number}",
             "markers",
-            marker={
-                "size": _STAR_PX,
-                "symbol": "star",
-                "color": palette.best,
-                "opacity": 1,
-                "line": {"width": 1.5, "color": palette.surface},
-            },
+            marker=theme.solid(palette.best, size=_STAR_PX, symbol="star", line=edge),
             hovertext=[_hover_text(best, unit)],
         )
         return [path, star]
@@ -185,13 +179,7 @@ class LandscapeFigure:
             "tried",
             "Tried on model",
             "markers",
-            marker={
-                "size": 6,
-                "symbol": "circle-open",
-                "color": palette.prediction,
-                "opacity": 1,
-                "line": {"width": 1.5},
-            },
+            marker=theme.solid(palette.prediction, size=6, symbol="circle-open", line={"width": 1.5}),
             hovertext=[f"Tried: the model predicts {step.predicted_error:.4f} {unit}" for step in inside],
         )
         return [steps]
@@ -208,13 +196,9 @@ class LandscapeFigure:
             "proposed",
             f"Next, flight {proposal.number}",
             "markers",
-            marker={
-                "size": 13,
-                "symbol": "diamond",
-                "color": palette.prediction,
-                "opacity": 1,
-                "line": {"width": 1.5, "color": palette.surface},
-            },
+            marker=theme.solid(
+                palette.prediction, size=13, symbol="diamond", line={"width": 1.5, "color": palette.surface}
+            ),
             hovertext=[
                 f"Flight {proposal.number}, proposed{prediction} {self.history.error_unit if prediction else ''}"
             ],
@@ -225,25 +209,18 @@ class LandscapeFigure:
         across, up = _place(index, len(self.landscape.slices), stacked=self.stacked)
         named = {gain.name: gain for gain in self.history.gains}
         suffix = theme.suffix(index)
+        axes = (("x", "y", one.x, one.x_values, across, 5), ("y", "x", one.y, one.y_values, up, 6))
         return {
-            f"xaxis{suffix}": theme.titled(
+            f"{own}axis{suffix}": theme.titled(
                 palette,
-                _title(named[one.x]),
-                domain=across,
-                anchor=f"y{suffix}",
-                range=padded(one.x_values),
-                nticks=5,
+                _title(named[gain]),
+                domain=place,
+                anchor=f"{other}{suffix}",
+                range=padded(values),
+                nticks=ticks,
                 showgrid=False,
-            ),
-            f"yaxis{suffix}": theme.titled(
-                palette,
-                _title(named[one.y]),
-                domain=up,
-                anchor=f"x{suffix}",
-                range=padded(one.y_values),
-                nticks=6,
-                showgrid=False,
-            ),
+            )
+            for own, other, gain, values, place, ticks in axes
         }
 
     def _note(self, palette: Palette, scale: Scale) -> dict[str, object]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import structlog
-from sqlalchemy.orm import Session
 
 from app.common.errors import GainlineError, StorageError
 from app.core.clock import REAL_TIME, Clock
@@ -63,14 +62,9 @@ class JobRunner:
         self._at_work: set[int] = set()
         self._beat_due_s = 0.0
 
-    @property
-    def running_count(self) -> int:
-        """Number of jobs that are claimed and not finished."""
-        return len(self._at_work)
-
     def claim(self) -> ClaimedJob | None:
         """Claim the oldest queued job; None when there is none or the runner is full. Raises StorageError."""
-        if self.running_count >= self._room:
+        if len(self._at_work) >= self._room:
             return None
         with self._database.write() as session:
             row = jobs.claim_job(session, worker=self._worker, kinds=(self._kind,), lease_s=self._lease_s)
@@ -106,8 +100,6 @@ class JobRunner:
                 _log.info("job interrupted: the worker is shutting down; the next worker runs it again")
             except StorageError as error:
                 _log.error("job abandoned; it runs again when its lease expires", why=str(error))
-            except jobs.SupersededError as error:
-                self._withdraw(job, error)
             except GainlineError as error:
                 self._fail(job, error)
             except Exception as error:  # noqa: BLE001 - outermost frame of the thread
@@ -117,17 +109,13 @@ class JobRunner:
                 self._at_work.discard(job.id)
 
     def _fail(self, job: ClaimedJob, error: GainlineError) -> None:
-        _log.warning("job failed", why=str(error))
-        self._end(lambda session: jobs.fail_job(session, job.id, error, worker=self._worker))
-
-    def _withdraw(self, job: ClaimedJob, error: jobs.SupersededError) -> None:
-        _log.info("job withdrawn", why=str(error))
-        self._end(lambda session: jobs.cancel_superseded_job(session, job.id, error, worker=self._worker))
-
-    def _end(self, store: Callable[[Session], bool]) -> None:
+        if isinstance(error, jobs.SupersededError):
+            _log.info("job withdrawn", why=str(error))
+        else:
+            _log.warning("job failed", why=str(error))
         try:
             with self._database.write() as session:
-                store(session)
+                jobs.fail_job(session, job.id, error, worker=self._worker)
         except StorageError as refused:
             _log.error("job abandoned; it runs again when its lease expires", why=str(refused))
 

@@ -1,8 +1,8 @@
 """Jobs: numeric work as rows, written in the transaction that needs it, carried out by a worker, repeated after a
 crash.
 
-For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job`, `fail_job` or
-`cancel_superseded_job`; `requeue_job` and `requeue_or_fail_job` when it has to end before that.
+For a worker: `claim_job`, then `heartbeat_job` or `report_progress` while it computes, then `finish_job` or `fail_job`;
+`requeue_job` and `requeue_or_fail_job` when it has to end before that.
 """
 
 from collections.abc import Collection, Sequence
@@ -143,50 +143,25 @@ def finish_job(session: Session, job_id: int, *, worker: str, result: JsonObject
     return True
 
 
-def requeue_job(session: Session, job_id: int, *, worker: str) -> bool:
-    """Queue the job again as if it had not been started, because the worker shuts down.
-
-    False when the job was no longer held by this worker.
-    """
-    row = repository.held_by_or_none(session, job_id, worker)
-    if row is None:
-        return False
-    row.attempts -= 1
-    _requeue(row)
-    return True
+def requeue_job(session: Session, job_id: int, *, worker: str) -> None:
+    """Queue the job again as if it had not been started, because the worker shuts down; if this worker holds it."""
+    if (row := repository.held_by_or_none(session, job_id, worker)) is not None:
+        row.attempts -= 1
+        _requeue(row)
 
 
-def requeue_or_fail_job(session: Session, job_id: int, *, worker: str) -> bool:
-    """Queue the job again after its process died, or fail it when that has happened too often.
-
-    False when the job was no longer held by this worker.
-    """
-    row = repository.held_by_or_none(session, job_id, worker)
-    if row is None:
-        return False
-    _requeue(row)
-    return True
+def requeue_or_fail_job(session: Session, job_id: int, *, worker: str) -> None:
+    """Queue the job again after its process died, or fail it when that has happened too often; if this worker holds
+    it."""
+    if (row := repository.held_by_or_none(session, job_id, worker)) is not None:
+        _requeue(row)
 
 
-def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str) -> bool:
-    """Fail the job and store the error for a person. False when the job was no longer held by this worker."""
-    row = repository.held_by_or_none(session, job_id, worker)
-    if row is None:
-        return False
-    _fail(row, error.message, error.hint, [f"{problem.field}: {problem.reason}" for problem in error.problems])
-    return True
-
-
-def cancel_superseded_job(session: Session, job_id: int, error: SupersededError, *, worker: str) -> bool:
-    """Cancel a job whose result is no longer needed, and store the reason.
-
-    False when the job was no longer held by this worker.
-    """
-    row = repository.held_by_or_none(session, job_id, worker)
-    if row is None:
-        return False
-    _end(row, JobState.CANCELLED, error.message, error.hint, [])
-    return True
+def fail_job(session: Session, job_id: int, error: GainlineError, *, worker: str) -> None:
+    """Fail the job, or cancel one whose result is no longer needed, and store the error for a person; if this worker
+    holds it."""
+    if (row := repository.held_by_or_none(session, job_id, worker)) is not None:
+        _end(row, error)
 
 
 def is_withdrawn(row: JobRow) -> bool:
@@ -271,21 +246,11 @@ def job_views(session: Session, rows: Sequence[JobRow]) -> list[Job]:
 
 
 def _view(row: JobRow, campaign_name: str | None) -> Job:
-    return Job(
-        id=row.id,
-        kind=row.kind,
+    return Job.view_of(
+        row,
         name=_ordered(row),
-        state=row.state,
-        campaign_id=row.campaign_id,
         campaign_name=campaign_name,
-        problem=job_problem(row),
-        done_share=row.done_share,
-        doing=row.doing,
         remaining_s=_remaining_s(row),
-        attempts=row.attempts,
-        created_at=row.created_at,
-        started_at=row.started_at,
-        finished_at=row.finished_at,
         actions=allowed(JOB_ACTIONS, row.state),
     )
 
@@ -312,12 +277,8 @@ def _ordered(row: JobRow) -> str:
 
 def _requeue(row: JobRow) -> int:
     if row.attempts >= MAX_ATTEMPTS:
-        _fail(
-            row,
-            f"The worker stopped {row.attempts} times during this job.",
-            "Read its log on the Jobs page, then retry it.",
-            [],
-        )
+        happened = f"The worker stopped {row.attempts} times during this job."
+        _end(row, GainlineError(happened, hint="Read its log on the Jobs page, then retry it."))
     else:
         _move(row, JobState.QUEUED)
         row.worker, row.lease_until = None, None
@@ -325,14 +286,11 @@ def _requeue(row: JobRow) -> int:
     return row.id
 
 
-def _fail(row: JobRow, happened: str, hint: str, problems: list[str]) -> None:
-    _end(row, JobState.FAILED, happened, hint, problems)
-
-
-def _end(row: JobRow, state: JobState, happened: str, hint: str, problems: list[str]) -> None:
-    _move(row, state)
-    description: JsonObject = {"title": happened, "detail": "; ".join(problems), "hint": hint}
-    row.problem, row.finished_at, row.lease_until = description, utc_now(), None
+def _end(row: JobRow, error: GainlineError) -> None:
+    _move(row, JobState.CANCELLED if isinstance(error, SupersededError) else JobState.FAILED)
+    detail = "; ".join(f"{problem.field}: {problem.reason}" for problem in error.problems)
+    row.problem = {"title": error.message, "detail": detail, "hint": error.hint}
+    row.finished_at, row.lease_until = utc_now(), None
 
 
 def _move(row: JobRow, to: JobState) -> None:

@@ -181,15 +181,7 @@ _LOAD: Final = "Load the gains on the ground. Fly them first at a safe height, r
 
 def _assessed(each: Assessment) -> GainsInManoeuvre:
     prediction = each.prediction
-    return GainsInManoeuvre(
-        name=each.name,
-        gains=dict(each.gains),
-        error_m=prediction.error_m,
-        low_m=prediction.low_m,
-        high_m=prediction.high_m,
-        activity=each.activity,
-        margin=each.margin,
-    )
+    return GainsInManoeuvre.view_of(each, error_m=prediction.error_m, low_m=prediction.low_m, high_m=prediction.high_m)
 
 
 def _mm(metres: float) -> str:

@@ -202,12 +202,5 @@ def _numbers(analysis: TakeoffAnalysis) -> TakeoffNumbers:
 
 
 def _assessed(each: AssessedGains) -> GainsInTakeoff:
-    return GainsInTakeoff(
-        name=each.name,
-        gains=dict(each.gains),
-        error_m=each.predicted_error_m,
-        low_m=each.interval.lower,
-        high_m=each.interval.upper,
-        flown_error_m=each.flown_error_m,
-        refusal=each.refusal,
-    )
+    low_m, high_m = each.interval.lower, each.interval.upper
+    return GainsInTakeoff.view_of(each, error_m=each.predicted_error_m, low_m=low_m, high_m=high_m)

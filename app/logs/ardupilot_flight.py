@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import BinaryIO, Final
 
@@ -28,6 +29,7 @@ from app.core.records.trajectory import Samples
 from app.logs.base import Table, contents, numbers, rows_of
 from app.logs.dataflash import parameters_in, read_tables
 from app.logs.flight_parts import (
+    LARGEST_LEAN,
     LONGEST_INTERVAL_S,
     SHORTEST_PART_S,
     ParameterHistory,
@@ -37,6 +39,7 @@ from app.logs.flight_parts import (
     choose_parts,
     jumps,
     thinned,
+    usable_rows,
 )
 
 _WANTED: Final = frozenset({"PSCD", "PSCZ", "CTUN", "ATT", "MODE", "EV", "ERR", "PARM", "MSG"})
@@ -51,8 +54,6 @@ _NOT_LANDED, _LANDED = 28, 18
 _VIBRATION_FAILSAFE: Final = 29
 _AFTER_TAKEOFF_S: Final = 2.0
 _BEFORE_LANDING_S: Final = 3.0
-_LARGEST_LEAN: Final = 0.866
-"""Cosine of the lean beyond which rows are left out: 30°."""
 _JUMP_M: Final = 0.1
 _JUMP_M_S: Final = 1.0
 _LARGEST_ACCELERATION_M_S2: Final = 50.0
@@ -127,13 +128,9 @@ def read_ardupilot_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
         (_in_flight(tables, time_s), "EV", "has no takeoff, or nothing between takeoff and landing"),
         (_holding_altitude(tables, time_s), "MODE", "has no mode that holds altitude in flight"),
         (~_compensating_vibration(tables, time_s), "ERR", "has vibration compensation active throughout the flight"),
-        (logged.lean >= _LARGEST_LEAN, "ATT", "leans by more than 30° throughout the flight"),
+        (logged.lean >= LARGEST_LEAN, "ATT", "leans by more than 30° throughout the flight"),
     )
-    usable = np.ones(len(time_s), dtype=np.bool_)
-    for condition, field, reason in conditions:
-        usable &= condition
-        if not usable.any():
-            raise _refused(name, field, reason)
+    usable = usable_rows(conditions, partial(_refused, name))
     given, chosen = choose_parts(time_s, usable, logged.is_reset, history, logged.up["DAD"])
     if not chosen:
         raise _refused(

@@ -38,12 +38,14 @@ from app.logs.copter_telemetry import (
     find_vehicle,
 )
 from app.logs.flight_parts import (
+    LARGEST_LEAN,
     LONGEST_INTERVAL_S,
     SHORTEST_PART_S,
     ParameterHistory,
     Parameters,
     Rows,
     choose_parts,
+    usable_rows,
 )
 from app.logs.tlog_frames import is_tlog
 
@@ -52,8 +54,6 @@ _COPTERS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
 _OTHER_KINDS: Final[Mapping[int, str]] = MappingProxyType(
     {1: "a fixed-wing aircraft", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
 )
-_LARGEST_LEAN: Final = 0.866
-"""Cosine of the lean beyond which rows are left out: 30°."""
 _STEPS_APART_S: Final = 1.0
 _SETTLED_S: Final = 6.5
 """Hover after the last step that is analysed."""
@@ -150,17 +150,12 @@ class _Reader:
             (rows.is_known, MESSAGE_NAMES[LOCAL_POSITION_NED], "has no rows beside all the other messages"),
             (rows.is_off_ground, MESSAGE_NAMES[LOCAL_POSITION_NED], f"never is {OFF_GROUND_M:g} m above the ground"),
             (
-                rows.lean >= _LARGEST_LEAN,
+                rows.lean >= LARGEST_LEAN,
                 MESSAGE_NAMES[ATTITUDE_TARGET],
                 "leans by more than 30° throughout the flight",
             ),
         )
-        usable = np.ones(len(rows.time_s), dtype=np.bool_)
-        for condition, field, reason in conditions:
-            usable &= condition
-            if not usable.any():
-                raise self._refused(Problem(field, reason))
-        return usable
+        return usable_rows(conditions, lambda field, reason: self._refused(Problem(field, reason)))
 
     def _sparse_messages(self) -> Iterator[Problem]:
         """Messages that are missing, or too rare where the vehicle flew in the mode with set points."""

@@ -1,7 +1,7 @@
 """Parts of a logged flight that can be analysed: rows that follow each other without a gap, a jump or a change."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Self
 
@@ -13,6 +13,8 @@ from app.core.records.trajectory import Samples
 LONGEST_INTERVAL_S: Final = 0.25
 SHORTEST_PART_S: Final = 4.0
 LONGEST_FLIGHT_S: Final = 120.0
+LARGEST_LEAN: Final = 0.866
+"""Cosine of the lean beyond which rows are left out: 30°."""
 _INTERVAL_S: Final = 0.1
 _ALREADY_THIN: Final = 0.9
 
@@ -47,6 +49,17 @@ class ParameterHistory:
         """The values at a time."""
         place = bisect_right(self.times_s, time_s) - 1
         return self.values[place] if place >= 0 else {}
+
+
+def usable_rows(conditions: Sequence[tuple[Rows, str, str]], refused: Callable[[str, str], Exception]) -> Rows:
+    """Rows, shape (n,), that meet all conditions. Raises what `refused` makes of the field and the reason of the first
+    condition that leaves none."""
+    usable = np.ones_like(conditions[0][0])
+    for condition, field, reason in conditions:
+        usable &= condition
+        if not usable.any():
+            raise refused(field, reason)
+    return usable
 
 
 def jumps(time_s: Samples, values: Samples, rates: Samples, largest: float) -> Rows:

@@ -7,6 +7,7 @@ noisy, and most are not logged.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import BinaryIO, Final
 
 import numpy as np
@@ -26,6 +27,7 @@ from app.core.errors import Problem, TrajectoryError
 from app.core.records.trajectory import Samples
 from app.logs.base import Table, numbers
 from app.logs.flight_parts import (
+    LARGEST_LEAN,
     LONGEST_INTERVAL_S,
     SHORTEST_PART_S,
     ParameterHistory,
@@ -35,6 +37,7 @@ from app.logs.flight_parts import (
     increasing,
     jumps,
     thinned,
+    usable_rows,
 )
 from app.logs.ulog_tables import ULogTables, has_rows, latest, read_ulog_tables, seconds
 
@@ -55,8 +58,6 @@ _OTHER_KINDS: Final = 2
 """The first kind of vehicle that does not fly on rotors; a VTOL changes from one to the other."""
 _LEFT_OUT: Final = (12.0, 17.0, 18.0, 20.0)
 """Modes: descend, takeoff, land, precision landing."""
-_LARGEST_LEAN: Final = 0.866
-"""Cosine of the lean beyond which rows are left out: 30°."""
 _JUMP_M: Final = 0.5
 _JUMP_M_S: Final = 2.0
 _EVERY_POSITION_S: Final = 0.0125
@@ -170,13 +171,9 @@ def read_px4_flight(stream: BinaryIO, *, name: str) -> LoggedFlight:
             f"{_TARGET}.z",
             "has no altitude to follow in flight, as in manual modes: fly in Hold, Mission or Offboard",
         ),
-        (logged.lean >= _LARGEST_LEAN, f"{_TARGET}.thrust", "leans by more than 30° throughout the flight"),
+        (logged.lean >= LARGEST_LEAN, f"{_TARGET}.thrust", "leans by more than 30° throughout the flight"),
     )
-    usable = np.ones(len(logged.time_s), dtype=np.bool_)
-    for condition, field, reason in conditions:
-        usable &= condition
-        if not usable.any():
-            raise _refused(tables, name, field, reason)
+    usable = usable_rows(conditions, partial(_refused, tables, name))
     history = ParameterHistory.of((each.time_s, each.name, each.value) for each in tables.settings)
     given, chosen = choose_parts(logged.time_s, usable, logged.is_reset, history, _manoeuvres(logged))
     if not chosen:

@@ -42,14 +42,13 @@ def read_takeoff_csv(stream: BinaryIO | bytes) -> Trajectory:
     An optional column with missing values is left out and named in the trajectory's `source`. Raises TrajectoryError
     naming the line and the column of the first error, and what to do about it.
     """
-    lines = _Lines(io.BytesIO(stream) if isinstance(stream, bytes) else stream)
-    reader = csv.reader(lines, strict=True)
+    reader = csv.reader(_lines(io.BytesIO(stream) if isinstance(stream, bytes) else stream), strict=True)
     try:
         header = [name.strip() for name in next(reader, [])]
         columns = _columns(header)
-        values, numbers = _read_rows(reader, header, columns, lines)
+        values, numbers = _read_rows(((reader.line_num, row) for row in reader), header, columns)
     except csv.Error as error:
-        raise _refused(f"line {lines.number}", f"is not a line of CSV: {error}", _ROW_HINT) from error
+        raise _refused(f"line {reader.line_num}", f"is not a line of CSV: {error}", _ROW_HINT) from error
     time_s, *channels = (np.array(column, dtype=np.float64) for column in values)
     _require_rows(len(time_s))
     _require_rising_when_stored(time_s, numbers)
@@ -67,41 +66,28 @@ def _without_holes(channels: dict[str, Samples], numbers: "array[int]") -> tuple
     return complete, f"csv; left out, with its first missing value: {named}"
 
 
-class _Lines:
-    """Text lines of a byte stream, numbered, each of bounded length."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self.number = 0
-
-    def __iter__(self) -> Iterator[str]:
-        return self
-
-    def __next__(self) -> str:
-        raw = self._stream.readline(_MAX_LINE_BYTES + 1)
-        if not raw:
-            raise StopIteration
-        self.number += 1
-        if self.number > MAX_ROWS + 1:
+def _lines(stream: BinaryIO) -> Iterator[str]:
+    """Text lines of a byte stream, each of bounded length."""
+    number = 0
+    while raw := stream.readline(_MAX_LINE_BYTES + 1):
+        number += 1
+        where = f"line {number}"
+        if number > MAX_ROWS + 1:
             raise _refused(
-                f"line {self.number}",
+                where,
                 f"is one too many: a flight may have at most {MAX_ROWS} rows",
                 "Trim the log to the takeoff, or keep every tenth row: 50 rows per second are enough.",
             )
-        if self.number == 1:
+        if number == 1:
             if raw.startswith(_UTF_16):
-                raise _refused("line 1", "is text in UTF-16, not UTF-8", _FORMAT_HINT)
+                raise _refused(where, "is text in UTF-16, not UTF-8", _FORMAT_HINT)
             raw = raw.removeprefix(_BYTE_ORDER_MARK)
-        return self._decode(raw)
-
-    def _decode(self, raw: bytes) -> str:
-        where = f"line {self.number}"
         if b"\0" in raw:
             raise _refused(where, "contains bytes that are not text", _FORMAT_HINT)
         if len(raw) > _MAX_LINE_BYTES:
             raise _refused(where, f"is longer than {_MAX_LINE_BYTES} bytes", _FORMAT_HINT)
         try:
-            return raw.decode("utf-8")
+            yield raw.decode("utf-8")
         except UnicodeDecodeError as error:
             raise _refused(where, f"is not UTF-8 text (byte {error.start + 1})", _FORMAT_HINT) from error
 
@@ -128,31 +114,31 @@ def _columns(header: Sequence[str]) -> list[str]:
 
 
 def _read_rows(
-    reader: Iterator[list[str]], header: Sequence[str], columns: Sequence[str], lines: _Lines
+    rows: Iterator[tuple[int, list[str]]], header: Sequence[str], columns: Sequence[str]
 ) -> tuple[list["array[float]"], "array[int]"]:
     """Values of the kept columns, and the line number of each row. Empty lines are skipped."""
     places = [header.index(name) for name in columns]
     values = [array("d") for _ in columns]
     numbers = array("L")
     last_s = -math.inf
-    for row in reader:
+    for line, row in rows:
         if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(header):
             raise _refused(
-                f"line {lines.number}", f"has {len(row)} values where the header names {len(header)} columns", _ROW_HINT
+                f"line {line}", f"has {len(row)} values where the header names {len(header)} columns", _ROW_HINT
             )
-        numbers_of_row = [_value(row[place], lines.number, name) for place, name in zip(places, columns, strict=True)]
+        numbers_of_row = [_value(row[place], line, name) for place, name in zip(places, columns, strict=True)]
         if numbers_of_row[0] <= last_s:
             raise _refused(
-                f"line {lines.number}, column time_s",
+                f"line {line}, column time_s",
                 f"must increase, but {numbers_of_row[0]:g} s follows {last_s:g} s",
                 _ROW_HINT,
             )
         last_s = numbers_of_row[0]
         for column, value in zip(values, numbers_of_row, strict=True):
             column.append(value)
-        numbers.append(lines.number)
+        numbers.append(line)
     return values, numbers
 
 

@@ -16,7 +16,6 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.forkserver import ensure_running
 from traceback import format_exc
-from types import TracebackType
 from typing import Any, Final, Generic, Self, TypeVar
 
 PRELOADED: Final = ("__main__", "app.runtime.preload")
@@ -100,9 +99,7 @@ class ChildProcess:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.kill()
         self.pipe.close()
 

@@ -9,7 +9,6 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import Final, ParamSpec, Self, TypeVar
 
 import structlog
@@ -51,9 +50,7 @@ class ComputePool:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for computer in self._computers:
             computer.close()
 

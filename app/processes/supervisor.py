@@ -7,12 +7,9 @@ import time
 from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
-from types import TracebackType
 from typing import Final, Generic, Self, TypeVar
 
 import structlog
-
-from app.core.clock import REAL_TIME, Clock
 
 FIRST_PAUSE_S: Final = 0.2
 LONGEST_PAUSE_S: Final = 10.0
@@ -30,11 +27,10 @@ T = TypeVar("T")
 class Supervisor(Generic[T]):
     """Runs `target(argument)` in a spawned process between enter and exit."""
 
-    def __init__(self, target: Callable[[T], None], argument: T, *, name: str, clock: Clock = REAL_TIME) -> None:
+    def __init__(self, target: Callable[[T], None], argument: T, *, name: str) -> None:
         self._target = target
         self._argument = argument
         self._name = name
-        self._clock = clock
         self._stopping = threading.Event()
         self._process: BaseProcess | None = None
         self._thread = threading.Thread(target=self._watch, name=f"{name} supervisor", daemon=True)
@@ -44,9 +40,7 @@ class Supervisor(Generic[T]):
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stopping.set()
         self._thread.join()
         process = self._process
@@ -71,14 +65,14 @@ class Supervisor(Generic[T]):
 
     def _watch(self) -> None:
         pause_s = FIRST_PAUSE_S
-        started_s = self._clock.now_s()
+        started_s = time.monotonic()
         while not self._stopping.is_set():
             process = self._process
             assert process is not None
             process.join(0.1)
             if process.is_alive() or self._stopping.is_set():
                 continue
-            lived_s = self._clock.now_s() - started_s
+            lived_s = time.monotonic() - started_s
             pause_s = FIRST_PAUSE_S if lived_s > HEALTHY_AFTER_S else min(2 * pause_s, LONGEST_PAUSE_S)
             _log.error(
                 "child died; restarting it",
@@ -88,9 +82,9 @@ class Supervisor(Generic[T]):
                 lived_s=round(lived_s, 1),
                 pause_s=pause_s,
             )
-            if not self._stopping.wait(self._clock.wall_s(pause_s)):
+            if not self._stopping.wait(pause_s):
                 self._process = self._start()
-                started_s = self._clock.now_s()
+                started_s = time.monotonic()
 
 
 def _dump_stacks(process: BaseProcess) -> None:

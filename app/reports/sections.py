@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final, Protocol
 
-from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.campaigns.history import FLOWN
 from app.campaigns.schemas import Campaign, CampaignStatistics, Start, StopRule
+from app.campaigns.trials.photos import photos_of_campaign
 from app.campaigns.trials.schemas import Trial
 from app.common.states import AbortCause
 from app.core.definition import OptionValue, with_defaults
@@ -21,24 +21,10 @@ from app.core.formatting import EXACT_DIGITS, format_gains, gain, setting_text, 
 from app.core.policy import Gain, Gains
 from app.core.tuning.stop_rules import describe_budget
 from app.core.tuning.strategies import STRATEGIES
-from app.db.models import TrialPhotoRow, TrialRow
+from app.db.models import TrialPhotoRow
 from app.figures.base import Card
 from app.fleet.schemas import GivenGains, Identity, Vehicle, VehicleAct
 from app.vehicles.registry import VEHICLE_KINDS
-
-
-def photos_of(session: Session, campaign_id: int) -> Sequence[tuple[TrialPhotoRow, int]]:
-    """The photos of all trials of a campaign with their sizes in bytes, in the order they were added.
-
-    The image data is loaded on access.
-    """
-    wanted = (
-        select(TrialPhotoRow, func.length(TrialPhotoRow.data))
-        .join(TrialPhotoRow.trial)
-        .where(TrialRow.campaign_id == campaign_id)
-        .order_by(TrialPhotoRow.id)
-    )
-    return [(row, size) for row, size in session.execute(wanted)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,7 +289,7 @@ MAX_BYTES: Final = 24 * 2**20
 def remarks_on(session: Session, campaign_id: int, trials: Sequence[Trial]) -> Iterator[Remark]:
     """Remarks of the trials that have any, in order."""
     photos: dict[int, list[tuple[TrialPhotoRow, int]]] = {}
-    for row, size in photos_of(session, campaign_id):
+    for row, size in photos_of_campaign(session, campaign_id):
         photos.setdefault(row.trial_id, []).append((row, size))
     kept = _fitting(photos)
     for trial in trials:

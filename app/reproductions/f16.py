@@ -185,7 +185,7 @@ def _methods(comparisons: Sequence[_Comparison], seeds: Sequence[int], on_progre
         on_progress(_FROM_STARTS + (1.0 - _FROM_STARTS) * share, f"methods: {before + done} of {total} campaigns")
 
     for each in comparisons:
-        found = study(each.perturbation, seeds, each.methods, tell, max_flights=each.max_flights, processes=1)
+        found = study(each.perturbation, seeds, each.methods, tell, max_flights=each.max_flights)
         before += len(seeds) * len(each.methods)
         yield from (row for result in found for row in each.rows(result))
 

@@ -1,10 +1,10 @@
 """The paper's F-16 experiment over many inaccurate models: which methods find the true optimum, and how fast."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import product
 from statistics import median
 from types import MappingProxyType
 from typing import Final
@@ -13,10 +13,10 @@ import numpy as np
 
 from app.core.definition import Definition, Flight, OptionValue, Start, StopRule, flight_seed
 from app.core.experiments.pitch_tracking import PitchTracking
+from app.core.policy import Vector
 from app.core.records.trajectory import Trajectory
 from app.core.tuning.corrected_model import Optimum, model_optimum
 from app.core.tuning.proposals import next_proposal
-from app.processes import process_context
 from app.vehicles.f16 import whole_flight
 
 BEST_ERROR: Final = 0.204716
@@ -27,6 +27,7 @@ SEARCH_FLIGHTS: Final = 300
 """Flight budget of Nelder–Mead without a model."""
 SHOWCASE_SEED: Final = 50
 """Chosen among the models off by ±45 % because its campaign resembles the paper's."""
+SHOWCASE_PERTURBATION: Final = 0.45
 SHOWCASE_FLIGHTS: Final = 25
 PAPER_FLIGHTS: Final = 27
 PAPER_NEAR_OPTIMAL_AFTER: Final = 16
@@ -150,14 +151,6 @@ class Showcase:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Case:
-    method: str
-    perturbation: float
-    seed: int
-    max_flights: int
-
-
 def study(
     perturbation: float,
     seeds: Sequence[int],
@@ -165,20 +158,15 @@ def study(
     on_progress: Progress = lambda _done, _total: None,
     *,
     max_flights: int = MAX_FLIGHTS,
-    processes: int = 2,
 ) -> tuple[MethodResult, ...]:
     """Run every method on every inaccurate model.
 
     Each campaign ends when it is within 5 % of the true optimum, has nothing to propose, or has flown `max_flights`.
-    The results do not depend on the number of processes.
     """
-    cases = [
-        _Case(method=m, perturbation=perturbation, seed=s, max_flights=max_flights) for s in seeds for m in methods
-    ]
     found: dict[tuple[str, int], CampaignResult] = {}
-    for case, result in _computed(cases, processes):
-        found[case.method, case.seed] = result
-        on_progress(len(found), len(cases))
+    for seed, method in product(seeds, methods):
+        found[method, seed] = _campaign(METHODS[method], perturbation, seed, max_flights)
+        on_progress(len(found), len(seeds) * len(methods))
     return tuple(
         MethodResult(
             method=method,
@@ -190,11 +178,11 @@ def study(
     )
 
 
-def showcase(seed: int = SHOWCASE_SEED, *, flights: int = SHOWCASE_FLIGHTS, perturbation: float = 0.45) -> Showcase:
+def showcase() -> Showcase:
     """The paper's method, scaled, on one inaccurate model, and the search for its start gains."""
-    definition = _definition(METHODS["outside"], perturbation, seed, flights)
+    definition = _definition(METHODS["outside"], SHOWCASE_PERTURBATION, SHOWCASE_SEED, SHOWCASE_FLIGHTS)
     experiment = PitchTracking(definition.experiment_options)
-    default, optimum = experiment.space.default, start(perturbation, seed)
+    default, optimum = experiment.space.default, start(SHOWCASE_PERTURBATION, SHOWCASE_SEED)
     return Showcase(
         search_errors=optimum.course,
         model_hand=experiment.simulate(default, experiment.nominal_model),
@@ -216,22 +204,12 @@ def start(perturbation: float, seed: int) -> Optimum:
     return model_optimum(experiment, experiment.space, experiment.space.default)
 
 
-def _computed(cases: Sequence[_Case], processes: int) -> Iterator[tuple[_Case, CampaignResult]]:
-    if processes < 2:
-        yield from ((case, _campaign(case)) for case in cases)
-        return
-    with ProcessPoolExecutor(processes, mp_context=process_context()) as pool:
-        waiting = {pool.submit(_campaign, case): case for case in cases}
-        yield from ((waiting[done], done.result()) for done in as_completed(waiting))
-
-
-def _campaign(case: _Case) -> CampaignResult:
-    method = METHODS[case.method]
+def _campaign(method: Method, perturbation: float, seed: int, max_flights: int) -> CampaignResult:
     if not method.strategy:
-        return CampaignResult(seed=case.seed, errors=_searched(case))
-    definition = _definition(method, case.perturbation, case.seed, case.max_flights)
+        return CampaignResult(seed=seed, errors=_searched(start(perturbation, seed).gains))
+    definition = _definition(method, perturbation, seed, max_flights)
     flights = list(_flown(definition, method, until_near=True))
-    return CampaignResult(seed=case.seed, errors=tuple(_true_errors([flight.gains for flight in flights])))
+    return CampaignResult(seed=seed, errors=tuple(_true_errors([flight.gains for flight in flights])))
 
 
 def _definition(method: Method, perturbation: float, seed: int, max_flights: int) -> Definition:
@@ -278,14 +256,14 @@ class _NearError(Exception):
     """Raised when the search is within 5 % of the optimum."""
 
 
-def _searched(case: _Case) -> tuple[float, ...]:
+def _searched(first: Vector) -> tuple[float, ...]:
     """Nelder–Mead on the true system from the same start; every evaluation is a flight."""
     from scipy.optimize import minimize
 
-    space, first = PitchTracking.space, start(case.perturbation, case.seed).gains
+    space = PitchTracking.space
     errors: list[float] = []
 
-    def fly(vector: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+    def fly(vector: Vector) -> float:
         errors.extend(_true_errors([space.mapping(space.nearest(vector))]))
         if errors[-1] <= (1.0 + WITHIN) * BEST_ERROR:
             raise _NearError

@@ -68,15 +68,13 @@ def ratio(measured: float, paper: float | None) -> float | None:
     return None if not paper else measured / paper
 
 
-def curve(
-    name: str, style: Style, x: Samples, y: Samples | NDArray[np.int64], *, note: str = "", points: int = CURVE_POINTS
-) -> Line:
+def curve(name: str, style: Style, x: Samples, y: Samples | NDArray[np.int64], *, note: str = "") -> Line:
     """A line through samples of shape (n,), thinned so that its shape and extremes are preserved."""
-    near, values = thinned(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), points)
+    near, values = thinned(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), CURVE_POINTS)
     return Line(name=name, style=style, x=tuple(near), y=tuple(values), note=note)
 
 
-def marks(name: str, style: Style, x: Samples, y: Samples, *, note: str = "") -> Line:
+def marks(name: str, style: Style, x: Samples, y: Samples) -> Line:
     """A mark for each sample of shape (n,)."""
     return Line(
         name=name,
@@ -84,5 +82,4 @@ def marks(name: str, style: Style, x: Samples, y: Samples, *, note: str = "") ->
         x=tuple(float(value) for value in x),
         y=tuple(round(float(value), 6) for value in y),
         marks=True,
-        note=note,
     )

@@ -49,20 +49,18 @@ def read_order(order: object) -> Order:
 
 def list_reproductions(session: Session) -> list[schemas.ReproductionSummary]:
     """All reproductions, in the order of the registry, without their rows."""
-    return [schemas.ReproductionSummary.model_validate(_summary(session, each)) for each in REPRODUCTIONS.values()]
+    return [schemas.ReproductionSummary.view_of(each, **_summary(session, each)) for each in REPRODUCTIONS.values()]
 
 
 def get_reproduction(session: Session, name: str) -> schemas.Reproduction:
     """One reproduction with the rows of its newest result. Raises NotFoundError."""
     each = _registered(name)
     result = _result(session, name)
-    return schemas.Reproduction.model_validate(
-        {
-            **_summary(session, each),
-            "rows": [] if result is None else list(result.rows),
-            "notes": [] if result is None else list(result.notes),
-        },
-        from_attributes=True,
+    return schemas.Reproduction.view_of(
+        each,
+        **_summary(session, each),
+        rows=[] if result is None else list(result.rows),
+        notes=[] if result is None else list(result.notes),
     )
 
 
@@ -94,13 +92,9 @@ def _registered(name: str) -> Reproduction:
 
 
 def _summary(session: Session, each: Reproduction) -> dict[str, object]:
+    """What the registry does not know of a reproduction."""
     latest = jobs.latest_result(session, REPRODUCTION_JOB, each.name)
     return {
-        "name": each.name,
-        "title": each.title,
-        "line": each.line,
-        "paper": each.paper,
-        "long_form": each.long_form,
         "figures": [{"name": figure_name, "title": title} for figure_name, title in each.figures.items()],
         "job": _open_job(session, each, latest),
         "latest": None if latest is None else _latest_run(latest),

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import Final
 
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.campaigns import repository
 from app.campaigns.trials.schemas import TrialPhoto
 from app.common.errors import ConflictError, InputError, MediaTypeError, NotFoundError, Problem, TooLargeError
-from app.db.models import TrialPhotoRow
+from app.db.models import TrialPhotoRow, TrialRow
 
 MAX_BYTES: Final = 10 * 2**20
 MAX_PER_TRIAL: Final = 20
@@ -77,6 +78,20 @@ def list_photos(session: Session, trial_id: int) -> list[TrialPhoto]:
     return [_view(row) for row in repository.photos_of_trial(session, repository.get_trial(session, trial_id).id)]
 
 
+def photos_of_campaign(session: Session, campaign_id: int) -> list[tuple[TrialPhotoRow, int]]:
+    """The photos of all trials of a campaign with their sizes in bytes, in the order they were added.
+
+    The image data is loaded on access.
+    """
+    wanted = (
+        select(TrialPhotoRow, func.length(TrialPhotoRow.data))
+        .join(TrialPhotoRow.trial)
+        .where(TrialRow.campaign_id == campaign_id)
+        .order_by(TrialPhotoRow.id)
+    )
+    return [(row, size) for row, size in session.execute(wanted)]
+
+
 def get_picture(session: Session, trial_id: int, photo_id: int) -> Picture:
     """Raises NotFoundError."""
     row = _one(session, trial_id, photo_id)
@@ -97,4 +112,4 @@ def _one(session: Session, trial_id: int, photo_id: int) -> TrialPhotoRow:
 
 
 def _view(row: TrialPhotoRow) -> TrialPhoto:
-    return TrialPhoto(id=row.id, trial_id=row.trial_id, media_type=row.media_type, added_at=row.added_at)
+    return TrialPhoto.view_of(row)

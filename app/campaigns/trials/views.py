@@ -12,10 +12,10 @@ from sqlalchemy.orm import Session
 from app.campaigns import history, repository
 from app.campaigns.definitions import experiment_of_campaign
 from app.campaigns.rehearsals import is_rehearsal_satisfied, rehearsal_of
-from app.campaigns.trials.schemas import FlightBrief, Glitch, GroupBrief, RecordBrief, Trial, TrialComparison
+from app.campaigns.trials.schemas import FlightBrief, GroupBrief, RecordBrief, Trial, TrialComparison
 from app.campaigns.trials.schemas import Trajectory as TrajectoryOut
 from app.common.conflict_checks import allowed
-from app.common.schemas import Gate, Interval
+from app.common.schemas import Interval
 from app.common.states import ACTIVE_FLIGHT_STATES, CAMPAIGN_ACTIONS, TRIAL_ACTIONS, FlightState, TrialState
 from app.core.definition import Flight
 from app.core.experiments import get_experiment
@@ -79,16 +79,7 @@ def comparisons(row: TrialRow, field: ReferenceFlights) -> list[TrialComparison]
         if other is None or other.gains == own.gains:
             continue
         comparison = compare(own, other, field.scatter, CONFIDENCE, plan_further=False)
-        found.append(
-            TrialComparison(
-                against=against,
-                trial_number=number,
-                verdict=comparison.verdict,
-                confidence=comparison.confidence,
-                difference=comparison.difference,
-                standard_error=comparison.standard_error,
-            )
-        )
+        found.append(TrialComparison.view_of(comparison, against=against, trial_number=number))
     return found
 
 
@@ -145,42 +136,20 @@ def _view(
     rehearsed: bool,
 ) -> Trial:
     predicted_error, interval = _prediction(row, field)
-    return Trial(
-        id=row.id,
-        version=row.version,
-        campaign_id=row.campaign_id,
-        number=row.number,
-        state=row.state,
-        kind=row.kind,
-        gains=row.gains,
-        read_back=row.read_back,
-        proposal_id=row.proposal_id,
-        error=row.error,
+    return Trial.view_of(
+        row,
         predicted_error=predicted_error,
         predicted_interval=interval,
         inside_interval=_is_inside(interval, row),
         group=_group(row, field),
         comparisons=comparisons(row, field),
-        overshoot_m=row.overshoot_m,
-        rise_time_s=row.rise_time_s,
-        settling_time_s=row.settling_time_s,
-        steady_state_error_m=row.steady_state_error_m,
         verdict=verdict(row, field, get_experiment(campaign.experiment).error_unit, _flown_before(row, field)),
-        reason=row.reason,
-        abort_cause=row.abort_cause,
-        note=row.note,
-        gate=Gate.model_validate(row.gate),
-        overrule_reason=row.overrule_reason,
-        glitches=[Glitch.model_validate(glitch) for glitch in row.glitches or ()],
-        repaired_error=row.repaired_error,
+        glitches=row.glitches or [],
         record=_record(row),
         may_be_valid=_may_be_valid(campaign, row),
         flight=_flight(flight),
-        seed=row.seed,
         speed=flight.speed if flight else None,
         settings=row.settings or {},
-        created_at=row.created_at,
-        flown_at=row.flown_at,
         actions=_actions(campaign, row, flight, rehearsed),
     )
 
@@ -275,16 +244,8 @@ def _record(trial: TrialRow) -> RecordBrief | None:
     row = trial.trajectory
     if row is None:
         return None
-    return RecordBrief(
-        ending=trial.ending or "completed",
-        samples=row.samples,
-        duration_s=row.duration_s,
-        source=row.source,
-        clock=row.clock,
-        channels=row.columns[1:],
-        units=_units(row.columns[1:]),
-        checksum=row.checksum,
-    )
+    channels = row.columns[1:]
+    return RecordBrief.view_of(row, ending=trial.ending or "completed", channels=channels, units=_units(channels))
 
 
 def _may_be_valid(campaign: CampaignRow, row: TrialRow) -> bool:
@@ -301,16 +262,9 @@ def _units(channels: Iterable[str]) -> dict[str, str]:
 def _flight(row: FlightRow | None) -> FlightBrief | None:
     if row is None:
         return None
-    return FlightBrief(
-        id=row.id,
-        state=row.state,
-        mode=row.mode,
-        take_off_at=row.take_off_at,
+    return FlightBrief.view_of(
+        row,
         standing_down=row.stand_down,
-        problem=row.problem,
-        battery=row.battery,
-        battery_v_before=row.battery_v_before,
-        battery_v_after=row.battery_v_after,
         safe_gains_restored=None if row.restored is None else row.restored == row.safe_gains,
     )
 
