@@ -163,7 +163,7 @@ class CopterModel(LimitedModel[Copter]):
     def _rules_note(self, gains: Vector) -> str:
         """What the likeliest vehicle would fly with the sets that are set without a model. Those are as good that are
         not above the interval of `gains`: no flight would tell them apart."""
-        as_good_m = _interval(self._all.predict(self._loop(gains))).upper
+        as_good_m = _interval(self._all.predict(self.loop(gains))).upper
         found = [self._rule_note(*rule, as_good_m=as_good_m) for rule in self._rules]
         return f"For comparison, the model predicts {'; '.join(found)}."
 
