@@ -59,15 +59,17 @@ class DuplicateDetector:
         self._certain_s: float | None = None
         self._why = ""
 
-    def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None) -> None:
-        """Add a message by its whole frame and sequence number; `boot_s` is its time stamp, if it has one."""
+    def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None, *, is_counted: bool = True) -> bool:
+        """Add a message by its whole frame and sequence number, which counts unless the message has another counter;
+        `boot_s` is its time stamp, if it has one. Return whether it is a copy."""
         if frame in self._frames:
-            return
+            return True
         self._frames[frame] = None
         if len(self._frames) > _FRAMES:
             del self._frames[next(iter(self._frames))]
-        if self._add_number(number, now_s) and boot_s is not None:
+        if is_counted and self._add_number(number, now_s) and boot_s is not None:
             self._add_clock(boot_s - now_s, now_s)
+        return False
 
     def has_seen(self, frame: bytes) -> bool:
         """Whether a message is a copy of a recent one."""

@@ -37,6 +37,7 @@ _CONTRADICTED_S: Final = 4.0
 _STEPPED_S: Final = 0.3
 """A greater step of the clock is not one of the latency."""
 _LEANING: Final = 0.5
+_OSCILLATES: Final = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
 _CLIMBED_WITHIN_M: Final = 1.0
 """PX4 hovers from 0.8 m below its set point on (NAV_MC_ALT_RAD)."""
 
@@ -45,6 +46,8 @@ def find_on_ground(watch: TrialObservation, limits: Limits, now_s: float) -> Fin
     """Return the most severe failure of a vehicle before the takeoff command, if any."""
     if watch.rebooted:
         return Finding(failure=Failure.UNEXPECTED, why="The vehicle rebooted.")
+    if watch.leaning > _LEANING:
+        return Finding(failure=Failure.ENVELOPE, why=_OSCILLATES)
     return (
         find_duplicate(watch)
         or find_link(watch, limits, now_s)
@@ -159,7 +162,7 @@ def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, s
         elif settling and watch.crossings >= limits.crossings:
             why = f"It crossed its set point {watch.crossings} times by more than ±{limits.crossing_m:g} m."
     if not why and watch.leaning > _LEANING:
-        why = "It leaned by more than 20° most of the time: its attitude oscillates. Tune its attitude first."
+        why = _OSCILLATES
     return Finding(failure=Failure.ENVELOPE, why=why) if why else None
 
 

@@ -51,6 +51,9 @@ MAX_SEQUENCE_LEAD: Final = 128
 DUPLICATE_TIMEOUT_S: Final = 3.0
 """Time for which messages of another peer with the vehicle's ids count."""
 
+_TOLD_ONCE: Final = frozenset({"PARAM_VALUE", "COMMAND_ACK", "MISSION_ACK", "SCRIPT_CURRENT"})
+"""Messages of something that has happened: a copy of one that arrives later is out of date."""
+
 MAV_TYPE_GCS: Final = 6
 MAV_STATE_ACTIVE: Final = 4
 
@@ -416,9 +419,11 @@ class Link:
             self._plan[number(message, "seq")] = frame
         if self._vehicle_component in (None, source_component(message)):
             self._last_packet_s = now_s
-            if not message.get_type().startswith(self._dialect.uncounted):
-                self._last_number = sequence(message)
-                self._duplicates.add(frame, sequence(message), now_s, _boot_s(message))
+            counts = not message.get_type().startswith(self._dialect.uncounted)
+            self._last_number = sequence(message) if counts else self._last_number
+            is_copy = self._duplicates.add(frame, sequence(message), now_s, _boot_s(message), is_counted=counts)
+            if is_copy and message.get_type() in _TOLD_ONCE:
+                return False
         if is_autopilot:
             self._last_heartbeat_s = now_s
         return True

@@ -144,8 +144,8 @@ class TrialObservation:
     """Greatest altitude since the command."""
     lifted: bool = False
     """Whether it has been above the ground."""
-    unseen: bool = False
-    """Whether no position of it was received for a while since it was last above the ground."""
+    unseen_m: float | None = None
+    """Its altitude before no position of it was received for a while, unless it has been above the ground since."""
     behind_m: float = 0.0
     """How far its altitude is behind its integrated climb rate, until it is first above the ground."""
     second: SecondaryAltitude | None = None
@@ -177,7 +177,7 @@ def begin(
 def reset_altitude(watch: TrialObservation) -> TrialObservation:
     """Return the observation of a vehicle on the ground whose altitude was reset, without its earlier altitudes."""
     second = None if watch.second is None else replace(watch.second, apart_m=0.0, apart_since_s=None)
-    return replace(watch, jumped_m=0.0, lifted=False, unseen=False, behind_m=0.0, side=-1, crossings=0, second=second)
+    return replace(watch, jumped_m=0.0, lifted=False, unseen_m=None, behind_m=0.0, side=-1, crossings=0, second=second)
 
 
 def change_set_point(watch: TrialObservation, set_point_m: float) -> TrialObservation:
@@ -239,7 +239,7 @@ def settle(watch: TrialObservation, now_s: float, ground_m: float, *, commanded:
     return with_changes(
         watch,
         lifted=watch.lifted or airborne,
-        unseen=watch.unseen and not airborne,
+        unseen_m=None if airborne else watch.unseen_m,
         grounded_since_s=since_s if grounded and not said_to_fly else None,
         contradicted_since_s=flying_since_s if grounded and said_to_fly else None,
     )
@@ -484,7 +484,7 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
         watch,
         unchanged_s=_unchanged_s(watch, position),
         behind_m=_behind_m(watch, position),
-        unseen=watch.unseen or (watch.last is not None and position.time_boot_s - watch.last.time_boot_s > FRESH_S),
+        unseen_m=_unseen_m(watch, position),
         highest_m=max(watch.highest_m, position.altitude_m),
         accepted_s=now_s,
         sent_s=now_s if watch.least_offset_s is None else position.time_boot_s + watch.least_offset_s,
@@ -495,6 +495,13 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
         may_overshoot=watch.may_overshoot and not has_crossed,
         other=None,
     )
+
+
+def _unseen_m(watch: TrialObservation, position: Position) -> float | None:
+    last = watch.last
+    if last is None or position.time_boot_s - last.time_boot_s <= FRESH_S:
+        return watch.unseen_m
+    return last.altitude_m if watch.unseen_m is None else max(watch.unseen_m, last.altitude_m)
 
 
 def _unchanged_s(watch: TrialObservation, position: Position) -> float:

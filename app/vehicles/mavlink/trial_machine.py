@@ -190,14 +190,17 @@ def _with_fall(trial: Trial, now_s: float) -> Trial:
 
 
 def _with_disarming(trial: Trial) -> Trial:
-    """Note that somebody else, or the vehicle itself, stopped its motors in the air: it exceeded its limits because it
-    fell."""
+    """Note that somebody else, or the vehicle itself, stopped its motors in the air, or may have while it was not
+    observed there: it exceeded its limits because it fell."""
     watch, limits = trial.watch, trial.plan.limits
     if trial.stopped or trial.state not in _FLOWN or not watching.is_disarmed(watch, limits):
         return trial
     fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= limits.confirmation_s
+    unseen_m = trial.plan.ground_m if watch.unseen_m is None else watch.unseen_m
     if not fell and trial.disarmed_m <= watching.DRIFT_M:
-        return trial
+        why = "Its motors stopped while it was not observed: it may have fallen."
+        may_have_fallen = unseen_m - trial.plan.ground_m > watching.DRIFT_M
+        return note(trial, Finding(failure=Failure.UNEXPECTED, why=why)) if may_have_fallen else trial
     return note_cause(trial, Finding(failure=Failure.UNEXPECTED, why="Its motors were stopped in the air."))
 
 
@@ -319,7 +322,7 @@ def _record(trial: Trial, event: Event) -> Step:
     if finding := _finding(trial, now_s):
         return fail(trial, finding, now_s)
     trial = _resting(trial, now_s)
-    if _has_rested(trial, DOWN_S, now_s):
+    if _has_rested(trial, DOWN_S, now_s) and _is_armed_since(trial, trial.resting_since_s):
         return fail(trial, Finding(failure=Failure.ENVELOPE, why="It descended to the ground by itself."), now_s)
     if (changed := _change_set_point(trial, event)) is not None:
         return changed
@@ -465,6 +468,11 @@ def _resting(trial: Trial, now_s: float) -> Trial:
 
 def _has_rested(trial: Trial, seconds: float, now_s: float) -> bool:
     return trial.resting_since_s is not None and now_s - trial.resting_since_s >= seconds
+
+
+def _is_armed_since(trial: Trial, since_s: float | None) -> bool:
+    """Whether a heartbeat since then has reported that its motors run: nobody else has stopped them."""
+    return trial.watch.armed and since_s is not None and trial.watch.heartbeat_s >= since_s
 
 
 def _has_landed(trial: Trial, now_s: float) -> bool:

@@ -395,7 +395,7 @@ def find_doubt_of_descent(trial: Trial, now_s: float) -> str:
     if landed_blocks or watch.landed is not None:
         has_landed = watch.block in landed_blocks if landed_blocks else watching.reports_landing(watch, now_s)
         return "" if has_landed else "it has not reported a landing, and an altitude may drift"
-    return "" if watch.lifted and not watch.unseen else "its descent was not observed"
+    return "" if watch.lifted and watch.unseen_m is None else "its descent was not observed"
 
 
 def request_reply(trial: Trial, now_s: float) -> Step:
