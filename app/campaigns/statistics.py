@@ -104,11 +104,10 @@ def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestT
     if best is None or best.error is None or now is None:
         return None
     group = next(group for group in now.groups if best.number in group.numbers)
-    return BestTrial(
+    return BestTrial.view_of(
+        best,
         trial_id=best.id,
         trial_number=best.number,
-        error=best.error,
-        gains=best.gains,
         mean=group.mean,
         standard_error=group.known_error(now.scatter),
         flights=group.size,
@@ -116,11 +115,9 @@ def best_trial(trials: Sequence[TrialRow], now: ComparisonState | None) -> BestT
 
 
 def _group(now: ComparisonState, group: Group) -> RepeatGroup:
-    return RepeatGroup(
-        gains=dict(group.gains),
-        trial_numbers=list(group.numbers),
-        errors=list(group.errors),
-        mean=group.mean,
+    return RepeatGroup.view_of(
+        group,
+        trial_numbers=group.numbers,
         standard_error=group.known_error(now.scatter),
         is_baseline=group is now.baseline,
         is_best=group is now.winner,

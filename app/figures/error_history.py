@@ -224,13 +224,13 @@ class ErrorsFigure:
     def _next(self) -> dict[str, object]:
         return {} if self.history.proposal is None else {"next": self.history.proposal.number}
 
-    def _foreseen(self) -> list[FlightData | NextFlight]:
+    def _predicted_flights(self) -> list[FlightData | NextFlight]:
         """The flights whose predictions are drawn."""
         flown = () if self._is_crowded else self.history.flights
         return [*flown, *([] if self.history.proposal is None else [self.history.proposal])]
 
     def _expected(self) -> list[tuple[int, Range]]:
-        return [(each.number, each.interval) for each in self._foreseen() if each.interval is not None]
+        return [(each.number, each.interval) for each in self._predicted_flights() if each.interval is not None]
 
     def _labels(self, palette: Palette, top: float) -> list[dict[str, object]]:
         """The error beside each mark, clear of the steps; with many flights only the best."""
@@ -344,7 +344,7 @@ class ErrorsFigure:
 
     def _predictions(self) -> list[tuple[int, float]]:
         """Predicted errors by the number of their flight."""
-        pairs = [(each.number, each.predicted_error) for each in self._foreseen()]
+        pairs = [(each.number, each.predicted_error) for each in self._predicted_flights()]
         return [(number, round(value, 6)) for number, value in pairs if value is not None]
 
     def _summary(self) -> str:
