@@ -7,7 +7,7 @@ from typing import ClassVar, Final, Protocol
 
 from app.core.errors import InputError, Problem
 from app.core.policy import is_finite
-from app.simdrone.body import Autopilot, Body, OutgoingMessage
+from app.simdrone.body import TICK_S, Autopilot, Body, Fields, OutgoingMessage
 from app.simdrone.motion_capture import MotionCapture
 from app.vehicles.mavlink.dialects import FieldValue
 
@@ -22,6 +22,8 @@ _TWICE_EVERY: Final = 5
 _SWAP_EVERY: Final = 4
 _WRONG_SYSTEM: Final = 77
 _WIND_M_S: Final = 2.0
+_DRIFT_M: Final = 0.45
+_DRIFT_S: Final = 3.6
 
 
 class FaultTarget(Protocol):
@@ -292,6 +294,38 @@ class MocapDrift(Fault):
         drone.cameras.drifts = False
 
 
+@dataclass
+class GroundDrift(Fault):
+    """The altitude sent rises by 0.45 m within 3.6 s of arming while the drone stands, and sinks as fast afterwards."""
+
+    name: ClassVar[str] = "ground-drift"
+    _drone: FaultTarget | None = None
+    _risen_s: float = 0.0
+    _error_m: float = 0.0
+
+    def begin(self, drone: FaultTarget) -> None:
+        self._drone = drone
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        rate_m_s = self._rate_m_s()
+        self._error_m = max(self._error_m + rate_m_s * TICK_S, 0.0)
+        added = {"z": -self._error_m, "vz": -rate_m_s if self._error_m else 0.0}
+        return [
+            replace(message, fields=_shifted(message.fields, added)) if message.kind == "LOCAL_POSITION_NED" else message
+            for message in messages
+        ]
+
+    def _rate_m_s(self) -> float:
+        """Return the rate of the error: upwards for as long as it stands armed, at most `_DRIFT_S`."""
+        drone, speed_m_s = self._drone, _DRIFT_M / _DRIFT_S
+        if drone is None or not drone.autopilot.armed:
+            self._risen_s = 0.0
+        elif drone.body.stands and self._risen_s < _DRIFT_S:
+            self._risen_s += TICK_S
+            return speed_m_s
+        return -speed_m_s
+
+
 FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
     {
         fault.name: fault
@@ -315,6 +349,7 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
             MocapLost,
             MocapFrozen,
             MocapDrift,
+            GroundDrift,
         )
     }
 )
@@ -384,6 +419,12 @@ class Faults:
         for _, fault in self._working:
             frames = fault.transform_frames(frames)
         return frames
+
+
+def _shifted(fields: Fields, added: Mapping[str, float]) -> Fields:
+    """Return the fields with these values added to some of them."""
+    numbers = {name: value for name in added if isinstance(value := fields[name], int | float)}
+    return {**fields, **{name: value + added[name] for name, value in numbers.items()}}
 
 
 def _drained(fields: Mapping[str, FieldValue]) -> dict[str, FieldValue]:
