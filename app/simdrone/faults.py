@@ -311,7 +311,9 @@ class GroundDrift(Fault):
         self._error_m = max(self._error_m + rate_m_s * TICK_S, 0.0)
         added = {"z": -self._error_m, "vz": -rate_m_s if self._error_m else 0.0}
         return [
-            replace(message, fields=_shifted(message.fields, added)) if message.kind == "LOCAL_POSITION_NED" else message
+            replace(message, fields=_shifted(message.fields, added))
+            if message.kind == "LOCAL_POSITION_NED"
+            else message
             for message in messages
         ]
 

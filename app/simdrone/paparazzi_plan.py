@@ -45,8 +45,8 @@ class Engine(Enum):
 @dataclass(frozen=True, slots=True)
 class Block:
     """One block. `after` is the block that follows after `lasts_s`, if any, and not before there is a position if it
-    `waits`; `landed` the one that follows when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up) and `max_distance_m` (along an axis from HOME) are
-    exceptions that lead to "land here"."""
+    `waits`; `landed` the one that follows when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up)
+    and `max_distance_m` (along an axis from HOME) are exceptions that lead to "land here"."""
 
     name: str
     vertical: Vertical = Vertical.WAYPOINT

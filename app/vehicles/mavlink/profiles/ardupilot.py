@@ -70,6 +70,7 @@ class ArduPilot:
     automatic_modes: Final = frozenset({"3", "4", "6", "9", "17", "19", "20", "21", "23", "26", "27"})
     modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
+    ground_blocks: Final[tuple[str, ...]] = ()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
     landed_blocks: Final[frozenset[str]] = frozenset()
@@ -135,7 +136,10 @@ class ArduPilot:
             request_throttle(target),
         )
 
-    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+        return ()
+
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - arming does
         return ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude

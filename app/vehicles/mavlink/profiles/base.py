@@ -289,6 +289,12 @@ class Profile(Protocol):
         ...
 
     @property
+    def ground_blocks(self) -> tuple[str, ...]:
+        """Blocks of its flight plan that set its ground reference, in order: it passes through them by itself, and the
+        reference is set once it enters the last. None if arming sets the reference."""
+        ...
+
+    @property
     def flying_blocks(self) -> frozenset[str]: ...
     @property
     def landing_blocks(self) -> frozenset[str]: ...
@@ -347,8 +353,13 @@ class Profile(Protocol):
         """Return the steps that request the further telemetry of a flight with several set points."""
         ...
 
-    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
-        """Return the steps out of a mode in which it does not arm; none for other modes."""
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
+        """Return the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
+        None if nothing."""
+        ...
+
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:
+        """Return the steps by which its flight plan sets the ground reference anew; none if the plan cannot."""
         ...
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
@@ -454,12 +465,13 @@ def heartbeat(message: Message, mode: str) -> Heartbeat | None:
 
 
 def battery(message: Message) -> Battery:
-    """Read SYS_STATUS, whose voltage is in mV."""
+    """Read SYS_STATUS, whose voltage is in mV. Since release 1.14 PX4 reports that it may be armed by the health bit
+    alone, and nothing while it may not."""
     millivolts = number(message, "voltage_battery")
     present, health = (int(number(message, f"onboard_control_sensors_{bits}")) for bits in ("present", "health"))
     return Battery(
         voltage_v=None if millivolts in _UNKNOWN_MV else millivolts / 1000.0,
-        may_arm=bool(health & _PREARM_CHECK) if present & _PREARM_CHECK else None,
+        may_arm=bool(health & _PREARM_CHECK) if (present | health) & _PREARM_CHECK else None,
     )
 
 

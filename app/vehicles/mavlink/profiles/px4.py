@@ -74,6 +74,7 @@ class Px4:
     )
     modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
     arming_blocks: Final[frozenset[str]] = frozenset()
+    ground_blocks: Final[tuple[str, ...]] = ()
     flying_blocks: Final[frozenset[str]] = frozenset()
     landing_blocks: Final[frozenset[str]] = frozenset()
     landed_blocks: Final[frozenset[str]] = frozenset()
@@ -128,11 +129,18 @@ class Px4:
     def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
         return (request_target(target), request_throttle(target))
 
-    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
-        """Leave the landing mode, in which it does not arm, and in which it stays if Land arrives after the landing."""
-        if mode not in self.landing_modes:
-            return ()
-        return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),)
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
+        """Switch to hold from all other automatic modes: in most it does not arm, and in that of the takeoff it takes
+        off as soon as it is armed; and from a pilot's mode in which it reports that it does not arm. It returns to the
+        last mode when it disarms, and stays in the landing mode if Land arrives after that."""
+        leaves = mode in self.automatic_modes - self.hovering_modes or (
+            may_arm is False and mode not in self.automatic_modes
+        )
+        hold = base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER)
+        return (Step((hold,), awaits="command 176", needed=False),) if leaves else ()
+
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - arming does
+        return ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
         return (Setting(TAKE_OFF_ALTITUDE, target.altitude_m),)
