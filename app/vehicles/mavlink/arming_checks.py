@@ -93,11 +93,6 @@ class ArmingChecks:
         report.is_whole = is_next and ends
         self._open = None
 
-    @property
-    def are_known(self) -> bool:
-        """Whether there are results."""
-        return bool(self._reports)
-
     def failing(self, mode: str) -> tuple[str, ...]:
         """Return the components that prevent arming in this mode, or in any mode if modes cannot be distinguished."""
         failing = 0

@@ -38,6 +38,7 @@ ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
 _REFERENCE_WITHIN_S: Final = 13.0
+"""Time from a position on within which a flight plan sets its ground reference; 10 s in the stock plans."""
 _LARGEST_LOSS: Final = 0.25
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
@@ -252,8 +253,8 @@ def prepare_set_points(radio: AutopilotLink) -> None:
 def make_armable(radio: AutopilotLink) -> None:
     """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm."""
     heartbeat = radio.seen.heartbeat
-    may_arm = radio.seen.may_arm
-    steps = radio.profile.make_armable(radio.target, heartbeat.mode, may_arm=may_arm) if heartbeat is not None else ()
+    profile, may_arm = radio.profile, radio.seen.may_arm
+    steps = () if heartbeat is None else profile.make_armable(radio.target, heartbeat.mode, may_arm=may_arm)
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
     while steps and not radio.is_disarmed and not reports_armed(radio) and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
@@ -264,23 +265,19 @@ def make_armable(radio: AutopilotLink) -> None:
 def set_ground_reference(radio: AutopilotLink, watched: GroundObservation) -> bool:
     """Have the flight plan of a vehicle that was just observed standing, disarmed by every heartbeat, set its ground
     reference, unless it was heard to do so and the vehicle stands by it; wait for it for 13 s at most. Return whether
-    the reference may have been set since the observation began: its altitudes then count from another zero."""
+    to observe the vehicle again, because its altitudes may now count from another zero."""
     seen, steps, now_s = radio.seen, radio.profile.refer_to_ground(radio.target), radio.clock.now_s()
-    if not steps:
+    if not steps or radio.link.duplicate_reason or (seen.has_ground_reference and watched.is_at_reference):
         return False
     *passing, holding = radio.profile.ground_blocks
-    if seen.has_ground_reference and watched.is_at_reference:
-        return False
-    if radio.has_entered(holding, after_s=now_s - watched.seconds):
-        return True
     if radio.block not in passing or now_s - seen.block_s > _REFERENCE_WITHIN_S:
-        if not watched.stands or radio.link.duplicate_reason:
-            return False
+        if not watched.stands:
+            return True
         seen.has_ground_reference = False
         _set_up(radio, steps)
     while radio.is_disarmed and radio.clock.now_s() < now_s + _REFERENCE_WITHIN_S:
         radio.listen(_LISTEN_S)
-        if radio.has_entered(holding, after_s=now_s):
+        if radio.block == holding and seen.block_s > now_s:
             return True
     return False
 
@@ -598,8 +595,8 @@ def _losses(radio: AutopilotLink) -> CheckItem:
         name="losses",
         title="Lost messages",
         passed=passed,
-        found=f"{share:.0%} in the last {LOSS_OVER_S:g} s".replace("%", " %"),
-        needed=f"{_LARGEST_LOSS:.0%} or less".replace("%", " %"),
+        found=f"{100.0 * share:.0f} % in the last {LOSS_OVER_S:g} s",
+        needed=f"{100.0 * _LARGEST_LOSS:g} % or less",
         hint="" if passed else "Bring the antennas closer, or change the channel, then check again after 10 s.",
     )
 

@@ -47,8 +47,8 @@ _PAUSE_S: Final = 0.2
 _REFERENCE_HOLDS_S: Final = 0.25
 """Greatest age of a report of the autopilot's reference."""
 _SAME_TARGET_M: Final = 0.01
-GROUND_REFERENCE_S: Final = 9.0
-"""Least time in "Geo init", which lasts 10 s in the stock flight plans."""
+_REFERENCE_TAKES_S: Final = 9.0
+"""Least time in which a flight plan sets its ground reference; 10 s in the stock plans."""
 
 
 @dataclass(slots=True)
@@ -105,12 +105,14 @@ class VehicleMemory:
     """Whether its flight plan was heard to set its ground reference, and it has not restarted since."""
     battery_v: float | None = None
     loop: LoopReports = field(default_factory=LoopReports)
+    may_arm: bool | None = None
+    """Whether it reports that it may be armed in its mode; None if it never reports that. One that has done so, or that
+    sends events, may not while it reports nothing."""
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
     restart_counter: RestartCounter = field(default_factory=RestartCounter)
     status_texts: deque[str] = field(default_factory=lambda: deque(maxlen=_STATUS_TEXTS))
     status_text_s: float | None = None
-    _may_arm: bool | None = None
     _piece_of: int = 0
     _pieces: str = ""
 
@@ -119,16 +121,10 @@ class VehicleMemory:
         """Number of times that the vehicle has restarted since it was connected."""
         return self.restart_counter.restarts
 
-    @property
-    def may_arm(self) -> bool | None:
-        """Whether it reports that it may be armed in its mode; None if it never reports that. A vehicle that has done
-        so, or sends the results of its arming checks, may not while it reports nothing."""
-        return False if self._may_arm is None and self.arming_checks.are_known else self._may_arm
-
     def forget_vehicle(self) -> None:
         """Discard its identity, the results of its arming checks and its ground reference."""
         self.version = self.uid = ""
-        self._may_arm = None
+        self.may_arm = None
         self.has_ground_reference = False
         self.arming_checks = ArmingChecks()
 
@@ -144,11 +140,12 @@ class VehicleMemory:
                 self.block, self.block_s = number, now_s
             case Battery(voltage_v=volts, may_arm=may_arm):
                 self.battery_v = volts if volts is not None else self.battery_v
-                self._may_arm = False if may_arm is None and self._may_arm is not None else may_arm
+                self.may_arm = False if may_arm is None and self.may_arm is not None else may_arm
             case Throttle() | AltitudeError() | TargetAltitude():
                 self.loop.note(measurement, now_s)
             case VehicleEvent():
                 self.arming_checks.take(measurement)
+                self.may_arm = bool(self.may_arm)
             case Position():
                 self.positions.append((now_s, measurement))
                 before = self.restarts
@@ -255,16 +252,9 @@ class AutopilotLink:
     def _note_ground_reference(self, entered: int, now_s: float) -> None:
         """Note whether the flight plan has set its ground reference: it has if it enters the last of those blocks from
         the one before, and was in that for its full time, because a command may end it earlier."""
-        numbers = [self.target.blocks.get(name) for name in self.profile.ground_blocks]
-        lasted_s = now_s - self.seen.block_s
-        if entered in numbers[:-1]:
-            self.seen.has_ground_reference = False
-        elif [self.seen.block, entered] == numbers[-2:] and lasted_s >= GROUND_REFERENCE_S:
-            self.seen.has_ground_reference = True
-
-    def has_entered(self, block: str, *, after_s: float) -> bool:
-        """Whether this block of its flight plan is the current one, and was entered after this time."""
-        return self.block == block and self.seen.block_s > after_s
+        seen, numbers = self.seen, [self.target.blocks.get(name) for name in self.profile.ground_blocks]
+        has_passed = [seen.block, entered] == numbers[-2:] and now_s - seen.block_s >= _REFERENCE_TAKES_S
+        seen.has_ground_reference = has_passed or (seen.has_ground_reference and entered not in numbers[:-1])
 
     @property
     def block(self) -> str:

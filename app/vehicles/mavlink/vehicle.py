@@ -48,9 +48,9 @@ STANDSTILL_S: Final = 1.0
 """Observation before arming, because a long time may have passed since the gains were staged."""
 
 _LISTEN_S: Final = 0.1
-_REFERENCE_ATTEMPTS: Final = 3
-"""Attempts to observe a vehicle that stands by its ground reference: a plan that is just setting it, and was not heard
-from the beginning, must set it again."""
+_FURTHER_OBSERVATIONS: Final = 3
+"""Greatest number of further observations of a vehicle whose ground reference is set: one whose plan is just setting
+it, and was not heard from the beginning, must set it again."""
 _POSITIONS_CEASED_S: Final = 2.0
 _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
@@ -538,7 +538,7 @@ class MavlinkVehicle:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
             preflight.make_armable(self._radio)
         watched = self._observe_standing(watched_s)
-        for _ in range(_REFERENCE_ATTEMPTS):
+        for _ in range(_FURTHER_OBSERVATIONS):
             if self._state in QUARANTINE_STATES or not preflight.set_ground_reference(self._radio, watched):
                 break
             watched = self._observe_standing(watched_s)

@@ -291,7 +291,7 @@ class Profile(Protocol):
     @property
     def ground_blocks(self) -> tuple[str, ...]:
         """Blocks of its flight plan that set its ground reference, in order: it passes through them by itself, and the
-        reference is set once it enters the last. None if arming sets the reference."""
+        reference is set once it enters the last; none if arming sets the reference."""
         ...
 
     @property
@@ -423,6 +423,34 @@ def read_place(target: Target, place: int) -> Outgoing:
         "PARAM_REQUEST_READ",
         {"target_system": target.aircraft, "target_component": 0, "param_id": "", "param_index": place},
     )
+
+
+class FliesByModes:
+    """Common part of the profiles of autopilots that fly by modes, without a flight plan in blocks, and execute Land
+    and the command that stops the motors in every mode."""
+
+    modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
+    ground_blocks: Final[tuple[str, ...]] = ()
+    arming_blocks: Final[frozenset[str]] = frozenset()
+    flying_blocks: Final[frozenset[str]] = frozenset()
+    landing_blocks: Final[frozenset[str]] = frozenset()
+    landed_blocks: Final[frozenset[str]] = frozenset()
+    stop_settings: Final[tuple[str, ...]] = ()
+
+    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - there are no blocks
+        return {}
+
+    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+        return ()
+
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - arming does
+        return ()
+
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
+        return set_parameter(target, parameter, value, component=AUTOPILOT)
+
+    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
+        return read_parameter(target, parameter)
 
 
 def command(target: Target, code: int, *parameters: float) -> Outgoing:
