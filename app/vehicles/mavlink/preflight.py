@@ -634,11 +634,12 @@ def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> Check
     is_set = radio.seen.has_ground_reference or not radio.profile.refer_to_ground(radio.target)
     passed = is_set and watched.is_at_reference
     at = f"it stands at {watched.ground.altitude_m:.2f} m" if watched.positions else "waiting for a position"
+    mode = radio.profile.mode_names.get(_mode(radio), _mode(radio))
     return CheckItem(
         name="ground_reference",
         title="Ground reference",
         passed=passed,
-        found=at if is_set else f"not set by the flight plan (block: {radio.block or 'not reported'})",
+        found=at if is_set else f"not set by the flight plan (mode {mode}, block {radio.block or 'not reported'})",
         needed=f"set by the flight plan, within {_STANDS_WITHIN_M:g} m of where it stands",
         hint=""
         if passed

@@ -109,7 +109,10 @@ def test_without_a_position_it_is_not_flown() -> None:
         autopilot_of(rig).position_after_s = math.inf
         with connected(rig) as vehicle:
             item = reference(vehicle)
-            assert (item.passed, item.found) == (False, "not set by the flight plan (block: not reported)")
+            assert (item.passed, item.found) == (
+                False,
+                "not set by the flight plan (mode Automatic, block not reported)",
+            )
             assert "until it has a position" in item.hint
             assert blocks_told(rig) == [WAIT_GPS]
 
