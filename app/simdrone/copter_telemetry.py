@@ -26,8 +26,9 @@ _NOISE_M_S: Final = 2e-6
 _NOISE_MS: Final = 20
 """An estimate is never the same twice."""
 _PREARM: Final = 1 << 28
-_SENSORS: Final = 1 | 2 | 4 | 8 | 32 | (1 << 10) | (1 << 11) | (1 << 15) | (1 << 25) | _PREARM
-"""Gyroscope, accelerometer, magnetometer, pressure, GPS, attitude and yaw control, motors, battery, prearm check."""
+_SENSORS: Final = 1 | 2 | 4 | 8 | 32 | (1 << 10) | (1 << 11) | (1 << 15) | (1 << 25)
+"""Gyroscope, accelerometer, magnetometer, pressure, GPS, attitude and yaw control, motors, battery."""
+_ARDUPILOT: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,11 +139,13 @@ def vfr_hud(now: Snapshot) -> Fields:
 
 
 def sys_status(now: Snapshot) -> Fields:
-    sensors = dict.fromkeys((f"onboard_control_sensors_{bits}" for bits in ("present", "enabled", "health")), _SENSORS)
+    """Return SYS_STATUS. PX4 sets the bit of its arming checks in the health alone, since release 1.14."""
+    present = _SENSORS | (_PREARM if now.autopilot == _ARDUPILOT else 0)
     errors = dict.fromkeys(("drop_rate_comm", "errors_comm", *(f"errors_count{i}" for i in range(1, 5))), 0)
-    sensors["onboard_control_sensors_health"] -= 0 if now.ready else _PREARM
     return {
-        **sensors,
+        "onboard_control_sensors_present": present,
+        "onboard_control_sensors_enabled": present,
+        "onboard_control_sensors_health": _SENSORS | (_PREARM if now.ready else 0),
         "load": 200,
         "voltage_battery": round(now.battery_v * 1000.0),
         "current_battery": -1,

@@ -8,7 +8,7 @@ from typing import ClassVar, Final, Protocol
 
 from app.core.errors import InputError, Problem
 from app.core.policy import is_finite
-from app.simdrone.body import Autopilot, Body, Fields, OutgoingMessage
+from app.simdrone.body import TICK_S, Autopilot, Body, Fields, OutgoingMessage
 from app.simdrone.motion_capture import MotionCapture
 from app.vehicles.mavlink.dialects import FieldValue
 
@@ -27,6 +27,8 @@ _DRIFT_M_S: Final = 0.5
 _CREEP_M_S: Final = 0.1
 _LEAN_RAD: Final = math.radians(28.0 * math.sqrt(2.0))
 _LEAN_HZ: Final = 1.7
+_GROUND_DRIFT_M: Final = 0.45
+_GROUND_DRIFT_S: Final = 3.6
 
 
 class FaultTarget(Protocol):
@@ -397,6 +399,40 @@ class MocapDrift(Fault):
         drone.cameras.drifts = False
 
 
+@dataclass
+class GroundDrift(ChangedMessages):
+    """The altitude sent rises by 0.45 m within 3.6 s of arming while the drone stands, and sinks as fast afterwards."""
+
+    name: ClassVar[str] = "ground-drift"
+    kinds: ClassVar[frozenset[str]] = frozenset({_POSITION})
+    _drone: FaultTarget | None = None
+    _risen_s: float = 0.0
+    _error_m: float = 0.0
+    _rate_m_s: float = 0.0
+
+    def begin(self, drone: FaultTarget) -> None:
+        self._drone = drone
+
+    def transform_messages(self, messages: Sequence[OutgoingMessage]) -> list[OutgoingMessage]:
+        self._rate_m_s = self._drift_m_s()
+        self._error_m = max(self._error_m + self._rate_m_s * TICK_S, 0.0)
+        return super().transform_messages(messages)
+
+    def change(self, message: OutgoingMessage) -> Fields:
+        rate_m_s = self._rate_m_s if self._error_m else 0.0
+        return {"z": _value(message, "z") - self._error_m, "vz": _value(message, "vz") - rate_m_s}
+
+    def _drift_m_s(self) -> float:
+        """Return the rate of the error: upwards for as long as it stands armed, at most `_GROUND_DRIFT_S`."""
+        drone, speed_m_s = self._drone, _GROUND_DRIFT_M / _GROUND_DRIFT_S
+        if drone is None or not drone.autopilot.armed:
+            self._risen_s = 0.0
+        elif drone.body.stands and self._risen_s < _GROUND_DRIFT_S:
+            self._risen_s += TICK_S
+            return speed_m_s
+        return -speed_m_s
+
+
 FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
     {
         fault.name: fault
@@ -427,6 +463,7 @@ FAULTS: Final[Mapping[str, type[Fault]]] = MappingProxyType(
             MocapLost,
             MocapFrozen,
             MocapDrift,
+            GroundDrift,
         )
     }
 )

@@ -44,15 +44,17 @@ class Engine(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One block. `after` is the block that follows at once, if any; `landed` the one that follows when the vehicle no
-    longer flies. `max_time_s`, `max_height_m` (local z, up) and `max_distance_m` (along an axis from HOME) are
-    exceptions that lead to "land here"."""
+    """One block. `after` is the block that follows after `lasts_s`, if any, and not before there is a position if it
+    `waits`; `landed` the one that follows when the vehicle no longer flies. `max_time_s`, `max_height_m` (local z, up)
+    and `max_distance_m` (along an axis from HOME) are exceptions that lead to "land here"."""
 
     name: str
     vertical: Vertical = Vertical.WAYPOINT
     waypoint: str = "STDBY"
     engine: Engine = Engine.LEAVE
     after: str | None = None
+    lasts_s: float = 0.0
+    waits: bool = False
     landed: str | None = None
     max_time_s: float = float("inf")
     max_height_m: float = float("inf")
@@ -64,8 +66,8 @@ class Block:
 
 
 BLOCKS: Final = (
-    Block("Wait GPS", Vertical.THROTTLE, engine=Engine.KILL, after="Geo init"),
-    Block("Geo init", Vertical.THROTTLE, engine=Engine.KILL, after="Holding point"),
+    Block("Wait GPS", Vertical.THROTTLE, engine=Engine.KILL, after="Geo init", waits=True),
+    Block("Geo init", Vertical.THROTTLE, engine=Engine.KILL, after="Holding point", lasts_s=10.0),
     Block("Holding point", Vertical.THROTTLE, engine=Engine.KILL),
     Block("Start Engine", Vertical.THROTTLE, engine=Engine.RESURRECT),
     Block("Takeoff", waypoint="CLIMB", max_time_s=45.0, max_height_m=4.5, max_distance_m=8.0),
@@ -86,18 +88,18 @@ BLOCKS: Final = (
 """The plan's blocks in order; of blocks with horizontal figures only the height is flown."""
 
 BY_NAME: Final = {block.name: seq for seq, block in enumerate(BLOCKS)}
+GEO_INIT: Final = BY_NAME["Geo init"]
 LAND_HERE: Final = BY_NAME["land here"]
 TAKEOFF: Final = BY_NAME["Takeoff"]
-HOLDING_POINT: Final = BY_NAME["Holding point"]
 
 
 class FlightPlan:
     """Current block of the plan."""
 
     def __init__(self, *, landed_after_s: float) -> None:
-        """Begin in "Holding point"; `landed_after_s` is the minimum time of descent before a landing is detected."""
+        """Begin in the first block; `landed_after_s` is the minimum time of descent before a landing is detected."""
         self._landed_after_s = landed_after_s
-        self.seq = HOLDING_POINT
+        self.seq = 0
         self.time_s = 0.0
         """Time since the block was entered, s."""
         self.altitudes_m = dict.fromkeys(WAYPOINTS, DEFAULT_ALTITUDE_M)
@@ -118,11 +120,13 @@ class FlightPlan:
         if self.seq == LAND_HERE:
             self.altitudes_m["TD"] = height_m
 
-    def next(self, elapsed_s: float, height_m: float, distance_m: float, *, flies: bool) -> int | None:
+    def next(
+        self, elapsed_s: float, height_m: float, distance_m: float, *, flies: bool, has_position: bool
+    ) -> int | None:
         """Advance time in the block; return the next block if the plan leaves this one. `distance_m` is from HOME."""
         self.time_s += elapsed_s
         block = self.block
-        if block.after is not None:
+        if block.after is not None and self.time_s >= block.lasts_s and (has_position or not block.waits):
             return BY_NAME[block.after]
         if block.landed is not None and not flies and self.time_s > self._landed_after_s:
             return BY_NAME[block.landed]

@@ -31,7 +31,8 @@ BARE_POSITION_PERIOD_S: Final = 0.8
 
 _LATITUDE_E7: Final = 435641193
 _LONGITUDE_E7: Final = 14812804
-_ORIGIN_MM: Final = 147095
+GROUND_MM: Final = 147_095
+"""Altitude of the place, and of the origin that the flight plan sets there."""
 _GEOID_MM: Final = 49817
 _KILL: Final = 0
 _FAILSAFE: Final = 1
@@ -54,6 +55,7 @@ class Snapshot:
     battery_v: float
     mode: int
     motors_on: bool
+    origin_mm: int
     north_m: float
     north_m_s: float
     sends_mode: bool
@@ -96,13 +98,13 @@ def local_position(now: Snapshot) -> Fields:
 
 def global_position(now: Snapshot) -> Fields:
     """Return GLOBAL_POSITION_INT; as in the real one, `relative_alt` is altitude in mm minus the origin in m."""
-    altitude_mm = _ORIGIN_MM + _GEOID_MM + round(now.height_m * 1000.0)
+    altitude_mm = now.origin_mm + _GEOID_MM + round(now.height_m * 1000.0)
     return {
         "time_boot_ms": now.boot_ms,
         "lat": _LATITUDE_E7,
         "lon": _LONGITUDE_E7,
         "alt": altitude_mm,
-        "relative_alt": altitude_mm - _ORIGIN_MM // 1000 - 1,
+        "relative_alt": altitude_mm - now.origin_mm // 1000 - 1,
         "vx": 0,
         "vy": 0,
         "vz": _down_cm_s(now),
@@ -117,7 +119,7 @@ def vfr_hud(now: Snapshot) -> Fields:
         "groundspeed": 0.0,
         "heading": 0,
         "throttle": round(now.thrust * 100.0),
-        "alt": (_ORIGIN_MM + _GEOID_MM) / 1000.0 + now.height_m,
+        "alt": (now.origin_mm + _GEOID_MM) / 1000.0 + now.height_m,
         "climb": -now.climb_rate_m_s,
     }
 
@@ -163,8 +165,8 @@ def system_time(now: Snapshot) -> Fields:
     return {"time_unix_usec": 0, "time_boot_ms": now.boot_ms}
 
 
-def global_origin(_now: Snapshot) -> Fields:
-    return {"latitude": _LATITUDE_E7, "longitude": _LONGITUDE_E7, "altitude": _ORIGIN_MM}
+def global_origin(now: Snapshot) -> Fields:
+    return {"latitude": _LATITUDE_E7, "longitude": _LONGITUDE_E7, "altitude": now.origin_mm}
 
 
 def version(_now: Snapshot) -> Fields:

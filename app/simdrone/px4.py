@@ -148,22 +148,25 @@ class Px4(Copter):
         defaults = {parameter.name: parameter.default for parameter in self.firmware.parameters}
         super().__init__(body, Px4Controller(body, defaults, ground_m=self.firmware.ground_m), system=system)
         self._streamed_s = self._stream_began_s = -math.inf
+        self._chosen = self.mode
         self._events = 0
         self._reported_failing: bool | None = None
 
     def tick(self) -> list[OutgoingMessage]:
-        """Advance by one tick. At its takeoff height it switches to hold, and also once it has landed and disarmed. If
-        Land is commanded after that, it stays in the landing mode, and does not arm."""
+        """Advance by one tick. At its takeoff height it switches to hold. When it disarms it returns to the last mode
+        that was chosen and in which it may be armed: after targets, to OFFBOARD, where it does not arm without a
+        stream. If Land is commanded after that, it stays in the landing mode, and does not arm either."""
         was_armed = self.armed
         self._watch_stream()
         messages = super().tick()
         self.took_off |= self.controller.flies
         if self._is_failing != self._reported_failing:
             self._send_check_events()
-        if was_armed and not self.armed and self.mode.behaviour is Behaviour.LAND:
-            self.mode = self.find_mode(self.firmware.hold)
         if self.mode.name == _TAKEOFF and self.controller.phase is Phase.HOLDING:
             self.mode = self.find_mode(self.firmware.hold)
+        self._chosen = self.mode if self.mode.may_arm else self._chosen
+        if was_armed and not self.armed:
+            self.mode = self._chosen
         return messages
 
     def prearm_failure(self) -> str | None:

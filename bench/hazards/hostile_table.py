@@ -270,6 +270,12 @@ _VEHICLE: Final[Mapping[str, Hazard]] = {
         faults=("lean-oscillation",),
         expected=Expected(codes=frozenset({"F6"}), refuses=True, ends_in=AIR, aborts=ALL),
     ),
+    "drifts on the ground": Hazard(
+        faults=("ground-drift",),
+        has_one_length=True,
+        states=(*PREPARING, State.ARM),
+        expected=Expected(codes=frozenset({"F9d"}), refuses=True),
+    ),
     "left in OFFBOARD": Hazard(
         act=lambda rig: rig.enter_offboard(), expected=HARMLESS, has_one_length=True, states=PREPARING, autopilots=PX4
     ),

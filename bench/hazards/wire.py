@@ -31,8 +31,15 @@ GAINS: Final[Mapping[str, Mapping[str, str]]] = {
 }
 """Parameter of each gain on the vehicle."""
 
-_BLOCKS: Final = {3: Command.ARM, 4: Command.TAKE_OFF, 13: Command.LAND, 14: Command.LAND, 15: Command.LAND}
-"""Commands of the blocks of the stock flight plan."""
+_BLOCKS: Final = {
+    0: Command.REQUEST,
+    3: Command.ARM,
+    4: Command.TAKE_OFF,
+    13: Command.LAND,
+    14: Command.LAND,
+    15: Command.LAND,
+}
+"""Commands of the blocks of the stock flight plan. The first has the plan set its ground reference."""
 _STOPPING_BLOCKS: Final = frozenset({0, 1, 2, 3, 16})
 """Blocks that kill the motors or hold their thrust at zero."""
 _KILL_SETTINGS: Final = frozenset({"kil_thr", "aut_kil_thr"})

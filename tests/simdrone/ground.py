@@ -31,6 +31,7 @@ SPEED: Final = 20.0
 SILENCE_S: Final = 120.0
 """Of the drone's time, or the wall's: nothing that is waited for takes as long."""
 BOOTED_WITHIN_MS: Final = 1000
+HOLDS_AFTER_S: Final = 11.5
 STILL: Final[Mapping[str, OptionValue]] = {"scatter": 0.0, "start_latency_s": 0.0}
 """A twin without scatter, that starts at once."""
 
@@ -224,10 +225,15 @@ def dialect_of(autopilot: str) -> Any:
     return import_module(MODULES[autopilot.partition("-")[0]])
 
 
-def flying(autopilot: str, **settings: Any) -> Ground:
+def flying(autopilot: str, *, settled: bool = True, **settings: Any) -> Ground:
     """A ground station in lockstep with a drone, with the settings of `switched_on`, and the telemetry that ground
-    stations ask an ArduPilot for."""
-    ground = Ground(dialect_of(autopilot), LockstepWire(Lockstep(switched_on(autopilot, **settings))))
+    stations ask an ArduPilot for. A `settled` Paparazzi has been on until its plan came to "Holding point"."""
+    lockstep = Lockstep(switched_on(autopilot, **settings))
+    if settled and autopilot.startswith("paparazzi"):
+        lockstep.muted = True
+        lockstep.wait_s(HOLDS_AFTER_S)
+        lockstep.muted = False
+    ground = Ground(dialect_of(autopilot), LockstepWire(lockstep), _boot_ms=round(1000.0 * lockstep.now_s()))
     if autopilot.startswith("ardupilot"):
         rate = {"req_stream_id": 0, "req_message_rate": 4, "start_stop": 1}
         ground.send("REQUEST_DATA_STREAM", target_system=1, target_component=1, **rate)

@@ -18,6 +18,8 @@ ARMED: Final = 128
 HOLDING_POINT, START_ENGINE, TAKEOFF, LAND_HERE, LAND, FLARE, LANDED, HOME = 2, 3, 4, 13, 14, 15, 16, 17
 CLIMB: Final = 2
 GROUND_M: Final = 25 / 256
+PLAN_M: Final = 1.095
+"""Height of the ground above the flight plan's own origin: 147.095 − 146 m."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,10 @@ from pymavlink.dialects.v20 import common as mavlink_2
 
 from tests.simdrone.ground import Ground, Heard, flying
 from tests.simdrone.paparazzi import (
+    GROUND_M,
     HOLDING_POINT,
     HOME,
+    PLAN_M,
     REAL32,
     START_ENGINE,
     SYSTEM,
@@ -72,7 +74,7 @@ def test_its_telemetry_is_that_of_the_recorded_drone_in_kinds_and_periods(ground
     real = [message for recording in RECORDINGS for message in recorded(recording)]
     kinds = {message.get_type() for message in from_vehicle(real)}
     asked_for = {"PARAM_VALUE", "SCRIPT_COUNT", "SCRIPT_ITEM", "SCRIPT_CURRENT", "MISSION_ACK"}
-    assert {message.get_type() for message in ours} == kinds - asked_for | {"SCRIPT_CURRENT"}
+    assert {message.get_type() for message in ours} == kinds - asked_for
     steps_ms = [b.time_boot_ms - a.time_boot_ms for a, b in pairwise(from_vehicle(ours, "LOCAL_POSITION_NED"))]
     assert set(steps_ms) == {19, 20}
     assert sum(steps_ms) / len(steps_ms) == pytest.approx(1000 / 51.2, abs=0.01)
@@ -169,8 +171,21 @@ def test_a_burst_of_requests_is_lost_and_the_same_one_by_one_are_all_answered() 
         assert ground.expect("PARAM_VALUE").param_index == index
 
 
+def test_the_plan_waits_for_a_position_and_then_ten_seconds_before_it_refers_to_the_ground() -> None:
+    """As in the stock plans: "Wait GPS", "Geo init" for 10 s, "Holding point", each told once."""
+    ground = flying("paparazzi", settled=False)
+    entered_s = []
+    for seq in (0, 1, 2):
+        assert ground.expect("SCRIPT_CURRENT", within_s=12.0).seq == seq
+        entered_s.append(ground.elapsed_s)
+        height_m = GROUND_M if seq == HOLDING_POINT else GROUND_M + PLAN_M
+        assert -ground.expect("LOCAL_POSITION_NED").z == pytest.approx(height_m, abs=0.01)
+    assert entered_s == pytest.approx([0.1, 1.1, 11.1], abs=0.1)
+    assert {each.altitude for each in from_vehicle(ground.heard, "GPS_GLOBAL_ORIGIN")} == {146_000}
+    assert ground.expect("GPS_GLOBAL_ORIGIN", within_s=6.0).altitude == 147_095
+
+
 def test_a_list_being_read_locks_the_blocks_until_it_is_acknowledged(ground: Ground) -> None:
-    ground.expect("SCRIPT_CURRENT", lambda message: message.seq == HOLDING_POINT)
     ground.ask("SCRIPT_REQUEST_LIST", "SCRIPT_COUNT", **TO)
     ground.send("SCRIPT_ITEM", seq=START_ENGINE, name="", **TO)
     assert ground.wait_for("SCRIPT_CURRENT", within_s=1.0) is None
@@ -191,7 +206,7 @@ def test_the_block_is_told_only_when_it_changes_and_a_number_too_high_means_the_
     ground: Ground, pilot: Pilot
 ) -> None:
     pilot.block(START_ENGINE)
-    assert ground.expect("SCRIPT_CURRENT", lambda message: message.seq != HOLDING_POINT).seq == START_ENGINE
+    assert ground.expect("SCRIPT_CURRENT").seq == START_ENGINE
     pilot.block(START_ENGINE)
     assert ground.wait_for("SCRIPT_CURRENT", within_s=1.0) is None
     pilot.block(200)

@@ -21,6 +21,8 @@ from tests.simdrone.copters import (
 from tests.simdrone.ground import flying
 
 TAKING_OFF, LOITER, LANDING = (4 << 16 | sub << 24 for sub in (2, 3, 6))
+OFFBOARD = 6 << 16
+PREARM_CHECK = 1 << 28
 
 
 @pytest.fixture
@@ -82,6 +84,31 @@ def test_it_takes_off_above_its_place_waits_there_lands_and_disarms(pilot: Px4) 
     pilot.ground.expect("HEARTBEAT", lambda message: message.custom_mode == LANDING)
     pilot.ground.expect("HEARTBEAT", lambda message: not message.base_mode & ARMED, within_s=20.0)
     assert pilot.height_m() == pytest.approx(0.0, abs=0.05)
+
+
+def test_it_reports_that_it_may_arm_in_its_health_alone(pilot: Px4) -> None:
+    """As recorded: present 33570863, health 320915519, and 52480063 where it refuses to arm."""
+    statuses = [each for each in pilot.ground.listen(5.0) if each.get_type() == "SYS_STATUS"]
+    assert not any(each.onboard_control_sensors_present & PREARM_CHECK for each in statuses)
+    ready = [bool(each.onboard_control_sensors_health & PREARM_CHECK) for each in statuses]
+    assert (ready[0], ready[-1]) == (False, True)
+
+
+def test_after_a_flight_with_targets_it_is_in_offboard_again_and_does_not_arm(pilot: Px4) -> None:
+    """px4_refused_in_offboard.tlog: custom_mode 0x60000, result 1."""
+    pilot.hover()
+    pilot.ground.listen(4.0)
+    for _ in range(15):
+        pilot.go_to(3.0)
+        pilot.ground.listen(0.1)
+    assert pilot.command(SET_MODE, 1.0, 6.0, 0.0) == 0
+    assert pilot.command(SET_MODE, 1.0, 4.0, 6.0) == 0
+    pilot.ground.expect("HEARTBEAT", lambda message: not message.base_mode & ARMED, within_s=20.0)
+    assert pilot.ground.expect("HEARTBEAT").custom_mode == OFFBOARD
+    assert not pilot.ground.expect("SYS_STATUS").onboard_control_sensors_health & PREARM_CHECK
+    assert pilot.command(ARM, 1.0) == 1
+    assert pilot.command(SET_MODE, 1.0, 4.0, 3.0) == 0
+    assert pilot.command(ARM, 1.0) == 0
 
 
 def test_the_height_of_the_takeoff_command_counts_from_the_sea(pilot: Px4) -> None:

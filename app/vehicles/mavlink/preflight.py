@@ -28,7 +28,7 @@ from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import PROFILES, base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
-from app.vehicles.mavlink.radio import AutopilotLink
+from app.vehicles.mavlink.radio import LOSS_OVER_S, AutopilotLink
 
 HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
@@ -37,6 +37,9 @@ SECONDARY_HZ: Final = 10.0
 ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight was interrupted."
 _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
+_REFERENCE_WITHIN_S: Final = 13.0
+"""Time from a position on within which a flight plan sets its ground reference; 10 s in the stock plans."""
+_LARGEST_LOSS: Final = 0.25
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
 _DISARMED: Final = "disarmed"
@@ -74,6 +77,16 @@ class GroundObservation:
         """Position of the ground. Raises ValueError without a position."""
         altitude_m = statistics.median(position.altitude_m for position in self.positions)
         return Ground(altitude_m, self._last, self.secondary_m)
+
+    @property
+    def stands(self) -> bool:
+        """Whether it was seen to stand, disarmed by every heartbeat."""
+        return self.disarmed and bool(self.positions) and _moved_m(self.positions) <= _STANDS_WITHIN_M
+
+    @property
+    def is_at_reference(self) -> bool:
+        """Whether its altitude is that of the ground reference."""
+        return bool(self.positions) and abs(self.ground.altitude_m) <= _STANDS_WITHIN_M
 
     @property
     def _last(self) -> Position:
@@ -171,8 +184,7 @@ def confirm_stop(radio: AutopilotLink, watched: GroundObservation) -> None:
     sent only if the vehicle was just observed standing, disarmed by every heartbeat: in the air, it would fall."""
     if radio.target.stop_settings or not radio.profile.stop_settings or radio.link.duplicate_reason:
         return
-    stands = watched.disarmed and _moved_m(watched.positions) <= _STANDS_WITHIN_M and bool(watched.positions)
-    if stands:
+    if watched.stands:
         reply = radio.request(base.disarm(radio.target), lambda it: isinstance(it, CommandReply) and it.to == DISARMING)
         accepted = isinstance(reply, CommandReply) and reply.accepted
         radio.target = replace(radio.target, stops_by_command=accepted)
@@ -239,15 +251,35 @@ def prepare_set_points(radio: AutopilotLink) -> None:
 
 
 def make_armable(radio: AutopilotLink) -> None:
-    """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm. Raises VehicleError if it
-    refuses."""
+    """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm."""
     heartbeat = radio.seen.heartbeat
-    steps = radio.profile.make_armable(radio.target, heartbeat.mode) if heartbeat is not None else ()
+    profile, may_arm = radio.profile, radio.seen.may_arm
+    steps = () if heartbeat is None else profile.make_armable(radio.target, heartbeat.mode, may_arm=may_arm)
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
     while steps and not radio.is_disarmed and not reports_armed(radio) and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
     if steps and radio.is_disarmed:
         _set_up(radio, steps)
+
+
+def set_ground_reference(radio: AutopilotLink, watched: GroundObservation) -> bool:
+    """Have the flight plan of a vehicle that was just observed standing, disarmed by every heartbeat, set its ground
+    reference, unless it was heard to do so and the vehicle stands by it; wait for it for 13 s at most. Return whether
+    to observe the vehicle again, because its altitudes may now count from another zero."""
+    seen, steps, now_s = radio.seen, radio.profile.refer_to_ground(radio.target), radio.clock.now_s()
+    if not steps or radio.link.duplicate_reason or (seen.has_ground_reference and watched.is_at_reference):
+        return False
+    *passing, holding = radio.profile.ground_blocks
+    if radio.block not in passing or now_s - seen.block_s > _REFERENCE_WITHIN_S:
+        if not watched.stands:
+            return True
+        seen.has_ground_reference = False
+        _set_up(radio, steps)
+    while radio.is_disarmed and radio.clock.now_s() < now_s + _REFERENCE_WITHIN_S:
+        radio.listen(_LISTEN_S)
+        if radio.block == holding and seen.block_s > now_s:
+            return True
+    return False
 
 
 def _set_up(radio: AutopilotLink, steps: tuple[Step, ...]) -> None:
@@ -286,16 +318,15 @@ def evaluate_items(
         _heartbeat(radio),
         _single_vehicle_item(radio),
         _disarmed(radio),
+        _losses(radio),
         *_motion(watched),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
     if radio.profile.flying_blocks:
-        items.append(_flight_plan(plan_problem))
+        items += [_flight_plan(plan_problem), _ground_reference(radio, watched)]
     if radio.profile.stop_settings:
         items.append(_stopping(radio))
-    if radio.seen.may_arm is not None:
-        items.append(_own_checks(radio))
-    return (*items, *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
+    return (*items, *_own_checks(radio), *(_failsafe(radio, requirement) for requirement in radio.profile.requirements))
 
 
 def evaluate_secondary(secondary: AlignedAltitudeSource, watched: GroundObservation) -> CheckItem:
@@ -460,11 +491,14 @@ def _stopping(radio: AutopilotLink) -> CheckItem:
     )
 
 
-def _own_checks(radio: AutopilotLink) -> CheckItem:
-    ready = bool(radio.seen.may_arm)
-    if not ready and not reports_armed(radio):
+def _own_checks(radio: AutopilotLink) -> tuple[CheckItem, ...]:
+    """Return the item of its arming checks; none if it reports nothing of them, by events neither."""
+    if not radio.seen.may_arm and not reports_armed(radio):
         _request_checks(radio)
-    return CheckItem(
+    ready = radio.seen.may_arm
+    if ready is None:
+        return ()
+    item = CheckItem(
         name="own_checks",
         title="Arming checks of the autopilot",
         passed=ready,
@@ -472,6 +506,7 @@ def _own_checks(radio: AutopilotLink) -> CheckItem:
         needed="passed",
         hint="" if ready else _checks_hint(radio),
     )
+    return (item,)
 
 
 def _request_checks(radio: AutopilotLink) -> None:
@@ -553,6 +588,19 @@ def _motion(watched: GroundObservation) -> tuple[CheckItem, ...]:
     )
 
 
+def _losses(radio: AutopilotLink) -> CheckItem:
+    share = radio.lost_share or 0.0
+    passed = share <= _LARGEST_LOSS
+    return CheckItem(
+        name="losses",
+        title="Lost messages",
+        passed=passed,
+        found=f"{100.0 * share:.0f} % in the last {LOSS_OVER_S:g} s",
+        needed=f"{100.0 * _LARGEST_LOSS:g} % or less",
+        hint="" if passed else "Bring the antennas closer, or change the channel, then check again after 10 s.",
+    )
+
+
 def _moved_m(positions: Sequence[Position]) -> float:
     altitudes = [position.altitude_m for position in positions]
     return max(altitudes) - min(altitudes) if altitudes else 0.0
@@ -577,6 +625,26 @@ def _flight_plan(problem: str) -> CheckItem:
         found=problem or "blocks for takeoff and landing",
         needed="blocks for takeoff and landing",
         hint="Load a flight plan with these blocks (docs/real-flight.md), then connect again." if problem else "",
+    )
+
+
+def _ground_reference(radio: AutopilotLink, watched: GroundObservation) -> CheckItem:
+    """Check that the flight plan was heard to set the ground reference, if it can, and that the vehicle stands by it:
+    a takeoff's altitude counts from there, and so does its error."""
+    is_set = radio.seen.has_ground_reference or not radio.profile.refer_to_ground(radio.target)
+    passed = is_set and watched.is_at_reference
+    at = f"it stands at {watched.ground.altitude_m:.2f} m" if watched.positions else "waiting for a position"
+    mode = radio.profile.mode_names.get(_mode(radio), _mode(radio))
+    return CheckItem(
+        name="ground_reference",
+        title="Ground reference",
+        passed=passed,
+        found=at if is_set else f"not set by the flight plan (mode {mode}, block {radio.block or 'not reported'})",
+        needed=f"set by the flight plan, within {_STANDS_WITHIN_M:g} m of where it stands",
+        hint=""
+        if passed
+        else "Leave it on the ground where it starts, in its automatic mode, until it has a position, then check "
+        "again: its flight plan sets the reference, which takes 10 s.",
     )
 
 

@@ -31,7 +31,7 @@ from app.vehicles.mavlink.events import (
     Version,
 )
 from app.vehicles.mavlink.failures import CONFIRMATION_PERIODS, HEARTBEATS_MISSED
-from app.vehicles.mavlink.link import Link, LinkHealth, Received
+from app.vehicles.mavlink.link import Link, Received
 from app.vehicles.mavlink.profiles.base import TARGET, Outgoing, Profile, ReferenceSource, Step, Target
 
 REPLY_TIMEOUT_S: Final = 0.5
@@ -47,6 +47,8 @@ _PAUSE_S: Final = 0.2
 _REFERENCE_HOLDS_S: Final = 0.25
 """Greatest age of a report of the autopilot's reference."""
 _SAME_TARGET_M: Final = 0.01
+_REFERENCE_TAKES_S: Final = 9.0
+"""Least time in which a flight plan sets its ground reference; 10 s in the stock plans."""
 
 
 @dataclass(slots=True)
@@ -99,9 +101,13 @@ class VehicleMemory:
     uid: str = ""
     block: int | None = None
     block_s: float = float("-inf")
+    has_ground_reference: bool = False
+    """Whether its flight plan was heard to set its ground reference, and it has not restarted since."""
     battery_v: float | None = None
     loop: LoopReports = field(default_factory=LoopReports)
     may_arm: bool | None = None
+    """Whether it reports that it may be armed in its mode; None if it never reports that. One that has done so, or that
+    sends events, may not while it reports nothing."""
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
     positions: deque[tuple[float, Position]] = field(default_factory=lambda: deque(maxlen=_POSITIONS))
     restart_counter: RestartCounter = field(default_factory=RestartCounter)
@@ -116,8 +122,10 @@ class VehicleMemory:
         return self.restart_counter.restarts
 
     def forget_vehicle(self) -> None:
-        """Discard its identity and the results of its arming checks."""
+        """Discard its identity, the results of its arming checks and its ground reference."""
         self.version = self.uid = ""
+        self.may_arm = None
+        self.has_ground_reference = False
         self.arming_checks = ArmingChecks()
 
     def note(self, measurement: Measurement | None, now_s: float) -> None:
@@ -132,14 +140,17 @@ class VehicleMemory:
                 self.block, self.block_s = number, now_s
             case Battery(voltage_v=volts, may_arm=may_arm):
                 self.battery_v = volts if volts is not None else self.battery_v
-                self.may_arm = may_arm
+                self.may_arm = False if may_arm is None and self.may_arm is not None else may_arm
             case Throttle() | AltitudeError() | TargetAltitude():
                 self.loop.note(measurement, now_s)
             case VehicleEvent():
                 self.arming_checks.take(measurement)
+                self.may_arm = bool(self.may_arm)
             case Position():
                 self.positions.append((now_s, measurement))
+                before = self.restarts
                 self.restart_counter.take(measurement, now_s)
+                self.has_ground_reference &= self.restarts == before
             case StatusText():
                 self._add_chunk(measurement, now_s)
             case _:
@@ -154,6 +165,13 @@ class VehicleMemory:
             self.status_texts.append(self._pieces)
             self.status_text_s = now_s
             self._piece_of, self._pieces = 0, ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Count:
+    at_s: float
+    received: int
+    lost: int
 
 
 class AutopilotLink:
@@ -184,6 +202,9 @@ class AutopilotLink:
         self.paused_until_s = float("-inf")
         """End of the last time in which nothing was received because this program stalled: what arrives then is old."""
         self._listened_s = clock.now_s()
+        self._counts: deque[_Count] = deque(
+            [_Count(clock.now_s(), 0, 0)], maxlen=round(LOSS_OVER_S / _COUNT_EVERY_S) + 1
+        )
         self._on_message = on_message
         self._on_wait = on_wait
 
@@ -217,6 +238,25 @@ class AutopilotLink:
         return CONFIRMATION_PERIODS * self.profile.heartbeat_s * self.timeout_factor
 
     @property
+    def lost_share(self) -> float | None:
+        """Share of the vehicle's messages that were lost in about the last ten seconds; None without any."""
+        first, health = self._counts[0], self.link.health
+        lost, received = health.lost - first.lost, health.received - first.received
+        return lost / (lost + received) if lost + received else None
+
+    def _count_losses(self) -> None:
+        if self._listened_s - self._counts[-1].at_s >= _COUNT_EVERY_S:
+            health = self.link.health
+            self._counts.append(_Count(self._listened_s, health.received, health.lost))
+
+    def _note_ground_reference(self, entered: int, now_s: float) -> None:
+        """Note whether the flight plan has set its ground reference: it has if it enters the last of those blocks from
+        the one before, and was in that for its full time, because a command may end it earlier."""
+        seen, numbers = self.seen, [self.target.blocks.get(name) for name in self.profile.ground_blocks]
+        has_passed = [seen.block, entered] == numbers[-2:] and now_s - seen.block_s >= _REFERENCE_TAKES_S
+        seen.has_ground_reference = has_passed or (seen.has_ground_reference and entered not in numbers[:-1])
+
+    @property
     def block(self) -> str:
         """Name of the current block of its flight plan; empty if not reported."""
         names = {number: name for name, number in self.target.blocks.items()}
@@ -239,6 +279,7 @@ class AutopilotLink:
         is_paused = self.clock.now_s() - self._listened_s > _PAUSE_S
         messages = self.link.receive(timeout_s)
         self._listened_s = self.clock.now_s()
+        self._count_losses()
         if is_paused:
             self.paused_until_s = self._listened_s + _JUST_HEARD_S
         if self._on_message is not None:
@@ -252,6 +293,8 @@ class AutopilotLink:
         for each in packets:
             if isinstance(each.measurement, Heartbeat):
                 self._forget_absent(each.now_s)
+            if isinstance(each.measurement, BlockEntered):
+                self._note_ground_reference(each.measurement.number, each.now_s)
             self.seen.note(each.measurement, each.now_s)
         return packets
 
@@ -401,20 +444,11 @@ def _verdict(step: Step, measurement: Measurement | None) -> bool | None:
             return None
 
 
-@dataclass(frozen=True, slots=True)
-class _Count:
-    at_s: float
-    received: int
-    lost: int
-
-
 class StatusReader:
-    """Reads the state of a vehicle without sending or waiting. Losses are counted over about the last ten seconds."""
+    """Reads the state of a vehicle without sending or waiting."""
 
     def __init__(self, radio: AutopilotLink) -> None:
         self._radio = radio
-        opened = _Count(radio.clock.now_s(), 0, 0)
-        self._counts: deque[_Count] = deque([opened], maxlen=round(LOSS_OVER_S / _COUNT_EVERY_S) + 1)
 
     def read(self, *, step: str, datum_m: float, held: Mapping[str, float], trouble: str) -> Condition:
         """Return the current state; altitude counts from `datum_m` on the vehicle's own datum."""
@@ -432,7 +466,7 @@ class StatusReader:
             climb_rate_m_s=None if last is None else last.climb_rate_m_s,
             battery_v=radio.seen.battery_v,
             position_hz=len(recent) / RATE_OVER_S,
-            lost_share=self._lost_share(now_s, health),
+            lost_share=radio.lost_share,
             held=dict(held),
             said=radio.seen.status_texts[-1] if radio.seen.status_texts else "",
             said_age_s=_age(now_s, radio.seen.status_text_s),
@@ -445,13 +479,6 @@ class StatusReader:
         profile = self._radio.profile
         name = profile.mode_names.get(number, number)
         return name if number in profile.modes_without_land else self._radio.block or name
-
-    def _lost_share(self, now_s: float, health: LinkHealth) -> float | None:
-        if now_s - self._counts[-1].at_s >= _COUNT_EVERY_S:
-            self._counts.append(_Count(now_s, health.received, health.lost))
-        first = self._counts[0]
-        lost, received = health.lost - first.lost, health.received - first.received
-        return lost / (lost + received) if lost + received else None
 
 
 def _age(now_s: float, then_s: float | None) -> float | None:

@@ -48,6 +48,9 @@ STANDSTILL_S: Final = 1.0
 """Observation before arming, because a long time may have passed since the gains were staged."""
 
 _LISTEN_S: Final = 0.1
+_FURTHER_OBSERVATIONS: Final = 3
+"""Greatest number of further observations of a vehicle whose ground reference is set: one whose plan is just setting
+it, and was not heard from the beginning, must set it again."""
 _POSITIONS_CEASED_S: Final = 2.0
 _HEARD_WITHIN_S: Final = 5.0
 _ON_THE_GROUND: Final = frozenset({State.CONNECT, State.PREFLIGHT, State.SET_GAINS})
@@ -576,8 +579,11 @@ class MavlinkVehicle:
         if not preflight.reports_armed(self._radio) and self._state not in QUARANTINE_STATES:
             preflight.prepare(self._radio, float(self._options["telemetry_hz"]))
             preflight.make_armable(self._radio)
-        watched = preflight.observe(self._radio, self._secondary, watched_s=watched_s)
-        self._identify()
+        watched = self._observe_standing(watched_s)
+        for _ in range(_FURTHER_OBSERVATIONS):
+            if self._state in QUARANTINE_STATES or not preflight.set_ground_reference(self._radio, watched):
+                break
+            watched = self._observe_standing(watched_s)
         if self._state not in QUARANTINE_STATES:
             preflight.confirm_stop(self._radio, watched)
         minimum_v = float(self._options["min_battery_v"])
@@ -592,6 +598,11 @@ class MavlinkVehicle:
         items = (*items, self._gains.check())
         positions = tuple(position for _, position in self._radio.seen.positions)
         return replace(watched, positions=positions), items
+
+    def _observe_standing(self, watched_s: float) -> preflight.GroundObservation:
+        watched = preflight.observe(self._radio, self._secondary, watched_s=watched_s)
+        self._identify()
+        return watched
 
     def _settings(self, order: FlightOptions) -> tuple[Setting, ...]:
         """Return the parameters that the flight needs."""

@@ -206,6 +206,14 @@ def order_of(autopilot: str, **more: OptionValue) -> FlightOptions:
     return FlightOptions(seed=1, window_s=steps.window_s, set_points=steps.set_points)
 
 
+def require_armable_again(vehicle: MavlinkVehicle) -> None:
+    """It returned to Offboard when it disarmed, where the real one refused every later flight."""
+    vehicle.attend(1.5)
+    assert vehicle.condition().mode == "Offboard"
+    assert [item.name for item in vehicle.check() if not item.passed] == []
+    assert vehicle.condition().mode == "Hold"
+
+
 def require_hover_throttle(rig: LockstepRig, vehicle: MavlinkVehicle, order: FlightOptions) -> None:
     """It hovered at 0.62, where PX4's estimate must reach before it flies again."""
     assert vehicle._hover_throttle == pytest.approx(0.62, abs=0.02)
@@ -237,6 +245,7 @@ def test_the_copters_hold_by_a_position_target_then_step_and_report_their_refere
         targets = [(at_s, -number(message, "z")) for at_s, message in rig.heard if message.get_type() == TARGET]
         commanded_s = next(at_s for at_s, message in reversed(rig.heard) if message.get_type() == "COMMAND_LONG")
         if name == "px4":
+            require_armable_again(vehicle)
             require_hover_throttle(rig, vehicle, order)
         vehicle.close()
     flight = record.trajectory

@@ -253,7 +253,7 @@ def test_whenever_it_is_stopped_a_drone_that_truly_rose_has_flown_and_one_that_w
         assert record.has_flown == was_commanded, tenths
 
 
-@pytest.mark.parametrize(("at_s", "flown"), [(0.0, False), (1.0, False), (1.8, False), (2.6, True)])
+@pytest.mark.parametrize(("at_s", "flown"), [(0.0, False), (1.0, False), (1.7, False), (2.6, True)])
 def test_an_abort_before_the_lift_off_of_a_drone_is_no_flight(at_s: float, flown: bool) -> None:
     record, rose_m, concern = stopped("paparazzi", at_s, motors_off=False)
     assert (record.has_flown, rose_m > 0.0, concern) == (flown, flown, "")

@@ -70,7 +70,7 @@ def attend_until(vehicle: MavlinkVehicle, condition: Callable[[], bool], within_
 
 def test_a_connected_vehicle_reports_its_identity_and_state() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
-        vehicle.attend(2.0)
+        vehicle.attend(12.0)
         condition = vehicle.condition()
         assert replace(vehicle.identity, version="") == PINNED
         assert (vehicle.concern, condition.step, condition.armed, condition.held) == ("", "idle", False, SAFE)

@@ -1,6 +1,7 @@
 """What the real ArduCopter and PX4 were seen to do, done by the simulated ones, and what the program makes of it."""
 
 import math
+import random
 import struct
 from collections.abc import Sequence
 from contextlib import closing
@@ -15,13 +16,13 @@ from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
 from app.simdrone.px4 import Px4
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, StopRequest, VehicleError
-from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY
+from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY, ArmingChecks
 from app.vehicles.mavlink.dialects import Message
 from app.vehicles.mavlink.events import VehicleEvent
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from tests.vehicles.flying import never, unwatched
-from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig
+from tests.vehicles.mavlink.rigs import SAFE, LockstepRig, UdpRig, copter_of
 from tests.vehicles.mavlink.test_connected import connected
 
 ORDER = FlightOptions(seed=1)
@@ -275,17 +276,68 @@ def test_what_a_refused_run_had_set_is_put_back_too() -> None:
             assert rig.drone.autopilot.held("MIS_TAKEOFF_ALT") == 2.5
 
 
-@pytest.mark.complete
-def test_a_px4_that_was_told_to_land_after_it_had_disarmed_is_brought_back_and_flies() -> None:
+@pytest.mark.parametrize(
+    ("mode", "title"), [("AUTO.LAND", "Land"), ("OFFBOARD", "Offboard"), ("AUTO.TAKEOFF", "Takeoff")]
+)
+def test_a_px4_is_brought_out_of_a_mode_in_which_it_cannot_be_armed_for_a_flight(mode: str, title: str) -> None:
+    """The real one was in Offboard after 2 of 7 landings, and refused every later flight while the checks passed."""
     with ready("px4") as rig, connected(rig) as vehicle:
-        autopilot = rig.drone.autopilot
-        assert fly(vehicle, "px4").ending == "completed"
-        autopilot.enter(autopilot.find_mode("AUTO.LAND"))  # type: ignore[attr-defined]
-        vehicle.attend(2.0)
-        assert vehicle.condition().mode == "Land"
+        copter = copter_of(rig.drone)
+        copter.mode = copter.find_mode(mode)
+        vehicle.attend(4.0)
+        assert vehicle.condition().mode == title
         assert [item.name for item in vehicle.check() if not item.passed] == []
         assert vehicle.condition().mode == "Hold"
-        assert fly(vehicle, "px4").ending == "completed"
+
+
+def test_a_px4_that_refuses_to_leave_its_mode_is_not_flown() -> None:
+    """It says that it may not be armed by saying nothing, also to a ground station that has never heard it."""
+    with ready("px4") as rig:
+        copter = copter_of(rig.drone)
+        copter.mode = copter.find_mode("OFFBOARD")
+        copter.mode_refusal = lambda _mode: "not available"  # type: ignore[method-assign]
+        rig.wait_s(4.0)
+        with connected(rig) as vehicle:
+            [own] = [item for item in vehicle.check() if item.name == "own_checks"]
+            assert not own.passed
+            assert own.found.startswith("not passed; messages: not available / ")
+
+
+def test_a_px4_that_never_reports_whether_it_may_be_armed_is_not_refused_for_that() -> None:
+    """Before release 1.11 it had neither the bit in SYS_STATUS nor events."""
+    with ready("px4") as rig:
+        assert isinstance(rig.drone.autopilot, Px4)
+        rig.drone.autopilot._send_check_events = lambda: None  # type: ignore[method-assign]
+        rig.drone.autopilot.prearm_failure = lambda: ""  # type: ignore[method-assign]
+        with connected(rig) as vehicle:
+            vehicle.attend(4.0)
+            items = vehicle.check()
+            assert "own_checks" not in {item.name for item in items}
+            assert [item.name for item in items if not item.passed] == []
+
+
+class LossyRig(LockstepRig):
+    """Loses this share of the drone's packets."""
+
+    lost_share = 0.0
+    chance = random.Random(1)
+
+    def arriving(self, frames: list[bytes]) -> list[bytes]:
+        return [frame for frame in frames if self.chance.random() >= self.lost_share]
+
+
+@pytest.mark.parametrize(("lost_share", "passes"), [(0.3, False), (0.15, True)])
+@pytest.mark.parametrize("autopilot", SAFE)
+def test_a_link_that_loses_three_messages_in_ten_is_refused(autopilot: str, lost_share: float, passes: bool) -> None:
+    """By the positions of a second alone, one flight in ten went off."""
+    with LossyRig(autopilot) as rig, connected(rig) as vehicle:
+        vehicle.attend(4.0)
+        vehicle.check()
+        rig.lost_share = lost_share
+        vehicle.attend(10.0)
+        [item] = [item for item in vehicle.check() if item.name == "losses"]
+        assert item.passed is passes
+        assert float(item.found.split()[0]) == pytest.approx(100.0 * lost_share, abs=6.0)
 
 
 def test_a_persons_land_always_goes_and_is_not_repeated_to_a_vehicle_whose_motors_stand() -> None:
@@ -318,12 +370,13 @@ def test_a_vehicle_whose_own_checks_fail_is_not_flown_and_all_reasons_are_report
 @pytest.mark.parametrize("tells_events", [True, False])
 def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events: bool) -> None:
     """It sent them at its start, before anyone listened, and sends them again after a change or on request."""
-    with LockstepRig("px4", faults=["arm-refused@connect"]) as rig:
+    with LockstepRig("px4") as rig:
         if not tells_events:
             rig.drone.autopilot._send_check_events = lambda: None  # type: ignore[attr-defined]  # as before release 1.14
         with connected(rig) as vehicle:
             vehicle.attend(4.0)
-            vehicle._radio.seen.forget_vehicle()
+            vehicle._radio.seen.arming_checks = ArmingChecks()
+            rig.drone.autopilot.refuses_arming = True
             [own] = [item for item in vehicle.check() if item.name == "own_checks"]
             messages = "messages: Preflight Fail: Arming denied: resolve system health failures first"
             failing = "failing: Local position estimate; " if tells_events else ""
@@ -344,11 +397,12 @@ def test_the_last_message_of_a_vehicle_has_its_age() -> None:
         assert vehicle.condition().said_age_s == pytest.approx(7.0, abs=0.5)
 
 
-def test_a_px4_reports_in_which_mode_it_would_arm() -> None:
+def test_a_px4_that_does_not_leave_its_mode_reports_in_which_it_would_arm() -> None:
     with LockstepRig("px4") as rig, connected(rig) as vehicle:
         vehicle.attend(4.0)
         mode = next(each for each in rig.drone.autopilot.firmware.modes if each.name == "POSCTL")  # type: ignore[attr-defined]
         rig.drone.autopilot.mode = replace(mode, may_arm=False)  # type: ignore[attr-defined]
+        rig.drone.autopilot.mode_refusal = lambda _mode: "not available"  # type: ignore[attr-defined]
         vehicle._radio.seen.arming_checks.take(
             VehicleEvent(ARMING_CHECK_SUMMARY, 900, struct.pack("<BIIII", 1, 0, 0, 1 << 4, 0))
         )

@@ -162,6 +162,7 @@ def test_it_is_not_flown_so_far_from_home_that_its_plan_would_act_before_the_tri
     away_m: float, passes: bool
 ) -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
+        assert [each.name for each in vehicle.check() if not each.passed] == []
         rig.drone.body.north_m = away_m
         [item] = [each for each in vehicle.check() if each.name == "home"]
         assert item.passed is passes

@@ -183,6 +183,52 @@ class Recorder:
         return self.blocks.get(seq) if isinstance(seq, int) else self.count
 
 
+def test_a_flight_plan_begins_again_where_it_has_blocks_that_set_the_ground_reference() -> None:
+    def told(*missing: str) -> list[FieldValue]:
+        blocks = {name: number for name, number in aim().blocks.items() if name not in missing}
+        steps = PAPARAZZI.refer_to_ground(replace(aim(), blocks=blocks))
+        return [message.fields["seq"] for step in steps for message in step.sends if message.kind == "SCRIPT_ITEM"]
+
+    assert (told(), told("Wait GPS"), told("Geo init")) == ([0], [1], [])
+
+
+@pytest.mark.parametrize(
+    ("present", "health", "may_arm"),
+    [(33570863, 320915519, True), (33570863, 52480063, None), (33570863 | 1 << 28, 52480063, False)],
+)
+def test_px4_reports_that_it_may_be_armed_by_the_health_alone(present: int, health: int, may_arm: bool | None) -> None:
+    """As recorded on the ground and where it refused, both of release 1.17; until 1.13 the bit was present, too."""
+    bits = {"onboard_control_sensors_present": present, "onboard_control_sensors_health": health}
+    errors = [f"errors_count{count}" for count in range(1, 5)]
+    others = ("onboard_control_sensors_enabled", "load", "drop_rate_comm", "errors_comm", *errors)
+    fields = dict.fromkeys(others, 0) | {"voltage_battery": 16200, "current_battery": -100, "battery_remaining": 100}
+    assert heard(PX4, "SYS_STATUS", **bits, **fields) == Battery(16.2, may_arm)
+
+
+@pytest.mark.parametrize(
+    ("mode", "may_arm", "leaves"),
+    [
+        ("4.3", True, False),
+        ("4.3", False, False),
+        ("4.2", True, True),
+        ("4.4", True, True),
+        ("4.6", True, True),
+        ("6.0", None, True),
+        ("3.0", True, False),
+        ("3.0", None, False),
+        ("3.0", False, True),
+    ],
+)
+def test_px4_leaves_every_mode_in_which_it_does_not_arm_or_takes_off_at_once(
+    mode: str, may_arm: bool | None, leaves: bool
+) -> None:
+    """Offboard, land, takeoff and mission, and a pilot's mode only if it reports that it does not arm in it."""
+    steps = PX4.make_armable(aim(), mode, may_arm=may_arm)
+    assert [[each.fields[f"param{count}"] for count in (2, 3)] for step in steps for each in step.sends] == [
+        [4, 3]
+    ] * leaves
+
+
 def test_the_flight_plan_is_listed_block_by_block() -> None:
     names = {number: name for name, number in aim().blocks.items()}
     ask = answers(names, len(names))

@@ -8,7 +8,7 @@ from app.core.control.ardupilot_parameters import LOOP_NAMES, NEWER_NAMES, UNSUP
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
+from app.vehicles.mavlink.profiles.base import FliesByModes, GainParameter, Outgoing, Requirement, Step, Target
 
 GUIDED: Final = 4
 LAND: Final = 9
@@ -42,7 +42,7 @@ _MAY_LACK: Final = _LATER | {
 """Releases have one of two names for PSC_JERK_Z."""
 
 
-class ArduPilot:
+class ArduPilot(FliesByModes):
     """Gains have the names before 4.7; on vehicles with the new names, some of the values are a tenth. It does not arm
     without an integral gain of the acceleration."""
 
@@ -70,11 +70,6 @@ class ArduPilot:
         }
     )  # fmt: skip
     automatic_modes: Final = frozenset({"3", "4", "6", "9", "17", "19", "20", "21", "23", "26", "27"})
-    modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
-    arming_blocks: Final[frozenset[str]] = frozenset()
-    flying_blocks: Final[frozenset[str]] = frozenset()
-    landing_blocks: Final[frozenset[str]] = frozenset()
-    landed_blocks: Final[frozenset[str]] = frozenset()
     gain_sets: Final = (
         (
             GainParameter("PSC_POSZ_P", "PSC_POSZ_P", 0.1, 4.0),
@@ -91,8 +86,6 @@ class ArduPilot:
             GainParameter("PSC_ACCZ_D", "PSC_D_ACC_D", 0.0, 0.4, factor=0.1),
         ),
     )
-    stop_settings: Final[tuple[str, ...]] = ()
-    mode_parameter: Final = None
     requirements: Final = (
         Requirement("FS_GCS_ENABLE", "5 (land when the ground station is lost)", frozenset({5.0})),
         Requirement("FS_GCS_TIMEOUT", "15 s or less (until it lands)", most=15.0),
@@ -121,12 +114,6 @@ class ArduPilot:
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
-        return {}
-
-    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
-        return ()
-
     def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
         """Request telemetry: without requests, only heartbeats are sent on a direct link."""
         return request_telemetry(target, telemetry_hz)
@@ -138,7 +125,7 @@ class ArduPilot:
             request_throttle(target),
         )
 
-    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
@@ -175,12 +162,6 @@ class ArduPilot:
                 return (Step((base.disarm(target),)),)
             case Action.KILL:
                 return (Step((base.disarm(target, forced=True),)),)
-
-    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
-        return base.set_parameter(target, parameter, value, component=base.AUTOPILOT)
-
-    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
-        return base.read_parameter(target, parameter)
 
 
 def request_telemetry(target: Target, telemetry_hz: float) -> tuple[Step, ...]:

@@ -292,6 +292,12 @@ class Profile(Protocol):
         ...
 
     @property
+    def ground_blocks(self) -> tuple[str, ...]:
+        """Blocks of its flight plan that set its ground reference, in order: it passes through them by itself, and the
+        reference is set once it enters the last; none if arming sets the reference."""
+        ...
+
+    @property
     def flying_blocks(self) -> frozenset[str]: ...
     @property
     def landing_blocks(self) -> frozenset[str]: ...
@@ -355,8 +361,13 @@ class Profile(Protocol):
         """Return the steps that request the further telemetry of a flight with several set points."""
         ...
 
-    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
-        """Return the steps out of a mode in which it does not arm; none for other modes."""
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
+        """Return the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
+        None if nothing."""
+        ...
+
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:
+        """Return the steps by which its flight plan sets the ground reference anew; none if the plan cannot."""
         ...
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
@@ -422,6 +433,35 @@ def read_place(target: Target, place: int) -> Outgoing:
     )
 
 
+class FliesByModes:
+    """Common part of the profiles of autopilots that fly by modes, without a flight plan in blocks, and execute Land
+    and the command that stops the motors in every mode."""
+
+    modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
+    ground_blocks: Final[tuple[str, ...]] = ()
+    arming_blocks: Final[frozenset[str]] = frozenset()
+    flying_blocks: Final[frozenset[str]] = frozenset()
+    landing_blocks: Final[frozenset[str]] = frozenset()
+    landed_blocks: Final[frozenset[str]] = frozenset()
+    stop_settings: Final[tuple[str, ...]] = ()
+    mode_parameter: Final[ModeParameter | None] = None
+
+    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - there are no blocks
+        return {}
+
+    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
+        return ()
+
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - arming does
+        return ()
+
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
+        return set_parameter(target, parameter, value, component=AUTOPILOT)
+
+    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
+        return read_parameter(target, parameter)
+
+
 def command(target: Target, code: int, *parameters: float) -> Outgoing:
     """Return a COMMAND_LONG; missing parameters are 0."""
     filled = (*parameters, *(0.0 for _ in range(7 - len(parameters))))
@@ -467,12 +507,13 @@ def heartbeat(message: Message, mode: str) -> Heartbeat | None:
 
 
 def battery(message: Message) -> Battery:
-    """Read SYS_STATUS, whose voltage is in mV."""
+    """Read SYS_STATUS, whose voltage is in mV. Since release 1.14 PX4 reports that it may be armed by the health bit
+    alone, and nothing while it may not."""
     millivolts = number(message, "voltage_battery")
     present, health = (int(number(message, f"onboard_control_sensors_{bits}")) for bits in ("present", "health"))
     return Battery(
         voltage_v=None if millivolts in _UNKNOWN_MV else millivolts / 1000.0,
-        may_arm=bool(health & _PREARM_CHECK) if present & _PREARM_CHECK else None,
+        may_arm=bool(health & _PREARM_CHECK) if (present | health) & _PREARM_CHECK else None,
     )
 
 

@@ -21,6 +21,8 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
 
+WAIT_GPS: Final = "Wait GPS"
+GEO_INIT: Final = "Geo init"
 HOLDING: Final = "Holding point"
 START_ENGINE: Final = "Start Engine"
 TAKE_OFF: Final = "Takeoff"
@@ -64,6 +66,7 @@ class Paparazzi:
     """Including the failsafe, base mode 0."""
     modes_without_land: Final = MappingProxyType({_HOME: "it flies back by itself and ignores Land"})
     arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
+    ground_blocks: Final = (WAIT_GPS, GEO_INIT, HOLDING)
     flying_blocks: Final = frozenset({TAKE_OFF})
     landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
     landed_blocks: Final = frozenset({AFTER_LAND[-1]})
@@ -117,8 +120,13 @@ class Paparazzi:
     def prepare_set_points(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - it sends all that it can
         return ()
 
-    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         return ()
+
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:
+        """Begin the flight plan again: "Wait GPS" waits for a position, "Geo init" sets the reference after 10 s."""
+        begins = [name for name in self.ground_blocks[:-1] if name in target.blocks]
+        return (Step(_block(target, begins[0])),) if GEO_INIT in begins else ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
         return ()

@@ -24,7 +24,7 @@ from app.vehicles.mavlink.profiles.ardupilot import (
     request_throttle,
     request_version,
 )
-from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
+from app.vehicles.mavlink.profiles.base import FliesByModes, GainParameter, Outgoing, Requirement, Step, Target
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 
@@ -43,7 +43,7 @@ _STREAMED_FOR_S: Final = 1.2
 """It accepts the offboard mode once set points have arrived for a second."""
 
 
-class Px4:
+class Px4(FliesByModes):
     """PX4's profile. Integer parameters are encoded bytewise in a float."""
 
     name: Final = "px4"
@@ -72,11 +72,6 @@ class Px4:
     automatic_modes: Final = frozenset(
         f"{main}.{sub}" for main in (_AUTO, _OFFBOARD, _TERMINATION) for sub in range(256)
     )
-    modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
-    arming_blocks: Final[frozenset[str]] = frozenset()
-    flying_blocks: Final[frozenset[str]] = frozenset()
-    landing_blocks: Final[frozenset[str]] = frozenset()
-    landed_blocks: Final[frozenset[str]] = frozenset()
     gain_sets: Final = (
         (
             GainParameter("MPC_Z_P", "MPC_Z_P", 0.1, 1.5),
@@ -85,8 +80,6 @@ class Px4:
             GainParameter("MPC_Z_VEL_D_ACC", "MPC_Z_VEL_D_ACC", 0.0, 2.0),
         ),
     )
-    stop_settings: Final[tuple[str, ...]] = ()
-    mode_parameter: Final = None
     requirements: Final = (
         Requirement("NAV_DLL_ACT", "3 (land when the ground station is lost)", frozenset({3.0})),
         Requirement("COM_DL_LOSS_T", "15 s or less (until it lands)", most=15.0),
@@ -117,23 +110,19 @@ class Px4:
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
 
-    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - it has no blocks
-        return {}
-
-    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
-        return ()
-
     def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
         return request_telemetry(target, telemetry_hz)
 
     def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
         return (request_target(target), request_throttle(target))
 
-    def make_armable(self, target: Target, mode: str) -> tuple[Step, ...]:
-        """Leave the landing mode, in which it does not arm, and in which it stays if Land arrives after the landing."""
-        if mode not in self.landing_modes:
-            return ()
-        return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER),), awaits="command 176"),)
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
+        """Switch to hold from all other automatic modes: in most it does not arm, and in that of the takeoff it takes
+        off as soon as it is armed; and from a pilot's mode in which it reports that it does not arm. It returns to the
+        last mode when it disarms, and stays in the landing mode if Land arrives after that."""
+        leaves = mode not in self.hovering_modes if mode in self.automatic_modes else may_arm is False
+        hold = base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LOITER)
+        return (Step((hold,), awaits="command 176", needed=False),) if leaves else ()
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
         return (Setting(TAKE_OFF_ALTITUDE, target.altitude_m),)
@@ -171,12 +160,6 @@ class Px4:
                 return (Step((base.command(target, _SET_MODE, _CUSTOM_MODE, _AUTO, _LAND),)),)
             case Action.MOTORS_OFF | Action.KILL:
                 return (Step((base.disarm(target, forced=action is Action.KILL),)),)
-
-    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
-        return base.set_parameter(target, parameter, value, component=base.AUTOPILOT)
-
-    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
-        return base.read_parameter(target, parameter)
 
 
 def _parameter(message: Message) -> Parameter:
