@@ -277,7 +277,11 @@ _VEHICLE: Final[Mapping[str, Hazard]] = {
         expected=Expected(codes=frozenset({"F9d"}), refuses=True),
     ),
     "left in OFFBOARD": Hazard(
-        act=lambda rig: rig.enter_offboard(), expected=HARMLESS, has_one_length=True, states=PREPARING, autopilots=PX4
+        act=lambda rig: rig.enter_offboard(),
+        expected=HARMLESS,
+        has_one_length=True,
+        states=(State.CONNECT, State.SET_GAINS),
+        autopilots=PX4,
     ),
 }
 
