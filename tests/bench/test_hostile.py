@@ -38,7 +38,6 @@ SEEN = [
     ("paparazzi", "no SCRIPT_CURRENT", State.RECORD, "completed", "", "quarantined"),
     ("paparazzi", "process killed", State.RECORD, "lost", "", "quarantined"),
     ("px4", "left in OFFBOARD", State.SET_GAINS, "completed", "", "safe"),
-    ("px4", "drifts on the ground", State.SET_GAINS, "refused", "", "safe"),
     ("ardupilot", "stuck altitude", State.SET_GAINS, "invalid", "F9a", "safe"),
     ("ardupilot", "copy from another port", State.RECORD, "completed", "", "safe"),
     ("px4", "moves to another port", State.RECORD, "completed", "", "safe"),
