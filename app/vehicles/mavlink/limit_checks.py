@@ -9,7 +9,6 @@ from app.vehicles.mavlink.observation import (
     MAX_DIFFERENCE_M,
     SecondaryAltitude,
     TrialObservation,
-    has_reported_landing,
     has_unreliable_position,
     is_behind_climb_rate,
     is_disarmed,
@@ -199,12 +198,12 @@ def find_disagreement(second: SecondaryAltitude | None) -> Finding | None:
     return Finding(failure=Failure.DISAGREEMENT, why=why)
 
 
-def find_departure(watch: TrialObservation, ground_m: float, now_s: float) -> Finding | None:
+def find_departure(watch: TrialObservation, limits: Limits, ground_m: float, now_s: float) -> Finding | None:
     """Find that a vehicle without a takeoff command may have left the ground, by its altitude, or that its altitude
     drifts while it reports that it stands."""
     if watch.last is None or abs(away_m := watch.last.altitude_m - ground_m) <= GROUND_M:
         return None
-    stands = stands_by_own_account(watch, now_s, ground_m)
+    stands = stands_by_own_account(watch, now_s, ground_m, limits)
     what = "although it stood on the ground: wait until its estimate has settled" if stands else "and it may have moved"
     why = f"Its altitude changed by {away_m:+.2f} m before the takeoff command, {what}."
     return Finding(failure=Failure.LOST_POSITION, why=why)
@@ -245,13 +244,12 @@ def find_jump(watch: TrialObservation) -> Finding | None:
     return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude jumped by {watch.jumped_m:.1f} m.")
 
 
-def find_drift(watch: TrialObservation, now_s: float, ground_m: float, landed_blocks: frozenset[str]) -> Finding | None:
+def find_drift(watch: TrialObservation, now_s: float, ground_m: float, *, has_landed: bool) -> Finding | None:
     """Find that the altitude of a flown vehicle has drifted: it is below the ground, or it shows the ground or the air
     where the vehicle reports the other."""
     if watch.last is None or watch.doubted is not None or not is_fresh(watch, now_s):
         return None
     off_m = watch.last.altitude_m - ground_m
-    has_landed = watch.lifted and has_reported_landing(watch, now_s, landed_blocks)
     since_s = watch.contradicted_since_s
     if since_s is not None and now_s - since_s > _CONTRADICTED_S:
         return Finding(failure=Failure.LOST_POSITION, why="It reports that it flies, but its altitude is the ground's.")

@@ -225,13 +225,15 @@ def update_secondary(watch: TrialObservation, sample: SecondaryAltitudeReceived)
     return replace(watch, second=_add_secondary(second, sample, vehicle_m))
 
 
-def settle(watch: TrialObservation, now_s: float, ground_m: float, *, commanded: bool) -> TrialObservation:
+def settle(
+    watch: TrialObservation, now_s: float, ground_m: float, limits: Limits, *, commanded: bool
+) -> TrialObservation:
     """Note since when every source shows it on the ground: its position by height and speed, the landed state that it
     reports, and the second source of altitude. A single sample that jumps is ignored. Before it is `commanded` to take
-    off, its landed state is believed rather than an altitude that drifts."""
+    off, its landed state or its block is believed rather than an altitude that drifts."""
     if watch.doubted is not None and is_fresh(watch, now_s):
         return watch
-    stands = not commanded and stands_by_own_account(watch, now_s, ground_m)
+    stands = not commanded and stands_by_own_account(watch, now_s, ground_m, limits)
     airborne = is_airborne(watch, now_s, ground_m) and not stands
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
     grounded, said_to_fly = stands or is_grounded(watch, now_s, ground_m), is_said_to_fly(watch, now_s, ground_m)
@@ -303,10 +305,11 @@ def has_reported_landing(watch: TrialObservation, now_s: float, landed_blocks: f
     return reports_landing(watch, now_s) and now_s - watch.landed_since_s >= AGREED_S
 
 
-def stands_by_own_account(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
-    """Whether it reports that it is on the ground, and its altitude has not drifted further than one may."""
+def stands_by_own_account(watch: TrialObservation, now_s: float, ground_m: float, limits: Limits) -> bool:
+    """Whether it reports that it is on the ground, or in a block of its plan that has no thrust, and its altitude has
+    not drifted further than one may. To be called for a vehicle that was not commanded to take off."""
     drifted_m = 0.0 if watch.last is None else watch.last.altitude_m - ground_m
-    return reports_landing(watch, now_s) and abs(drifted_m) <= DRIFT_M
+    return abs(drifted_m) <= DRIFT_M and (reports_landing(watch, now_s) or watch.block in limits.arming_blocks)
 
 
 def secondary_altitude_m(second: SecondaryAltitude | None, now_s: float) -> float | None:

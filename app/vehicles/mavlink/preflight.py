@@ -90,11 +90,13 @@ class GroundObservation:
 
     @property
     def _last(self) -> Position:
-        """Newest position that continues the one before it; a single one by another clock is ignored."""
-        for newer, older in pairwise(reversed(self.positions)):
-            if 0.0 < newer.time_boot_s - older.time_boot_s < _GOES_ON_S:
+        """Position with the latest time that continues another one: a single one by another clock is ignored, and so
+        are copies that arrive late."""
+        latest_first = sorted(self.positions, key=lambda position: position.time_boot_s, reverse=True)
+        for newer, older in pairwise(latest_first):
+            if newer.time_boot_s - older.time_boot_s < _GOES_ON_S:
                 return newer
-        return self.positions[-1]
+        return latest_first[0]
 
 
 # ---- connecting to the vehicle

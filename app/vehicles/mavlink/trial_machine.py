@@ -98,7 +98,9 @@ def advance(trial: Trial, event: Event) -> Step:
         trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
     elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=replace(trial.watch, duplicate_reason=event.why))
-    settled = watching.settle(trial.watch, event.now_s, trial.plan.ground_m, commanded=trial.commanded_s is not None)
+    settled = watching.settle(
+        trial.watch, event.now_s, trial.plan.ground_m, trial.plan.limits, commanded=trial.commanded_s is not None
+    )
     trial = trial if settled is trial.watch else replace(trial, watch=settled)
     trial, requests = _confirm_take_off(trial, event)
     trial, polls = _poll_mode(trial, event.now_s)
@@ -208,8 +210,10 @@ def _with_drift(trial: Trial, now_s: float) -> Trial:
     """Note an altitude that has drifted: limits that it exceeded may have been false. In a fall it lags."""
     if trial.stopped or trial.state not in {*_FLOWN, State.DISARM} or trial.commanded_s is None or trial.fell_s:
         return trial
-    plan = trial.plan
-    drift = limit_checks.find_drift(trial.watch, now_s, plan.ground_m, plan.limits.landed_blocks)
+    plan, landed_blocks = trial.plan, trial.plan.limits.landed_blocks
+    is_told_to_land = trial.state not in _STATES_WITH_TRIAL_GAINS
+    has_landed = is_told_to_land and watching.has_reported_landing(trial.watch, now_s, landed_blocks)
+    drift = limit_checks.find_drift(trial.watch, now_s, plan.ground_m, has_landed=has_landed)
     return trial if drift is None else note_cause(trial, drift)
 
 
@@ -246,15 +250,15 @@ def _arm(trial: Trial, event: Event) -> Step:
     last = trial.watch.last
     if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
-    watch = replace(trial.watch, block="", behind_m=0.0, stepped_s=0.0, highest_m=last.altitude_m)
+    watch = replace(trial.watch, behind_m=0.0, stepped_s=0.0, highest_m=last.altitude_m)
     trial = measure_ground(replace(trial, watch=watch), now_s)
     if finding := (
-        limit_checks.find_departure(trial.watch, trial.plan.ground_m, now_s)
+        limit_checks.find_departure(trial.watch, trial.plan.limits, trial.plan.ground_m, now_s)
         or limit_checks.find_disagreement_on_ground(trial.watch, trial.ground_shift_m, now_s)
         or _unconfirmed_setting(trial)
     ):
         return fail(trial, finding, now_s)
-    mode, watch = trial.watch.mode, replace(trial.watch, mode_since_s=now_s + _MODE_KNOWN_S)
+    mode, watch = trial.watch.mode, replace(trial.watch, block="", mode_since_s=now_s + _MODE_KNOWN_S)
     boot_s = _boot_s(trial.watch, last, now_s)
     trial = replace(trial, watch=watch, commanded_s=now_s, commanded_boot_s=boot_s, commanded_in=mode)
     trial, request = request_reply(enter(trial, State.TAKEOFF, now_s), now_s)
@@ -505,8 +509,9 @@ def _disarming(trial: Trial, event: Event) -> Step:
         confirmed = " The vehicle confirmed that its motors have stopped." if trial.stopped else ""
         trial = replace(trial, why=trial.why + confirmed, contact=find_contact(trial, now_s))
         return enter(trial, State.RESTORE, now_s), (RestoreGains(),)
-    stands = trial.commanded_s is None and watching.stands_by_own_account(trial.watch, now_s, trial.plan.ground_m)
-    airborne = trial.watch.armed and watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
+    watch, plan = trial.watch, trial.plan
+    stands = trial.commanded_s is None and watching.stands_by_own_account(watch, now_s, plan.ground_m, plan.limits)
+    airborne = watch.armed and watching.is_airborne(watch, now_s, plan.ground_m)
     if airborne and not (stands or trial.stopped):
         why = "It was in the air when its motors were to be stopped."
         return abort(replace(trial, doubt=trial.doubt or why), now_s)

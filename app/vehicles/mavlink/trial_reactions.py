@@ -422,7 +422,7 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     """Return why a vehicle whose motors are stopped now may have fallen; empty if every source shows it on the ground,
     or it has not been commanded to take off and nothing shows that it moved."""
     watch, ground_m = trial.watch, trial.plan.ground_m
-    is_still = trial.state is State.ARM or watching.stands_by_own_account(watch, now_s, ground_m)
+    is_still = trial.state is State.ARM or watching.stands_by_own_account(watch, now_s, ground_m, trial.plan.limits)
     if trial.commanded_s is None and is_still:
         return ""
     if watch.last is not None and watching.is_airborne(watch, now_s, ground_m):

@@ -52,3 +52,12 @@ def test_a_hover_throttle_that_is_not_known_or_has_no_limits_is_not_checked() ->
 def test_a_range_that_px4_cannot_have_is_a_refusal_of_the_flight() -> None:
     with pytest.raises(VehicleError, match="HTE_THR_RANGE: must be 0 to 1"):
         PROFILES["px4"].hover_limits({"MPC_THR_HOVER": 0.5, "HTE_THR_RANGE": 1.5})
+
+
+def test_copies_that_arrive_late_are_not_the_last_position_on_the_ground() -> None:
+    """Seen: every packet again 3 s later; the flight began by the clock of the copies, and saw no lift-off."""
+    own = [Position(100.0 + 0.02 * place, 0.1, 0.0) for place in range(50)]
+    copies = [replace(each, time_boot_s=each.time_boot_s - 3.0) for each in own]
+    mixed = tuple(position for pair in zip(own, copies, strict=True) for position in pair)
+    stray = (*mixed, Position(4000.0, 0.1, 0.0))
+    assert GroundObservation(stray, 2.0).ground.last == own[-1]
