@@ -71,7 +71,7 @@ _COMMANDS_DELAYED: Final = Expected(
 _UNSEEN: Final = Expected(reasons=("second source of altitude", "Second source of altitude: "), ends_in=AIR)
 _ONCE: Final = Expected(reasons=(_MOVED, "Vehicle clock: ", "Position: "))
 _SHIFTED: Final = Expected(reasons=(_MOVED, _NOT_LANDED), may_quarantine=True)
-_PILOT: Final = Expected(reasons=_BY_HAND, ends_in=AIR, may_abort=True, may_quarantine=True)
+_PILOT: Final = Expected(reasons=(*_BY_HAND, "(mode Manual, block "), ends_in=AIR, may_abort=True, may_quarantine=True)
 
 EXPECTED: Final[Mapping[str, Expected]] = {
     **{f"{name} {value}": _BLIND for name, value in product(("x", "y", "z", "vz"), UNREAL)},
