@@ -271,10 +271,12 @@ def make_armable(radio: AutopilotLink) -> None:
 def set_ground_reference(radio: AutopilotLink, watched: GroundObservation) -> bool:
     """Have the flight plan of a vehicle that was just observed standing, disarmed by every heartbeat, set its ground
     reference, unless it was heard to do so and the vehicle stands by it; wait for it for 13 s at most. Return whether
-    to observe the vehicle again, because its altitudes may now count from another zero."""
+    to observe the vehicle again, because its altitudes may count from two zeros."""
     seen, steps, now_s = radio.seen, radio.profile.refer_to_ground(radio.target), radio.clock.now_s()
-    if not steps or radio.link.duplicate_reason or (seen.has_ground_reference and watched.is_at_reference):
+    if not steps or radio.link.duplicate_reason:
         return False
+    if seen.has_ground_reference and watched.is_at_reference:
+        return not watched.stands
     *passing, holding = radio.profile.ground_blocks
     if radio.block not in passing or now_s - seen.block_s > _REFERENCE_WITHIN_S:
         if not watched.stands:

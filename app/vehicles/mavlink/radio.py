@@ -47,9 +47,9 @@ _PAUSE_S: Final = 0.2
 _REFERENCE_HOLDS_S: Final = 0.25
 """Greatest age of a report of the autopilot's reference."""
 _SAME_TARGET_M: Final = 0.01
-_REFERENCE_TAKES_S: Final = 5.0
-"""Least time in which a flight plan sets its ground reference; 10 s in the stock plans, of which late copies of its
-reports seem to take some."""
+_REFERENCE_TAKES_S: Final = 4.0
+"""Least time in which a flight plan sets its ground reference: 10 s in the stock plans, but fewer by the clock of the
+ground if a simulation is fast, or reports arrive again late."""
 
 
 @dataclass(slots=True)
