@@ -414,7 +414,8 @@ def test_motors_off_is_done_only_once_the_vehicle_has_confirmed_it(
 
 
 def in_the_air(rig: AnsweringRig, process: VehicleProcess) -> None:
-    """As somebody else has it take off."""
+    """As somebody else has it take off, once its plan has set its ground reference."""
+    process._vehicle.attend(12.0)
     for block in (START_ENGINE, TAKE_OFF):
         rig.drone.autopilot._enter(block)  # type: ignore[attr-defined]
         process._vehicle.attend(1.0)

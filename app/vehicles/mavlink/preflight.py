@@ -28,7 +28,7 @@ from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.parameters import read_parameter
 from app.vehicles.mavlink.profiles import PROFILES, base
 from app.vehicles.mavlink.profiles.base import Requirement, Step
-from app.vehicles.mavlink.radio import LOSS_OVER_S, AutopilotLink
+from app.vehicles.mavlink.radio import AutopilotLink
 
 HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
@@ -39,7 +39,7 @@ _LISTEN_S: Final = 0.1
 _STANDS_WITHIN_M: Final = 0.3
 _REFERENCE_WITHIN_S: Final = 13.0
 """Time from a position on within which a flight plan sets its ground reference; 10 s in the stock plans."""
-_LARGEST_LOSS: Final = 0.25
+_RATE_OVER_S: Final = 10.0
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
 _DISARMED: Final = "disarmed"
@@ -71,6 +71,12 @@ class GroundObservation:
     secondary_m: tuple[float, ...] = ()
     disarmed: bool = False
     """Whether there were heartbeats and all of them reported disarmed."""
+    begun_s: float = 0.0
+
+    def continued(self, radio: AutopilotLink) -> "GroundObservation":
+        """Return it with all positions that have been received since it began."""
+        positions = tuple(position for at_s, position in radio.seen.positions if at_s > self.begun_s)
+        return replace(self, positions=positions)
 
     @property
     def ground(self) -> Ground:
@@ -267,17 +273,19 @@ def make_armable(radio: AutopilotLink) -> None:
 def set_ground_reference(radio: AutopilotLink, watched: GroundObservation) -> bool:
     """Have the flight plan of a vehicle that was just observed standing, disarmed by every heartbeat, set its ground
     reference, unless it was heard to do so and the vehicle stands by it; wait for it for 13 s at most. Return whether
-    to observe the vehicle again, because its altitudes may now count from another zero."""
+    to observe the vehicle again, because its altitudes may count from two zeros."""
     seen, steps, now_s = radio.seen, radio.profile.refer_to_ground(radio.target), radio.clock.now_s()
-    if not steps or radio.link.duplicate_reason or (seen.has_ground_reference and watched.is_at_reference):
+    if not steps or radio.link.duplicate_reason:
         return False
+    if seen.has_ground_reference and watched.is_at_reference:
+        return not watched.stands
     *passing, holding = radio.profile.ground_blocks
     if radio.block not in passing or now_s - seen.block_s > _REFERENCE_WITHIN_S:
         if not watched.stands:
             return True
         seen.has_ground_reference = False
         _set_up(radio, steps)
-    while radio.is_disarmed and radio.clock.now_s() < now_s + _REFERENCE_WITHIN_S:
+    while not radio.is_armed and radio.clock.now_s() < now_s + _REFERENCE_WITHIN_S:
         radio.listen(_LISTEN_S)
         if radio.block == holding and seen.block_s > now_s:
             return True
@@ -297,7 +305,6 @@ def observe(
 ) -> GroundObservation:
     """Receive for `watched_s`, and for up to 10 s until there is a battery voltage and a heartbeat."""
     radio.listen(0.0)
-    radio.seen.positions.clear()
     if secondary is not None:
         secondary.discard_pending()
     begun_s = radio.clock.now_s()
@@ -308,8 +315,8 @@ def observe(
         packets = radio.listen(_LISTEN_S)
         armed += [each.measurement.armed for each in packets if isinstance(each.measurement, Heartbeat)]
     secondary_m = () if secondary is None else secondary.ground_altitudes()
-    positions = tuple(position for _, position in radio.seen.positions)
-    return GroundObservation(positions, now_s - begun_s, secondary_m, disarmed=bool(armed) and not any(armed))
+    disarmed = bool(armed) and not any(armed)
+    return GroundObservation((), now_s - begun_s, secondary_m, disarmed, begun_s).continued(radio)
 
 
 def evaluate_items(
@@ -320,8 +327,7 @@ def evaluate_items(
         _heartbeat(radio),
         _single_vehicle_item(radio),
         _disarmed(radio),
-        _losses(radio),
-        *_motion(watched),
+        *_motion(watched, _position_hz(radio)),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
     if radio.profile.flying_blocks:
@@ -557,10 +563,9 @@ def _disarmed(radio: AutopilotLink) -> CheckItem:
     )
 
 
-def _motion(watched: GroundObservation) -> tuple[CheckItem, ...]:
+def _motion(watched: GroundObservation, rate_hz: float) -> tuple[CheckItem, ...]:
     positions = watched.positions
     passed_s = positions[-1].time_boot_s - positions[0].time_boot_s if positions else 0.0
-    rate_hz = (len(positions) - 1) / passed_s if passed_s > 0.0 else 0.0
     moved_m = _moved_m(positions)
     return (
         CheckItem(
@@ -569,7 +574,9 @@ def _motion(watched: GroundObservation) -> tuple[CheckItem, ...]:
             passed=rate_hz >= POSITIONS_HZ,
             found=f"{rate_hz:.1f} per second",
             needed=f"{POSITIONS_HZ:g} per second or more",
-            hint="Configure its telemetry for tuning (docs/real-flight.md)." if positions else _NO_POSITION,
+            hint="Configure its telemetry for tuning (docs/real-flight.md), or improve a weak link and wait for 10 s."
+            if positions
+            else _NO_POSITION,
         ),
         CheckItem(
             name="clock",
@@ -590,17 +597,18 @@ def _motion(watched: GroundObservation) -> tuple[CheckItem, ...]:
     )
 
 
-def _losses(radio: AutopilotLink) -> CheckItem:
-    share = radio.lost_share or 0.0
-    passed = share <= _LARGEST_LOSS
-    return CheckItem(
-        name="losses",
-        title="Lost messages",
-        passed=passed,
-        found=f"{100.0 * share:.0f} % in the last {LOSS_OVER_S:g} s",
-        needed=f"{100.0 * _LARGEST_LOSS:g} % or less",
-        hint="" if passed else "Bring the antennas closer, or change the channel, then check again after 10 s.",
-    )
+def _position_hz(radio: AutopilotLink) -> float:
+    """Return the positions received per second, without repeated ones, in the last 10 s or since there was none for a
+    second: in a single second a link that loses three of ten may seem to lose two."""
+    last_s = first_s = radio.clock.now_s()
+    stamps_s: set[float] = set()
+    for at_s, position in reversed(radio.seen.positions):
+        last_s = last_s if stamps_s else at_s
+        if last_s - at_s > _RATE_OVER_S or first_s - at_s > _GOES_ON_S:
+            break
+        first_s = at_s
+        stamps_s.add(position.time_boot_s)
+    return (len(stamps_s) - 1) / (last_s - first_s) if last_s > first_s else 0.0
 
 
 def _moved_m(positions: Sequence[Position]) -> float:

@@ -596,8 +596,7 @@ class MavlinkVehicle:
             radius_m, plan_radius_m = float(self._options["radius_m"]), float(self._options["plan_radius_m"])
             items = (*items, preflight.evaluate_distance(watched, radius_m=radius_m, plan_radius_m=plan_radius_m))
         items = (*items, self._gains.check())
-        positions = tuple(position for _, position in self._radio.seen.positions)
-        return replace(watched, positions=positions), items
+        return watched.continued(self._radio), items
 
     def _observe_standing(self, watched_s: float) -> preflight.GroundObservation:
         watched = preflight.observe(self._radio, self._secondary, watched_s=watched_s)
