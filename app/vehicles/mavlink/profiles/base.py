@@ -289,11 +289,11 @@ class Profile(ABC):
         """Return the messages that end an exploration, successful or not."""
         return ()
 
-    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
+    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - none by default
         """Return the steps that request telemetry, without lasting changes."""
         return ()
 
-    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - it sends all that it can
+    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - none by default
         """Return the steps that request the further telemetry of a flight with several set points."""
         return ()
 
@@ -302,7 +302,7 @@ class Profile(ABC):
         None if nothing."""
         return ()
 
-    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - arming does
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - none by default
         """Return the steps by which its flight plan sets the ground reference anew; none if the plan cannot."""
         return ()
 
@@ -310,7 +310,7 @@ class Profile(ABC):
         """Return the parameters required for a takeoff to the altitude of `target`."""
         return ()
 
-    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - none
+    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - none by default
         """Return the further parameters required for a flight with several set points."""
         return ()
 
