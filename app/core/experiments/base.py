@@ -2,11 +2,12 @@
 experiment needs one file and one line in the registry.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count as numbers_from
 from itertools import islice
-from typing import Final, Protocol, Self
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,101 +227,75 @@ class SimplexSearch:
     bounded: bool = True
 
 
-class Experiment(Protocol):
+class Experiment(ABC):
     """One manoeuvre with its policy space and its performance measure (lower is better)."""
 
-    def __hash__(self) -> int: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def options(self) -> tuple[Option, ...]:
-        """Settings of the experiment itself, for example of its model."""
-        ...
+    name: str
+    title: str
+    options: tuple[Option, ...]
+    """Settings of the experiment itself, for example of its model."""
+    space: PolicySpace
+    scatter: Scatter
+    output: str
+    """The scored channel, e.g. `altitude_m`."""
+    integrates: bool = False
+    """Whether the error is the integral of the absolute deviation over time, rather than its mean."""
+    error_unit: str
+    window_s: float
+    """End of the scored time, s since the command. Errors over different windows are different quantities."""
+    scored_from_s: float = 0.0
+    """Beginning of the scored time, s since the command."""
+    measure: str
+    """What is scored, apart from the window: errors of different measures are different quantities."""
+    target_channel: str | None = None
+    """Recorded channel with which the output is compared; None: the set point."""
+    set_points: SetPoints | None = None
+    """Altitudes that the vehicle is told to fly to; None for a manoeuvre of its own."""
 
+    @abstractmethod
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         """The experiment with these settings, the others at their defaults; they must be free of problems."""
-        ...
 
     @property
     def modelled(self) -> "ModelledExperiment | None":
         """The same experiment with its simple model; None if there is none, and nothing can then be predicted."""
-        ...
-
-    @property
-    def space(self) -> PolicySpace: ...
-    @property
-    def scatter(self) -> Scatter: ...
-    @property
-    def output(self) -> str:
-        """The scored channel, e.g. `altitude_m`."""
-        ...
-
-    @property
-    def integrates(self) -> bool:
-        """Whether the error is the integral of the absolute deviation over time, rather than its mean."""
-        ...
-
-    @property
-    def error_unit(self) -> str: ...
-    @property
-    def window_s(self) -> float:
-        """End of the scored time, s since the command. Errors over different windows are different quantities."""
-        ...
-
-    @property
-    def scored_from_s(self) -> float:
-        """Beginning of the scored time, s since the command."""
-        ...
-
-    @property
-    def measure(self) -> str:
-        """What is scored, apart from the window: errors of different measures are different quantities."""
-        ...
-
-    @property
-    def target_channel(self) -> str | None:
-        """Recorded channel with which the output is compared; None: the set point."""
-        ...
+        return None
 
     @property
     def reference(self) -> Samples | None:
         """What that channel is in a model run, on its grid, (n,), if a flight may be late in following it: its distance
         from the recorded channel is then what a model run explains. None: model runs explain its output."""
-        ...
+        return None
 
     @property
-    def set_points(self) -> SetPoints | None:
-        """Altitudes that the vehicle is told to fly to; None for a manoeuvre of its own."""
-        ...
-
-    @property
+    @abstractmethod
     def grid_s(self) -> Samples:
         """Times of a model run from the command to the end of the window, shape (n,)."""
-        ...
 
+    @abstractmethod
     def set_point(self, time_s: Samples) -> Samples:
         """Set point of the scored output, same shape as `time_s`; zero before the command."""
-        ...
 
+    @abstractmethod
     def errors(self, outputs: Matrix) -> Vector:
         """Performance of outputs given on `grid_s`: (k, n) → (k,)."""
-        ...
 
+    @abstractmethod
     def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float:
         """Performance of a recorded flight on its own time stamps. Raises TrajectoryError if it cannot be scored.
 
         `accept_gaps`: a person has reviewed the gaps in the record and counts the flight.
         """
-        ...
 
 
-class OwnModel:
-    """What experiments share that are their own modelled experiment, see `ModelledExperiment`: its model depends on no
-    parameters of an autopilot, unless they say otherwise."""
+class ModelledExperiment(Experiment):
+    """An experiment with a simple model of its vehicle, which depends on no parameters of an autopilot unless the
+    experiment says otherwise."""
 
     model_parameters: tuple[ModelParameter, ...]
+    search: SimplexSearch
+    difference: float
+    """Step of the finite differences of the gradient, as a share of each gain's scale."""
 
     @property
     def modelled(self) -> Self:
@@ -329,85 +304,55 @@ class OwnModel:
 
     @property
     def nominal_model(self) -> Vector:
-        """Parameters before the first flight, shape (m,)."""
+        """Nominal parameters, shape (m,), in the order of `model_parameters`."""
         return np.array([parameter.nominal for parameter in self.model_parameters])
 
     def least_model_error(self, base: Trajectory) -> float:  # noqa: ARG002 - not without a resolution of its own
-        """None."""
+        """Standard deviation, in the error's unit, by which a prediction of even a fitted model is wrong, beside a
+        relative error, for flights recorded as `base` was."""
         return 0.0
 
-    def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
-        """The experiment itself."""
-        return self
-
-    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002 - as for `under`
-        """None."""
-        return {}
-
-
-class ModelledExperiment(Experiment, Protocol):
-    """An experiment with a simple model of its vehicle."""
-
+    @abstractmethod
     def informed(self, mean: Vector, sd: Vector) -> Self:
         """The experiment with another vehicle's fitted model as its nominal one; `mean` and `sd` have shape (m,)."""
-        ...
 
-    def under(self, parameters: Mapping[str, float]) -> Self:
+    def under(self, parameters: Mapping[str, float]) -> Self:  # noqa: ARG002 - the model does not depend on them
         """The experiment on a vehicle whose autopilot has these parameters, by the firmware's names.
 
         Itself if its model does not depend on them. If the model does not hold with them, it keeps its own, and
         `hazards` refuses every flight.
         """
-        ...
+        return self
 
-    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
+    def loop_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002 - as for `under`
         """Those of an autopilot's parameters on which the model depends, gains among them."""
-        ...
+        return {}
 
-    @property
-    def model_parameters(self) -> tuple[ModelParameter, ...]: ...
-    @property
-    def nominal_model(self) -> Vector:
-        """Nominal parameters, shape (m,), in the order of `model_parameters`."""
-        ...
-
-    def least_model_error(self, base: Trajectory) -> float:
-        """Standard deviation, in the error's unit, by which a prediction of even a fitted model is wrong, beside a
-        relative error, for flights recorded as `base` was."""
-        ...
-
-    @property
-    def search(self) -> SimplexSearch: ...
-    @property
-    def difference(self) -> float:
-        """Step of the finite differences of the gradient, as a share of each gain's scale."""
-        ...
-
+    @abstractmethod
     def simulate(self, gains: Vector, model: Vector) -> Trajectory:
         """One model run with every channel of the model."""
-        ...
 
+    @abstractmethod
     def outputs(self, gains: Matrix, model: Matrix) -> Matrix:
         """Scored outputs of many policies in one compiled call, each on its own model or all on one.
 
         gains (k, g), model (k, m) or (m,) → (k, n) on `grid_s`.
         """
-        ...
 
+    @abstractmethod
     def disturbances(self, trajectory: Trajectory, gains: Vector, model: Vector) -> Matrix | None:
         """Difference between each recorded step and the model's step from the same state and command.
 
         In the experiment's own layout for `disturbed_outputs`. None if the record lacks the required channels.
         """
-        ...
 
+    @abstractmethod
     def disturbed_outputs(self, gains: Matrix, model: Matrix, disturbances: Matrix) -> Matrix:
         """`outputs` with the disturbances added to the model's state at the same times, inside the control loop."""
-        ...
 
+    @abstractmethod
     def hazards(self, gains: Vector, spread: ParameterDistribution, envelope: Envelope) -> tuple[Check, ...]:
         """Hazards of a flight with these gains, inside the bounds or not, on vehicles distributed as `spread`.
 
         These are the gate's checks that are specific to the experiment. Pure; at most a tenth of a second.
         """
-        ...

@@ -6,7 +6,7 @@ experiment's space, filters and limits are the autopilot's parameters (`under`),
 """
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, Final, Self
 
@@ -16,16 +16,15 @@ from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.hover import HoverAdvice, advise_hover, found_hover
 from app.core.analysis.loop import AltitudeLoop, Run
 from app.core.analysis.recorded_flight import Steps
-from app.core.definition import Option, OptionValue
+from app.core.definition import OptionValue
 from app.core.errors import InputError, Problem
 from app.core.experiments.base import (
     Check,
     Envelope,
     Matrix,
+    ModelledExperiment,
     ModelParameter,
-    OwnModel,
     ParameterDistribution,
-    Scatter,
     SimplexSearch,
     informed_parameters,
 )
@@ -38,7 +37,8 @@ from app.core.experiments.copter_steps_hazards import (
 )
 from app.core.experiments.step_sequence import ALTITUDE, REFERENCE, StepSequence, step_options
 from app.core.models.copter import DISTURBANCES, FLOWN, Copter
-from app.core.policy import PolicySpace, Vector
+from app.core.models.set_points import SetPoints
+from app.core.policy import Vector
 from app.core.records.trajectory import Samples, Trajectory
 
 CLIMB_S: Final = 15.0
@@ -78,25 +78,21 @@ def vector_of(copter: Copter) -> Vector:
     return np.array([copter.hover_throttle, copter.thrust_slope, copter.motor_lag_s, copter.drag_1_s])
 
 
-class CopterSteps(OwnModel, ABC):
+class CopterSteps(ModelledExperiment):
     """Steps of the altitude set point under an autopilot, with the model of a copter."""
 
-    name: ClassVar[str]
     autopilot: ClassVar[str]
-    space: ClassVar[PolicySpace]
-    scatter: ClassVar[Scatter]
     data_sheet: ClassVar[tuple[ModelParameter, ...]]
     """The parameters of copters under this autopilot in general."""
 
-    options: ClassVar[tuple[Option, ...]] = step_options(largest_step_m=LARGEST_STEP_M)
-    output: Final = ALTITUDE
-    integrates: Final = False
-    error_unit: Final = "m"
-    scored_from_s: Final = CLIMB_S
-    target_channel: Final = REFERENCE
-    reference: Final = None
-    search: Final = SimplexSearch(of_scale=0.5, evaluations=200)
-    difference: Final = 0.05
+    options = step_options(largest_step_m=LARGEST_STEP_M)
+    output = ALTITUDE
+    error_unit = "m"
+    scored_from_s = CLIMB_S
+    target_channel = REFERENCE
+    set_points: SetPoints
+    search = SimplexSearch(of_scale=0.5, evaluations=200)
+    difference = 0.05
 
     def __init__(
         self,
@@ -107,10 +103,11 @@ class CopterSteps(OwnModel, ABC):
         unfit: tuple[Problem, ...] = (),
     ) -> None:
         """`unfit` are the autopilot's parameters with which the replica of its loop does not hold."""
+        self.title = f"Altitude steps under {self.autopilot}"
         self.sequence: Final = sequence
-        self.set_points: Final = sequence.set_points
-        self.window_s: Final = sequence.ends_s
-        self.measure: Final = f"{sequence}, under {self.autopilot}"
+        self.set_points = sequence.set_points
+        self.window_s = sequence.ends_s
+        self.measure = f"{sequence}, under {self.autopilot}"
         self.parameters: Final = dict(parameters or {})
         self.model_parameters = self.data_sheet if model_parameters is None else model_parameters
         self._unfit: Final = unfit
@@ -131,10 +128,6 @@ class CopterSteps(OwnModel, ABC):
     def references(self, steps_s: Samples) -> Samples:
         """What the loop is given at the times of its steps, shape (m, 4) as `REFERENCE`; without a hover throttle that
         it assumes."""
-
-    @property
-    def title(self) -> str:
-        return f"Altitude steps under {self.autopilot}"
 
     @property
     def steps(self) -> Steps:

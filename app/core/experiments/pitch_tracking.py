@@ -10,8 +10,8 @@ from app.core.experiments.base import (
     Check,
     Envelope,
     Matrix,
+    ModelledExperiment,
     ModelParameter,
-    OwnModel,
     ParameterDistribution,
     Scatter,
     SimplexSearch,
@@ -83,28 +83,24 @@ def _parameters(perturbation: float) -> tuple[ModelParameter, ...]:
     )
 
 
-class PitchTracking(OwnModel):
+class PitchTracking(ModelledExperiment):
     """Pitch tracking on an inaccurate model.
 
     The model is the true system with every element of A and B off by up to `perturbation`, drawn with `model_seed`; its
     parameters are the logarithms of factors on these elements.
     """
 
-    name: Final = "pitch-tracking"
-    title: Final = "Pitch tracking of an F-16"
-    output: Final = OUTPUT
-    integrates: Final = True
-    error_unit: Final = "rad·s"
-    window_s: Final = WINDOW_S
-    scored_from_s: Final = 0.0
-    measure: Final = "pitch tracking"
-    target_channel: Final = None
-    reference: Final = None
-    set_points: Final = None
-    scatter: Final = Scatter(sd=0.001, degrees_of_freedom=4.0)
-    search: Final = SimplexSearch(of_scale=0.5, iterations=300, bounded=False)
-    difference: Final = 0.001
-    space: Final = PolicySpace(
+    name = "pitch-tracking"
+    title = "Pitch tracking of an F-16"
+    output = OUTPUT
+    integrates = True
+    error_unit = "rad·s"
+    window_s = WINDOW_S
+    measure = "pitch tracking"
+    scatter = Scatter(sd=0.001, degrees_of_freedom=4.0)
+    search = SimplexSearch(of_scale=0.5, iterations=300, bounded=False)
+    difference = 0.001
+    space = PolicySpace(
         (
             _gain("theta_1", "Thrust per speed", "lb·s/ft", -200.0, -20.0, 50.0, -50.0),
             _gain("theta_2", "Thrust offset", "lb", -50.0, 50.0, 100.0, 0.0),
@@ -114,7 +110,7 @@ class PitchTracking(OwnModel):
             _gain("theta_6", "Elevator offset", "deg", -5.0, 5.0, 1.0, 0.0),
         )
     )
-    options: Final = (
+    options = (
         Option(
             name="perturbation",
             title="Largest relative error of each element of the model",

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.core.control.paparazzi import RATE_HZ
 from app.core.definition import Option, OptionValue, with_defaults
-from app.core.experiments.base import Matrix, ModelParameter, Scatter
+from app.core.experiments.base import Experiment, Matrix, ModelParameter, Scatter
 from app.core.experiments.vertical_loop import MODEL_PARAMETERS, VerticalLoop, counts
 from app.core.models.set_points import SetPoints
 from app.core.models.vertical_batch import fly_batch
@@ -77,8 +77,6 @@ class Takeoff(VerticalLoop):
     title = "Takeoff to 3 m"
     measure = "a takeoff to 3 m"
     options = OPTIONS
-    scored_from_s = 0.0
-    target_channel = None
     sketches_s: Final = (8.0, 12.0)
     """Times until which the robust optimum simulates: a coarse look, then a finer one."""
     expected_m: Final = (TARGET_M - 0.6, TARGET_M + 0.6)
@@ -154,25 +152,20 @@ PX4_GAINS: Final = (
 )
 
 
-class CopterTakeoff:
+class CopterTakeoff(Experiment):
     """The paper's takeoff, manoeuvre and score, with the gains of another autopilot."""
 
-    options: Final = OPTIONS
-    modelled: Final = None
-    output: Final = _PAPER.output
-    integrates: Final = _PAPER.integrates
-    error_unit: Final = _PAPER.error_unit
-    measure: Final = _PAPER.measure
-    scored_from_s: Final = _PAPER.scored_from_s
-    target_channel: Final = _PAPER.target_channel
-    reference: Final = _PAPER.reference
-    set_points: Final = _PAPER.set_points
+    options = OPTIONS
+    output = _PAPER.output
+    error_unit = _PAPER.error_unit
+    measure = _PAPER.measure
+    set_points = _PAPER.set_points
 
     def __init__(self, name: str, autopilot: str, gains: tuple[Gain, ...], *, paper: Takeoff = _PAPER) -> None:
-        self.name: Final = name
-        self.title: Final = f"{paper.title} under {autopilot}"
-        self.space: Final = PolicySpace(gains)
-        self.window_s: Final = paper.window_s
+        self.name = name
+        self.title = f"{paper.title} under {autopilot}"
+        self.space = PolicySpace(gains)
+        self.window_s = paper.window_s
         self.scatter = _scatter(paper.window_s, degrees_of_freedom=1.0, measured=False)
         """That of the paper's drone, as none was measured; under PX4 one flight scattered three times as much."""
         self._autopilot: Final = autopilot

@@ -2,23 +2,20 @@
 parameters, and the hazards. An experiment adds its set points and its performance measure.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from abc import abstractmethod
 from functools import lru_cache
 from typing import ClassVar, Final, Self
 
 import numpy as np
 
 from app.core.control.paparazzi import RATE_HZ
-from app.core.definition import Option, OptionValue
 from app.core.experiments.base import (
     Check,
     Envelope,
     Matrix,
+    ModelledExperiment,
     ModelParameter,
-    OwnModel,
     ParameterDistribution,
-    Scatter,
     SimplexSearch,
     informed_parameters,
 )
@@ -66,57 +63,34 @@ MODEL_PARAMETERS: Final = (
 typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
 
 
-class VerticalLoop(OwnModel, ABC):
+class VerticalLoop(ModelledExperiment):
     """An experiment under Paparazzi's vertical loop, with its simple model; a run has n samples.
 
     Gains are the loop's integers; above 1073 for ki and 409 for kd a product can wrap at 32 bits.
     """
 
-    name: ClassVar[str]
-    title: ClassVar[str]
-    options: ClassVar[tuple[Option, ...]]
-    scatter: Scatter
-    measure: str
-    scored_from_s: float
-    target_channel: str | None
-
-    output: Final = "altitude_m"
-    integrates: Final = False
-    error_unit: Final = "m"
-    space: Final = PolicySpace(
+    output = "altitude_m"
+    error_unit = "m"
+    space = PolicySpace(
         (
             _gain("kp", "Proportional gain", 4000, 283),
             _gain("ki", "Integral gain", 1073, 13),
             _gain("kd", "Derivative gain", 409, 82),
         )
     )
-    search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
-    difference: Final = 0.1
+    search = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
+    difference = 0.1
     simulated_as: ClassVar[str] = "flight"
     """What the gate calls a simulated flight."""
     held_s: ClassVar[float] = 0.0
     """Time that the gate simulates beyond the window, at the last set point."""
+    set_points: SetPoints
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...], set_points: SetPoints, window_s: float) -> None:
         self.model_parameters = model_parameters
-        self.set_points: Final = set_points
-        self.window_s: Final = window_s
+        self.set_points = set_points
+        self.window_s = window_s
         self._samples: Final = int(np.ceil(window_s * RATE_HZ)) + 1
-
-    @property
-    def reference(self) -> Samples | None:
-        """See `Experiment`."""
-        return None
-
-    @abstractmethod
-    def configured(self, options: Mapping[str, OptionValue]) -> Self:
-        """See `Experiment`, as for the next two."""
-
-    @abstractmethod
-    def errors(self, outputs: Matrix) -> Vector: ...
-
-    @abstractmethod
-    def error(self, trajectory: Trajectory, *, accept_gaps: bool = False) -> float: ...
 
     @abstractmethod
     def with_parameters(self, model_parameters: tuple[ModelParameter, ...]) -> Self:

@@ -5,13 +5,13 @@ from typing import Final, Self
 
 import numpy as np
 
-from app.core.definition import Flight, Option, OptionValue
+from app.core.definition import Flight, OptionValue
 from app.core.experiments.base import (
     Check,
     Envelope,
     Matrix,
+    ModelledExperiment,
     ModelParameter,
-    OwnModel,
     ParameterDistribution,
     Scatter,
     SimplexSearch,
@@ -23,34 +23,32 @@ from app.core.records.trajectory import Samples, Trajectory
 OFFSET: Final = ModelParameter("offset", "Offset", "m", 0.0, -1.0, 1.0, prior_sd=0.1, known_within=0.5)
 
 
-class QuadraticExperiment(OwnModel):
+class QuadraticExperiment(ModelledExperiment):
     """Real gain `a` and whole gain `b` in 0 … 100, of scale 10 and 5; the lowest error is at a = 30, b = 40."""
 
-    name: Final = "bowl"
-    title: Final = "Bowl"
-    output: Final = "depth"
-    integrates: Final = False
-    error_unit: Final = "m"
-    space: Final = PolicySpace(
+    name = "bowl"
+    title = "Bowl"
+    output = "depth"
+    error_unit = "m"
+    space = PolicySpace(
         (
             Gain("a", "A", "1", lower=0, upper=100, scale=10, default=90, integer=False),
             Gain("b", "B", "counts", lower=0, upper=100, scale=5, default=90, integer=True),
         )
     )
-    options: Final[tuple[Option, ...]] = ()
-    scatter: Final = Scatter(sd=0.01, degrees_of_freedom=4.0)
-    search: Final = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
-    difference: Final = 0.1
-    window_s: Final = 1.0
-    scored_from_s: Final = 0.0
-    measure: Final = "a bowl"
-    target_channel: Final = None
-    reference: Final = None
-    set_points: Final = None
-    grid_s: Final = np.linspace(0.0, 1.0, 11)
+    options = ()
+    scatter = Scatter(sd=0.01, degrees_of_freedom=4.0)
+    search = SimplexSearch(of_gain=0.3, constant=20.0, evaluations=300)
+    difference = 0.1
+    window_s = 1.0
+    measure = "a bowl"
 
     def __init__(self, model_parameters: tuple[ModelParameter, ...] = (OFFSET,)) -> None:
         self.model_parameters = model_parameters
+
+    @property
+    def grid_s(self) -> Samples:
+        return np.linspace(0.0, 1.0, 11)
 
     def configured(self, options: Mapping[str, OptionValue]) -> Self:
         return self

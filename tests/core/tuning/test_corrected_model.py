@@ -20,7 +20,9 @@ def test_the_corrected_model_reproduces_the_flight_that_corrected_it() -> None:
 def test_a_fresh_flight_corrects_bit_for_bit_like_a_stored_one() -> None:
     stored = fly(1, 50.0, 70)
     noise = np.random.default_rng(7).normal(size=11)
-    fresh = Trajectory(QuadraticExperiment.grid_s, {"depth": stored.trajectory["depth"] + noise}, "model", "simulation")
+    fresh = Trajectory(
+        QuadraticExperiment().grid_s, {"depth": stored.trajectory["depth"] + noise}, "model", "simulation"
+    )
     biases = [
         correct_by_bias(
             QuadraticExperiment(),
@@ -36,7 +38,7 @@ def test_flights_sampled_otherwise_are_brought_to_the_grid_and_held_beyond_their
     ramp = Trajectory(np.array([0.25, 0.75]), {"depth": np.array([1.25, 1.75])}, "csv", "vehicle")
     recorded = type(flight)(number=1, gains=flight.gains, trajectory=ramp, error=1.0, outcome="valid")
     assert correct_by_bias(QuadraticExperiment(), recorded).bias == pytest.approx(
-        np.clip(QuadraticExperiment.grid_s, 0.25, 0.75), abs=1e-7
+        np.clip(QuadraticExperiment().grid_s, 0.25, 0.75), abs=1e-7
     )
 
 

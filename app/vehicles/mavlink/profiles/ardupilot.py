@@ -1,6 +1,5 @@
 """ArduCopter: guided mode, and its vertical controllers' gains by the names before and since release 4.7."""
 
-from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -8,7 +7,7 @@ from app.core.control.ardupilot_parameters import LOOP_NAMES, NEWER_NAMES, UNSUP
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import FliesByModes, GainParameter, Outgoing, Requirement, Step, Target
+from app.vehicles.mavlink.profiles.base import GainParameter, Outgoing, Profile, Requirement, Step, Target
 
 GUIDED: Final = 4
 LAND: Final = 9
@@ -42,26 +41,21 @@ _MAY_LACK: Final = _LATER | {
 """Releases have one of two names for PSC_JERK_Z."""
 
 
-class ArduPilot(FliesByModes):
+class ArduPilot(Profile):
     """Gains have the names before 4.7; on vehicles with the new names, some of the values are a tenth. It does not arm
     without an integral gain of the acceleration."""
 
-    name: Final = "ardupilot"
-    title: Final = "ArduCopter"
-    experiments: Final = ("takeoff-ardupilot", "altitude-steps-ardupilot")
-    dialect: Final = ARDUPILOTMEGA
-    autopilot: Final = 3
-    heartbeat_s: Final = 1.0
-    lift_off_s: Final = 6.0
-    land_again_s: Final = 1.0
-    climbs_from_ground: Final = True
-    reference: Final = "error"
-    holds_first: Final = True
-    flying_modes: Final = frozenset({str(GUIDED)})
-    following_modes: Final = frozenset({str(GUIDED)})
-    hovering_modes: Final[frozenset[str]] = frozenset()
-    landing_modes: Final = frozenset({str(LAND)})
-    mode_names: Final = MappingProxyType(
+    name = "ardupilot"
+    title = "ArduCopter"
+    experiments = ("takeoff-ardupilot", "altitude-steps-ardupilot")
+    dialect = ARDUPILOTMEGA
+    autopilot = 3
+    lift_off_s = 6.0
+    reference = "error"
+    flying_modes = frozenset({str(GUIDED)})
+    following_modes = frozenset({str(GUIDED)})
+    landing_modes = frozenset({str(LAND)})
+    mode_names = MappingProxyType(
         {
             "0": "Stabilize", "1": "Acro", "2": "AltHold", "3": "Auto", "4": "Guided", "5": "Loiter", "6": "RTL",
             "7": "Circle", "9": "Land", "11": "Drift", "13": "Sport", "14": "Flip", "15": "AutoTune", "16": "PosHold",
@@ -69,8 +63,8 @@ class ArduPilot(FliesByModes):
             "23": "Follow", "24": "ZigZag", "25": "SystemID", "26": "Autorotate", "27": "Auto RTL", "28": "Turtle",
         }
     )  # fmt: skip
-    automatic_modes: Final = frozenset({"3", "4", "6", "9", "17", "19", "20", "21", "23", "26", "27"})
-    gain_sets: Final = (
+    automatic_modes = frozenset({"3", "4", "6", "9", "17", "19", "20", "21", "23", "26", "27"})
+    gain_sets = (
         (
             GainParameter("PSC_POSZ_P", "PSC_POSZ_P", 0.1, 4.0),
             GainParameter("PSC_VELZ_P", "PSC_VELZ_P", 0.5, 10.0),
@@ -86,7 +80,7 @@ class ArduPilot(FliesByModes):
             GainParameter("PSC_ACCZ_D", "PSC_D_ACC_D", 0.0, 0.4, factor=0.1),
         ),
     )
-    requirements: Final = (
+    requirements = (
         Requirement("FS_GCS_ENABLE", "5 (land when the ground station is lost)", frozenset({5.0})),
         Requirement("FS_GCS_TIMEOUT", "15 s or less (until it lands)", most=15.0),
         Requirement(
@@ -102,14 +96,11 @@ class ArduPilot(FliesByModes):
         Requirement("FS_EKF_ACTION", "1 or 3 (land when its position is lost)", frozenset({1.0, 3.0})),
     )
 
-    set_point_requirements: Final = (
+    set_point_requirements = (
         Requirement("GUID_OPTIONS", "without bit 6 (targets flown by the position controller)", clear_bits=1 << 6),
     )
-    may_lack: Final = _MAY_LACK
-    loop_parameters: Final = (LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in _RENAMED), *NEWER_NAMES))
-
-    def hover_limits(self, parameters: Mapping[str, float]) -> None:
-        """Return None: it keeps to what it is told or has learned."""
+    may_lack = _MAY_LACK
+    loop_parameters = (LOOP_NAMES, (*(name for name in LOOP_NAMES if name not in _RENAMED), *NEWER_NAMES))
 
     def measure(self, message: Message) -> Measurement | None:
         return base.read(_READERS, message)
@@ -125,24 +116,12 @@ class ArduPilot(FliesByModes):
             request_throttle(target),
         )
 
-    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
-        return ()
-
-    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
-        return ()
-
     def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the same for all
         """Return that the hover throttle is not learned: the gains are compared with one and the same."""
         return (Setting("MOT_HOVER_LEARN", 0.0),)
 
-    def stream(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - it keeps its target by itself
-        return ()
-
     def version_request(self, target: Target) -> Outgoing:
         return request_version(target)
-
-    def checks_request(self, target: Target) -> None:
-        """Return None: failed checks are reported as status texts."""
 
     def steps(self, action: Action, target: Target) -> tuple[Step, ...]:
         match action:

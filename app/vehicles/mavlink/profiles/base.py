@@ -2,10 +2,11 @@
 
 import math
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import Final, Literal, Protocol
+from typing import ClassVar, Final, Literal
 
 from app.core.errors import GainsError, Problem
 from app.core.policy import Gains, shortened
@@ -210,214 +211,142 @@ Ask = Callable[[Outgoing, Callable[[Measurement], bool]], Measurement | None]
 """Sends a request, repeatedly if necessary, until a reply fits; returns None without one."""
 
 
-class Profile(Protocol):
-    """Profile of one autopilot, as data and pure functions: it decides what is sent, not when."""
+class Profile(ABC):
+    """Profile of one autopilot, as data and pure functions: it decides what is sent, not when. The defaults are those
+    of autopilots that fly by modes, without a flight plan in blocks, and execute Land and the command that stops the
+    motors in every mode."""
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def experiments(self) -> tuple[str, ...]:
-        """Experiments that tune its gains, the default first."""
-        ...
+    name: ClassVar[str]
+    title: ClassVar[str]
+    experiments: ClassVar[tuple[str, ...]]
+    """Experiments that tune its gains, the default first."""
+    dialect: ClassVar[Dialect]
+    autopilot: ClassVar[int]
+    """MAV_AUTOPILOT in its heartbeats."""
+    heartbeat_s: ClassVar[float] = 1.0
+    lift_off_s: ClassVar[float]
+    """Time after the takeoff command for which it may still stand on the ground."""
+    land_again_s: ClassVar[float] = 1.0
+    """Interval at which Land may be repeated, if every command restarts the landing: the time that the landing takes on
+    the ground to end."""
+    climbs_from_ground: ClassVar[bool] = True
+    """Whether the altitude commanded is above the place of takeoff, rather than above the autopilot's origin."""
+    reference: ClassVar[ReferenceSource]
+    """Where its own reference comes from."""
+    holds_first: ClassVar[bool] = True
+    """Whether it must hold its first set point by position targets (`Action.HOLD`) before it flies to others."""
+    flying_modes: ClassVar[frozenset[str]]
+    following_modes: ClassVar[frozenset[str]]
+    """Modes that it may be in once it follows set points."""
+    hovering_modes: ClassVar[frozenset[str]] = frozenset()
+    """Flying modes that it enters after the climb; none if it climbs and hovers in one mode."""
+    landing_modes: ClassVar[frozenset[str]]
+    automatic_modes: ClassVar[frozenset[str]]
+    """Modes in which it flies by itself. In any other, known or not, a pilot flies it."""
+    mode_names: ClassVar[Mapping[str, str]]
+    """Display names of its modes by their names in `Heartbeat`; others are displayed by those."""
+    modes_without_land: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """Modes in which it does not execute Land, with a description of its behaviour in them."""
+    arming_blocks: ClassVar[frozenset[str]] = frozenset()
+    """Blocks of its flight plan, if it has one, in which it stands on the ground before the takeoff."""
+    ground_blocks: ClassVar[tuple[str, ...]] = ()
+    """Blocks of its flight plan that set its ground reference, in order: it passes through them by itself, and the
+    reference is set once it enters the last; none if arming sets the reference."""
+    flying_blocks: ClassVar[frozenset[str]] = frozenset()
+    landing_blocks: ClassVar[frozenset[str]] = frozenset()
+    landed_blocks: ClassVar[frozenset[str]] = frozenset()
+    """Those of them that it enters once it has landed."""
+    gain_sets: ClassVar[tuple[GainSet, ...]]
+    """The gains by their names in the releases of the autopilot, newest last; in the order of its experiment."""
+    stop_settings: ClassVar[tuple[str, ...]] = ()
+    """Settings that stop the motors, by their names in the releases; none if a command always does."""
+    mode_parameter: ClassVar[ModeParameter | None] = None
+    """Its mode as a parameter, if its heartbeats do not distinguish all modes."""
+    requirements: ClassVar[tuple[Requirement, ...]] = ()
+    set_point_requirements: ClassVar[tuple[Requirement, ...]] = ()
+    """Further requirements of flights with several set points."""
+    loop_parameters: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set points.
+    None if the replica of its loop has no parameters but its gains."""
+    may_lack: ClassVar[frozenset[str]] = frozenset()
+    """Those of them that some releases lack, whose replica then has their default."""
+    parameter_component: ClassVar[int] = AUTOPILOT
+    """Component that a PARAM_SET names. Some vehicles, such as MAVSDK's, ignore one to all components (0)."""
 
-    @property
-    def dialect(self) -> Dialect: ...
-    @property
-    def autopilot(self) -> int:
-        """MAV_AUTOPILOT in its heartbeats."""
-        ...
-
-    @property
-    def heartbeat_s(self) -> float: ...
-    @property
-    def lift_off_s(self) -> float:
-        """Time after the takeoff command for which it may still stand on the ground."""
-        ...
-
-    @property
-    def land_again_s(self) -> float:
-        """Interval at which Land may be repeated, if every command restarts the landing: the time that the landing
-        takes on the ground to end."""
-        ...
-
-    @property
-    def climbs_from_ground(self) -> bool:
-        """Whether the altitude commanded is above the place of takeoff, rather than above the autopilot's origin."""
-        ...
-
-    @property
-    def reference(self) -> ReferenceSource:
-        """Where its own reference comes from."""
-        ...
-
-    @property
-    def holds_first(self) -> bool:
-        """Whether it must hold its first set point by position targets (`Action.HOLD`) before it flies to others."""
-        ...
-
-    @property
-    def flying_modes(self) -> frozenset[str]: ...
-    @property
-    def following_modes(self) -> frozenset[str]:
-        """Modes that it may be in once it follows set points."""
-        ...
-
-    @property
-    def hovering_modes(self) -> frozenset[str]:
-        """Flying modes that it enters after the climb; none if it climbs and hovers in one mode."""
-        ...
-
-    @property
-    def landing_modes(self) -> frozenset[str]: ...
-    @property
-    def automatic_modes(self) -> frozenset[str]:
-        """Modes in which it flies by itself. In any other, known or not, a pilot flies it."""
-        ...
-
-    @property
-    def mode_names(self) -> Mapping[str, str]:
-        """Display names of its modes by their names in `Heartbeat`; others are displayed by those."""
-        ...
-
-    @property
-    def modes_without_land(self) -> Mapping[str, str]:
-        """Modes in which it does not execute Land, with a description of its behaviour in them."""
-        ...
-
-    @property
-    def arming_blocks(self) -> frozenset[str]:
-        """Blocks of its flight plan, if it has one, in which it stands on the ground before the takeoff."""
-        ...
-
-    @property
-    def ground_blocks(self) -> tuple[str, ...]:
-        """Blocks of its flight plan that set its ground reference, in order: it passes through them by itself, and the
-        reference is set once it enters the last; none if arming sets the reference."""
-        ...
-
-    @property
-    def flying_blocks(self) -> frozenset[str]: ...
-    @property
-    def landing_blocks(self) -> frozenset[str]: ...
-    @property
-    def landed_blocks(self) -> frozenset[str]:
-        """Those of them that it enters once it has landed."""
-        ...
-
-    @property
-    def gain_sets(self) -> tuple[GainSet, ...]:
-        """The gains by their names in the releases of the autopilot, newest last; in the order of its experiment."""
-        ...
-
-    @property
-    def stop_settings(self) -> tuple[str, ...]:
-        """Settings that stop the motors, by their names in the releases; none if a command always does."""
-        ...
-
-    @property
-    def mode_parameter(self) -> ModeParameter | None:
-        """Its mode as a parameter, if its heartbeats do not distinguish all modes."""
-        ...
-
-    @property
-    def requirements(self) -> tuple[Requirement, ...]: ...
-    @property
-    def set_point_requirements(self) -> tuple[Requirement, ...]:
-        """Further requirements of flights with several set points."""
-        ...
-
-    @property
-    def loop_parameters(self) -> tuple[tuple[str, ...], ...]:
-        """Parameters of its vertical loop for each of `gain_sets`, which are kept with a flight with several set
-        points. None if the replica of its loop has no parameters but its gains."""
-        ...
-
-    @property
-    def may_lack(self) -> frozenset[str]:
-        """Those of them that some releases lack, whose replica then has their default."""
-        ...
-
-    def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
+    def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:  # noqa: B027 - None by default
         """Return the least and the largest hover throttle that its loop can find in flight with these parameters of it;
-        None without such limits. Raises VehicleError for a parameter out of its range."""
-        ...
+        None without such limits: it keeps to what it is told or has learned. Raises VehicleError for a parameter out of
+        its range."""
 
+    @abstractmethod
     def measure(self, message: Message) -> Measurement | None: ...
-    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:
+
+    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - there are no blocks
         """Return the blocks of the flight plan, if there is one. Raises VehicleError if a required one is missing."""
-        ...
+        return {}
 
-    def conclude(self, target: Target) -> tuple[Outgoing, ...]:
+    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
         """Return the messages that end an exploration, successful or not."""
-        ...
+        return ()
 
-    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:
+    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - none by default
         """Return the steps that request telemetry, without lasting changes."""
-        ...
+        return ()
 
-    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:
+    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - none by default
         """Return the steps that request the further telemetry of a flight with several set points."""
-        ...
+        return ()
 
-    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:
+    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
         """Return the steps out of a mode in which it does not arm; none for other modes. `may_arm` is what it reports,
         None if nothing."""
-        ...
+        return ()
 
-    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:
+    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - none by default
         """Return the steps by which its flight plan sets the ground reference anew; none if the plan cannot."""
-        ...
+        return ()
 
-    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
+    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
         """Return the parameters required for a takeoff to the altitude of `target`."""
-        ...
+        return ()
 
-    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:
+    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - none by default
         """Return the further parameters required for a flight with several set points."""
-        ...
+        return ()
 
-    def stream(self, target: Target) -> tuple[Outgoing, ...]:
+    def stream(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - it keeps its target by itself
         """Return the messages that it must receive all the time while it follows set points."""
-        ...
+        return ()
 
-    def version_request(self, target: Target) -> Outgoing | None:
+    def version_request(self, target: Target) -> Outgoing | None:  # noqa: B027 - None by default
         """Return the request for its version; None if it sends that unrequested, or never."""
-        ...
 
-    def checks_request(self, target: Target) -> Outgoing | None:
-        """Return the request to run its arming checks and send the results as events; None if unsupported."""
-        ...
+    def checks_request(self, target: Target) -> Outgoing | None:  # noqa: B027 - None by default
+        """Return the request to run its arming checks and send the results as events; None if unsupported: failed
+        checks are then reported as status texts."""
 
+    @abstractmethod
     def steps(self, action: Action, target: Target) -> tuple[Step, ...]:
         """Return the steps of an action. Raises KeyError if it needs a block of the flight plan that `target` lacks."""
-        ...
 
-    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing: ...
-    def read_parameter(self, target: Target, parameter: str) -> Outgoing: ...
+    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
+        """Return the message that sets a floating-point parameter, the type of all gains."""
+        return Outgoing(
+            "PARAM_SET",
+            {
+                "target_system": target.aircraft,
+                "target_component": self.parameter_component,
+                "param_id": parameter,
+                "param_value": value,
+                "param_type": REAL32,
+            },
+        )
 
-
-def set_parameter(target: Target, parameter: str, value: float, *, component: int = 0) -> Outgoing:
-    """Return the message that sets a floating-point parameter, the type of all gains. Some vehicles, such as MAVSDK's,
-    ignore a PARAM_SET to all components (0)."""
-    return Outgoing(
-        "PARAM_SET",
-        {
-            "target_system": target.aircraft,
-            "target_component": component,
-            "param_id": parameter,
-            "param_value": value,
-            "param_type": REAL32,
-        },
-    )
-
-
-def read_parameter(target: Target, parameter: str) -> Outgoing:
-    return Outgoing(
-        "PARAM_REQUEST_READ",
-        {"target_system": target.aircraft, "target_component": 0, "param_id": parameter, "param_index": -1},
-    )
+    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
+        return Outgoing(
+            "PARAM_REQUEST_READ",
+            {"target_system": target.aircraft, "target_component": 0, "param_id": parameter, "param_index": -1},
+        )
 
 
 def list_parameters(target: Target) -> Outgoing:
@@ -431,35 +360,6 @@ def read_place(target: Target, place: int) -> Outgoing:
         "PARAM_REQUEST_READ",
         {"target_system": target.aircraft, "target_component": 0, "param_id": "", "param_index": place},
     )
-
-
-class FliesByModes:
-    """Common part of the profiles of autopilots that fly by modes, without a flight plan in blocks, and execute Land
-    and the command that stops the motors in every mode."""
-
-    modes_without_land: Final[Mapping[str, str]] = MappingProxyType({})
-    ground_blocks: Final[tuple[str, ...]] = ()
-    arming_blocks: Final[frozenset[str]] = frozenset()
-    flying_blocks: Final[frozenset[str]] = frozenset()
-    landing_blocks: Final[frozenset[str]] = frozenset()
-    landed_blocks: Final[frozenset[str]] = frozenset()
-    stop_settings: Final[tuple[str, ...]] = ()
-    mode_parameter: Final[ModeParameter | None] = None
-
-    def explore(self, ask: Ask, target: Target) -> Mapping[str, int]:  # noqa: ARG002 - there are no blocks
-        return {}
-
-    def conclude(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - nothing was begun
-        return ()
-
-    def refer_to_ground(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - arming does
-        return ()
-
-    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
-        return set_parameter(target, parameter, value, component=AUTOPILOT)
-
-    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
-        return read_parameter(target, parameter)
 
 
 def command(target: Target, code: int, *parameters: float) -> Outgoing:

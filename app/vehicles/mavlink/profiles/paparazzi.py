@@ -15,11 +15,10 @@ from app.vehicles.mavlink.events import (
     CommandReply,
     Measurement,
     ModeParameter,
-    Setting,
     Version,
 )
 from app.vehicles.mavlink.profiles import base
-from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Requirement, Step, Target
+from app.vehicles.mavlink.profiles.base import Ask, GainParameter, Outgoing, Profile, Step, Target
 
 WAIT_GPS: Final = "Wait GPS"
 GEO_INIT: Final = "Geo init"
@@ -41,53 +40,43 @@ _HOME_NUMBER: Final = 2
 """Number of the autopilot's mode HOME, in the heartbeats of releases that send it; its base mode is that of NAV."""
 
 
-class Paparazzi:
-    """v5.8 or newer, with the `mavlink` module and the blocks of the stock flight plans."""
+class Paparazzi(Profile):
+    """v5.8 or newer, with the `mavlink` module and the blocks of the stock flight plans. It sends its version every few
+    seconds."""
 
-    name: Final = "paparazzi"
-    title: Final = "Paparazzi"
-    experiments: Final = ("takeoff", "altitude-steps")
-    dialect: Final = DIALECT
-    autopilot: Final = 9
-    heartbeat_s: Final = 0.5
-    lift_off_s: Final = 1.5
-    land_again_s: Final = 6.0
-    climbs_from_ground: Final = False
-    reference: Final = "replica"
-    holds_first: Final = False
-    flying_modes: Final = frozenset({_NAV})
-    following_modes: Final = frozenset({_NAV})
-    hovering_modes: Final[frozenset[str]] = frozenset()
-    landing_modes: Final = frozenset({_NAV})
-    mode_names: Final = MappingProxyType(
-        {_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "Manual", "80": "Manual"}
-    )
-    automatic_modes: Final = frozenset({"0", _NAV, _HOME, "8"})
+    name = "paparazzi"
+    title = "Paparazzi"
+    experiments = ("takeoff", "altitude-steps")
+    dialect = DIALECT
+    autopilot = 9
+    heartbeat_s = 0.5
+    lift_off_s = 1.5
+    land_again_s = 6.0
+    climbs_from_ground = False
+    reference = "replica"
+    holds_first = False
+    flying_modes = frozenset({_NAV})
+    following_modes = frozenset({_NAV})
+    landing_modes = frozenset({_NAV})
+    mode_names = MappingProxyType({_NAV: "Automatic", _HOME: "Home", "8": "Guided", "64": "Manual", "80": "Manual"})
+    automatic_modes = frozenset({"0", _NAV, _HOME, "8"})
     """Including the failsafe, base mode 0."""
-    modes_without_land: Final = MappingProxyType({_HOME: "it flies back by itself and ignores Land"})
-    arming_blocks: Final = frozenset({HOLDING, START_ENGINE})
-    ground_blocks: Final = (WAIT_GPS, GEO_INIT, HOLDING)
-    flying_blocks: Final = frozenset({TAKE_OFF})
-    landing_blocks: Final = frozenset({LAND, *AFTER_LAND})
-    landed_blocks: Final = frozenset({AFTER_LAND[-1]})
-    gain_sets: Final = (
+    modes_without_land = MappingProxyType({_HOME: "it flies back by itself and ignores Land"})
+    arming_blocks = frozenset({HOLDING, START_ENGINE})
+    ground_blocks = (WAIT_GPS, GEO_INIT, HOLDING)
+    flying_blocks = frozenset({TAKE_OFF})
+    landing_blocks = frozenset({LAND, *AFTER_LAND})
+    landed_blocks = frozenset({AFTER_LAND[-1]})
+    gain_sets = (
         (
             GainParameter("kp", "gui_v_kp", 0.0, 4000.0, whole=True),
             GainParameter("ki", "gui_v_ki", 0.0, 2000.0, whole=True, integrates=True),
             GainParameter("kd", "gui_v_kd", 0.0, 800.0, whole=True),
         ),
     )
-    stop_settings: Final = ("kil_thr", "aut_kil_thr")
-    mode_parameter: Final = ModeParameter(
-        "aut_mod", 13.0, MappingProxyType({0.0: "0", 1.0: "0", 2.0: _HOME, 19.0: "8"})
-    )
-    requirements: Final[tuple[Requirement, ...]] = ()
-    set_point_requirements: Final[tuple[Requirement, ...]] = ()
-    may_lack: Final[frozenset[str]] = frozenset()
-    loop_parameters: Final[tuple[tuple[str, ...], ...]] = ()
-
-    def hover_limits(self, parameters: Mapping[str, float]) -> None:
-        """Return None: it keeps to what it is told or has learned."""
+    stop_settings = ("kil_thr", "aut_kil_thr")
+    mode_parameter = ModeParameter("aut_mod", 13.0, MappingProxyType({0.0: "0", 1.0: "0", 2.0: _HOME, 19.0: "8"}))
+    parameter_component = 0
 
     def measure(self, message: Message) -> Measurement | None:
         """Read a message; altitude only from LOCAL_POSITION_NED, because other messages mix their units."""
@@ -114,34 +103,10 @@ class Paparazzi:
         """Return the end of the listing of blocks, which otherwise prevents every change of block for 15 s."""
         return (_acknowledge(target),)
 
-    def prepare(self, target: Target, telemetry_hz: float) -> tuple[Step, ...]:  # noqa: ARG002 - rates are compiled in
-        return ()
-
-    def prepare_set_points(self, target: Target) -> tuple[Step, ...]:  # noqa: ARG002 - it sends all that it can
-        return ()
-
-    def make_armable(self, target: Target, mode: str, *, may_arm: bool | None) -> tuple[Step, ...]:  # noqa: ARG002 - arming begins with its mode
-        return ()
-
     def refer_to_ground(self, target: Target) -> tuple[Step, ...]:
         """Begin the flight plan again: "Wait GPS" waits for a position, "Geo init" sets the reference after 10 s."""
         begins = [name for name in self.ground_blocks[:-1] if name in target.blocks]
         return (Step(_block(target, begins[0])),) if GEO_INIT in begins else ()
-
-    def take_off_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - the command contains the altitude
-        return ()
-
-    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - none
-        return ()
-
-    def stream(self, target: Target) -> tuple[Outgoing, ...]:  # noqa: ARG002 - it flies to its waypoint by itself
-        return ()
-
-    def version_request(self, target: Target) -> None:
-        """Return None: it sends its version every few seconds."""
-
-    def checks_request(self, target: Target) -> None:
-        """Return None: failed checks are reported as status texts."""
 
     def steps(self, action: Action, target: Target) -> tuple[Step, ...]:
         match action:
@@ -160,12 +125,6 @@ class Paparazzi:
             case Action.MOTORS_OFF | Action.KILL:
                 settings = target.stop_settings or self.stop_settings
                 return (Step((base.disarm(target), *(self.set_parameter(target, name, 1.0) for name in settings))),)
-
-    def set_parameter(self, target: Target, parameter: str, value: float) -> Outgoing:
-        return base.set_parameter(target, parameter, value)
-
-    def read_parameter(self, target: Target, parameter: str) -> Outgoing:
-        return base.read_parameter(target, parameter)
 
 
 def _to(target: Target) -> dict[str, float]:

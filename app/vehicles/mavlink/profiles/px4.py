@@ -24,7 +24,7 @@ from app.vehicles.mavlink.profiles.ardupilot import (
     request_throttle,
     request_version,
 )
-from app.vehicles.mavlink.profiles.base import FliesByModes, GainParameter, Outgoing, Requirement, Step, Target
+from app.vehicles.mavlink.profiles.base import GainParameter, Outgoing, Profile, Requirement, Step, Target
 
 TAKE_OFF_ALTITUDE: Final = "MIS_TAKEOFF_ALT"
 
@@ -43,25 +43,21 @@ _STREAMED_FOR_S: Final = 1.2
 """It accepts the offboard mode once set points have arrived for a second."""
 
 
-class Px4(FliesByModes):
+class Px4(Profile):
     """PX4's profile. Integer parameters are encoded bytewise in a float."""
 
-    name: Final = "px4"
-    title: Final = "PX4"
-    experiments: Final = ("takeoff-px4", "altitude-steps-px4")
-    dialect: Final = COMMON
-    autopilot: Final = 12
-    heartbeat_s: Final = 1.0
-    lift_off_s: Final = 8.0
-    land_again_s: Final = 1.0
-    climbs_from_ground: Final = True
-    reference: Final = "target"
-    holds_first: Final = True
-    flying_modes: Final = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
-    following_modes: Final = frozenset({f"{_OFFBOARD}.0"})
-    hovering_modes: Final = frozenset({f"{_AUTO}.{_LOITER}"})
-    landing_modes: Final = frozenset({f"{_AUTO}.{_LAND}"})
-    mode_names: Final = MappingProxyType(
+    name = "px4"
+    title = "PX4"
+    experiments = ("takeoff-px4", "altitude-steps-px4")
+    dialect = COMMON
+    autopilot = 12
+    lift_off_s = 8.0
+    reference = "target"
+    flying_modes = frozenset({f"{_AUTO}.{_TAKE_OFF}", f"{_AUTO}.{_LOITER}"})
+    following_modes = frozenset({f"{_OFFBOARD}.0"})
+    hovering_modes = frozenset({f"{_AUTO}.{_LOITER}"})
+    landing_modes = frozenset({f"{_AUTO}.{_LAND}"})
+    mode_names = MappingProxyType(
         {
             "1.0": "Manual", "2.0": "Altitude", "3.0": "Position", "4.1": "Ready", "4.2": "Takeoff", "4.3": "Hold",
             "3.1": "Orbit", "3.2": "Position slow", "4.4": "Mission", "4.5": "Return", "4.6": "Land", "5.0": "Acro",
@@ -69,10 +65,8 @@ class Px4(FliesByModes):
             "11.0": "Altitude cruise",
         }
     )  # fmt: skip
-    automatic_modes: Final = frozenset(
-        f"{main}.{sub}" for main in (_AUTO, _OFFBOARD, _TERMINATION) for sub in range(256)
-    )
-    gain_sets: Final = (
+    automatic_modes = frozenset(f"{main}.{sub}" for main in (_AUTO, _OFFBOARD, _TERMINATION) for sub in range(256))
+    gain_sets = (
         (
             GainParameter("MPC_Z_P", "MPC_Z_P", 0.1, 1.5),
             GainParameter("MPC_Z_VEL_P_ACC", "MPC_Z_VEL_P_ACC", 2.0, 15.0),
@@ -80,22 +74,22 @@ class Px4(FliesByModes):
             GainParameter("MPC_Z_VEL_D_ACC", "MPC_Z_VEL_D_ACC", 0.0, 2.0),
         ),
     )
-    requirements: Final = (
+    requirements = (
         Requirement("NAV_DLL_ACT", "3 (land when the ground station is lost)", frozenset({3.0})),
         Requirement("COM_DL_LOSS_T", "15 s or less (until it lands)", most=15.0),
         Requirement("GF_ACTION", "2 or 5 (hold or land when it leaves its fence)", frozenset({2.0, 5.0})),
         Requirement("GF_MAX_VER_DIST", "10 m or less (altitude of its fence above home)", most=10.0),
     )
 
-    set_point_requirements: Final = (
+    set_point_requirements = (
         Requirement("COM_OF_LOSS_T", "0.5 to 2 s (until it reacts to missing set points)", least=0.5, most=2.0),
         Requirement("COM_OBL_RC_ACT", "4 (land without set points)", frozenset({4.0})),
         Requirement(
             "COM_FAIL_ACT_T", "5 s or less (in which it holds before it lands)", least=0.0, most=5.0, may_lack=True
         ),
     )
-    may_lack: Final = frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME})
-    loop_parameters: Final = (LOOP_NAMES,)
+    may_lack = frozenset({*UNSUPPORTED, "MPC_VEL_LP", *ESTIMATOR_NAMES, HOVER_RANGE_NAME})
+    loop_parameters = (LOOP_NAMES,)
 
     def hover_limits(self, parameters: Mapping[str, float]) -> tuple[float, float] | None:
         """Return those of its estimator; None if its parameter is not known."""
@@ -126,9 +120,6 @@ class Px4(FliesByModes):
 
     def take_off_settings(self, target: Target) -> tuple[Setting, ...]:
         return (Setting(TAKE_OFF_ALTITUDE, target.altitude_m),)
-
-    def set_point_settings(self, target: Target) -> tuple[Setting, ...]:  # noqa: ARG002 - none
-        return ()
 
     def stream(self, target: Target) -> tuple[Outgoing, ...]:
         return (base.position_target(target),)
