@@ -23,7 +23,7 @@ def case(*faults: PlannedFault, autopilot: str = "paparazzi", staged_s: float = 
         autopilot=autopilot,
         faults=faults,
         gains=TUNED[autopilot],
-        powered_s=4.0,
+        powered_s=15.0,
         staged_s=staged_s,
         pinned=True,
     )
@@ -201,7 +201,7 @@ FOUND: Final = [
     # seed 20261209: a stop before arming left the gains of the trial on the vehicle
     (case(PlannedFault("abort", State.SET_GAINS, 2.0)), "refused", "safe"),
     # a restart while the gains were staged: the trial flew on the autopilot's own; Paparazzi forgets what was set
-    (case(PlannedFault("reboot", State.SET_GAINS, 3.0), staged_s=8.0), "refused", "safe"),
+    (case(PlannedFault("reboot", State.SET_GAINS, 18.0), staged_s=8.0), "refused", "safe"),
     # PX4 keeps it, but is no longer staged either
     (case(PlannedFault("reboot", State.SET_GAINS, 3.0), autopilot="px4", staged_s=8.0), "refused", "safe"),
     # seed 20261388: a lift-off that could not be seen, for the link was lost, passed for none

@@ -661,6 +661,8 @@ def _confirms_landing(trial: Trial, now_s: float) -> bool:
     last = trial.watch.last
     if last is None or not watching.is_fresh(trial.watch, now_s):
         return False
-    lands = trial.watch.block in trial.plan.limits.landing_blocks  # another Land would begin its landing again
+    limits = trial.plan.limits
+    lands = trial.watch.block in limits.landing_blocks  # another Land would begin its landing again
+    lands = lands or watching.mode_of(trial.watch, limits) in limits.landing_modes - limits.flying_modes
     near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     return (near and (lands or not find_doubt_of_descent(trial, now_s))) or last.climb_rate_m_s < DESCENDING_M_S
