@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.analysis.analysis import Analysis, analyze
+from app.core.analysis.analysis import analyze
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.hover import advise_hover
 from app.core.analysis.segment import Segment
