@@ -52,6 +52,11 @@ class OtherClock:
     last_s: float
     last: Position
 
+    @property
+    def advances(self) -> bool:
+        """Whether more than one position is by this clock."""
+        return self.last_s > self.first_s
+
     def goes_on(self, position: Position, now_s: float) -> bool:
         """Whether the position is by this clock."""
         gained_s = position.time_boot_s - self.last.time_boot_s

@@ -30,8 +30,8 @@ _OF_A_ROUND: Final = 0.9
 _LOST: Final = 32
 """A sequence of numbers goes on with one less than this ahead of its last."""
 _SEQUENCES: Final = 8
-_FRAMES: Final = 2048
-"""Frames that are remembered, of more than the 3 s that a copy may be late."""
+_REMEMBERED_FRAMES_S: Final = 5.0
+"""Longer than a copy is late, shorter than the same frame takes to be sent again."""
 
 
 @dataclass(slots=True)
@@ -45,7 +45,7 @@ class DuplicateDetector:
 
     def __init__(self) -> None:
         self._used: dict[int, _Used] = {}
-        self._frames: dict[bytes, None] = {}
+        self._frames: dict[bytes, float] = {}
         self._sequences = _Sequences()
         self._rate = _Rate()
         self._count = 0
@@ -62,11 +62,11 @@ class DuplicateDetector:
     def add(self, frame: bytes, number: int, now_s: float, boot_s: float | None, *, is_counted: bool = True) -> bool:
         """Add a message by its whole frame and sequence number, which counts unless the message has another counter;
         `boot_s` is its time stamp, if it has one. Return whether it is a copy."""
+        while self._frames and now_s - self._frames[oldest := next(iter(self._frames))] > _REMEMBERED_FRAMES_S:
+            del self._frames[oldest]
         if frame in self._frames:
             return True
-        self._frames[frame] = None
-        if len(self._frames) > _FRAMES:
-            del self._frames[next(iter(self._frames))]
+        self._frames[frame] = now_s
         if is_counted and self._add_number(number, now_s) and boot_s is not None:
             self._add_clock(boot_s - now_s, now_s)
         return False

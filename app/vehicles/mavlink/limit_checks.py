@@ -29,10 +29,11 @@ _IMPACT_BELOW_M: Final = 0.5
 _JUMP_ENDS_RECORD_M: Final = 0.5
 """A single false sample near the ground causes smaller jumps."""
 _UNCHANGED_S: Final = 1.0
-"""In recordings of all three autopilots, no two consecutive estimates in flight are equal in altitude and climb
-rate."""
-_CONTRADICTED_S: Final = 4.0
+"""In recordings of all three autopilots, no three consecutive estimates are equal in altitude and climb rate."""
+_CONTRADICTED_S: Final = 8.0
 """Longer than an autopilot takes to detect its landing."""
+_SINKING_M_S: Final = 0.3
+"""A vehicle that is faster than this swings."""
 _STEPPED_S: Final = 0.3
 """A greater step of the clock is not one of the latency."""
 _LEANING: Final = 0.5
@@ -167,7 +168,7 @@ def find_envelope(watch: TrialObservation, limits: Limits, ground_m: float, *, s
 
 def find_frozen(watch: TrialObservation, limits: Limits, now_s: float) -> Finding | None:
     why = ""
-    if watch.stuck_s > limits.stuck_s and watch.other is not None and watch.last is not None:
+    if watch.stuck_s > limits.stuck_s and watch.other is not None and watch.other.advances and watch.last is not None:
         gained_s = watch.other.last.time_boot_s - watch.last.time_boot_s
         why = f"Its clock jumped by {gained_s - (watch.other.last_s - watch.accepted_s):+.1f} s."
     elif watch.stuck_s > limits.stuck_s:
@@ -245,17 +246,22 @@ def find_jump(watch: TrialObservation) -> Finding | None:
 
 
 def find_drift(watch: TrialObservation, now_s: float, ground_m: float, *, has_landed: bool) -> Finding | None:
-    """Find that the altitude of a flown vehicle has drifted: it is below the ground, or it shows the ground or the air
-    where the vehicle reports the other."""
+    """Find that the altitude of a flown vehicle has drifted: it is below the ground, or above it where the vehicle
+    reports that it has landed."""
     if watch.last is None or watch.doubted is not None or not is_fresh(watch, now_s):
         return None
     off_m = watch.last.altitude_m - ground_m
-    since_s = watch.contradicted_since_s
-    if since_s is not None and now_s - since_s > _CONTRADICTED_S:
-        return Finding(failure=Failure.LOST_POSITION, why="It reports that it flies, but its altitude is the ground's.")
     if off_m >= -DRIFT_M and not (off_m > DRIFT_M and has_landed):
         return None
     return Finding(failure=Failure.LOST_POSITION, why=f"Its altitude has drifted: it was {off_m:+.1f} m on the ground.")
+
+
+def find_contradiction(watch: TrialObservation, now_s: float) -> Finding | None:
+    """Find that a vehicle has reported for long that it flies while its altitude shows the ground."""
+    since_s = watch.contradicted_since_s
+    if since_s is None or now_s - since_s <= _CONTRADICTED_S:
+        return None
+    return Finding(failure=Failure.LOST_POSITION, why="It reports that it flies, but its altitude is the ground's.")
 
 
 def find_sunken(watch: TrialObservation, lowest_m: float, ground_m: float) -> Finding | None:
@@ -263,7 +269,8 @@ def find_sunken(watch: TrialObservation, lowest_m: float, ground_m: float) -> Fi
     point, where it had been near that."""
     had_climbed = watch.highest_m >= lowest_m - _CLIMBED_WITHIN_M
     height_m = 0.0 if watch.last is None else watch.last.altitude_m - ground_m
-    if not had_climbed or height_m >= 0.5 * (lowest_m - ground_m):
+    swings = watch.last is not None and abs(watch.last.climb_rate_m_s) > _SINKING_M_S
+    if swings or not had_climbed or height_m >= 0.5 * (lowest_m - ground_m):
         return None
     why = f"At the end of the record it was {height_m:.1f} m above the ground: it, or its altitude alone, has sunk."
     return Finding(failure=Failure.LOST_POSITION, why=why)

@@ -64,6 +64,8 @@ BEHIND_M: Final = 0.5
 """An altitude that has fallen behind the integrated climb rate by more than this does not follow it."""
 DRIFT_M: Final = 1.0
 """Greatest drift of an altitude during a flight."""
+_STANDS_S: Final = 3.0
+"""Time for which the landed state of a vehicle that was not commanded to take off is believed."""
 _LEAN_RAD: Final = math.radians(20.0)
 _LEANING_OVER_S: Final = 1.5
 _LONGEST_LEAN_S: Final = 0.5
@@ -157,9 +159,15 @@ class TrialObservation:
 
 
 def begin(
-    now_s: float, *, last: Position | None = None, battery_v: float | None = None, stood_s: float = 0.0
+    now_s: float,
+    *,
+    last: Position | None = None,
+    battery_v: float | None = None,
+    stood_s: float = 0.0,
+    reports_landing: bool = False,
 ) -> TrialObservation:
-    """Begin an observation with all times now. `last` is the position at which the vehicle has stood for `stood_s`."""
+    """Begin an observation with all times now. `last` is the position at which the vehicle has stood for `stood_s`;
+    `reports_landing`: it has sent its landed state before, without which a landing is then not believed."""
     return TrialObservation(
         received_s=now_s,
         heartbeat_s=now_s,
@@ -171,6 +179,8 @@ def begin(
         last=last,
         origin=last,
         grounded_since_s=None if last is None else now_s - stood_s,
+        landed=True if reports_landing else None,
+        landed_s=-math.inf,
     )
 
 
@@ -237,13 +247,15 @@ def settle(
     airborne = is_airborne(watch, now_s, ground_m) and not stands
     since_s = watch.grounded_since_s if watch.grounded_since_s is not None else now_s
     grounded, said_to_fly = stands or is_grounded(watch, now_s, ground_m), is_said_to_fly(watch, now_s, ground_m)
+    contradicts = grounded and _reports_flight(watch, now_s)
+    unseen_high = watch.unseen_m is not None and watch.unseen_m - ground_m > GROUND_M
     flying_since_s = watch.contradicted_since_s if watch.contradicted_since_s is not None else now_s
     return with_changes(
         watch,
         lifted=watch.lifted or airborne,
-        unseen_m=None if airborne else watch.unseen_m,
+        unseen_m=watch.unseen_m if unseen_high and not airborne else None,
         grounded_since_s=since_s if grounded and not said_to_fly else None,
-        contradicted_since_s=flying_since_s if grounded and said_to_fly else None,
+        contradicted_since_s=flying_since_s if contradicts else None,
     )
 
 
@@ -288,9 +300,12 @@ def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
 
 def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """Whether its own landed state or the second source shows it in the air, independent of its altitude."""
-    reports_flight = watch.landed is False and now_s - watch.landed_s < AGREED_S
     secondary_m = secondary_altitude_m(watch.second, now_s)
-    return reports_flight or (secondary_m is not None and secondary_m - ground_m > GROUND_M)
+    return _reports_flight(watch, now_s) or (secondary_m is not None and secondary_m - ground_m > GROUND_M)
+
+
+def _reports_flight(watch: TrialObservation, now_s: float) -> bool:
+    return watch.landed is False and now_s - watch.landed_s < AGREED_S
 
 
 def reports_landing(watch: TrialObservation, now_s: float) -> bool:
@@ -309,7 +324,8 @@ def stands_by_own_account(watch: TrialObservation, now_s: float, ground_m: float
     """Whether it reports that it is on the ground, or in a block of its plan that has no thrust, and its altitude has
     not drifted further than one may. To be called for a vehicle that was not commanded to take off."""
     drifted_m = 0.0 if watch.last is None else watch.last.altitude_m - ground_m
-    return abs(drifted_m) <= DRIFT_M and (reports_landing(watch, now_s) or watch.block in limits.arming_blocks)
+    says_so = watch.landed is True and now_s - watch.landed_s < _STANDS_S
+    return abs(drifted_m) <= DRIFT_M and (says_so or watch.block in limits.arming_blocks)
 
 
 def secondary_altitude_m(second: SecondaryAltitude | None, now_s: float) -> float | None:

@@ -20,6 +20,7 @@ from app.vehicles.mavlink.events import (
     BlockEntered,
     CommandReply,
     Heartbeat,
+    LandedState,
     Measurement,
     PacketReceived,
     Parameter,
@@ -107,6 +108,8 @@ class VehicleMemory:
     battery_v: float | None = None
     loop: LoopReports = field(default_factory=LoopReports)
     may_arm: bool | None = None
+    reports_landing: bool = False
+    """Whether it has sent its landed state."""
     """Whether it reports that it may be armed in its mode; None if it never reports that. One that has done so, or that
     sends events, may not while it reports nothing."""
     arming_checks: ArmingChecks = field(default_factory=ArmingChecks)
@@ -130,6 +133,7 @@ class VehicleMemory:
         self.arming_checks = ArmingChecks()
 
     def note(self, measurement: Measurement | None, now_s: float) -> None:
+        self.reports_landing |= isinstance(measurement, LandedState)
         match measurement:
             case Heartbeat(armed=armed):
                 if self.heartbeat is None or self.heartbeat.armed != armed:

@@ -77,6 +77,11 @@ _REPLY_S: Final = 0.5
 _OTHER_M: Final = 1.0
 """After a greater jump of the altitude, another vehicle may be answering."""
 _SET_POINT_ACTIONS: Final = frozenset({Action.HOLD, Action.FLY_TO})
+_STOPPED_WITHIN_S: Final = 0.6
+"""A vehicle whose heartbeats report its motors off within this time of its fall fell because they were stopped; one
+that detects its landing takes longer."""
+_LANDING_BLOCK_S: Final = 20.0
+"""Longer than a flight plan takes from the descent to the block that reports the landing, once."""
 _ARMING_S: Final = 15.0
 """Longest time that arming may take, with all repetitions."""
 
@@ -103,18 +108,19 @@ def advance(trial: Trial, event: Event) -> Step:
     )
     trial = trial if settled is trial.watch else replace(trial, watch=settled)
     trial, requests = _confirm_take_off(trial, event)
-    trial, polls = _poll_mode(trial, event.now_s)
+    trial, polls = _poll_settings(trial, event.now_s)
     trial = _with_drift(_with_jump(_with_disarming(_with_fall(trial, event.now_s))), event.now_s)
     trial, commands = _react(trial, event)
     return trial, (*kept, *requests, *polls, *commands)
 
 
-def _poll_mode(trial: Trial, now_s: float) -> Step:
-    """Request the mode of a vehicle whose heartbeats do not distinguish all modes."""
+def _poll_settings(trial: Trial, now_s: float) -> Step:
+    """Request the mode of a vehicle whose heartbeats do not distinguish all modes, and settings in doubt."""
     mode = trial.plan.mode_parameter
-    if mode is None or trial.state not in _STATES_WITH_TRIAL_GAINS or now_s - trial.polled_s < REPEAT_S:
+    names = sorted(trial.suspects | (set() if mode is None else {mode.name}))
+    if not names or trial.state not in _STATES_WITH_TRIAL_GAINS or now_s - trial.polled_s < REPEAT_S:
         return trial, ()
-    return replace(trial, polled_s=now_s), (RequestGain(mode.name),)
+    return replace(trial, polled_s=now_s), tuple(RequestGain(name) for name in names)
 
 
 def _confirm_take_off(trial: Trial, event: Event) -> Step:
@@ -197,7 +203,7 @@ def _with_disarming(trial: Trial) -> Trial:
     watch, limits = trial.watch, trial.plan.limits
     if trial.stopped or trial.state not in _FLOWN or not watching.is_disarmed(watch, limits):
         return trial
-    fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= limits.confirmation_s
+    fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= _STOPPED_WITHIN_S
     unseen_m = trial.plan.ground_m if watch.unseen_m is None else watch.unseen_m
     if not fell and trial.disarmed_m <= watching.DRIFT_M:
         why = "Its motors stopped while it was not observed: it may have fallen."
@@ -207,14 +213,18 @@ def _with_disarming(trial: Trial) -> Trial:
 
 
 def _with_drift(trial: Trial, now_s: float) -> Trial:
-    """Note an altitude that has drifted: limits that it exceeded may have been false. In a fall it lags."""
-    if trial.stopped or trial.state not in {*_FLOWN, State.DISARM} or trial.commanded_s is None or trial.fell_s:
+    """Note an altitude that has drifted, so that limits may have been exceeded by it alone, or that contradicts the
+    landed state. In a fall it lags."""
+    is_up = trial.commanded_s is not None and trial.state in {*_FLOWN, State.DISARM}
+    if trial.stopped or not is_up or trial.fell_s is not None:
         return trial
     plan, landed_blocks = trial.plan, trial.plan.limits.landed_blocks
     is_told_to_land = trial.state not in _STATES_WITH_TRIAL_GAINS
     has_landed = is_told_to_land and watching.has_reported_landing(trial.watch, now_s, landed_blocks)
     drift = limit_checks.find_drift(trial.watch, now_s, plan.ground_m, has_landed=has_landed)
-    return trial if drift is None else note_cause(trial, drift)
+    trial = trial if drift is None else note_cause(trial, drift)
+    contradiction = limit_checks.find_contradiction(trial.watch, now_s)
+    return trial if contradiction is None else note(trial, contradiction)
 
 
 def _with_jump(trial: Trial) -> Trial:
@@ -243,8 +253,8 @@ def _arm(trial: Trial, event: Event) -> Step:
         trial = replace(trial, armed_s=now_s)
     if isinstance(event, ActionRefused):
         return fail(measure_ground(trial, now_s), Finding(failure=Failure.NOT_ARMED, why=event.why), now_s)
-    if trial.failure is Failure.INTERRUPTED:
-        return fail(measure_ground(trial, now_s), Finding(failure=Failure.INTERRUPTED, why=trial.why), now_s)
+    if finding := _noted(trial, Failure.INTERRUPTED, Failure.UNEXPECTED):
+        return fail(measure_ground(trial, now_s), finding, now_s)
     if finding := limit_checks.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
@@ -337,8 +347,9 @@ def _record(trial: Trial, event: Event) -> Step:
     if watching.too_many_glitches(trial.watch):
         trial = note(trial, Finding(failure=Failure.GLITCHES, why=f"{trial.watch.glitches} samples were dropped."))
     lowest_m = min(trial.plan.set_points.altitudes_m) + trial.plan.datum_m
-    if sunken := limit_checks.find_sunken(trial.watch, lowest_m, trial.plan.ground_m):
-        trial = note(trial, sunken)
+    sunken = limit_checks.find_sunken(trial.watch, lowest_m, trial.plan.ground_m)
+    if finding := _unconfirmed_setting(trial) or sunken:
+        trial = note(trial, finding)
     incomplete = limit_checks.find_incomplete_climb(trial.watch, trial.plan.climb_to_m)
     if trial.plan.climbs_from_ground and incomplete:
         trial = note(trial, incomplete)
@@ -662,7 +673,8 @@ def _confirms_landing(trial: Trial, now_s: float) -> bool:
     if last is None or not watching.is_fresh(trial.watch, now_s):
         return False
     limits = trial.plan.limits
-    lands = trial.watch.block in limits.landing_blocks  # another Land would begin its landing again
+    is_new = now_s - trial.watch.block_s < _LANDING_BLOCK_S
+    lands = is_new and trial.watch.block in limits.landing_blocks  # another Land would begin its landing again
     lands = lands or watching.mode_of(trial.watch, limits) in limits.landing_modes - limits.flying_modes
     near = not watching.is_airborne(trial.watch, now_s, trial.plan.ground_m)
     return (near and (lands or not find_doubt_of_descent(trial, now_s))) or last.climb_rate_m_s < DESCENDING_M_S

@@ -326,7 +326,8 @@ def _lose_link(trial: Trial, now_s: float) -> Step:
 
 def _give_up_take_off(trial: Trial, now_s: float) -> Step:
     """Stop the motors of a vehicle that has received the command and is on the ground by every source; otherwise abort,
-    because it may yet lift off, or has, with its integrator wound up. A flight plan ends the landing on the ground."""
+    because it may yet lift off, or has, with its integrator wound up. One that reports its landing by a block of its
+    flight plan always lands."""
     stands = trial.watch.grounded_since_s is not None and not find_doubt_of_descent(trial, now_s)
     return disarm(trial, now_s) if stands else abort(trial, now_s)
 
@@ -422,8 +423,9 @@ def _find_drop(trial: Trial, now_s: float) -> str:
     """Return why a vehicle whose motors are stopped now may have fallen; empty if every source shows it on the ground,
     or it has not been commanded to take off and nothing shows that it moved."""
     watch, ground_m = trial.watch, trial.plan.ground_m
-    is_still = trial.state is State.ARM or watching.stands_by_own_account(watch, now_s, ground_m, trial.plan.limits)
-    if trial.commanded_s is None and is_still:
+    stands = watching.stands_by_own_account(watch, now_s, ground_m, trial.plan.limits)
+    is_arming = trial.state is State.ARM and not watching.is_said_to_fly(watch, now_s, ground_m)
+    if trial.commanded_s is None and (stands or is_arming):
         return ""
     if watch.last is not None and watching.is_airborne(watch, now_s, ground_m):
         height_m = watch.last.altitude_m - ground_m

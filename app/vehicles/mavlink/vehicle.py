@@ -277,6 +277,7 @@ class MavlinkVehicle:
             packets = self._radio.receive(min(left_s, _LISTEN_S))
             self._check_identity()
             self._repeat_command(packets)
+            self._was_flying = self._was_flying and not self._radio.is_disarmed
         self._renew_telemetry()
 
     def confirm_staged(self) -> None:
@@ -546,7 +547,12 @@ class MavlinkVehicle:
     def _repeat_command(self, packets: list[PacketReceived]) -> None:
         if (repeated := self._repeated) is None:
             return
-        repeated.proceed(packets)
+        try:
+            repeated.proceed(packets)
+        except LinkError:
+            raise
+        except VehicleError as error:  # its flight plan is not known
+            self._requested, self._repeated = str(error), None
         if self.has_stopped is None and self._flight is None and repeated.action is Action.KILL and repeated.is_over:
             self.has_stopped = repeated.has_stopped
             if not repeated.has_stopped:
@@ -646,7 +652,11 @@ class MavlinkVehicle:
         plan = replace(self._plan_of(order, ground), trial_gains=self._gains.staged_settings)
         self._gains.staged = self._repeated = None
         watch = watching.begin(
-            self._radio.clock.now_s(), last=last, battery_v=self._radio.seen.battery_v, stood_s=STANDSTILL_S
+            self._radio.clock.now_s(),
+            last=last,
+            battery_v=self._radio.seen.battery_v,
+            stood_s=STANDSTILL_S,
+            reports_landing=self._radio.seen.reports_landing,
         )
         if self._secondary is not None:
             self._secondary.align(ground.secondary_m, ground.altitude_m)

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import pytest
 
+from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.boot_clock import WRAP_S
 from app.vehicles.mavlink.events import (
     DISARMING,
@@ -33,7 +34,7 @@ from app.vehicles.mavlink.events import (
     Setting,
 )
 from app.vehicles.mavlink.failures import Failure
-from app.vehicles.mavlink.trial_machine import Plan
+from app.vehicles.mavlink.trial_machine import Plan, begin
 from app.vehicles.mavlink.trial_reactions import TRANSITIONS, State
 from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver
 
@@ -967,7 +968,7 @@ def test_an_altitude_that_drifts_below_the_ground_is_lost_and_is_no_limit_of_the
 
 
 def test_a_record_at_whose_end_the_vehicle_or_its_altitude_has_sunk_is_invalid() -> None:
-    walk = recording()
+    walk = TrialDriver(plan=replace(PLAN, record_s=10.0)).lift_off().pass_s(1.0)
     walk.climb_rate_m_s = -0.5
     walk.pass_s(3.9)
     walk.climb_rate_m_s = 0.0
@@ -1053,3 +1054,53 @@ def test_an_altitude_that_stands_still_while_the_clock_runs_is_frozen() -> None:
         walk.hear(replace(stuck, time_boot_s=walk.boot_s + STEP_S)).pass_s(STEP_S)
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
     assert walk.trial.why == "Its altitude stood still for more than 1 s while its clock ran."
+
+
+def test_a_gain_in_doubt_is_asked_for_again_and_voids_a_flight_that_ends_without_a_reply() -> None:
+    walk = TrialDriver(plan=replace(PLAN, trial_gains=(Setting("gui_v_kp", 1600.0),))).lift_off()
+    walk.deaf = True
+    walk.hear(Parameter("gui_v_kp", 300.0))
+    while walk.state is State.RECORD:
+        walk.pass_s(STEP_S)
+    assert [command for _, command in walk.told].count(RequestGain("gui_v_kp")) > 3
+    assert (walk.state, walk.trial.failure) == (State.LAND, Failure.INTERRUPTED)
+
+
+def test_a_lost_report_of_the_landing_block_is_caught_up_by_another_land() -> None:
+    """Paparazzi reports "landed" once; without it the vehicle would be quarantined after every such loss."""
+    limits = replace(
+        PLAN.limits,
+        blocks={4: "Takeoff", 15: "flare", 16: "landed"},
+        flying_blocks=frozenset({"Takeoff"}),
+        landing_blocks=frozenset({"flare", "landed"}),
+        landed_blocks=frozenset({"landed"}),
+    )
+    walk = TrialDriver(plan=replace(PLAN, limits=limits, land_again_s=6.0)).lift_off().hear(BlockEntered(4))
+    while walk.state is State.RECORD:
+        walk.pass_s(STEP_S)
+    walk.hear(BlockEntered(15)).climb_rate_m_s = -0.8
+    walk.pass_s(3.6).climb_rate_m_s = 0.0
+    before = len(walk.when(Action.LAND))
+    walk.pass_s(15.0)
+    assert len(walk.when(Action.LAND)) == before
+    walk.pass_s(4.0)
+    assert len(walk.when(Action.LAND)) == before + 1
+    walk.hear(BlockEntered(16)).pass_s(0.1)
+    assert walk.state is State.DISARM
+
+
+def test_a_landed_state_that_was_heard_before_the_trial_only_is_missed() -> None:
+    walk = TrialDriver(without_landed_state=True)
+    here = Position(walk.boot_s, GROUND_M, 0.0)
+    watch = watching.begin(walk.now_s, last=here, battery_v=12.4, stood_s=1.0, reports_landing=True)
+    walk.trial, _ = begin(walk.plan, watch, walk.now_s)
+    walk.land().touch_down()
+    assert walk.state is State.QUARANTINE
+    assert not {Action.MOTORS_OFF, Action.KILL} & set(walk.actions)
+
+
+def test_repeated_positions_are_a_clock_that_stands_still_not_one_that_jumps() -> None:
+    walk = recording()
+    walk.frozen = True
+    walk.pass_s(0.5)
+    assert (walk.trial.failure, walk.trial.why) == (Failure.FROZEN, "Its clock stood still for more than 0.25 s.")
