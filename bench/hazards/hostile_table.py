@@ -137,7 +137,7 @@ _NUMBERS: Final[Mapping[str, Hazard]] = {
         link=lambda forger: ChangedMessages(
             forger, "PARAM_VALUE", lambda message: {"param_value": number(message, "param_value") + 1.0}
         ),
-        expected=_UNVERIFIED,
+        expected=_may("F10c", NOT_SEEN),
     ),
     **{
         f"altitude {by_m:+g} m": Hazard(link=higher(POSITION, by_m), expected=_UNVERIFIED)

@@ -49,7 +49,7 @@ def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_c
 def test_a_ground_log_is_handed_in_together_with_its_companion(dashboard: Dashboard, states: States) -> None:
     campaign_id = states.campaign("import")
     dashboard.open_campaign(campaign_id)
-    data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82}, loop_log=False)).encode()
+    data = data_of(Flight({"kp": 283, "ki": 13, "kd": 82})).encode()
     hand_in(dashboard, ("flight.log", COMPANION.encode()), ("flight.data", data))
     dashboard.until(lambda: any(trial["state"] == "valid" for trial in dashboard.trials(campaign_id)))
     [trial] = dashboard.trials(campaign_id)

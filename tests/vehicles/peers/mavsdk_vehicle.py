@@ -3,6 +3,7 @@
 On the wire it has PX4's modes, parameters and answers; all of it is MAVSDK's own. Its time is this computer's.
 """
 
+import random
 import threading
 import time
 from collections.abc import Mapping
@@ -37,6 +38,9 @@ _UP_M_S: Final = 1.5
 _DOWN_M_S: Final = 0.7
 _BATTERY_EVERY: Final = 50
 _BATTERY_V: Final = 12.3
+
+
+_NOISE_M = 1e-4
 
 
 class MavsdkVehicle:
@@ -108,7 +112,7 @@ class MavsdkVehicle:
                 self._move()
             steps = due
             self._actions.set_disarmable(self.stands, False)
-            position = PositionNed(0.0, 0.0, -self.altitude_m)
+            position = PositionNed(0.0, 0.0, -self.altitude_m - _NOISE_M * random.random())  # never the same twice
             velocity = VelocityNed(0.0, 0.0, -self._climb_rate_m_s)
             self._telemetry.publish_position_velocity_ned(PositionVelocityNed(position, velocity))
             if tell_battery:
