@@ -107,7 +107,7 @@ def _may(*codes: str, ends_in: tuple[State, ...] = (), aborts: frozenset[str] = 
 _BLIND: Final = _may("F9d", NOT_SEEN, ends_in=AIR)
 _UNVERIFIED: Final = _may(NOT_SEEN)
 _TWINS: Final = _may("F12", "F9d", ends_in=AIR)
-_ON_GROUND: Final = _may("F9a", "F9d", "F4a", "F10b", NOT_SEEN, ends_in=AIR, aborts=ALL)
+_ON_GROUND: Final = _may("F9a", "F9d", "F4a", "F6", "F10b", NOT_SEEN, ends_in=AIR, aborts=ALL)
 _DELAYED: Final = _may("F9a", "F9d", "F5", "F12", NOT_SEEN, ends_in=AIR)
 _COMMANDS_DELAYED: Final = _may("F10b", "F10c", "F4a", NOT_SEEN, aborts=ALL)
 _REFUSED: Final = Expected(refuses=True)

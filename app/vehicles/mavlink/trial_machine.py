@@ -198,17 +198,14 @@ def _with_fall(trial: Trial, now_s: float) -> Trial:
 
 
 def _with_disarming(trial: Trial) -> Trial:
-    """Note that somebody else, or the vehicle itself, stopped its motors in the air, or may have while it was not
-    observed there: it exceeded its limits because it fell."""
+    """Note that somebody else, or the vehicle itself, stopped its motors in the air: it exceeded its limits because it
+    fell."""
     watch, limits = trial.watch, trial.plan.limits
     if trial.stopped or trial.state not in _FLOWN or not watching.is_disarmed(watch, limits):
         return trial
     fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= _STOPPED_WITHIN_S
-    unseen_m = trial.plan.ground_m if watch.unseen_m is None else watch.unseen_m
     if not fell and trial.disarmed_m <= watching.DRIFT_M:
-        why = "Its motors stopped while it was not observed: it may have fallen."
-        may_have_fallen = unseen_m - trial.plan.ground_m > watching.DRIFT_M
-        return note(trial, Finding(failure=Failure.UNEXPECTED, why=why)) if may_have_fallen else trial
+        return trial
     return note_cause(trial, Finding(failure=Failure.UNEXPECTED, why="Its motors were stopped in the air."))
 
 
@@ -462,9 +459,13 @@ def _doubting(trial: Trial) -> Trial:
 
 
 def _come_down(trial: Trial, now_s: float) -> Step:
-    """Stop the motors of a landed vehicle, unless its state or identity is uncertain."""
+    """Stop the motors of a landed vehicle, unless its state or identity is uncertain. One that was last observed high
+    may have fallen."""
     if trial.failure is not Failure.FALL and _changed(trial):
         return quarantine(trial, "", now_s)
+    unseen_m = trial.plan.ground_m if trial.watch.unseen_m is None else trial.watch.unseen_m
+    if unseen_m - trial.plan.ground_m > watching.DRIFT_M and not trial.doubt:
+        trial = replace(trial, doubt="Its landing was not observed: it may have fallen.")
     return disarm(trial, now_s)
 
 
