@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
+from app.simdrone.drone import BOOT_S
 from bench.hazards.cases import (
     ABORT,
     FALSE_ALTITUDES,
@@ -451,7 +452,11 @@ class _Checker:
                 if end_s - begun_s > longest_s:
                     yield f"the state {state} lasted {end_s - begun_s:.1f} s"
         for begun_s, end_s in self.states.spans(State.LAND, State.ABORT_LAND):
-            ended_by = [each.begun_s for each in self.result.injected if each.state is State.LAND]
+            ended_by = [
+                each.begun_s + (BOOT_S if each.kind == "reboot" else 0.0)
+                for each in self.result.injected
+                if each.state is State.LAND
+            ]
             if end_s - max([begun_s, *ended_by]) > 41.5:  # a failure during a landing begins another one
                 yield f"the landing lasted {end_s - begun_s:.1f} s"
         for since_s in (each.begun_s for each in self._kinds(ABORT) if each.state in AIR):
