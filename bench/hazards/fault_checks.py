@@ -235,9 +235,7 @@ class _Checker:
         """Yield the failures that a pilot, another ground station or this computer causes."""
         flown_s = self.within(self.of(TAKEN_OVER), State.RECORD)
         if self.within(self.of(TAKEN_OVER), State.ARM, *AIR) > 0.0:
-            may_be_overridden = self.began_in(
-                TAKEN_OVER, State.ARM
-            )  # no heartbeat showed it before the takeoff command
+            may_be_overridden = self.began_in(TAKEN_OVER, *GROUND, State.ARM)  # by the takeoff command
             is_shown = flown_s > 2.0 * self.heartbeat_s + 1.0 + SLACK_S
             yield Cause("F10a", "invalid", is_certain=is_shown and not may_be_overridden)
         if self.within(self.of(TAKEN_OVER), State.ARM, State.TAKEOFF) > 0.0:
@@ -346,8 +344,9 @@ class _Checker:
         yield any(each.state not in (State.CONNECT, *GROUND) for each in self._kinds("reboot", OTHER_MODE))
         yield any(each.kind in (OTHER_MODE, TAKEN_OVER) for each in self.result.injected)
         yield self.began_in(OTHER_GAIN, State.DISARM, State.RESTORE)
-        touched_s = self.result.touched_down_s  # nobody saw it land, and it may have fallen
-        yield covers(self.silent, (touched_s, touched_s))
+        unseen = [*self.silent, *self.of("frozen-position")]
+        for descent in self.states.spans(State.LAND, State.ABORT_LAND, State.LINK_LOST):  # it may have fallen
+            yield any(overlap(span, descent) > 1.0 for span in unseen)
         yield self.began_in(OTHER_LANDING, State.TAKEOFF)  # on the ground, its autopilot disarms it at once (F10b)
         yield self.result.impact_m_s > IMPACT_M_S
         yield bool(self.of("mocap-drift"))  # motion capture still shows it in the air
@@ -457,7 +456,7 @@ class _Checker:
                 for each in self.result.injected
                 if each.state is State.LAND
             ]
-            if end_s - max([begun_s, *ended_by]) > 41.5:  # a failure during a landing begins another one
+            if end_s - max([begun_s, *ended_by]) > 42.0:  # a failure during a landing begins another one
                 yield f"the landing lasted {end_s - begun_s:.1f} s"
         for since_s in (each.begun_s for each in self._kinds(ABORT) if each.state in AIR):
             left = [end_s for begun_s, end_s in self.states.spans(*AIR) if begun_s <= since_s + SLACK_S]

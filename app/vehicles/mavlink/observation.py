@@ -147,7 +147,8 @@ class TrialObservation:
     lifted: bool = False
     """Whether it has been above the ground."""
     unseen_m: float | None = None
-    """Its altitude before no position of it was received for a while, unless it has been above the ground since."""
+    """Altitude that it may have reached while no position of it was received, unless it has been above the ground
+    since."""
     behind_m: float = 0.0
     """How far its altitude is behind its integrated climb rate, until it is first above the ground."""
     second: SecondaryAltitude | None = None
@@ -518,9 +519,10 @@ def _accept(watch: TrialObservation, position: Position, now_s: float, limits: L
 
 def _unseen_m(watch: TrialObservation, position: Position) -> float | None:
     last = watch.last
-    if last is None or position.time_boot_s - last.time_boot_s <= FRESH_S:
+    if last is None or (unseen_s := position.time_boot_s - last.time_boot_s) <= FRESH_S:
         return watch.unseen_m
-    return last.altitude_m if watch.unseen_m is None else max(watch.unseen_m, last.altitude_m)
+    reached_m = last.altitude_m + max(last.climb_rate_m_s, 0.0) * unseen_s
+    return reached_m if watch.unseen_m is None else max(watch.unseen_m, reached_m)
 
 
 def _unchanged_s(watch: TrialObservation, position: Position) -> float:

@@ -313,8 +313,9 @@ def _take_off(trial: Trial, event: Event) -> Step:
 
 
 def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
-    if _waited_s(trial) <= trial.plan.lift_off_s or not watching.is_fresh(trial.watch, now_s):
-        return None
+    is_late = _waited_s(trial) > trial.plan.lift_off_s
+    if not is_late or not trial.watch.armed or not watching.is_fresh(trial.watch, now_s):
+        return None  # the next heartbeat decides whether somebody else has stopped its motors
     if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
         why = "It reports that it flies, but its altitude stayed on the ground."
         return Finding(failure=Failure.LOST_POSITION, why=why)
