@@ -64,9 +64,10 @@ class DuplicateDetector:
         `boot_s` is its time stamp, if it has one. Return whether it is a copy."""
         while self._frames and now_s - self._frames[oldest := next(iter(self._frames))] > _REMEMBERED_FRAMES_S:
             del self._frames[oldest]
-        if frame in self._frames:
-            return True
+        is_copy = self._frames.pop(frame, None) is not None
         self._frames[frame] = now_s
+        if is_copy:
+            return True
         if is_counted and self._add_number(number, now_s) and boot_s is not None:
             self._add_clock(boot_s - now_s, now_s)
         return False

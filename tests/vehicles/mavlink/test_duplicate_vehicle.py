@@ -129,3 +129,15 @@ def test_the_doubt_is_over_once_one_of_them_is_silent() -> None:
     doubted = [at_s for at_s, doubt in doubts if doubt]
     assert 3.0 < doubted[0] < 5.0
     assert 12.0 < doubted[-1] < 17.0
+
+
+def test_copies_of_a_message_that_never_changes_are_no_second_vehicle() -> None:
+    """Seen: the frame was forgotten 5 s after it was first sent, though it was sent again every second."""
+    detector = DuplicateDetector()
+    for count in range(256 * 8):
+        now_s, number = count / 256.0, count % 256
+        frame = b"constant %d" % number if number % 4 == 0 else b"%d" % count
+        detector.add(frame, number, now_s, None)
+        if count > 512 and number % 4 == 0:
+            detector.add(b"constant %d" % ((number - 128) % 256), (number - 128) % 256, now_s, None)
+        assert detector.reason(now_s) == ""
