@@ -1,6 +1,7 @@
 """Faults that can be injected into a simulated drone: each is one class and one line in `FAULTS`."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -75,7 +76,7 @@ class MissingMessages(Fault):
         return [message for message in messages if message.kind not in self.kinds]
 
 
-class ChangedMessages(Fault):
+class ChangedMessages(Fault, ABC):
     """Base of faults in which messages of some kinds have other values."""
 
     kinds: ClassVar[frozenset[str]]
@@ -88,9 +89,9 @@ class ChangedMessages(Fault):
             for message in messages
         ]
 
+    @abstractmethod
     def change(self, message: OutgoingMessage) -> Fields:
         """Return the fields that differ."""
-        raise NotImplementedError
 
 
 class NoHeartbeat(MissingMessages):
