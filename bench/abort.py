@@ -236,10 +236,12 @@ class Operator:
         self._api = httpx2.Client(base_url=f"{url}/api", timeout=PATIENCE_S, limits=each_its_own)
         self._index, self._asked = index, asked
         self._randomness = random.Random(SEED + index)
-        options = {"address": address, "simulated": True}
+        options = {"address": address, "simulated": True, "clock_speed": DRONE_SPEED}
         self._vehicle = self._post("/vehicles", {"name": f"Drone {index}", "kind": "mavlink", "options": options})["id"]
         self._post(f"/vehicles/{self._vehicle}/connect")
         self._until(f"/vehicles/{self._vehicle}", lambda vehicle: vehicle["state"] == "ready")
+        self._post(f"/vehicles/{self._vehicle}/check")  # sets the ground reference, which takes 10 s of the drone's
+        self._until(f"/vehicles/{self._vehicle}", lambda vehicle: bool(vehicle["checks"]))
         chosen = {"kind": "mavlink", "id": self._vehicle}
         self._campaign = self._post("/campaigns", {"name": "Aborts", "vehicle": chosen, "definition": ABORTED})["id"]
         self._until(f"/campaigns/{self._campaign}", lambda campaign: campaign["state"] == "ready")
