@@ -299,6 +299,13 @@ def is_airborne(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     return watch.last is not None and is_fresh(watch, now_s) and watch.last.altitude_m - ground_m > GROUND_M
 
 
+def may_have_stayed(watch: TrialObservation, ground_m: float, since_s: float) -> bool:
+    """Whether its landed state has always been that it stands since then, and its altitude has not been higher than one
+    may shift as the motors start."""
+    stood = watch.landed is True and watch.landed_since_s <= since_s
+    return stood and watch.highest_m - ground_m <= DRIFT_M
+
+
 def is_said_to_fly(watch: TrialObservation, now_s: float, ground_m: float) -> bool:
     """Whether its own landed state or the second source shows it in the air, independent of its altitude."""
     secondary_m = secondary_altitude_m(watch.second, now_s)

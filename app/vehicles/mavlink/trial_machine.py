@@ -70,6 +70,8 @@ LANDING_S: Final = 40.0
 DISARMED_WITHIN_S: Final = 5.0
 LINK_LOST_S: Final = 60.0
 _MODE_KNOWN_S: Final = 1.0
+_STUCK_S: Final = 0.2
+"""An altitude that has not changed at all for so long may stand still, which is certain soon."""
 _WAITED_S: Final = 0.05
 """Longest usual time from a sample to the next."""
 _REPLY_S: Final = 0.5
@@ -201,7 +203,7 @@ def _with_disarming(trial: Trial) -> Trial:
     """Note that somebody else, or the vehicle itself, stopped its motors in the air: it exceeded its limits because it
     fell."""
     watch, limits = trial.watch, trial.plan.limits
-    if trial.stopped or trial.state not in _FLOWN or not watching.is_disarmed(watch, limits):
+    if trial.stopped or trial.state not in {*_FLOWN, State.DISARM} or not watching.is_disarmed(watch, limits):
         return trial
     fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= _STOPPED_WITHIN_S
     if not fell and trial.disarmed_m <= watching.DRIFT_M:
@@ -313,9 +315,10 @@ def _take_off(trial: Trial, event: Event) -> Step:
 
 
 def _no_lift_off(trial: Trial, now_s: float) -> Finding | None:
-    is_late = _waited_s(trial) > trial.plan.lift_off_s
-    if not is_late or not trial.watch.armed or not watching.is_fresh(trial.watch, now_s):
-        return None  # the next heartbeat decides whether somebody else has stopped its motors
+    watch, is_late = trial.watch, _waited_s(trial) > trial.plan.lift_off_s
+    decides_soon = not watch.armed or watch.unchanged_s > _STUCK_S
+    if not is_late or decides_soon or not watching.is_fresh(watch, now_s):
+        return None
     if watching.is_said_to_fly(trial.watch, now_s, trial.plan.ground_m):
         why = "It reports that it flies, but its altitude stayed on the ground."
         return Finding(failure=Failure.LOST_POSITION, why=why)
@@ -335,7 +338,10 @@ def _record(trial: Trial, event: Event) -> Step:
         return fail(trial, finding, now_s)
     trial = _resting(trial, now_s)
     if _has_rested(trial, DOWN_S, now_s) and _is_armed_since(trial, trial.resting_since_s):
-        return fail(trial, Finding(failure=Failure.ENVELOPE, why="It descended to the ground by itself."), now_s)
+        stayed = watching.may_have_stayed(trial.watch, trial.plan.ground_m, trial.commanded_s or now_s)
+        descended = Finding(failure=Failure.ENVELOPE, why="It descended to the ground by itself.")
+        if finding := _no_lift_off(trial, now_s) if stayed else descended:
+            return fail(trial, finding, now_s)
     if (changed := _change_set_point(trial, event)) is not None:
         return changed
     if not _is_whole(trial) or _may_be_by_hand(trial, now_s):

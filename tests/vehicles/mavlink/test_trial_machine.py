@@ -513,6 +513,42 @@ def test_a_vehicle_that_does_not_lift_off_is_disarmed_after_1_5_s() -> None:
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "aborted")
 
 
+def test_an_altitude_that_shifts_as_the_motors_start_is_no_lift_off_if_the_vehicle_says_that_it_stands() -> None:
+    """Seen with a shift of 0.2 m for 1.5 s: it “descended to the ground by itself”, which blamed its gains."""
+    walk = TrialDriver(plan=replace(PLAN, lift_off_s=6.0)).arm()
+    walk.altitude_m += 0.2
+    walk.pass_s(1.5)
+    walk.altitude_m -= 0.2
+    walk.pass_s(1.5)
+    assert (walk.trial.failure, walk.gains_sent) == (None, [])
+    walk.climb_rate_m_s = 1.0
+    walk.pass_s(1.2)
+    assert (walk.state, walk.trial.failure) == (State.RECORD, None)
+
+
+@pytest.mark.parametrize(("rises_m", "landed", "failure"), [(0.2, True, "F4a"), (0.6, False, "F6"), (1.2, True, "F6")])
+def test_a_vehicle_that_shows_the_ground_again_has_descended_if_it_flew_and_has_not_lifted_off_otherwise(
+    rises_m: float, landed: bool, failure: str
+) -> None:
+    walk = TrialDriver(plan=replace(PLAN, lift_off_s=4.0)).arm()
+    walk.landed = landed
+    for rate_m_s in (0.5, -0.5):
+        walk.climb_rate_m_s = rate_m_s
+        walk.pass_s(rises_m / 0.5)
+    walk.climb_rate_m_s, walk.landed = 0.0, True
+    walk.pass_s(4.0)
+    assert walk.trial.failure == failure
+
+
+def test_an_altitude_that_stands_still_is_no_missing_lift_off() -> None:
+    """Seen: stuck 0.6 s after the command, which left 0.9 s until the lift-off was late, and blamed the gains."""
+    walk = taking_off().pass_s(0.1)
+    for _ in range(60):
+        walk.steps += 1  # the same estimate each time
+        walk.pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
+
+
 def test_a_lift_off_that_cannot_be_seen_is_a_lost_link_not_a_missing_lift_off() -> None:
     walk = TrialDriver().arm().pass_s(0.6)
     walk.mute = True
