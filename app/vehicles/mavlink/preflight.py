@@ -33,6 +33,8 @@ from app.vehicles.mavlink.radio import AutopilotLink
 HEARTBEAT_S: Final = 5.0
 WATCHED_S: Final = 2.0
 POSITIONS_HZ: Final = 40.0
+LOST_SHARE: Final = 0.2
+"""Greatest share of the vehicle's positions that may be lost, whatever their rate."""
 SECONDARY_HZ: Final = 10.0
 ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight was interrupted."
 _LISTEN_S: Final = 0.1
@@ -42,6 +44,8 @@ _REFERENCE_WITHIN_S: Final = 13.0
 _RATE_OVER_S: Final = 10.0
 _BATTERY_S: Final = 10.0
 _GOES_ON_S: Final = 1.0
+_IRREGULAR: Final = 0.25
+"""Some autopilots send at intervals that differ by half: a position is lost from 1.75 intervals on."""
 _DISARMED: Final = "disarmed"
 _VERSION_ATTEMPTS: Final = 2
 _UID_ATTEMPTS: Final = 10
@@ -258,16 +262,18 @@ def prepare_set_points(radio: AutopilotLink) -> None:
     _set_up(radio, radio.profile.prepare_set_points(radio.target))
 
 
-def make_armable(radio: AutopilotLink) -> None:
-    """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm."""
+def make_armable(radio: AutopilotLink) -> bool:
+    """Switch a vehicle that is certainly disarmed out of a mode in which it does not arm; return whether it was."""
     heartbeat = radio.seen.heartbeat
     profile, may_arm = radio.profile, radio.seen.may_arm
     steps = () if heartbeat is None else profile.make_armable(radio.target, heartbeat.mode, may_arm=may_arm)
     until_s = radio.clock.now_s() + HEARTBEAT_S * radio.timeout_factor
     while steps and not radio.is_disarmed and not reports_armed(radio) and radio.clock.now_s() < until_s:
         radio.listen(_LISTEN_S)
-    if steps and radio.is_disarmed:
-        _set_up(radio, steps)
+    if not (steps and radio.is_disarmed):
+        return False
+    _set_up(radio, steps)
+    return True
 
 
 def set_ground_reference(radio: AutopilotLink, watched: GroundObservation) -> bool:
@@ -327,7 +333,7 @@ def evaluate_items(
         _heartbeat(radio),
         _single_vehicle_item(radio),
         _disarmed(radio),
-        *_motion(watched, _position_hz(radio)),
+        *_motion(watched, _reception(radio)),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
     if radio.profile.flying_blocks:
@@ -563,17 +569,17 @@ def _disarmed(radio: AutopilotLink) -> CheckItem:
     )
 
 
-def _motion(watched: GroundObservation, rate_hz: float) -> tuple[CheckItem, ...]:
-    positions = watched.positions
+def _motion(watched: GroundObservation, reception: tuple[float, float]) -> tuple[CheckItem, ...]:
+    positions, (rate_hz, lost_share) = watched.positions, reception
     passed_s = positions[-1].time_boot_s - positions[0].time_boot_s if positions else 0.0
     moved_m = _moved_m(positions)
     return (
         CheckItem(
             name="position",
             title="Position",
-            passed=rate_hz >= POSITIONS_HZ,
-            found=f"{rate_hz:.1f} per second",
-            needed=f"{POSITIONS_HZ:g} per second or more",
+            passed=rate_hz >= POSITIONS_HZ and lost_share <= LOST_SHARE,
+            found=f"{rate_hz:.1f} per second, {100.0 * lost_share:.0f} % lost",
+            needed=f"{POSITIONS_HZ:g} per second or more, {100.0 * LOST_SHARE:.0f} % lost or less",
             hint="Configure its telemetry for tuning (docs/real-flight.md), or improve a weak link and wait for 10 s."
             if positions
             else _NO_POSITION,
@@ -597,9 +603,10 @@ def _motion(watched: GroundObservation, rate_hz: float) -> tuple[CheckItem, ...]
     )
 
 
-def _position_hz(radio: AutopilotLink) -> float:
-    """Return the positions received per second, without repeated ones, in the last 10 s or since there was none for a
-    second: in a single second a link that loses three of ten may seem to lose two."""
+def _reception(radio: AutopilotLink) -> tuple[float, float]:
+    """Return the positions received per second, without repeated ones, and the share that is lost, by the gaps between
+    the others: in the last 10 s, or since there was none for a second. In a single second a link that loses three of
+    ten may seem to lose two; those that arrive at once after a stall count by the vehicle's own time."""
     last_s = first_s = radio.clock.now_s()
     stamps_s: set[float] = set()
     for at_s, position in reversed(radio.seen.positions):
@@ -608,7 +615,12 @@ def _position_hz(radio: AutopilotLink) -> float:
             break
         first_s = at_s
         stamps_s.add(position.time_boot_s)
-    return (len(stamps_s) - 1) / (last_s - first_s) if last_s > first_s else 0.0
+    intervals_s = [late_s - early_s for early_s, late_s in pairwise(sorted(stamps_s)) if late_s - early_s < _GOES_ON_S]
+    if not intervals_s:
+        return 0.0, 0.0
+    usual_s, passed_s = statistics.median(intervals_s), max(last_s - first_s, sum(intervals_s))
+    lost = sum(max(int(each_s / usual_s + _IRREGULAR) - 1, 0) for each_s in intervals_s)
+    return len(intervals_s) / passed_s, lost / (lost + len(intervals_s))
 
 
 def _moved_m(positions: Sequence[Position]) -> float:

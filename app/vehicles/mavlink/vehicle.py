@@ -587,7 +587,9 @@ class MavlinkVehicle:
             preflight.make_armable(self._radio)
         watched = self._observe_standing(watched_s)
         for _ in range(_FURTHER_OBSERVATIONS):
-            if self._state in QUARANTINE_STATES or not preflight.set_ground_reference(self._radio, watched):
+            if self._state in QUARANTINE_STATES or not (
+                preflight.make_armable(self._radio) or preflight.set_ground_reference(self._radio, watched)
+            ):
                 break
             watched = self._observe_standing(watched_s)
         if self._state not in QUARANTINE_STATES:

@@ -327,10 +327,15 @@ class LossyRig(LockstepRig):
 
 
 @pytest.mark.parametrize(("lost_share", "passes"), [(0.3, False), (0.15, True)])
-@pytest.mark.parametrize("autopilot", SAFE)
-def test_a_link_that_loses_three_positions_in_ten_is_refused(autopilot: str, lost_share: float, passes: bool) -> None:
-    """51 a second are sent. By those of a single second, in which 40 may arrive, one flight in ten was let off."""
-    with LossyRig(autopilot) as rig, connected(rig) as vehicle:
+@pytest.mark.parametrize(
+    ("autopilot", "telemetry_hz", "sent_hz"),
+    [("paparazzi", 50.0, 51.2), ("ardupilot", 50.0, 51.2), ("px4", 50.0, 51.2), ("px4", 100.0, 128.0)],
+)
+def test_a_link_that_loses_three_positions_in_ten_is_refused(
+    autopilot: str, telemetry_hz: float, sent_hz: float, lost_share: float, passes: bool
+) -> None:
+    """By those of a single second, in which 40 may arrive, one flight in ten was let off; at 100 a second, all."""
+    with LossyRig(autopilot) as rig, connected(rig, telemetry_hz=telemetry_hz) as vehicle:
         vehicle.attend(4.0)
         rig.lost_share = lost_share
         vehicle.attend(11.0)
@@ -338,7 +343,32 @@ def test_a_link_that_loses_three_positions_in_ten_is_refused(autopilot: str, los
             _, items = vehicle._check(STANDSTILL_S)
             [item] = [item for item in items if item.name == "position"]
             assert item.passed is passes
-            assert float(item.found.split()[0]) == pytest.approx(51.2 * (1.0 - lost_share), abs=3.0)
+            rate_hz, lost_percent = (float(part.split()[0]) for part in item.found.split(", "))
+            assert rate_hz == pytest.approx(sent_hz * (1.0 - lost_share), rel=0.1)
+            assert lost_percent == pytest.approx(100.0 * lost_share, abs=6.0)
+
+
+class LateOffboardRig(LockstepRig):
+    """A person switches the vehicle to OFFBOARD in the middle of a check."""
+
+    switches_s = math.inf
+
+    def tick(self) -> None:
+        super().tick()
+        if self.drone.time_s >= self.switches_s:
+            copter_of(self.drone).mode = copter_of(self.drone).find_mode("OFFBOARD")
+            self.switches_s = math.inf
+
+
+def test_a_px4_that_enters_offboard_in_the_middle_of_a_check_is_brought_out_of_it() -> None:
+    rig = LateOffboardRig("px4")
+    rig.switch_on_failsafes()
+    with rig, connected(rig) as vehicle:
+        vehicle.attend(3.0)
+        rig.switches_s = rig.now_s() + 1.0
+        assert [item.name for item in vehicle.check() if not item.passed] == []
+        assert rig.switches_s == math.inf
+        assert vehicle.condition().mode == "Hold"
 
 
 def test_a_persons_land_always_goes_and_is_not_repeated_to_a_vehicle_whose_motors_stand() -> None:
