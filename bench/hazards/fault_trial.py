@@ -54,6 +54,7 @@ def run_trial(case: Case) -> TrialResult:
     """Run the trial of a case. An exception in the simulated drone propagates."""
     rig = Rig(case)
     rig.wait_s(case.powered_s)
+    rig.close()  # what was sent before the connection does not arrive
     rig.states.begin(rig.now_s())
     return _connect_and_fly(rig)
 

@@ -22,6 +22,7 @@ CEILING_M: Final = 5.5
 RECORD_WITHIN_M: Final = 0.35
 HOVERS_M: Final = 2.0
 """Height that a vehicle with a valid record must keep in the middle of the record."""
+SET_POINT_M: Final = 3.0
 SINKS_M_S: Final = -0.2
 LAND_WITHIN_S: Final = 8.0
 """Longest time without Land for a vehicle that does not descend; Land is repeated every six seconds under Paparazzi."""
@@ -233,6 +234,8 @@ def _record(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
     hovering = (record.time_s > 10.0) & (record.time_s < RECORDED_S)
     if true_m[hovering].min() < HOVERS_M:
         yield f"a valid record, but the vehicle was at {true_m[hovering].min():.2f} m"
+    if abs((stood_m := float(np.median(true_m[hovering]))) - SET_POINT_M) > RECORD_WITHIN_M:
+        yield f"a valid record, but the vehicle hovered at {stood_m:.2f} m: its altitude has another zero"
     apart_m = np.abs(record["altitude_m"] - true_m - (record["altitude_m"][0] - true_m[0]))
     if apart_m[hovering].max() > RECORD_WITHIN_M:
         yield f"a valid record differs by {apart_m[hovering].max():.2f} m from the true height"

@@ -71,6 +71,7 @@ class Disturbed(Protocol):
     def copy_from_other_port(self) -> None: ...
     def move_to_other_port(self) -> None: ...
     def enter_offboard(self) -> None: ...
+    def end_geo_init_early(self) -> None: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,8 +114,8 @@ _COMMANDS_DELAYED: Final = _may("F10b", "F10c", "F4a", NOT_SEEN, aborts=ALL)
 _REFUSED: Final = Expected(refuses=True)
 _UNSEEN: Final = Expected(codes=frozenset({"F9a", "F9c"}), refuses=True, ends_in=AIR)
 _PILOT: Final = _may("F10a", "F10b", "F10c", "F4a", ends_in=AIR, aborts=ALL)
-_DRIFTING: Final = _may("F9a", "F9d", "F4a", "F6", "F10b", "F10c", NOT_SEEN, ends_in=AIR, aborts=PAPARAZZI)
-_STUCK: Final = _may("F9a", "F9d", "F10c", "F4a", NOT_SEEN, ends_in=(State.TAKEOFF,), aborts=PAPARAZZI)
+_DRIFTING: Final = _may("F9a", "F9d", "F6", "F10b", NOT_SEEN, ends_in=AIR, aborts=PAPARAZZI)
+_STUCK: Final = _may("F9a", "F9d", NOT_SEEN, ends_in=(State.TAKEOFF,))
 _AHEAD: Final = _may("F9a", "F9d")
 _BEHIND: Final = _may("F9a", "F9d", "F10b")
 
@@ -172,7 +173,7 @@ _SENDERS: Final[Mapping[str, Hazard]] = {
     ),
     "moves to another port": Hazard(
         act=lambda rig: rig.move_to_other_port(),
-        expected=Expected(codes=frozenset({"F5"}), refuses=True),
+        expected=_REFUSED,
         has_one_length=True,
     ),
 }
@@ -264,7 +265,7 @@ _VEHICLE: Final[Mapping[str, Hazard]] = {
     ),
     "stuck altitude": Hazard(faults=("stuck-altitude",), expected=_STUCK),
     "stuck altitude unwitnessed": Hazard(
-        faults=("stuck-altitude", "silent-witness"), expected=replace(_STUCK, codes=_STUCK.codes | {"F10b"}, aborts=ALL)
+        faults=("stuck-altitude", "silent-witness"), expected=replace(_STUCK, codes=_STUCK.codes | {"F10b"})
     ),
     "lean oscillation": Hazard(
         faults=("lean-oscillation",),
@@ -275,6 +276,13 @@ _VEHICLE: Final[Mapping[str, Hazard]] = {
         has_one_length=True,
         states=(*PREPARING, State.ARM),
         expected=Expected(codes=frozenset({"F9d"}), refuses=True),
+    ),
+    "geo init ended early": Hazard(
+        act=lambda rig: rig.end_geo_init_early(),
+        expected=_REFUSED,
+        has_one_length=True,
+        states=PREPARING,
+        autopilots=PAPARAZZI,
     ),
     "left in OFFBOARD": Hazard(
         act=lambda rig: rig.enter_offboard(),

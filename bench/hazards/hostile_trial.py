@@ -9,6 +9,7 @@ from itertools import product
 from typing import Final
 
 from app.simdrone.copter import Copter
+from app.simdrone.drone import BOOT_S
 from app.vehicles.base import FlightOptions, FlightRecord, Identity, SafeGainsError, Sample, VehicleError
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
@@ -33,6 +34,8 @@ KILLED_FOR_S: Final = 3.0
 """Time from the death of the process until another one has connected."""
 OTHER_PORT: Final[Peer] = ("lockstep", 1)
 _STATE_TICKS: Final = 4
+_HOLDING_POINT: Final = 2
+_GEO_INIT_LASTED_S: Final = 1.0
 _AIR: Final = (State.TAKEOFF, State.RECORD, State.LAND)
 
 
@@ -92,6 +95,7 @@ class HostileRig(Rig):
         self._delay_s, self._delayed_until_s = 0.0, 0.0
         self._under_way: list[tuple[float, bytes]] = []
         self._copies_next_position = False
+        self._ends_geo_init_s = FOR_GOOD_S
         self.identity: Identity | None = None
         self.is_flying = False
         """What the program has stored: which vehicle it connected, and that it flies."""
@@ -152,6 +156,9 @@ class HostileRig(Rig):
             self.is_over.set()
             threading.Event().wait()
         self._deliver()
+        if self.drone.time_s >= self._ends_geo_init_s:
+            self._ends_geo_init_s = FOR_GOOD_S
+            self._interfere(("SCRIPT_ITEM", {"target_component": 0, "seq": _HOLDING_POINT, "name": ""}))
         self._ticks += 1
         if self._ticks % _STATE_TICKS == 0:
             now_s, body = self.drone.time_s, self.drone.body
@@ -204,6 +211,11 @@ class HostileRig(Rig):
     def move_to_other_port(self) -> None:
         self.peer = OTHER_PORT
 
+    def end_geo_init_early(self) -> None:
+        """Restart the vehicle; another station enters the next block before "Geo init" has set the reference."""
+        self.drone.reboot()
+        self._ends_geo_init_s = self.drone.time_s + BOOT_S + _GEO_INIT_LASTED_S
+
     def enter_offboard(self) -> None:
         autopilot = self.drone.autopilot
         if isinstance(autopilot, Copter):
@@ -214,6 +226,7 @@ def run_trial(case: Case) -> HostileResult:
     """Run the trial of a case. An exception in the simulated drone propagates."""
     rig = HostileRig(case)
     rig.wait_s(case.powered_s)
+    rig.close()  # what was sent before the connection does not arrive
     rig.states.begin(rig.now_s())
     if case.faults[0].kind != PROCESS_KILLED:
         return _run(rig)
@@ -274,6 +287,7 @@ def _go_on_after_death(rig: HostileRig) -> HostileResult:
     """Reconnect as another process does, attend to the vehicle, and return what it reports."""
     rig.states.ended_s = rig.drone.time_s
     rig.wait_s(KILLED_FOR_S)
+    rig.close()
     try:
         vehicle = _connect(rig)
     except VehicleError as error:

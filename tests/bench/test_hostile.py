@@ -84,6 +84,12 @@ def test_a_hazard_has_its_required_outcome(
     assert (ended.outcome, ended.failure, ended.vehicle) == (outcome, failure, vehicle)
 
 
+def test_a_flight_plan_that_another_station_hurries_sets_its_ground_reference_before_the_flight() -> None:
+    """Seen: valid flights of 0.272 and 0.283 m in place of 0.325 m."""
+    ended = run_trial(case("paparazzi", "geo init ended early", State.CONNECT, delay_s=0.1))
+    assert (ended.outcome, ended.wrong) == ("completed", ())
+
+
 DROPPED = [
     ("paparazzi", "later and later, to 2 s", State.ARM, 1.2),
     ("px4", "replaced after 1.3 s", State.RECORD, 6.0),
@@ -295,5 +301,10 @@ def test_a_valid_record_is_complete_and_agrees_with_the_true_height() -> None:
     )
     short = Trajectory(WHOLE.time_s[:50], {"altitude_m": np.full(50, 3.0)}, "mavlink", "vehicle")
     assert find_violations(happened(), replace(SAFE_AND_SOUND, record=short)) == ("a valid record ends after 24.5 s",)
+    low = tuple(replace(each, height_m=min(each.height_m, 2.1)) for each in DOWN)
+    shifted = Trajectory(WHOLE.time_s, {"altitude_m": np.full(67, 2.1)}, "mavlink", "vehicle")
+    assert find_violations(happened(low), replace(SAFE_AND_SOUND, record=shifted)) == (
+        "a valid record, but the vehicle hovered at 2.10 m: its altitude has another zero",
+    )
     sunk = tuple(replace(each, height_m=1.0) if 30.0 < each.time_s < 31.0 else each for each in DOWN)
     assert "a valid record, but the vehicle was at 1.00 m" in find_violations(happened(sunk), SAFE_AND_SOUND)
