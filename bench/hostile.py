@@ -120,7 +120,8 @@ delivers something false:
 
 In the others the link is honest, and something happens to the vehicle: a pilot takes over, permanently or for some
 seconds; it receives nothing (`deaf`); wind carries it away; another ground station stops its motors; it flies home by
-itself; its altitude drifts or is stuck, with and without a report of its landing; its attitude oscillates; it restarts.
+itself; its altitude drifts or is stuck, with and without a report of its landing; its attitude oscillates; it restarts,
+also with a flight plan that another ground station hurries past its ground reference (`geo init ended early`).
 Or Gainline's own process is killed (`process killed`, the flight is lost), and another one connects 3 s later.
 
 Each hazard begins once in each state of a trial in which it applies and stays, and once in each state in the air for a
@@ -143,7 +144,8 @@ The checks use the packets at the vehicle's antenna, its true height, and the ha
 - a failure that is not the hazard's (the numbers of [real-flight.md](real-flight.md#failures-and-reactions); *failures*
   in the table); an abort counted against the gains for something else; an unnecessary refusal or quarantine
   (`bench/hazards/hostile_table.py` lists the permitted consequences of each hazard);
-- a valid record that is incomplete, or differs from the true height by more than 0.35 m.
+- a valid record that is incomplete, or differs from the true height by more than 0.35 m; one of a vehicle that hovered
+  more than 0.35 m from 3 m above the true ground.
 
 {right} of {runs} runs ({autopilots}) passed.{wrong}
 
