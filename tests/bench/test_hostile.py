@@ -64,6 +64,7 @@ SEEN_ALIKE = [
     ("px4", "companion as autopilot", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "disarmed once", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "carried away", State.RECORD, "aborted", "F6", "safe"),
+    ("ardupilot", "clock wraps after 19 s", State.CONNECT, "completed", "", "safe"),
     ("px4", "an hour ahead", State.RECORD, "completed", "", "safe"),
     ("ardupilot", "deaf", State.RECORD, "invalid", "F11", "quarantined"),
     ("px4", "mocap nan", State.RECORD, "invalid", "F9a", "safe"),

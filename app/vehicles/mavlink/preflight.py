@@ -23,6 +23,7 @@ from app.vehicles.base import (
 )
 from app.vehicles.mavlink.altitude_sources import AlignedAltitudeSource
 from app.vehicles.mavlink.arming_checks import HEALTH_SUMMARY
+from app.vehicles.mavlink.boot_clock import unwrapped
 from app.vehicles.mavlink.events import DISARMING, CommandReply, Heartbeat, Position, VehicleEvent, Version
 from app.vehicles.mavlink.failures import RESPONSES, Failure
 from app.vehicles.mavlink.parameters import read_parameter
@@ -38,6 +39,8 @@ LOST_SHARE: Final = 0.2
 SECONDARY_HZ: Final = 10.0
 ARMED: Final = "The vehicle is armed: either somebody else armed it, or a flight was interrupted."
 _LISTEN_S: Final = 0.1
+_AUTOPILOT: Final = 1
+"""Usual component of an autopilot (MAV_COMP_ID_AUTOPILOT1): another one may pose as it."""
 _STANDS_WITHIN_M: Final = 0.3
 _REFERENCE_WITHIN_S: Final = 13.0
 """Time from a position on within which a flight plan sets its ground reference; 10 s in the stock plans."""
@@ -117,11 +120,19 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
     (longer if the vehicle's clock is fast), or if it is of another vehicle than the `pinned` one."""
     within_s = HEARTBEAT_S * radio.timeout_factor
     until_s = radio.clock.now_s() + within_s
+    other: Heartbeat | None = None
     while radio.clock.now_s() < until_s:
-        radio.listen(_LISTEN_S)
-        heartbeat = radio.seen.heartbeat
-        if heartbeat is not None and heartbeat.autopilot == radio.profile.autopilot:
-            return _set_target(radio, heartbeat, pinned)
+        heard = [each.measurement for each in radio.listen(_LISTEN_S) if isinstance(each.measurement, Heartbeat)]
+        for heartbeat in heard:
+            if heartbeat.autopilot != radio.profile.autopilot:
+                continue
+            if heartbeat.component == _AUTOPILOT:
+                return _set_target(radio, heartbeat, pinned)
+            if other is None:
+                until_s = radio.clock.now_s() + radio.silence_s
+                other = heartbeat
+    if other is not None:
+        return _set_target(radio, other, pinned)
     if makes := radio.link.other_makes:
         raise VehicleError(
             f"{_named(makes)} {'answers' if len(makes) == 1 else 'answer'} at {address}, not {radio.profile.title}; "
@@ -333,7 +344,7 @@ def evaluate_items(
         _heartbeat(radio),
         _single_vehicle_item(radio),
         _disarmed(radio),
-        *_motion(watched, _reception(radio)),
+        *_motion(watched, find_reception(radio.seen.positions, radio.clock.now_s())),
         _battery(radio.seen.battery_v, min_battery_v),
     ]
     if radio.profile.flying_blocks:
@@ -571,7 +582,7 @@ def _disarmed(radio: AutopilotLink) -> CheckItem:
 
 def _motion(watched: GroundObservation, reception: tuple[float, float]) -> tuple[CheckItem, ...]:
     positions, (rate_hz, lost_share) = watched.positions, reception
-    passed_s = positions[-1].time_boot_s - positions[0].time_boot_s if positions else 0.0
+    passed_s = unwrapped(positions[-1], positions[0]).time_boot_s - positions[0].time_boot_s if positions else 0.0
     moved_m = _moved_m(positions)
     return (
         CheckItem(
@@ -603,24 +614,29 @@ def _motion(watched: GroundObservation, reception: tuple[float, float]) -> tuple
     )
 
 
-def _reception(radio: AutopilotLink) -> tuple[float, float]:
-    """Return the positions received per second, without repeated ones, and the share that is lost, by the gaps between
-    the others: in the last 10 s, or since there was none for a second. In a single second a link that loses three of
-    ten may seem to lose two; those that arrive at once after a stall count by the vehicle's own time."""
-    last_s = first_s = radio.clock.now_s()
-    stamps_s: set[float] = set()
-    for at_s, position in reversed(radio.seen.positions):
-        last_s = last_s if stamps_s else at_s
+def find_reception(positions: Sequence[tuple[float, Position]], now_s: float) -> tuple[float, float]:
+    """Return how many positions arrived per second, without repeated ones, and the share that is lost, by the gaps
+    between the others: in the last 10 s, or since there was none for a second. `positions` are given with the time of
+    their receipt. In a single second a link that loses three of ten may seem to lose two. A gap must be one by both
+    clocks, because a stamp may be false, and packets may arrive at once after a stall."""
+    last_s = first_s = now_s
+    heard: list[tuple[float, float]] = []
+    for at_s, position in reversed(positions):
+        last_s = last_s if heard else at_s
         if last_s - at_s > _RATE_OVER_S or first_s - at_s > _GOES_ON_S:
             break
         first_s = at_s
-        stamps_s.add(position.time_boot_s)
-    intervals_s = [late_s - early_s for early_s, late_s in pairwise(sorted(stamps_s)) if late_s - early_s < _GOES_ON_S]
-    if not intervals_s:
+        heard.append((position.time_boot_s, at_s))
+    new: dict[float, float] = {}
+    for stamp_s, at_s in reversed(heard):
+        new.setdefault(stamp_s, at_s)
+    pairs = ((later[0] - earlier[0], later[1] - earlier[1]) for earlier, later in pairwise(new.items()))
+    gaps = [pair for pair in pairs if 0.0 < pair[0] < _GOES_ON_S]
+    if not gaps:
         return 0.0, 0.0
-    usual_s, passed_s = statistics.median(intervals_s), max(last_s - first_s, sum(intervals_s))
-    lost = sum(max(int(each_s / usual_s + _IRREGULAR) - 1, 0) for each_s in intervals_s)
-    return len(intervals_s) / passed_s, lost / (lost + len(intervals_s))
+    usual_s, further = statistics.median(own_s for own_s, _ in gaps), len(new) - 1
+    lost = sum(max(int(min(gap) / usual_s + _IRREGULAR) - 1, 0) for gap in gaps)
+    return further / max(last_s - first_s, further * usual_s), lost / (lost + further)
 
 
 def _moved_m(positions: Sequence[Position]) -> float:

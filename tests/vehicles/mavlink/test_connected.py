@@ -11,7 +11,7 @@ import pytest
 from pymavlink import mavutil
 
 from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, StopRequest, VehicleError
-from app.vehicles.mavlink.dialects import number, text
+from app.vehicles.mavlink.dialects import FieldValue, number, text
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
@@ -54,6 +54,27 @@ def enter_block(rig: LockstepRig, *blocks: int) -> None:
             link.send("MISSION_ACK", target_system=31, target_component=0, type=0)
             link.send("SCRIPT_ITEM", target_system=31, target_component=0, seq=block, name="")
             rig.wait_s(0.3)
+
+
+class PosingRig(LockstepRig):
+    """A companion computer with the vehicle's system id poses as its autopilot, and is heard first."""
+
+    def __init__(self, autopilot: str) -> None:
+        super().__init__(autopilot)
+        self.companion = PROFILES[autopilot].dialect.codec(system=1, component=191)
+
+    def arriving(self, frames: list[bytes]) -> list[bytes]:
+        fields: dict[str, FieldValue] = {"type": 2, "autopilot": PROFILES[self.autopilot].autopilot}
+        rest = dict.fromkeys(("base_mode", "custom_mode", "system_status", "mavlink_version"), 0)
+        beat = self.companion.pack(PROFILES[self.autopilot].dialect.message("HEARTBEAT", fields | rest))
+        return [beat, *frames] if frames else []
+
+
+def test_the_autopilot_is_connected_though_a_companion_poses_as_it_and_is_heard_first() -> None:
+    """Seen: a vehicle that “did not reply”, because the companion was asked."""
+    with PosingRig("ardupilot") as rig, connected(rig) as vehicle:
+        assert vehicle._radio.target.component == 1
+        assert vehicle.concern == ""
 
 
 def blocks_told(rig: LockstepRig) -> list[int]:

@@ -7,7 +7,7 @@ import pytest
 from app.core.models.set_points import SetPoints
 from app.vehicles.base import VehicleError
 from app.vehicles.mavlink.events import Position
-from app.vehicles.mavlink.preflight import GroundObservation, evaluate_hover, evaluate_set_points
+from app.vehicles.mavlink.preflight import GroundObservation, evaluate_hover, evaluate_set_points, find_reception
 from app.vehicles.mavlink.profiles import PROFILES
 
 HEARD = tuple(Position(60.0 + 0.02 * count, 0.1, 0.0) for count in range(100))
@@ -61,3 +61,44 @@ def test_copies_that_arrive_late_are_not_the_last_position_on_the_ground() -> No
     mixed = tuple(position for pair in zip(own, copies, strict=True) for position in pair)
     stray = (*mixed, Position(4000.0, 0.1, 0.0))
     assert GroundObservation(stray, 2.0).ground.last == own[-1]
+
+
+STEADY = [(160.0 + 0.02 * count, HEARD[count]) for count in range(100)]
+
+
+@pytest.mark.parametrize("off_s", [-3.0, -0.5, -0.3, 0.3, 2.0])
+@pytest.mark.parametrize("place", [0, 50, 99])
+def test_one_false_stamp_is_no_lost_position(off_s: float, place: int) -> None:
+    at_s, position = STEADY[place]
+    false = (at_s, replace(position, time_boot_s=position.time_boot_s + off_s))
+    rate_hz, lost_share = find_reception([*STEADY[:place], false, *STEADY[place + 1 :]], 162.0)
+    assert rate_hz == pytest.approx(50.0, rel=0.03)
+    assert lost_share == pytest.approx(0.0, abs=0.015)
+
+
+def test_positions_that_arrive_at_once_after_a_stall_are_no_more_per_second() -> None:
+    rate_hz, lost_share = find_reception([(161.9, position) for _, position in STEADY], 162.0)
+    assert rate_hz == pytest.approx(50.0)
+    assert lost_share == 0.0
+
+
+def test_positions_at_intervals_that_differ_by_half_are_not_lost() -> None:
+    """px4_refused_in_offboard.tlog: 16, 20 and 24 ms."""
+    stamps_s = [0.02 * count + 0.004 * (count % 2) for count in range(100)]
+    heard = [(160.0 + stamp_s, Position(60.0 + stamp_s, 0.1, 0.0)) for stamp_s in stamps_s]
+    assert find_reception(heard, 162.0)[1] == 0.0
+
+
+def test_every_third_position_lost_is_a_third_at_any_rate_and_repeated_ones_do_not_hide_it() -> None:
+    received = [each for count, each in enumerate(STEADY) if count % 3]
+    twice = ((at_s + late_s, position) for at_s, position in received for late_s in (0.0, 0.1))
+    copies = [each for each in sorted(twice, key=lambda each: each[0]) if each[0] < 162.0]
+    fast = [(at_s / 4.0, replace(position, time_boot_s=position.time_boot_s / 4.0)) for at_s, position in received]
+    for heard, until_s, expected_hz in ((received, 162.0, 33.3), (copies, 162.0, 33.3), (fast, 40.5, 133.3)):
+        rate_hz, lost_share = find_reception(heard, until_s)
+        assert rate_hz == pytest.approx(expected_hz, rel=0.06)
+        assert lost_share == pytest.approx(1 / 3, abs=0.01)
+
+
+def test_nothing_received_lately_is_no_rate() -> None:
+    assert find_reception(STEADY, 164.0) == find_reception(STEADY[:1], 160.0) == (0.0, 0.0)
