@@ -1,4 +1,5 @@
-"""The simulated AR.Drone 2 of the paper's Table 1: JSBSim, closed at 512 Hz around the autopilot's vertical loop.
+"""The simulated AR.Drone 2 that stands for that of the paper's Table 1: JSBSim, closed at 512 Hz around the autopilot's
+vertical loop. The paper publishes no airframe: mass and thrust are those of Paparazzi's own `simple_ardrone2.xml`.
 
 The aircraft file controls attitude, heading and horizontal position itself, so that each step exchanges only three
 outputs (altitude, sink rate, tilt) and one input (thrust) with JSBSim.
@@ -188,12 +189,12 @@ def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, .
 JSBSIM: Final = VehicleKind(
     name="jsbsim",
     title="Simulated AR.Drone 2",
-    line="Six degrees of freedom in JSBSim under the autopilot's own vertical loop, as flown for the paper's Table 1.",
+    line="Six degrees of freedom in JSBSim under the autopilot's own vertical loop, as the paper's Table 1 was flown.",
     is_real=False,
     can_fly=True,
     experiments=("takeoff", "altitude-steps"),
     options=(
-        VehicleOption("thrust_scale", "Thrust, as a multiple of the data sheet's", "×", 1.0, 0.7, 1.5),
+        VehicleOption("thrust_scale", "Thrust, as a multiple of the airframe's", "×", 1.0, 0.7, 1.5),
         VehicleOption("mass_kg", "Mass", "kg", MASS_KG, 0.3, 0.6),
         VehicleOption("motor_lag_s", "Motor lag", "s", 0.0, 0.0, 0.15),
         VehicleOption("start_latency_s", "Start latency", "s", 0.0, 0.0, 2.0),

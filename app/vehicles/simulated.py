@@ -117,7 +117,7 @@ class Pacer:
 
 GAIN_NAMES: Final = ("kp", "ki", "kd")
 FLIGHT_S: Final = WINDOW_S + RECORDED_BEYOND_S
-"""Time recorded after the command for the paper's window, 33 s."""
+"""Time recorded after the command for the default window, 33 s."""
 TELEMETRY_HZ: Final = 50
 HIGHEST_HOVER: Final = 0.95
 """Share of full thrust up to which a vehicle that hovers with it can be controlled."""
@@ -130,7 +130,7 @@ _LANDING_SLICE: Final = RATE_HZ // 4
 
 STEPS: Final = round(FLIGHT_S * RATE_HZ) + 1
 MAX_STEPS: Final = STEPS + round(_LANDING_S * RATE_HZ)
-"""Steps of the longest flight with the paper's window: aborted at the last instant, then landed."""
+"""Steps of the longest flight with the default window: aborted at the last instant, then landed."""
 
 
 class Simulation(Protocol):

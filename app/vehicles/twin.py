@@ -1,7 +1,8 @@
 """Twin of the paper's real flights: a simple vertical model with effects that the nominal model omits, and scatter.
 
-With a hover throttle of 0.61, a motor lag of 50 ms and a loop entered 0.3 s after the command, the scores of all rows
-of the paper's Table 2 are reproduced within 8 %; with the scatter below, repeated takeoffs differ as in its Fig. 12.
+Hover throttle (0.61), motor lag (50 ms) and start of the loop (0.3 s after the command) are fitted to the eight errors
+of the paper's Table 2, which they reproduce within 8 %, and the scatter below to the two standard deviations of its
+Fig. 12 (within 20 %): the paper publishes no record of a flight, so neither is evidence about the real drone.
 Further physics (thrust that grows with the square of the command, ground effect, delayed measurement, a sagging
 battery) is off by default.
 """
@@ -96,7 +97,7 @@ def _cannot_lift(options: Options, _simulation_hosts: Hosts) -> tuple[Problem, .
 TWIN: Final = VehicleKind(
     name="twin",
     title="Twin of the paper's AR.Drone 2",
-    line="A simple vertical model fitted to the paper's real flights, with their flight-to-flight scatter.",
+    line="A simple vertical model fitted to the published errors of the paper's real flights and to their scatter.",
     is_real=False,
     can_fly=True,
     experiments=("takeoff", "altitude-steps"),

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.common.settings import Settings
+from app.reproductions.registry import REPRODUCTIONS
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -54,3 +55,36 @@ def test_decision_records_are_numbered_without_gaps() -> None:
 def test_every_file_that_a_document_names_is_there(document: Path) -> None:
     named = re.findall(r"`((?:app|bench|frontend/src|migrations|tests)/[\w./-]+)`", document.read_text())
     assert [name for name in named if "NAME" not in name and not (ROOT / name).exists()] == []
+
+
+def test_the_table_of_the_papers_claims_leaves_nothing_out() -> None:
+    """Sections 1 to 6, equations (1) to (8), steps 1 to 7, Tables 1 and 2, Figs. 1 to 12, footnotes 1 to 10."""
+    text = (ROOT / "docs/paper.md").read_text()
+    numbers = re.findall(r"\((\d[ab]?)\)", text)
+    assert {"1", "2", "3", "4", "5", "6a", "6b", "7a", "7b", "8"} <= set(numbers)
+    assert [step for step in range(1, 8) if f"| Step {step}:" not in text] == []
+    sections = [
+        "1",
+        "2.1",
+        "2.2",
+        "3.1",
+        "3.2",
+        "3.2.1",
+        "3.2.2",
+        "3.2.3",
+        "4",
+        "4.1",
+        "4.2.1",
+        "4.2.2",
+        "5.1.1",
+        "5.1.2",
+    ]
+    sections += ["5.1.3", "5.2", "5.3"]
+    assert [section for section in sections if not re.search(rf"^\| .*\b{re.escape(section)}\b", text, re.M)] == []
+    assert [table for table in (1, 2) if f"| Table {table} " not in text] == []
+    assert [figure for figure in range(1, 13) if not re.search(rf"Figs?\. {figure}\b", text)] == []
+
+
+def test_every_reproduction_that_the_table_names_is_there() -> None:
+    named = re.findall(r"`gainline reproduce (\w+)", (ROOT / "docs/paper.md").read_text())
+    assert set(named) == set(REPRODUCTIONS)

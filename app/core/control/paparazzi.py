@@ -67,7 +67,7 @@ CLIMB: Final = 2
 MODES: Final = {"throttle": THROTTLE, "alt": ALT, "climb": CLIMB}
 """`throttle`: target is the thrust; `alt`: altitude up, 8 bits; `climb`: climb rate up, 19 bits."""
 
-# The AR.Drone 2 airframe.
+# The AR.Drone 2 airframe; nominal hover throttle fixed, without adaptation (the paper's footnote 5).
 NOMINAL_HOVER_THROTTLE: Final = 0.655
 _GRAVITY: Final = 9.81
 _OMEGA: Final = float(np.deg2rad(100.0))

@@ -59,7 +59,7 @@ MODEL_PARAMETERS: Final = (
     _known("measurement_delay_s", "Measurement delay", "s", 0.1, 0.02, 0.01),
     _known("battery_sag", "Battery sag", "of thrust", 0.1, 0.015, 0.01),
 )
-"""The data sheet gives mass and thrust only: every other nominal value is zero. The expected values of the others are
+"""The nominal model has mass and thrust only: every other nominal value is zero. The expected values of the others are
 typical of small multicopters; flights of one vehicle differ by 0.3 % in thrust and 60 ms in their start."""
 
 

@@ -99,7 +99,7 @@ QUARANTINE_STATES: Final = frozenset({State.QUARANTINE, State.OBSERVE})
 
 
 RECORD_S: Final = WINDOW_S + RECORDED_BEYOND_S
-"""Length of the record for the paper's window."""
+"""Length of the record for the default window."""
 GAIN_S: Final = 0.1
 GAINS_S: Final = 0.3
 _IN_PLACE_M: Final = 0.3
@@ -141,7 +141,7 @@ class Plan:
     @property
     def slow_s(self) -> float:
         """Longest delay of the vehicle's clock behind ours at the end of the record: its share of a longer record is
-        that of the paper's."""
+        that of the default one."""
         return self.limits.slow_s * max(1.0, self.record_s / RECORD_S)
 
     @property

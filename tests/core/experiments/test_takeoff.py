@@ -70,14 +70,14 @@ def test_the_model_of_the_real_flights_reproduces_the_twin_within_2_per_mille() 
 
 
 def test_the_reference_alone_scores_the_papers_bound() -> None:
-    """0.0913 m in the paper, 0.0914 m measured."""
+    """0.0913 m in the paper, from which the window was inferred; 0.0914 m measured."""
     run = TAKEOFF.simulate(gains(283, 13, 82), TAKEOFF.nominal_model)
     reference = Trajectory(run.time_s, {"altitude_m": run["reference_m"]}, "model", "simulation")
     assert TAKEOFF.error(reference) == pytest.approx(0.0914, abs=0.0002)
 
 
 @pytest.mark.parametrize(("name", "expected"), PAPARAZZI)
-def test_recorded_flights_of_the_real_autopilot_score_as_published(name: str, expected: float) -> None:
+def test_recorded_flights_of_the_real_autopilot_score_as_when_they_were_recorded(name: str, expected: float) -> None:
     path = Path(__file__).parents[2] / "data" / "takeoffs" / f"paparazzi_{name}.csv"
     rows = np.genfromtxt(path, delimiter=",", names=True)
     flight = Trajectory(rows["time_s"], {"altitude_m": rows["altitude_m"]}, "csv", "vehicle")

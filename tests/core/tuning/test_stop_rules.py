@@ -21,7 +21,7 @@ PAPER = StopRule(kind="paper")
         ([0.3775, 0.2006, 0.1596, 0.1733, 0.1521], True, "not improving"),  # … and improved by 4.7 % only
         ([0.5102, 0.2537, 0.2265, 0.2652, 0.2483], True, "not improving"),  # Table 2, left
         ([0.1006, 0.0966], False, None),
-        ([0.1006, 0.0966, 0.0940], True, "not improving"),  # Table 1, right, taken literally; the paper flew one more
+        ([0.1006, 0.0966, 0.0940], True, "not improving"),  # Table 1, right, literally; the paper flew one more
         ([0.1218, 0.1249, 0.1278], True, "not improving"),  # Table 2, right
         ([0.3, 0.2, 0.1, 0.05, 0.03, 0.02, 0.01], True, "flight budget"),
     ],
