@@ -8,11 +8,10 @@ Table 2, so that its agreement with them is circular.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
-
-import numpy as np
 
 from app.core.definition import Definition
 from app.core.experiments import get_experiment
@@ -22,19 +21,9 @@ from app.core.policy import Gains
 from app.core.records.trajectory import Samples, Trajectory
 from app.core.tuning.gate import GateResult, check_policy, require_flyable
 from app.figures.panels import Line, Panel, Plot, Style
-from app.reproductions.campaigns import (
-    CAMPAIGNS,
-    Campaign,
-    Run,
-    Step,
-    campaign_notes,
-    campaign_rows,
-    fly_campaign,
-    step_numbers,
-    steps_between,
-)
+from app.reproductions.campaigns import CAMPAIGNS, Run, campaign_notes, fly_campaign, gains_text, runs_of, step_numbers
 from app.reproductions.results import OVERRULE, Progress, Result, Row, curve
-from app.vehicles.base import FlightOptions, OptionValue, Vehicle
+from app.vehicles.base import FlightOptions, OptionValue
 from app.vehicles.registry import get_kind, open_vehicle
 
 _CAMPAIGN: Final = Definition(experiment="takeoff", first_step_fraction=1.0)
@@ -78,28 +67,23 @@ class PublishedFlight:
     reference: float
     is_legible: bool = True
 
-    @property
-    def run(self) -> Run:
-        return Run(self.gains, self.paper)
-
 
 @dataclass(frozen=True, slots=True)
 class Table:
     """A table of the paper; `vehicle` is the kind of vehicle that represents the paper's."""
 
-    number: int
-    title: str
     vehicle: str
     flights: tuple[PublishedFlight, ...]
 
     @property
-    def series(self) -> tuple[tuple[PublishedFlight, ...], tuple[PublishedFlight, ...]]:
-        """The flights from the default gains, and those from the simplex's."""
-        return self.flights[:FROM_DEFAULT], self.flights[FROM_DEFAULT:]
+    def series(self) -> dict[str, tuple[Run, ...]]:
+        """The paper's runs by the kind of their start."""
+        runs = [(flight.gains, flight.paper) for flight in self.flights]
+        return {"default": runs_of(runs[:FROM_DEFAULT]), "simplex": runs_of(runs[FROM_DEFAULT:])}
 
 
 TABLES: Final[Mapping[str, Table]] = MappingProxyType({
-    "table1": Table(1, "Simulated AR.Drone 2 (the paper's Table 1)", "jsbsim", (
+    "table1": Table("jsbsim", (
         PublishedFlight((283, 13, 82), 0.3775, 0.3267),
         PublishedFlight((285, 44, 82), 0.2006, 0.1873),
         PublishedFlight((286, 102, 82), 0.1596, 0.1515),
@@ -110,7 +94,7 @@ TABLES: Final[Mapping[str, Table]] = MappingProxyType({
         PublishedFlight((1649, 1365, 175), 0.0940, 0.0919),
         PublishedFlight((1652, 1365, 195), 0.0946, 0.0929),
     )),
-    "table2": Table(2, "Real AR.Drone 2 (the paper's Table 2)", "twin", (
+    "table2": Table("twin", (
         PublishedFlight((283, 13, 82), 0.5102, 0.5236),
         PublishedFlight((286, 60, 81), 0.2537, 0.2341),
         PublishedFlight((301, 133, 65), 0.2265, 0.2325),
@@ -121,24 +105,13 @@ TABLES: Final[Mapping[str, Table]] = MappingProxyType({
         PublishedFlight((1612, 1361, 163), 0.1278, 0.1211),
     )),
 })  # fmt: skip
-_SOURCES: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({
-    "table1": (
-        (
-            "The paper flew Table 1 on Paparazzi's JSBSim simulation and does not publish its airframe; the one here "
-            "is Gainline's own."
-        ),
-        (
-            "Two published errors are illegible in the text of the accepted manuscript: run 4 from the default gains "
-            "appears as 0.1722 and 0.1755, run 2 from the simplex's as 0.0900. 0.1733 and 0.0966 are inferred: "
-            "elsewhere in this table the text has 0.2775 for 0.3775 and 1044 for 1644, and the paper calls 0.0940 its "
-            "best."
-        ),
-    ),
-    "table2": (
-        "The twin's parameters were fitted to the errors of this very table, so its agreement with them is circular.",
-    ),
-})  # fmt: skip
-"""Where a table's vehicle and its published errors come from, as far as it limits the comparison."""
+_SOURCES: Final = {
+    "table1": "The paper does not publish its airframe. Two of its errors are illegible in the text of the accepted "
+    "manuscript: run 4 from the default gains appears as 0.1722 and 0.1755, run 2 from the simplex's as 0.0900. 0.1733 "
+    "and 0.0966 are inferred: the text also has 0.2775 for 0.3775 and 1044 for 1644, and calls 0.0940 the best.",
+    "table2": "The twin was fitted to the errors of this very table, so its agreement with them is circular.",
+}
+"""What limits the comparison of each table with the paper."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,105 +129,72 @@ class Takeoff:
     trajectory: Trajectory
 
 
-def run_table(
-    name: str, figure: str, on_progress: Progress, *, campaigns: Mapping[str, Definition] = CAMPAIGNS
-) -> Result:
+def run_table(name: str, figure: str, on_progress: Progress, *, campaigns: Sequence[str] = tuple(CAMPAIGNS)) -> Result:
     """Fly a table on both vehicles, and the campaigns on its own; `figure` is the name of the paper's figure."""
     table = TABLES[name]
     kinds = (table.vehicle, *(kind for kind in VEHICLES if kind != table.vehicle))
-    total = len(kinds) * len(table.flights) + sum(each.stop.max_flights for each in campaigns.values())
-    rows: list[Row] = []
-    own: list[Takeoff] = []
-    done = 0
-
-    def tell(doing: str) -> None:
-        nonlocal done
-        done += 1
-        on_progress(done / total, doing)
-
+    total = len(kinds) * len(table.flights) + len(campaigns)
+    flown: dict[str, list[Takeoff]] = {kind: [] for kind in kinds}
     for kind in kinds:
-        steps = _published_steps(table) if kind == table.vehicle else [None] * len(table.flights)
-        for takeoff, step in zip(_flown(table, kind), steps, strict=True):
-            rows.append(_row(table, kind, takeoff, step))
-            if kind == table.vehicle:
-                own.append(takeoff)
-            tell(f"{kind}: {_label(takeoff.gains)} flown")
-    flown = list(_campaigns(table, campaigns, tell))
+        for takeoff in _flown(table, kind):
+            flown[kind].append(takeoff)
+            on_progress(sum(map(len, flown.values())) / total, f"{kind}: {gains_text(takeoff.gains.values())} flown")
+    own, ended = flown[table.vehicle], []
+    with _simulated(table.vehicle) as fly:
+        for title in campaigns:
+            ended.append(fly_campaign(title, table.series[CAMPAIGNS[title].start.kind], fly))
+            on_progress(1.0 - (len(campaigns) - len(ended)) / total, f"{table.vehicle}: campaign {title} flown")
     return Result(
-        rows=(*rows, *(row for campaign in flown for row in campaign_rows(table.vehicle, campaign))),
+        rows=(
+            *(row for kind in kinds for row in _rows(table, kind, flown[kind])),
+            *(row for campaign in ended for row in campaign.rows(table.vehicle)),
+        ),
         figures={
             f"{figure}-left": _plot(table, own[:FROM_DEFAULT], default=True),
             f"{figure}-right": _plot(table, own[FROM_DEFAULT:], default=False),
         },
         notes=(
             _describe_reference(table, own),
-            *_SOURCES[name],
+            _SOURCES[name],
             (
                 "Every gain set is checked by a campaign's gate first. ki = 1356 and similar values can overflow "
                 f"and are flown by overruling the gate. The recorded reason: {OVERRULE}. The gate cannot be "
                 "overruled on a real vehicle."
             ),
-            *(campaign_notes(*flown) if flown else ()),
+            *(campaign_notes(*ended) if ended else ()),
         ),
     )
 
 
 def _describe_reference(table: Table, own: Sequence[Takeoff]) -> str:
-    measured = np.array([takeoff.measured for takeoff in own])
-    from_reference, from_paper = (
-        float(np.abs(measured / np.array(errors) - 1.0).max())
-        for errors in zip(*((takeoff.published.reference, takeoff.published.paper) for takeoff in own), strict=True)
-    )
+    from_reference = max(abs(each.measured / each.published.reference - 1.0) for each in own)
+    from_paper = max(abs(each.measured / each.published.paper - 1.0) for each in own)
     return (
         f"Flown without noise. On {table.vehicle} the errors are within {percent(from_reference, 1)} of the reference, "
         f"which Gainline measured once itself, and within {percent(from_paper)} of the paper."
     )
 
 
-def _published_steps(table: Table) -> list[Step | None]:
-    """The step to each of the paper's flights; None for the first of each series."""
-    return [step for part in table.series for step in (None, *steps_between([flight.run for flight in part]))]
-
-
-def _campaigns(table: Table, campaigns: Mapping[str, Definition], tell: Callable[[str], None]) -> Iterator[Campaign]:
-    experiment = get_experiment("takeoff")
-    default, simplex = table.series
-    with open_vehicle(
-        table.vehicle, VEHICLES[table.vehicle], safe_gains=experiment.space.mapping(experiment.space.default)
-    ) as vehicle:
-
-        def fly(gains: Gains) -> Trajectory:
-            flight = _fly(vehicle, gains)
-            tell(f"{table.vehicle}: campaign, {_label(gains)} flown")
-            return flight
-
-        for title, definition in campaigns.items():
-            published = default if definition.start.kind == "default" else simplex
-            yield fly_campaign(title, definition, [flight.run for flight in published], fly)
-
-
-def _row(table: Table, kind: str, flown: Takeoff, step: Step | None) -> Row:
+def _rows(table: Table, kind: str, flown: Sequence[Takeoff]) -> Iterator[Row]:
+    """Those of the table's own vehicle also have the steps between the paper's runs."""
     own = kind == table.vehicle
-    inferred = () if flown.published.is_legible else ("published error inferred",)
-    return Row(
-        group=f"{kind}, which represents the paper's vehicle" if own else f"{kind}, for comparison",
-        label=_label(flown.gains),
-        unit="m",
-        measured=flown.measured,
-        paper=flown.published.paper,
-        reference=flown.published.reference if own else None,
-        ratio=flown.measured / flown.published.paper,
-        note="; ".join(
-            (f"overshoot {flown.overshoot_m:.3f} m", *([] if step is None else [f"step {step}"]), *inferred)
-        ),
-        gains=flown.gains,
-        numbers={"overshoot_m": flown.overshoot_m, **step_numbers(step)},
-        overruled=flown.overruled,
-    )
-
-
-def _label(gains: Mapping[str, float]) -> str:
-    return ", ".join(f"{value:g}" for value in gains.values())
+    runs = (run for part in table.series.values() for run in part)
+    for each, run in zip(flown, runs, strict=True):
+        step = run.step if own else None
+        note = f"overshoot {each.overshoot_m:.3f} m" + (f"; step {step}" if step else "")
+        yield Row(
+            group=f"{kind}, which represents the paper's vehicle" if own else f"{kind}, for comparison",
+            label=gains_text(each.gains.values()),
+            unit="m",
+            measured=each.measured,
+            paper=each.published.paper,
+            reference=each.published.reference if own else None,
+            ratio=each.measured / each.published.paper,
+            note=note if each.published.is_legible else f"{note}; published error inferred",
+            gains=each.gains,
+            numbers={"overshoot_m": each.overshoot_m, **step_numbers(step)},
+            overruled=each.overruled,
+        )
 
 
 def _plot(table: Table, shown: Sequence[Takeoff], *, default: bool) -> Plot:
@@ -287,7 +227,7 @@ def _plot(table: Table, shown: Sequence[Takeoff], *, default: bool) -> Plot:
 
 
 def _takeoff(name: str, style: Style, flown: Takeoff, last_s: float) -> Line:
-    note = f"{_label(flown.gains)}: {flown.measured:.4f} m, published {flown.published.paper:.4f} m"
+    note = f"{gains_text(flown.gains.values())}: {flown.measured:.4f} m, published {flown.published.paper:.4f} m"
     return _until(name, style, flown.trajectory, flown.trajectory["altitude_m"], last_s, note=note)
 
 
@@ -298,12 +238,11 @@ def _until(name: str, style: Style, flight: Trajectory, values: Samples, last_s:
 
 def _flown(table: Table, kind: str) -> Iterator[Takeoff]:
     experiment = get_experiment("takeoff")
-    safe_gains = experiment.space.mapping(experiment.space.default)
-    with open_vehicle(kind, VEHICLES[kind], safe_gains=safe_gains) as vehicle:
+    with _simulated(kind) as fly:
         for published in table.flights:
             wanted = dict(zip(experiment.space.names, map(float, published.gains), strict=True))
             overruled = overruled_for(wanted, kind)
-            flight = _fly(vehicle, wanted)
+            flight = fly(wanted)
             yield Takeoff(
                 published=published,
                 gains=wanted,
@@ -314,6 +253,14 @@ def _flown(table: Table, kind: str) -> Iterator[Takeoff]:
             )
 
 
-def _fly(vehicle: Vehicle, gains: Gains) -> Trajectory:
-    vehicle.stage(gains)
-    return vehicle.fly(FlightOptions(seed=1), on_sample=lambda _: None, should_stop=lambda: None).trajectory
+@contextmanager
+def _simulated(kind: str) -> Iterator[Callable[[Gains], Trajectory]]:
+    """A function that flies gains on this kind of vehicle, without noise."""
+    space = get_experiment("takeoff").space
+    with open_vehicle(kind, VEHICLES[kind], safe_gains=space.mapping(space.default)) as vehicle:
+
+        def fly(gains: Gains) -> Trajectory:
+            vehicle.stage(gains)
+            return vehicle.fly(FlightOptions(seed=1), on_sample=lambda _: None, should_stop=lambda: None).trajectory
+
+        yield fly

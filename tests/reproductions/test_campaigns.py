@@ -8,29 +8,40 @@ import pytest
 
 from app.core.policy import PolicySpace
 from app.core.tuning.corrected_model import model_optimum
-from app.reproductions.campaigns import CAMPAIGNS, Run, steps_between
+from app.reproductions.campaigns import CAMPAIGNS
 from app.reproductions.results import Result, Row
 from app.reproductions.tables import TABLES, run_table
 from tests.core.tuning.flying import TAKEOFF, compiled_only
 
 
+def shortened(table: str, start: str) -> list[float | None]:
+    return [run.step.shortened for run in TABLES[table].series[start] if run.step]
+
+
 def test_a_step_starts_at_the_best_run_before_it() -> None:
     """The left half of Table 1: runs 4 and 5 both start at run 3, run 5 with 0.18 of the step."""
-    steps = steps_between([flight.run for flight in TABLES["table1"].series[0]])
-    assert [(step.base, step.change) for step in steps] == [
+    first, *runs = TABLES["table1"].series["default"]
+    assert first.step is None
+    assert [(run.step.base, run.step.change) for run in runs if run.step] == [
         (1, (2, 31, 0)), (2, (1, 58, 0)), (3, (213, 75, -40)), (3, (38, 14, -7)),
     ]  # fmt: skip
-    assert [step.shortened for step in steps] == [None, None, None, pytest.approx(0.179, abs=0.001)]
-    assert str(steps[0]) == "+2/+31/0 from run 1, 31 long"
+    assert shortened("table1", "default") == [None, None, None, pytest.approx(0.179, abs=0.001)]
+    assert str(runs[0].step) == "+2/+31/0 from run 1, 31 long"
 
 
 def test_the_published_shorter_steps_of_table_2() -> None:
-    shortened = [steps_between([flight.run for flight in part])[-1].shortened for part in TABLES["table2"].series]
-    assert shortened == [pytest.approx(0.50), pytest.approx(0.49, abs=0.005)]
+    assert shortened("table2", "default") == [None, None, None, pytest.approx(0.50)]
+    assert shortened("table2", "simplex") == [None, pytest.approx(0.49, abs=0.005)]
+    assert shortened("table1", "simplex") == [None, None, None]
 
 
-def test_a_step_of_a_single_run_is_none() -> None:
-    assert steps_between([Run((1.0, 2.0), 0.5)]) == ()
+def test_our_first_steps_have_the_direction_of_the_published_ones() -> None:
+    """By the recorded gains; to 2°."""
+    for table, flown in FLOWN.items():
+        (first, _), (second, _), *_ = flown["from the default gains"]
+        ours, step = np.subtract(second, first), TABLES[table].series["default"][1].step
+        assert step is not None
+        assert np.dot(ours, step.change) > np.cos(np.radians(2.0)) * np.linalg.norm(ours) * step.length
 
 
 def test_the_campaigns_are_the_papers_method() -> None:
@@ -67,19 +78,19 @@ FLOWN = {
 gains and of a step +3/+79/0 beside the published +2/+31/0."""
 SAID = {
     "table1": (
-        "+3/+79/0, agrees with the published +2/+31/0 in direction, to 1.5°, but is 2.5 times as long",
-        "0.0931 m in 6 flights, published 0.1521 m in 5",
-        "0.0927 m in 2 flights, published 0.0940 m in 4",
-        "(run 4 of 5 and run 4 of 4) have no counterpart, nor has the published plateau at 0.15 m",
+        "direction of the published one, but is 2.5 times as long, the later ones 3.5 to 15 times",
+        "from the default gains 0.0931 m in 6 flights (not improving), published 0.1521 m in 5",
+        "from the simplex's gains 0.0927 m in 2 flights (nothing better), published 0.0940 m in 4",
+        "published plateau at 0.15 m",
         "79, 40, 27, 20 long",
+        "0.1327 m in 5 flights (not improving)",
         "in the paper by one 0.18 as long",
         "1742, 881, 119, with 0.0914 m on the model, on which the published 1624, 1356, 195 have 0.0919 m",
     ),
     "table2": (
-        "+9/+199/+1, agrees with the published +3/+47/−1 in direction, to 1.8°, but is 4.2 times as long",
-        "0.1242 m in 7 flights, published 0.2265 m in 5",
-        "0.1229 m in 1 flight, published 0.1218 m in 3",
-        "(runs 4, 5 of 5 and runs 2, 3 of 3) have no counterpart",
+        "direction of the published one, but is 4.2 times as long, the later ones 2.1 to 100 times",
+        "from the default gains 0.1242 m in 7 flights (flight budget), published 0.2265 m in 5",
+        "from the simplex's gains 0.1229 m in 1 flight (nothing better), published 0.1218 m in 3",
         "in the paper by one 0.50 and 0.49 as long",
     ),
 }
@@ -94,17 +105,15 @@ def test_the_campaigns_are_flown_to_their_end_and_described(table: str, figure: 
     told: list[float] = []
     result = run_table(table, figure, lambda share, _doing: told.append(share))
     for title, flown in FLOWN[table].items():
-        *runs, best = in_group(result, f"Campaign on {vehicle} {title}")
+        runs = in_group(result, f"Campaign on {vehicle} {title}")
         assert len(runs) == len(flown)
         for row, (gains, error) in zip(runs, flown, strict=True):
             assert list(row.gains.values()) == pytest.approx(gains, abs=2.0)
             assert row.measured == pytest.approx(error, rel=0.01)
-            assert row.overruled == "", "inside the gate"
         errors = [row.measured for row in runs]
         assert errors == sorted(errors, reverse=True), "every flight improves"
-        assert best.measured == errors[-1]
     assert all(later > earlier for earlier, later in pairwise(told))
-    assert told[-1] <= 1.0
+    assert told[-1] == 1.0
     for said in SAID[table]:
         assert any(said in note for note in result.notes), said
 

@@ -9,7 +9,18 @@ from app.core.policy import Vector
 from app.figures.base import card_of
 from app.figures.panels import PanelsFigure
 from app.reproductions import f16
-from app.reproductions.f16 import _BRIEF, _FULL, EXPECTED, _definition, _figures, _method, _methods, _showcase, run_f16
+from app.reproductions.f16 import (
+    _BRIEF,
+    _FULL,
+    EXPECTED,
+    _definition,
+    _figures,
+    _method,
+    _methods,
+    _optimum,
+    _showcase,
+    run_f16,
+)
 from app.reproductions.f16_campaigns import BEST_ERROR, CampaignResult, MethodResult, Showcase, showcase, truth
 
 
@@ -23,7 +34,11 @@ def test_the_definition_gives_the_errors_it_was_checked_with() -> None:
     assert zero.measured == pytest.approx(6.66664, abs=1e-4)
     assert hand.measured == pytest.approx(3.38180, abs=1e-4)
     assert best.measured == pytest.approx(0.204716, abs=2e-4)
-    assert best.note == "theta_1, theta_2, theta_3 on a bound"
+
+
+def test_the_optimum_lies_on_three_bounds_of_ours() -> None:
+    space, optimum = PitchTracking.space, _optimum()
+    assert space.names_where((optimum == space.lower) | (optimum == space.upper)) == ("theta_1", "theta_2", "theta_3")
 
 
 def test_the_showcase_comes_near_the_optimum_about_as_fast_as_the_paper(shown: Showcase) -> None:
