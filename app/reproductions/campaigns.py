@@ -164,12 +164,12 @@ def campaign_notes(default: Campaign, simplex: Campaign, diminishing: Campaign) 
         f"The first step from the default gains has the direction of the published one, but is {first:.1f} times as "
         f"long, the later ones {min(longer):.1f} to {max(longer):.0f} times: each search starts with all step sizes "
         "again, however short the last step was. The paper does not publish its step sizes. "
-        f"Best error {default}; {simplex}. Every flight improves on the best before it: the published runs that do not "
-        f"have no counterpart, nor has the published plateau at {least(default.published):.2f} m."
+        f"Best error {default}; {simplex}. Every flight improves on the best before it: published runs that fail, such "
+        f"as run 4 from the default gains, and the published plateau at {least(default.published):.2f} m do not appear."
     )
     yield (
         f"With step_size = diminishing (footnote 3 of the paper) the steps are {lengths} long. Best error "
-        f"{diminishing}. The option does not limit a campaign's first step, the only one from the simplex's gains. A "
+        f"{diminishing}. The option does not limit the first step, the only one if any from the simplex's gains. A "
         f"step that does not improve is followed by one half as long; in the paper by one {shortened} as long."
     )
     yield (

@@ -106,9 +106,9 @@ TABLES: Final[Mapping[str, Table]] = MappingProxyType({
     )),
 })  # fmt: skip
 _SOURCES: Final = {
-    "table1": "The paper does not publish its airframe. Two of its errors are illegible in the text of the accepted "
-    "manuscript: run 4 from the default gains appears as 0.1722 and 0.1755, run 2 from the simplex's as 0.0900. 0.1733 "
-    "and 0.0966 are inferred: the text also has 0.2775 for 0.3775 and 1044 for 1644, and calls 0.0940 the best.",
+    "table1": "The paper does not publish the airframe of its simulation. Two errors are illegible in the text of its "
+    "accepted manuscript: run 4 from the default gains appears as 0.1722 and 0.1755, run 2 from the simplex's, 0.0900. "
+    "0.1733 and 0.0966 are inferred: the text also has 0.2775 for 0.3775, 1044 for 1644, and calls 0.0940 the best.",
     "table2": "The twin was fitted to the errors of this very table, so its agreement with them is circular.",
 }
 """What limits the comparison of each table with the paper."""

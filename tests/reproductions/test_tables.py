@@ -93,7 +93,7 @@ def test_the_notes_say_where_vehicle_reference_and_illegible_errors_come_from(ta
     """Against the paper the first row of Table 1 is off most, by 1 − 0.3261/0.3775 = 14 %."""
     for said in ("within 0.9\u00a0% of the reference, which Gainline measured", "within 14\u00a0% of the paper"):
         assert said in table1.notes[0]
-    for said in ("does not publish its airframe", "0.1722", "0.1755", "0.0900", "inferred"):
+    for said in ("does not publish the airframe", "0.1722", "0.1755", "0.0900", "inferred"):
         assert said in table1.notes[1]
     assert "circular" in table2.notes[1]
     inferred = [row.paper for row in on(table1, "jsbsim") if "inferred" in row.note]
