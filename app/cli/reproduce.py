@@ -50,7 +50,7 @@ def _run(each: Reproduction, full: bool, trace: Path | None) -> Result:
 
 def _show(each: Reproduction, result: Result, json_out: Path | None) -> None:
     out = console(json_out)
-    out.print(f"\n[bold]{each.title}[/]\n{each.paper}\n")
+    out.print(f"\n[bold]{each.title}[/]\nIn the paper: {each.paper}\n")
     for group, rows in groupby(result.rows, key=lambda row: row.group):
         out.print(_table(group, list(rows)))
     for note in result.notes:

@@ -20,7 +20,7 @@ from app.core.tuning.proposals import next_proposal
 from app.vehicles.f16 import whole_flight
 
 BEST_ERROR: Final = 0.204716
-"""Local optimum of the true system, rad·s, to ±0.0002: the same from 20 starts."""
+"""Local optimum of the true system within the experiment's bounds, rad·s, to ±0.0002: the same from 20 starts."""
 WITHIN: Final = 0.05
 MAX_FLIGHTS: Final = 40
 SEARCH_FLIGHTS: Final = 300

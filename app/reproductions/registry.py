@@ -86,7 +86,8 @@ _ALL: Final = (
     Reproduction(
         name="table1",
         title="Table 1 and Fig. 7: the simulated quadrotor",
-        line="Every gain set of the table flown on the JSBSim quadrotor, on which Table 1 was flown, and on the twin.",
+        line="Every gain set of the table flown on Gainline's JSBSim quadrotor, whose airframe is not the paper's, and "
+        "on the twin; then the paper's method flown as a campaign from both starts.",
         paper="Five simulated takeoffs from the default gains take the error from 0.3775 m to 0.1521 m; four from the "
         "simplex's gains, from 0.1006 m to 0.0940 m.",
         figures={"figure7-left": "Fig. 7, left", "figure7-right": "Fig. 7, right"},
@@ -95,8 +96,8 @@ _ALL: Final = (
     Reproduction(
         name="table2",
         title="Table 2 and Fig. 11: the real quadrotor",
-        line="Every gain set of the table flown on the twin of the paper's real drone, without its scatter, and on "
-        "the JSBSim quadrotor.",
+        line="Every gain set of the table flown on the twin, which was fitted to this table's errors, without its "
+        "scatter, and on the JSBSim quadrotor; then the paper's method flown as a campaign from both starts.",
         paper="Five real takeoffs from the default gains take the error from 0.5102 m to 0.2265 m; three from the "
         "simplex's gains stay at 0.12 m, within the scatter.",
         figures={"figure11-left": "Fig. 11, left", "figure11-right": "Fig. 11, right"},

@@ -1,12 +1,27 @@
 """The F-16 experiment beside the paper: the showcase's numbers and its three figures."""
 
+import numpy as np
 import pytest
+from scipy.optimize import minimize
 
+from app.core.experiments.pitch_tracking import PitchTracking
+from app.core.policy import Vector
 from app.figures.base import card_of
 from app.figures.panels import PanelsFigure
 from app.reproductions import f16
-from app.reproductions.f16 import _BRIEF, _FULL, EXPECTED, _definition, _figures, _method, _methods, _showcase, run_f16
-from app.reproductions.f16_campaigns import BEST_ERROR, CampaignResult, MethodResult, Showcase, showcase
+from app.reproductions.f16 import (
+    _BRIEF,
+    _FULL,
+    EXPECTED,
+    _definition,
+    _figures,
+    _method,
+    _methods,
+    _optimum,
+    _showcase,
+    run_f16,
+)
+from app.reproductions.f16_campaigns import BEST_ERROR, CampaignResult, MethodResult, Showcase, showcase, truth
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +34,11 @@ def test_the_definition_gives_the_errors_it_was_checked_with() -> None:
     assert zero.measured == pytest.approx(6.66664, abs=1e-4)
     assert hand.measured == pytest.approx(3.38180, abs=1e-4)
     assert best.measured == pytest.approx(0.204716, abs=2e-4)
+
+
+def test_the_optimum_lies_on_three_bounds_of_ours() -> None:
+    space, optimum = PitchTracking.space, _optimum()
+    assert space.names_where((optimum == space.lower) | (optimum == space.upper)) == ("theta_1", "theta_2", "theta_3")
 
 
 def test_the_showcase_comes_near_the_optimum_about_as_fast_as_the_paper(shown: Showcase) -> None:
@@ -50,6 +70,23 @@ def test_every_figure_draws_what_was_flown(shown: Showcase) -> None:
     assert after.lines[0].name == f"Flight {shown.best}, best"
     first, best = (max(map(abs, line.y[len(line.y) // 2 :])) for line in off.lines)
     assert best < first, "in the second half of the minute"
+
+
+@pytest.mark.complete
+def test_without_the_bounds_the_true_system_is_flown_far_better() -> None:
+    """As a note of the result says: below 0.01 rad·s, at gains far outside the bounds."""
+    aircraft, space = truth(), PitchTracking.space
+
+    def error(gains: Vector) -> float:
+        found = float(aircraft.errors(aircraft.outputs(gains[np.newaxis], aircraft.nominal_model))[0])
+        return found if np.isfinite(found) else 1e6
+
+    best = np.array([-20.0, -50.0, -57.3, -14.796, -4.210, -0.008])
+    for _ in range(2):
+        simplex = np.vstack((best, best + 0.5 * np.diag(space.scale)))
+        best = minimize(error, best, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": 3000}).x
+    assert error(best) < 0.01
+    assert abs(best[2]) > 100 * 57.3
 
 
 def test_a_method_is_told_by_the_share_that_comes_near_and_its_median_flights() -> None:

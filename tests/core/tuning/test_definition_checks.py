@@ -47,7 +47,11 @@ def test_the_default_definition_has_no_problems() -> None:
             "must be one of calibrated, gradient, identified, simplex, manual, got 'luck'",
         ),
         (replace(GOOD, strategy="identified"), "strategy", "'identified' works only with pitch-tracking"),
-        (replace(GOOD, options={"raw": True}), "options.raw", "is not an option of gradient (options: scaled, bias)"),
+        (
+            replace(GOOD, options={"raw": True}),
+            "options.raw",
+            "is not an option of gradient (options: scaled, bias, step_size)",
+        ),
         (
             replace(GOOD, strategy="manual", options={"raw": 1}),
             "options.raw",

@@ -3,11 +3,12 @@
 The base is the best flight so far. The model, corrected by it outside the loop (or inside, as an option), gives the
 gradient (central differences) and the error at every step of a geometric ladder along the negative gradient; the best
 step is flown. A flight that does not improve leaves the base and the line unchanged, and the next step is half as long.
-A step that the gate would refuse is halved in the same way.
+A step that the gate would refuse is halved in the same way. With the option of a diminishing step size, the ladder ends
+below the last successful step.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
@@ -108,11 +109,28 @@ def _raw_metric(space: PolicySpace) -> _Metric:
     return _Metric(np.ones(len(space.gains)), RAW_LADDER if whole else RAW_REAL_LADDER, "gain unit")
 
 
+def longest_step(space: PolicySpace, scale: Vector, flights: Sequence[Flight]) -> float | None:
+    """Largest length of successful step k, in units of `scale`: (k − 1)/k of the last one's. None for the first.
+
+    A step is successful if it flew a new best error. If every step succeeds and is as long as allowed, α_k = α₁/k: the
+    conditions of the paper's footnote 3, Σα = ∞ and Σα² < ∞ (Robbins and Monro 1951), hold.
+    """
+    valid = [flight for flight in flights if flight.outcome == "valid" and flight.error is not None]
+    bests = [flight for number, flight in enumerate(valid, 1) if best_flight(valid[:number]) is flight]
+    if len(bests) < 2:
+        return None
+    last = (space.vector(bests[-1].gains) - space.vector(bests[-2].gains)) / scale
+    return float(np.linalg.norm(last)) * (len(bests) - 1) / len(bests)
+
+
 def propose(
     definition: Definition, experiment: ModelledExperiment, space: PolicySpace, flights: Sequence[Flight]
 ) -> Proposal:
     """Propose the next gains on the line from the best flight. At least one flight must be valid."""
     metric = _scaled_metric(space) if definition.options.get("scaled", True) else _raw_metric(space)
+    limit = longest_step(space, metric.scale, flights) if definition.options.get("step_size") == "diminishing" else None
+    if limit is not None:
+        metric = replace(metric, ladder=(limit, *(length for length in metric.ladder if length < limit)))
     base = best_flight(flights)
     base_gains = space.nearest(space.vector(base.gains))
     model, correction = _corrected(definition, experiment, base)
@@ -139,7 +157,7 @@ def propose(
         ladder=ladder,
         chosen_length=chosen.length if chosen else None,
         clipped=chosen.clipped if chosen else (),
-        notes=(correction, _describe_unit(space, metric), *_notes(refused)),
+        notes=(correction, _describe_unit(space, metric), *_describe_limit(metric, limit), *_notes(refused)),
     )
     gains = space.mapping(base_gains) if chosen is None else chosen.gains
     trajectory, error = model.predict(space.vector(gains))
@@ -238,6 +256,10 @@ def _describe_unit(space: PolicySpace, metric: _Metric) -> str:
     return f"Step sizes are in {metric.unit}s: one is {format_gains(space.by_name(metric.scale))}."
 
 
+def _describe_limit(metric: _Metric, limit: float | None) -> tuple[str, ...]:
+    return () if limit is None else (f"After the last successful step this one is at most {metric.describe(limit)}.",)
+
+
 def _notes(refused: Sequence[LadderStep]) -> tuple[str, ...]:
     return (f"The gate refuses {'; '.join(format_gains(step.gains) for step in refused)}.",) if refused else ()
 
@@ -258,6 +280,12 @@ GRADIENT: Final = Strategy(
             title="Correction added outside or inside the control loop",
             default="outside",
             choices=("outside", "inside"),
+        ),
+        Option(
+            name="step_size",
+            title="Step size from the line search alone, or limited and diminishing with every iteration",
+            default="line-search",
+            choices=("line-search", "diminishing"),
         ),
     ),
     propose=propose,

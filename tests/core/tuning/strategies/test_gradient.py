@@ -10,7 +10,7 @@ from app.core.experiments.base import Check, Envelope, ParameterDistribution
 from app.core.policy import Vector
 from app.core.tuning.corrected_model import correct_by_bias
 from app.core.tuning.gate import check_policy
-from app.core.tuning.strategies.gradient import RAW_LADDER, SCALED_LADDER, gradient, propose
+from app.core.tuning.strategies.gradient import RAW_LADDER, SCALED_LADDER, gradient, longest_step, propose
 from tests.core.tuning.bowl import QuadraticExperiment, fly
 
 BOWL = QuadraticExperiment()
@@ -94,6 +94,43 @@ def test_an_improvement_becomes_the_base_of_a_new_line() -> None:
     flights = [fly(1, 50.0, 70), fly(2, first.gains["a"], first.gains["b"])]
     second = propose(Definition(), BOWL, SPACE, flights)
     assert (second.kind, second.explanation.base_flight) == ("step", 2)
+
+
+DIMINISHING = Definition(options={"step_size": "diminishing"})
+
+
+def test_a_diminishing_step_is_at_most_the_harmonic_share_of_the_last_successful_one() -> None:
+    """A step of 12 in both gains is √(1.2² + 2.4²) scales long, and allows half of that; then one of 1 allows 2/3."""
+    flights = [fly(1, 90.0, 90), fly(2, 78.0, 78)]
+    length = np.hypot(1.2, 2.4)
+    assert longest_step(SPACE, SPACE.scale, flights[:1]) is None
+    assert longest_step(SPACE, SPACE.scale, flights) == pytest.approx(length / 2)
+    assert longest_step(SPACE, SPACE.scale, [*flights, fly(3, 68.0, 78)]) == pytest.approx(2 / 3)
+    assert longest_step(SPACE, SPACE.scale, [*flights, fly(3, 68.0, 78, offset=90.0)]) == pytest.approx(length / 2)
+    proposal = propose(DIMINISHING, BOWL, SPACE, flights)
+    ladder = [step.length for step in proposal.explanation.ladder]
+    assert ladder == pytest.approx([length / 2, *(step for step in SCALED_LADDER if step < length / 2)])
+    assert proposal.explanation.chosen_length == pytest.approx(length / 2), "the optimum is further away"
+    assert "at most 1.342 gain scales" in " ".join(proposal.explanation.notes)
+
+
+def test_diminishing_steps_that_all_succeed_are_the_first_over_their_number() -> None:
+    """α_k = α₁/k, up to rounding of `b`: Σα = ∞ and Σα² < ∞, the conditions of the paper's footnote 3."""
+    flights = [fly(1, 90.0, 40), fly(2, 80.0, 40)]
+    for number in range(3, 8):
+        proposal = propose(DIMINISHING, BOWL, SPACE, flights)
+        flights.append(fly(number, proposal.gains["a"], proposal.gains["b"]))
+    steps = -np.diff([flight.gains["a"] for flight in flights]) / 10.0
+    assert steps == pytest.approx(1.0 / np.arange(1, 7))
+
+
+def test_without_the_option_a_step_is_as_long_as_the_search_finds_best() -> None:
+    flights = [fly(1, 90.0, 90), fly(2, 78.0, 78)]
+    found = propose(Definition(), BOWL, SPACE, flights)
+    named = propose(Definition(options={"step_size": "line-search"}), BOWL, SPACE, flights)
+    assert (found.gains, found.explanation) == (named.gains, named.explanation)
+    assert [step.length for step in found.explanation.ladder] == list(SCALED_LADDER)
+    assert found.explanation.chosen_length == 4.0, "longer than the last step of 2.7"
 
 
 def test_at_the_optimum_nothing_better_is_offered() -> None:
