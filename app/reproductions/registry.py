@@ -86,8 +86,8 @@ _ALL: Final = (
     Reproduction(
         name="table1",
         title="Table 1 and Fig. 7: the simulated quadrotor",
-        line="Every gain set of the table flown on Gainline's JSBSim quadrotor, whose airframe is not the paper's, and "
-        "on the twin; then the paper's method flown as a campaign from both starts.",
+        line="Every gain set of the table flown on the JSBSim quadrotor, with the figures of Paparazzi's own airframe, "
+        "and on the twin; then the paper's method flown as a campaign from both starts.",
         paper="Five simulated takeoffs from the default gains take the error from 0.3775 m to 0.1521 m; four from the "
         "simplex's gains, from 0.1006 m to 0.0940 m.",
         figures={"figure7-left": "Fig. 7, left", "figure7-right": "Fig. 7, right"},
