@@ -39,7 +39,8 @@ class CampaignFile(NewCampaign):
 
 
 def preset_names() -> tuple[str, ...]:
-    """Names of the campaigns that come with the program, the paper's own first."""
+    """Names of the campaigns that come with the program, the shortest first: of those with the same vehicle and
+    experiment, the first one is the default."""
     return tuple(sorted((path.stem for path in PRESETS_DIR.glob("*.yaml")), key=lambda name: (len(name), name)))
 
 

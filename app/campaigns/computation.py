@@ -73,7 +73,14 @@ def compute(past: CampaignHistory) -> ProposalComputation:
         spread=spread,
         flights=tuple(flight.number for flight in flights if flight.outcome == "valid"),
         stop_verdict=stop_verdict,
-        advice=advise(definition, experiment, flights, proposal, stop_verdict),
+        advice=advise(
+            definition,
+            experiment,
+            flights,
+            proposal,
+            stop_verdict,
+            is_reopened=len(flights) < past.open_until_flight,
+        ),
     )
 
 

@@ -62,7 +62,9 @@ DataDir = Annotated[Path | None, typer.Option(help="Folder of the database.  [de
 CampaignSource = Annotated[
     str,
     typer.Argument(
-        metavar="PRESET|FILE.yaml", show_default=False, help="A preset, such as ardrone-takeoff, or a campaign file."
+        metavar="PRESET|FILE.yaml",
+        show_default=False,
+        help="A preset, such as ardrone-takeoff or paper-ardrone-takeoff, or a campaign file.",
     ),
 ]
 GivenCampaign = Annotated[str, typer.Argument(metavar="ID|NAME", show_default=False, help="The campaign.")]

@@ -32,9 +32,29 @@ def test_every_preset_is_a_campaign_that_can_be_created(name: str) -> None:
         "ardrone-altitude-steps": "altitude-steps",
         "ardupilot-altitude-steps": "altitude-steps-ardupilot",
         "px4-altitude-steps": "altitude-steps-px4",
+        "paper-f16-pitch-tracking": "pitch-tracking",
     }
     assert definition.experiment == of_its_own.get(name, "takeoff")
     assert len(file.gains) == (definition.stop.max_flights if definition.strategy == "manual" else 0)
+
+
+def test_the_papers_presets_fly_the_papers_method_and_the_others_do_not() -> None:
+    raw = {"scaled": False, "bias": "outside"}
+    starts = {}
+    for name in preset_names():
+        file, definition = read_preset(name), checked(read_preset(name))
+        is_papers = name.startswith("paper-")
+        assert file.name.startswith("The paper's method") == is_papers
+        assert (definition.strategy == "gradient") == (definition.stop.kind == "paper") == is_papers
+        assert ("not the paper's" in file.description) != is_papers
+        if is_papers:
+            assert dict(definition.options) == raw
+            starts[name] = definition.start.kind
+    assert starts == {
+        "paper-ardrone-takeoff": "default",
+        "paper-ardrone-takeoff-simplex": "simplex",
+        "paper-f16-pitch-tracking": "simplex",
+    }
 
 
 def test_the_gain_sets_of_a_file_are_complete_and_in_the_experiments_order(tmp_path: Path) -> None:

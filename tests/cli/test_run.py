@@ -50,7 +50,7 @@ def test_the_gradient_tunes_the_jsbsim_drone_by_the_fourth_flight(tmp_path: Path
 
 @pytest.mark.complete
 def test_the_raw_gradient_beats_the_papers_best_simulated_flight_within_seven(tmp_path: Path) -> None:
-    campaign = flown(tmp_path, "run", "ardrone-takeoff", "--strategy", "gradient", *PAPER, "--set", "scaled=false")
+    campaign = flown(tmp_path, "run", "paper-ardrone-takeoff")
     assert min(errors(campaign)[:7]) <= 0.1521
 
 

@@ -148,6 +148,17 @@ def _next(
     return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
 
 
+def describe_doubt(
+    definition: Definition, experiment: Experiment, flights: Sequence[Flight], now: ComparisonState, proposal: Proposal
+) -> str:
+    """What speaks against a step whose effect the remaining flights cannot distinguish from noise; empty if they can.
+    At least one flight must be left."""
+    left = definition.stop.max_flights - len(flights)
+    if _is_worth_a_step(definition, now, left, proposal):
+        return ""
+    return f"This step {_lack(definition, experiment, now, left, proposal)}"
+
+
 def verdict_sentence(experiment: Experiment, now: ComparisonState) -> str:
     """The winner compared with the first gains, in a sentence."""
     if now.comparison is None:
@@ -223,11 +234,16 @@ def _no_prospect(
 ) -> str:
     if proposal.kind == "none":
         return f"{NO_STEP} the strategy proposes none."
+    return f"{NO_STEP} it {_lack(definition, experiment, now, left, proposal)}"
+
+
+def _lack(definition: Definition, experiment: Experiment, now: ComparisonState, left: int, proposal: Proposal) -> str:
+    """How little a step that is not worth a flight would gain, as the end of a sentence."""
     improvement, unit = _predicted_improvement(now, proposal), experiment.error_unit
     if improvement <= 0.0:
-        return f"{NO_STEP} it is not predicted to reduce the error."
+        return "is not predicted to reduce the error."
     return (
-        f"{NO_STEP} it would reduce the error by {short(improvement)} {unit}, less than the "
+        f"would reduce the error by {short(improvement)} {unit}, less than the "
         f"{short(_detectable_difference(definition, now, left))} {unit} that {count(left, 'flight')} can resolve."
     )
 

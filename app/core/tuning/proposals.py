@@ -13,7 +13,14 @@ from app.core.formatting import count, format_gains, named_flights, short
 from app.core.policy import Gains, PolicySpace
 from app.core.statistics.comparisons import Group, groups_of, pool_scatter
 from app.core.tuning.campaign_models import as_flown, changed_parameters, known_distribution
-from app.core.tuning.confirmation import NO_STEP, Confirmation, compare_winner, confirm, standing_within_bounds
+from app.core.tuning.confirmation import (
+    NO_STEP,
+    Confirmation,
+    compare_winner,
+    confirm,
+    describe_doubt,
+    standing_within_bounds,
+)
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
 from app.core.tuning.gate import GateResult, check_policy
 from app.core.tuning.predictions import is_informative, repeat_proposal, track_record, with_interval
@@ -194,7 +201,7 @@ def _with_notes(
 
 AdviceKind = Literal["step", "repeat", "baseline", "stop"]
 
-_MANUAL_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
+_OTHER_KINDS: dict[Kind, AdviceKind] = {"start": "baseline", "repeat": "repeat", "baseline": "baseline"}
 _REPEAT_SHOWS: Final = "Flying the best gains again shows whether their error stays the same."
 
 
@@ -213,14 +220,17 @@ def advise(
     flights: Sequence[Flight],
     proposal: Proposal,
     verdict: StopVerdict,
+    *,
+    is_reopened: bool = False,
 ) -> Advice:
     """Recommend the next action.
 
-    Under the stop rule `noise` the proposal already contains the recommendation. Under the other rules the advice is
-    only a recommendation: it advises against a step whose effect flights cannot distinguish from noise. With any rule
-    it advises to stop once a flight was aborted because of the start gains, and none is valid. Only gains within the
-    bounds are recommended, except when one of the other rules stops the campaign: that advice names the best of all
-    flights.
+    Under the stop rule `noise` the proposal already contains the recommendation. Under the other rules it is the
+    strategy's step until the rule stops, with a note where flights cannot distinguish its effect from noise. Without a
+    step, or in a campaign that `is_reopened` after its rule had stopped it, the advice is to confirm the best gains.
+    With any rule it is to stop once a flight was aborted because of the start gains, and none is valid. Only gains
+    within the bounds are recommended, except when one of the other rules stops the campaign: that advice names the best
+    of all flights.
     """
     tells_noise = definition.stop.kind == "noise"
     now = (compare_winner if verdict.stop and not tells_noise else standing_within_bounds)(
@@ -233,10 +243,11 @@ def advise(
         ended = f"{NO_STEP} the budget of {count(budget, 'flight')} is used up. " if len(flights) >= budget else ""
         why = f"{proposal.explanation.summary} {ended}{_REPEAT_SHOWS}"
         return Advice(kind="repeat", gains=dict(now.winner.gains), why=why)
-    if now is None or tells_noise:
+    if now is None or tells_noise or not (proposal.kind == "none" or is_reopened):
         is_refuted = proposal.kind == "start" and bool(aborted_by_gains(flights, proposal.gains))
-        kind = "stop" if is_refuted else _MANUAL_KINDS.get(proposal.kind, "step")
-        return Advice(kind=kind, gains=proposal.gains, why=proposal.explanation.summary)
+        kind = "stop" if is_refuted else _OTHER_KINDS.get(proposal.kind, "step")
+        doubt = "" if now is None or tells_noise else describe_doubt(definition, experiment, flights, now, proposal)
+        return Advice(kind=kind, gains=proposal.gains, why=f"{proposal.explanation.summary} {doubt}".strip())
     confirmation = confirm(definition, experiment, flights, proposal)
     kind = _kind(confirmation)
     chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}

@@ -1,6 +1,7 @@
 """Telling the winner from luck: the rule `noise`, and advice under the other rules."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -176,26 +177,58 @@ def test_a_real_improvement_of_five_standard_deviations_is_nearly_always_found()
     assert flights / 200 <= 5.0
 
 
+RUNS = [
+    ([], proposed("start"), "baseline", 99.0),
+    ([(1, 0.5)], proposed(error=0.3), "step", 99.0),
+    ([(1, 0.5), (2, 0.4)], proposed(error=0.399), "step", 99.0),
+    ([(1, 0.5), (2, 0.4), (2, 0.41)], proposed("shorter step", 0.399), "step", 99.0),
+    ([(1, 0.5), (2, 0.4), (2, 0.41), (1, 0.5)], proposed(error=0.3), "step", 99.0),
+    ([(1, 0.5), (2, 0.49)], proposed("manual", 0.49), "step", 99.0),
+]
+WITHOUT_A_STEP = [
+    ([(1, 0.5), (2, 0.4)], proposed("none", 0.4), "repeat", 2.0),
+    ([(1, 0.5), (2, 0.4), (2, 0.41)], proposed("none", 0.4), "baseline", 1.0),
+    ([(1, 0.5), (2, 0.4), (2, 0.41), (1, 0.5)], proposed("none", 0.4), "stop", 2.0),
+]
+
+
 @pytest.mark.parametrize(
-    ("runs", "proposal", "kind", "a"),
-    [
-        ([], proposed("start"), "baseline", 99.0),
-        ([(1, 0.5)], proposed(error=0.3), "step", 99.0),
-        ([(1, 0.5), (2, 0.4)], proposed(error=0.399), "repeat", 2.0),
-        ([(1, 0.5), (2, 0.4), (2, 0.41)], proposed(error=0.399), "baseline", 1.0),
-        ([(1, 0.5), (2, 0.4), (2, 0.41), (1, 0.5)], proposed(error=0.3), "stop", 2.0),
-    ],
+    ("rule", "runs", "proposal", "kind", "a"),
+    [*(("paper", *run) for run in RUNS), *(("budget", *run) for run in (*RUNS, *WITHOUT_A_STEP))],
 )
-def test_under_the_budget_rule_advice_is_given_beside_the_proposal(
-    runs: list[tuple[float, float]], proposal: Proposal, kind: str, a: float
+def test_under_the_other_rules_the_advice_is_the_strategys_step_as_long_as_there_is_one(
+    rule: Literal["paper", "budget"], runs: list[tuple[float, float]], proposal: Proposal, kind: str, a: float
 ) -> None:
-    definition = Definition(stop=StopRule(kind="budget", max_flights=12))
+    definition = Definition(stop=StopRule(kind=rule, max_flights=12))
     flights = flown(*runs)
-    advice = advise(
-        definition, QuadraticExperiment(), flights, proposal, evaluate_stop_rule(definition, flights, proposal)
-    )
+    verdict = evaluate_stop_rule(definition, flights, proposal)
+    advice = advise(definition, QuadraticExperiment(), flights, proposal, verdict)
+    assert not verdict.stop
     assert (advice.kind, advice.gains["a"]) == (kind, a)
     assert advice.why
+
+
+def test_a_step_that_flights_cannot_tell_from_noise_is_advised_with_a_note() -> None:
+    flights = flown((1, 0.5), (2, 0.4))
+
+    def why(error: float) -> str:
+        proposal = proposed(error=error)
+        verdict = evaluate_stop_rule(PAPER, flights, proposal)
+        return advise(PAPER, QuadraticExperiment(), flights, proposal, verdict).why
+
+    assert why(0.3) == "As the strategy has it."
+    assert why(0.399).startswith(
+        "As the strategy has it. This step would reduce the error by 0.0010 m, less than the 0.00"
+    )
+    assert why(0.41) == "As the strategy has it. This step is not predicted to reduce the error."
+
+
+def test_a_campaign_reopened_after_its_rule_ended_it_is_advised_to_confirm_its_best() -> None:
+    flights, proposal = flown((1, 0.5), (2, 0.4), (3, 0.41), (4, 0.42)), proposed(error=0.399)
+    verdict = evaluate_stop_rule(PAPER, flights, proposal, open_until_flight=6)
+    assert not verdict.stop
+    advice = advise(PAPER, QuadraticExperiment(), flights, proposal, verdict, is_reopened=True)
+    assert (advice.kind, advice.gains["a"]) == ("repeat", 2.0)
 
 
 def test_when_the_rule_says_stop_the_advice_is_to_stop_with_the_best() -> None:

@@ -64,6 +64,27 @@ def test_from_the_models_optimum_the_ardrone_reaches_the_papers_best() -> None:
     assert min(errors(flights)) <= 0.0940
 
 
+@pytest.mark.parametrize(
+    ("start", "ended", "count"),
+    [(Start(), "not improving", 5), pytest.param(SIMPLEX_START, "not improving", 3, marks=pytest.mark.complete)],
+)
+def test_who_follows_the_advice_under_the_papers_rule_flies_the_papers_loop(
+    start: Start, ended: str, count: int
+) -> None:
+    """Reported was *Repeat* after flight 3, and "stop the campaign" after flight 1 from the simplex start."""
+    definition = Definition(options=RAW, start=start, stop=PAPER)
+    flights, proposals = campaign(definition, ARDRONE)
+    for number, proposal in enumerate(proposals):
+        history = flights[:number]
+        verdict = evaluate_stop_rule(definition, history, proposal)
+        advice = advise(definition, TAKEOFF, history, proposal, verdict)
+        if number == len(flights):
+            assert (verdict.reason, advice.kind) == (ended, "stop")
+        else:
+            assert (advice.kind, advice.gains) == ("step" if number else "baseline", proposal.gains)
+    assert len(flights) == count
+
+
 @pytest.mark.parametrize("options", [{}, RAW])
 @pytest.mark.complete
 def test_on_the_twin_a_wrong_hover_throttle_latency_and_lag_do_not_hinder(options: dict[str, bool]) -> None:

@@ -55,7 +55,7 @@ export function FirstCampaign() {
         Create “{preset?.title ?? "AR.Drone takeoff to 3 m, simulated"}”
       </Button>
       <Anchor component={Link} to="/new" display="inline-block" py={12}>
-        Choose vehicle and settings first
+        Choose a preset or settings first
       </Anchor>
       <ImportBundle />
       <ErrorNotice error={catalogue.error ?? create.error} />

@@ -24,6 +24,7 @@ import {
   inUnitsOfForm,
   kindsFor,
   LABELS,
+  presetOf,
   registeredFor,
   requestFrom,
   type StartKind,
@@ -32,6 +33,7 @@ import {
   strategiesFor,
   unreadable,
   withExperiment,
+  withPreset,
   withRegistered,
   withVehicle,
 } from "./newCampaign";
@@ -64,6 +66,7 @@ export function NewCampaignPage() {
 const ENTER_NAME = "Enter a name.";
 const CHOOSE_VEHICLE = "Choose a vehicle.";
 const CHOOSE_CAMPAIGN = "Choose a campaign.";
+const NO_PRESET = { value: "", label: "Own settings" };
 
 const STARTS: Record<StartKind, string> = {
   default: "The vehicle's default gains",
@@ -96,6 +99,8 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
 
   const refusedBelow = Object.keys(advanced).some((field) => reasons[field] !== undefined);
   const set = (change: Partial<CampaignForm>): void => setForm({ ...form, ...change });
+  const preset = presetOf(form, catalogue);
+  const presets = catalogue.presets.map(({ name, title }) => ({ value: name, label: title }));
   const strategies = strategiesFor(catalogue, form.experiment);
   const strategy = strategies.find(({ name }) => name === form.strategy);
   const recommended = strategies[0]?.name;
@@ -119,6 +124,16 @@ function NewCampaignForm({ catalogue, vehicles, wanted }: FormProps) {
         create.mutate(request, { onSuccess: ({ id }) => void navigate(`/campaigns/${id}`) });
       }}
     >
+      <SelectField
+        label="Preset"
+        description={preset?.line}
+        data={preset === undefined ? [NO_PRESET, ...presets] : presets}
+        value={preset?.name ?? NO_PRESET.value}
+        onChange={(value) => {
+          const chosen = catalogue.presets.find(({ name }) => name === value);
+          if (chosen !== undefined) setForm(withPreset(form, catalogue, chosen));
+        }}
+      />
       {catalogue.experiments.length > 1 && (
         <SelectField
           label={LABELS["definition.experiment"]}

@@ -8,12 +8,14 @@ import {
   flyingOther,
   kindsFor,
   optionsOf,
+  presetOf,
   registeredFor,
   requestFrom,
   startingForm,
   startsFor,
   strategiesFor,
   withExperiment,
+  withPreset,
   withRegistered,
   withVehicle,
 } from "./newCampaign";
@@ -281,4 +283,48 @@ test("the height of steps is at most what the vehicle is commanded to fly to", (
     [10, 1],
     [3.5, 1],
   ]);
+});
+
+const papers = {
+  name: "paper",
+  title: "The paper's method",
+  line: "A gradient.",
+  campaign: {
+    name: "The paper's method",
+    vehicle: { kind: "lti", options: {}, id: null },
+    definition: {
+      experiment: "pitch-tracking",
+      experiment_options: { perturbation: 0.45 },
+      strategy: "gradient",
+      options: { scaled: false },
+      start: { kind: "simplex", gains: null, donor: null, log: null },
+      bounds: {},
+      first_step_fraction: 0.25,
+      step_fraction: 1,
+      ceiling_m: 4.5,
+      stop: { kind: "paper", max_flights: 27, improvement: 0.07, confidence: 0.9, min_battery_v: null },
+      seed: 1,
+    },
+  },
+} as unknown as Catalogue["presets"][number];
+
+test("a preset fills in the whole form, and is named until a setting is changed", () => {
+  const offering = { ...catalogue, presets: [papers] };
+  const form = withPreset({ ...startingForm(offering), seed: 5 }, offering, papers);
+  expect(presetOf(form, offering)?.name).toBe("paper");
+  expect(requestFrom(form, offering)).toEqual({
+    name: "The paper's method",
+    vehicle: { kind: "lti", options: {} },
+    definition: { ...papers.campaign.definition, start: { kind: "simplex" } },
+  });
+  expect(presetOf({ ...form, name: "Mine" }, offering)?.name).toBe("paper");
+  expect(presetOf({ ...form, seed: 2 }, offering)).toBeUndefined();
+  expect(presetOf(startingForm(offering), offering)).toBeUndefined();
+});
+
+test("a preset leaves a name that somebody has typed, and its own is no such name", () => {
+  const offering = { ...catalogue, presets: [papers, ...catalogue.presets] };
+  const form = startingForm(offering);
+  expect(withPreset({ ...form, name: "Mine" }, offering, papers).name).toBe("Mine");
+  expect(withExperiment(withPreset(form, offering, papers), offering, "takeoff").name).toBe("Simulated takeoff");
 });

@@ -151,7 +151,45 @@ export function startingForm(
 }
 
 function isNamedByHand({ name, experiment, vehicle, registered }: CampaignForm, catalogue: Catalogue): boolean {
-  return name !== nameFor(catalogue, experiment, registered?.name ?? vehicle);
+  const isTitle = catalogue.presets.some(({ title }) => title === name);
+  return !isTitle && name !== nameFor(catalogue, experiment, registered?.name ?? vehicle);
+}
+
+function percentOf(share: number): number {
+  return Number((100 * share).toPrecision(12));
+}
+
+/** Select a preset: replaces everything except an edited name. */
+export function withPreset(form: CampaignForm, catalogue: Catalogue, { title, campaign }: PresetInfo): CampaignForm {
+  const { definition, vehicle } = campaign;
+  const fresh = startingForm(catalogue, definition.experiment);
+  return {
+    ...fresh,
+    name: isNamedByHand(form, catalogue) ? form.name : title,
+    experimentOptions: definition.experiment_options,
+    vehicle: vehicle.kind,
+    vehicleOptions: vehicle.options,
+    strategy: definition.strategy,
+    strategyOptions: definition.options,
+    start: definition.start.kind,
+    startGains: { ...fresh.startGains, ...definition.start.gains },
+    stop: definition.stop.kind,
+    maxFlights: definition.stop.max_flights,
+    improvementPercent: percentOf(definition.stop.improvement),
+    confidencePercent: percentOf(definition.stop.confidence),
+    minBatteryV: definition.stop.min_battery_v ?? "",
+    bounds: { ...fresh.bounds, ...definition.bounds },
+    firstStepPercent: percentOf(definition.first_step_fraction),
+    stepPercent: percentOf(definition.step_fraction),
+    ceilingM: definition.ceiling_m,
+    seed: definition.seed,
+  };
+}
+
+/** The preset whose settings the form has; undefined if they are others. */
+export function presetOf(form: CampaignForm, catalogue: Catalogue): PresetInfo | undefined {
+  const settings = (one: CampaignForm): string => JSON.stringify({ ...one, name: "" });
+  return catalogue.presets.find((preset) => settings(withPreset(form, catalogue, preset)) === settings(form));
 }
 
 /** Select a vehicle: resets the vehicle settings and updates an unedited name. */
