@@ -189,7 +189,14 @@ _TIMES: Final[Mapping[str, Hazard]] = {
         link=lambda _: DelayedPackets(2.0, every=7, copies=False), expected=_may("F12", "F9a", "F9d")
     ),
     "copies after 2 s": Hazard(link=lambda _: DelayedPackets(2.0, every=2, copies=True), expected=_REFUSED),
-    "copies of all after 3 s": Hazard(link=lambda _: DelayedPackets(3.0, every=1, copies=True), expected=_REFUSED),
+    "copies of all after 3 s": Hazard(
+        link=lambda _: DelayedPackets(3.0, every=1, copies=True),
+        expected=_REFUSED,
+        states=tuple(state for state in State if state is not State.CONNECT),
+    ),
+    "copies of unheard packets": Hazard(  # for 3 s they are those of a second vehicle
+        link=lambda _: DelayedPackets(3.0, every=1, copies=True), expected=_TWINS, states=(State.CONNECT,)
+    ),
     "copies at once": Hazard(link=lambda _: DelayedPackets(0.0, every=1, copies=True), expected=HARMLESS),
     "an hour ahead": Hazard(link=false_position(height_m=0.1, every_s=1.0, ahead_s=3600.0), expected=_REFUSED),
     **{
