@@ -64,6 +64,8 @@ BEHIND_M: Final = 0.5
 """An altitude that has fallen behind the integrated climb rate by more than this does not follow it."""
 DRIFT_M: Final = 1.0
 """Greatest drift of an altitude during a flight."""
+_DRIFT_M_S: Final = 0.5
+"""Greatest rate of such a drift on the ground; 0.36 m/s were recorded under PX4."""
 _STANDS_S: Final = 3.0
 """Time for which the landed state of a vehicle that was not commanded to take off is believed."""
 _LEAN_RAD: Final = math.radians(20.0)
@@ -330,10 +332,11 @@ def has_reported_landing(watch: TrialObservation, now_s: float, landed_blocks: f
 
 def stands_by_own_account(watch: TrialObservation, now_s: float, ground_m: float, limits: Limits) -> bool:
     """Whether it reports that it is on the ground, or in a block of its plan that has no thrust, and its altitude has
-    not drifted further than one may. To be called for a vehicle that was not commanded to take off."""
-    drifted_m = 0.0 if watch.last is None else watch.last.altitude_m - ground_m
+    not drifted further than one may, nor faster. To be called for a vehicle that was not commanded to take off."""
+    last = watch.last
+    drifts = last is None or (abs(last.altitude_m - ground_m) <= DRIFT_M and abs(last.climb_rate_m_s) <= _DRIFT_M_S)
     says_so = watch.landed is True and now_s - watch.landed_s < _STANDS_S
-    return abs(drifted_m) <= DRIFT_M and (says_so or watch.block in limits.arming_blocks)
+    return drifts and (says_so or watch.block in limits.arming_blocks)
 
 
 def secondary_altitude_m(second: SecondaryAltitude | None, now_s: float) -> float | None:

@@ -630,13 +630,12 @@ def find_reception(positions: Sequence[tuple[float, Position]], now_s: float) ->
     new: dict[float, float] = {}
     for stamp_s, at_s in reversed(heard):
         new.setdefault(stamp_s, at_s)
-    pairs = ((later[0] - earlier[0], later[1] - earlier[1]) for earlier, later in pairwise(new.items()))
-    gaps = [pair for pair in pairs if 0.0 < pair[0] < _GOES_ON_S]
+    gaps = [(later[0] - earlier[0], later[1] - earlier[1]) for earlier, later in pairwise(new.items())]
     if not gaps:
         return 0.0, 0.0
-    usual_s, further = statistics.median(own_s for own_s, _ in gaps), len(new) - 1
+    usual_s = statistics.median(later_s - earlier_s for earlier_s, later_s in pairwise(sorted(new)))
     lost = sum(max(int(min(gap) / usual_s + _IRREGULAR) - 1, 0) for gap in gaps)
-    return further / max(last_s - first_s, further * usual_s), lost / (lost + further)
+    return len(gaps) / max(last_s - first_s, len(gaps) * usual_s), lost / (lost + len(gaps))
 
 
 def _moved_m(positions: Sequence[Position]) -> float:

@@ -257,7 +257,7 @@ def _arm(trial: Trial, event: Event) -> Step:
     if finding := limit_checks.find_on_ground(trial.watch, trial.plan.limits, now_s) or _not_armed(trial, event):
         return fail(measure_ground(trial, now_s), finding, now_s)
     last = trial.watch.last
-    if trial.armed_s is None or now_s - trial.armed_s < BASELINE_S or last is None:
+    if trial.armed_s is None or not trial.watch.armed or now_s - trial.armed_s < BASELINE_S or last is None:
         return trial, ()
     watch = replace(trial.watch, behind_m=0.0, stepped_s=0.0, highest_m=last.altitude_m)
     trial = measure_ground(replace(trial, watch=watch), now_s)

@@ -82,6 +82,13 @@ def test_positions_that_arrive_at_once_after_a_stall_are_no_more_per_second() ->
     assert lost_share == 0.0
 
 
+def test_positions_that_arrive_in_pairs_swapped_are_all_there() -> None:
+    swapped = [STEADY[count + (1 if count % 2 == 0 else -1)][1] for count in range(100)]
+    rate_hz, lost_share = find_reception([(160.0 + 0.02 * count, each) for count, each in enumerate(swapped)], 162.0)
+    assert rate_hz == pytest.approx(50.0)
+    assert lost_share == 0.0
+
+
 def test_positions_at_intervals_that_differ_by_half_are_not_lost() -> None:
     """px4_refused_in_offboard.tlog: 16, 20 and 24 ms."""
     stamps_s = [0.02 * count + 0.004 * (count % 2) for count in range(100)]

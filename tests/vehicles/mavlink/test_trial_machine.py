@@ -549,6 +549,33 @@ def test_an_altitude_that_stands_still_is_no_missing_lift_off() -> None:
     assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
 
 
+def test_no_take_off_is_commanded_while_the_newest_heartbeat_reports_the_motors_off() -> None:
+    """Seen: another station stopped them 0.06 s after arming; the takeoff was commanded, and a quarantine followed."""
+    walk = TrialDriver()
+    walk.give(ActionDone(Action.ARM, walk.now_s))
+    walk.armed = True
+    while walk.trial.armed_s is None:
+        walk.pass_s(STEP_S)
+    walk.armed = False
+    walk.pass_s(2.0)
+    assert (walk.trial.failure, Action.TAKE_OFF in walk.actions) == (Failure.NOT_ARMED, False)
+
+
+def test_a_vehicle_that_climbs_before_its_command_does_not_stand_though_it_says_so() -> None:
+    """Seen: HOME mode at arming; its motors were told to stop 0.16 m above the ground, because its plan's block has no
+    thrust."""
+    walk = TrialDriver()
+    walk.give(ActionDone(Action.ARM, walk.now_s))
+    walk.armed, walk.landed = True, True
+    while walk.trial.armed_s is None:
+        walk.pass_s(STEP_S)
+    walk.climb_rate_m_s = 0.8
+    for _ in range(75):
+        walk.pass_s(STEP_S)
+        assert Action.MOTORS_OFF not in walk.actions or walk.altitude_m - GROUND_M < 0.15
+    assert walk.state is State.ABORT_LAND
+
+
 def test_a_lift_off_that_cannot_be_seen_is_a_lost_link_not_a_missing_lift_off() -> None:
     walk = TrialDriver().arm().pass_s(0.6)
     walk.mute = True
