@@ -57,7 +57,7 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/jobs")
-    job_id = dashboard.post("/reproductions/variability/run")["id"]
+    job_id = dashboard.post("/reproductions/f16/run")["id"]  # lasts until it is cancelled
     kill_until_given_up(dashboard, empty_server, job_id)
     states.reproduce("controller")
     groups = page.get_by_role("main").get_by_role("region", name=re.compile("jobs$"))

@@ -148,14 +148,14 @@ def _next(
     return Confirmation(phase="step", why=_describe_improvement(definition, experiment, now, left, proposal))
 
 
-def describe_doubt(
+def describe_step(
     definition: Definition, experiment: Experiment, flights: Sequence[Flight], now: ComparisonState, proposal: Proposal
 ) -> str:
-    """What speaks against a step whose effect the remaining flights cannot distinguish from noise; empty if they can.
-    At least one flight must be left."""
+    """Predicted improvement of a step beside what the remaining flights, at least one, can distinguish from noise;
+    empty for a `manual` proposal."""
     left = definition.stop.max_flights - len(flights)
     if _is_worth_a_step(definition, now, left, proposal):
-        return ""
+        return _describe_improvement(definition, experiment, now, left, proposal)
     return f"This step {_lack(definition, experiment, now, left, proposal)}"
 
 

@@ -18,7 +18,7 @@ from app.core.tuning.confirmation import (
     Confirmation,
     compare_winner,
     confirm,
-    describe_doubt,
+    describe_step,
     standing_within_bounds,
 )
 from app.core.tuning.corrected_model import correct_by_bias, start_gains, uncorrected_model
@@ -246,8 +246,8 @@ def advise(
     if now is None or tells_noise or not (proposal.kind == "none" or is_reopened):
         is_refuted = proposal.kind == "start" and bool(aborted_by_gains(flights, proposal.gains))
         kind = "stop" if is_refuted else _OTHER_KINDS.get(proposal.kind, "step")
-        doubt = "" if now is None or tells_noise else describe_doubt(definition, experiment, flights, now, proposal)
-        return Advice(kind=kind, gains=proposal.gains, why=f"{proposal.explanation.summary} {doubt}".strip())
+        effect = "" if now is None or tells_noise else describe_step(definition, experiment, flights, now, proposal)
+        return Advice(kind=kind, gains=proposal.gains, why=effect or proposal.explanation.summary)
     confirmation = confirm(definition, experiment, flights, proposal)
     kind = _kind(confirmation)
     chosen = {"step": proposal.gains, "repeat": now.winner.gains, "baseline": now.baseline.gains}

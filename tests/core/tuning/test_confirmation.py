@@ -208,7 +208,7 @@ def test_under_the_other_rules_the_advice_is_the_strategys_step_as_long_as_there
     assert advice.why
 
 
-def test_a_step_that_flights_cannot_tell_from_noise_is_advised_with_a_note() -> None:
+def test_a_step_is_advised_with_its_effect_beside_what_flights_can_tell_from_noise() -> None:
     flights = flown((1, 0.5), (2, 0.4))
 
     def why(error: float) -> str:
@@ -216,11 +216,9 @@ def test_a_step_that_flights_cannot_tell_from_noise_is_advised_with_a_note() -> 
         verdict = evaluate_stop_rule(PAPER, flights, proposal)
         return advise(PAPER, QuadraticExperiment(), flights, proposal, verdict).why
 
-    assert why(0.3) == "As the strategy has it."
-    assert why(0.399).startswith(
-        "As the strategy has it. This step would reduce the error by 0.0010 m, less than the 0.00"
-    )
-    assert why(0.41) == "As the strategy has it. This step is not predicted to reduce the error."
+    assert why(0.3).startswith("The next step is predicted to reduce the error by 0.100 m, more than the 0.0082 m that")
+    assert why(0.399).startswith("This step would reduce the error by 0.0010 m, less than the 0.00")
+    assert why(0.41) == "This step is not predicted to reduce the error."
 
 
 def test_a_campaign_reopened_after_its_rule_ended_it_is_advised_to_confirm_its_best() -> None:

@@ -236,7 +236,7 @@ def test_a_vehicle_that_will_not_arm_is_not_flown_and_has_its_safe_gains_back() 
 def test_a_position_that_comes_too_seldom_is_refused() -> None:
     with (
         LockstepRig(release="paparazzi-bare") as rig,
-        pytest.raises(VehicleError, match=r"Position: .* per second, required: 40"),
+        pytest.raises(VehicleError, match=r"Position: .* per second, .* lost, required: 40"),
     ):
         rig.vehicle()
 
