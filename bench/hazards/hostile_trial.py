@@ -226,7 +226,6 @@ def run_trial(case: Case) -> HostileResult:
     """Run the trial of a case. An exception in the simulated drone propagates."""
     rig = HostileRig(case)
     rig.wait_s(case.powered_s)
-    rig.close()  # what was sent before the connection does not arrive
     rig.states.begin(rig.now_s())
     if case.faults[0].kind != PROCESS_KILLED:
         return _run(rig)
@@ -247,7 +246,8 @@ def _run(rig: HostileRig) -> HostileResult:
 
 
 def _connect(rig: HostileRig) -> MavlinkVehicle:
-    """Connect as a process does, which knows what the program has stored."""
+    """Connect as a process does, which knows what the program has stored, and hears nothing that was sent before."""
+    rig.close()
     source = open_source("odometry", rig) if rig.case.has_second_source else None
     return MavlinkVehicle(
         rig.options(),
@@ -287,7 +287,6 @@ def _go_on_after_death(rig: HostileRig) -> HostileResult:
     """Reconnect as another process does, attend to the vehicle, and return what it reports."""
     rig.states.ended_s = rig.drone.time_s
     rig.wait_s(KILLED_FOR_S)
-    rig.close()
     try:
         vehicle = _connect(rig)
     except VehicleError as error:

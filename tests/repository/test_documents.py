@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from app.campaigns.campaign_files import preset_names
 from app.common.settings import Settings
 from app.reproductions.registry import REPRODUCTIONS
 
@@ -85,6 +86,9 @@ def test_the_table_of_the_papers_claims_leaves_nothing_out() -> None:
     assert [figure for figure in range(1, 13) if not re.search(rf"Figs?\. {figure}\b", text)] == []
 
 
-def test_every_reproduction_that_the_table_names_is_there() -> None:
-    named = re.findall(r"`gainline reproduce (\w+)", (ROOT / "docs/paper.md").read_text())
-    assert set(named) == set(REPRODUCTIONS)
+def test_every_reproduction_and_preset_that_the_table_names_is_there() -> None:
+    text = (ROOT / "docs/paper.md").read_text()
+    assert set(re.findall(r"`gainline reproduce (\w+)", text)) == set(REPRODUCTIONS)
+    presets = set(re.findall(r"`gainline run ([\w-]+)", text))
+    assert presets
+    assert presets <= set(preset_names())

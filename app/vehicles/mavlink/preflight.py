@@ -123,9 +123,7 @@ def await_vehicle(radio: AutopilotLink, address: str, pinned: Identity | None = 
     other: Heartbeat | None = None
     while radio.clock.now_s() < until_s:
         heard = [each.measurement for each in radio.listen(_LISTEN_S) if isinstance(each.measurement, Heartbeat)]
-        for heartbeat in heard:
-            if heartbeat.autopilot != radio.profile.autopilot:
-                continue
+        for heartbeat in (each for each in heard if each.autopilot == radio.profile.autopilot):
             if heartbeat.component == _AUTOPILOT:
                 return _set_target(radio, heartbeat, pinned)
             if other is None:

@@ -203,7 +203,7 @@ def _with_disarming(trial: Trial) -> Trial:
     """Note that somebody else, or the vehicle itself, stopped its motors in the air: it exceeded its limits because it
     fell."""
     watch, limits = trial.watch, trial.plan.limits
-    if trial.stopped or trial.state not in {*_FLOWN, State.DISARM} or not watching.is_disarmed(watch, limits):
+    if trial.stopped or trial.state not in _UNTIL_STOPPED or not watching.is_disarmed(watch, limits):
         return trial
     fell = trial.fell_s is not None and watch.armed_since_s - trial.fell_s <= _STOPPED_WITHIN_S
     if not fell and trial.disarmed_m <= watching.DRIFT_M:
@@ -214,7 +214,7 @@ def _with_disarming(trial: Trial) -> Trial:
 def _with_drift(trial: Trial, now_s: float) -> Trial:
     """Note an altitude that has drifted, so that limits may have been exceeded by it alone, or that contradicts the
     landed state. In a fall it lags."""
-    is_up = trial.commanded_s is not None and trial.state in {*_FLOWN, State.DISARM}
+    is_up = trial.commanded_s is not None and trial.state in _UNTIL_STOPPED
     if trial.stopped or not is_up or trial.fell_s is not None:
         return trial
     plan, landed_blocks = trial.plan, trial.plan.limits.landed_blocks
@@ -592,6 +592,7 @@ _HANDLERS: Final[Mapping[State, Callable[[Trial, Event], Step]]] = {
 }
 _STATES_WITH_TRIAL_GAINS: Final = frozenset({State.TAKEOFF, State.RECORD})
 _FLOWN: Final = frozenset({State.TAKEOFF, State.RECORD, State.LAND, State.ABORT_LAND, State.LINK_LOST})
+_UNTIL_STOPPED: Final = _FLOWN | {State.DISARM}
 _RECORDED: Final = frozenset({State.ARM, State.TAKEOFF, State.RECORD, State.ABORT_LAND, State.LINK_LOST})
 
 
