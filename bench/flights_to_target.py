@@ -65,8 +65,9 @@ def tasks(methods: tuple[str, ...], vehicles: int, twins: int, seed: int) -> lis
             if name != "twin" or vehicle.number == 1:
                 optima.append((Task(population=name, number=vehicle.number, seed=seed, what=OPTIMUM), vehicle))
             for method in methods:
-                most = METHODS[method].most_vehicles
-                if (name == "twin" and method != "calibrated") or (most is not None and vehicle.number > most):
+                compared = METHODS[method]
+                most = compared.most_twins if name == "twin" else compared.most_vehicles
+                if most is not None and vehicle.number > most:
                     continue
                 tunings.append((Task(population=name, number=vehicle.number, seed=seed, what=method), vehicle))
     return sorted(optima + tunings, key=lambda each: each[0].number)

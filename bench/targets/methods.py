@@ -1,4 +1,5 @@
-"""What is compared: each method starts with the default gains and asks for one flight after the other.
+"""What is compared: each method starts with the default gains, or with the optimum of the nominal model (the paper's
+recommended start), and asks for one flight after the other.
 
 Black-box methods search the default bounds as a unit cube, in their libraries' own settings, and stand by the best they
 have observed. The Gaussian processes are told the logarithm of the error, which suits them better.
@@ -10,18 +11,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, Literal, Protocol
+from unittest.mock import patch
 
 import numpy as np
 from scipy.optimize import minimize
 
-from app.core.definition import Definition, Flight, OptionValue, StopRule
+from app.core.definition import Definition, Flight, OptionValue, Start, StopRule
+from app.core.experiments.base import prior_distribution
 from app.core.policy import PolicySpace, Vector
+from app.core.tuning.corrected_model import start_gains
 from app.core.tuning.definition_checks import check_definition
 from app.core.tuning.gate import check_policy
 from app.core.tuning.predictions import prediction_of
 from app.core.tuning.proposals import next_proposal
-from app.core.tuning.strategies import STRATEGIES
+from app.core.tuning.strategies import STRATEGIES, gradient
 from bench.targets.flying import EXPERIMENT, SPACE, Method, Tuning
 
 if TYPE_CHECKING:
@@ -37,7 +41,8 @@ DISTRIBUTIONS: Final[Mapping[str, str]] = MappingProxyType(
 @dataclass(frozen=True, slots=True)
 class Compared:
     """One method with its budget of flights; `needs` are modules of the group `bench`; `most_vehicles` of a population
-    are tuned by a method that takes long over each proposal."""
+    are tuned by a method that takes long over each proposal, and the twin of the paper's drone with `most_twins` seeds
+    (None: all)."""
 
     title: str
     run: Method
@@ -45,6 +50,7 @@ class Compared:
     recommends_last: bool = False
     needs: tuple[str, ...] = ()
     most_vehicles: int | None = None
+    most_twins: int | None = 0
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -178,14 +184,23 @@ def _finite_differences(search: Search) -> None:
                 length /= 2.0
 
 
-def _papers(*, scaled: bool) -> Method:
-    """The paper's method as published: no gate."""
+StartKind = Literal["default", "simplex"]
+
+
+def _as_published(*, scaled: bool, start: StartKind) -> Method:
+    """The paper's method without a gate, and without the fit of the vehicle's parameters that only the gate needs: the
+    strategy asks the gate about every step, so that here it is answered for."""
 
     def run(tuning: Tuning) -> None:
-        definition = _definition("gradient", {"scaled": scaled}, tuning)
-        history = [tuning.fly(SPACE.default)]
+        definition = _definition("gradient", {"scaled": scaled}, tuning, start)
+        history = [tuning.fly(SPACE.vector(start_gains(definition, EXPERIMENT, SPACE)))]
         while True:
-            proposal = STRATEGIES["gradient"].propose(definition, EXPERIMENT, SPACE, history)
+            with patch.multiple(
+                gradient,
+                allows=lambda *_: True,
+                known_distribution=lambda experiment, _: prior_distribution(experiment),
+            ):
+                proposal = STRATEGIES["gradient"].propose(definition, EXPERIMENT, SPACE, history)
             if proposal.kind == "none":
                 tuning.settle(SPACE.vector(proposal.gains), "nothing better")
                 return
@@ -194,33 +209,54 @@ def _papers(*, scaled: bool) -> Method:
     return run
 
 
-def _calibrated(tuning: Tuning) -> None:
-    """Gainline's own, proposal by proposal and through the gate as in a campaign: a refused proposal is not flown and
-    ends the tuning."""
-    definition = _definition("calibrated", {}, tuning)
-    history: list[Flight] = []
-    while True:
-        proposal = next_proposal(definition, history)
-        if proposal.kind == "none":
-            tuning.settle(SPACE.vector(proposal.gains), "nothing better")
-            return
-        gate = check_policy(definition, EXPERIMENT, SPACE, proposal.gains, history)
-        if not gate.passed:
-            tuning.ended = "refused: " + ", ".join(check.name for check in gate.checks if not check.passed)
-            return
-        flown = tuning.fly(SPACE.vector(proposal.gains), proposal.interval)
-        history.append(replace(flown, predicted=prediction_of(proposal)))
+def _campaign(strategy: str, options: Mapping[str, OptionValue], start: StartKind) -> Method:
+    """A strategy proposal by proposal and through the gate as in a campaign: a refused proposal is not flown and ends
+    the tuning."""
+
+    def run(tuning: Tuning) -> None:
+        definition = _definition(strategy, options, tuning, start)
+        history: list[Flight] = []
+        while True:
+            proposal = next_proposal(definition, history)
+            if proposal.kind == "none":
+                tuning.settle(SPACE.vector(proposal.gains), "nothing better")
+                return
+            gate = check_policy(definition, EXPERIMENT, SPACE, proposal.gains, history)
+            if not gate.passed:
+                tuning.ended = "refused: " + ", ".join(check.name for check in gate.checks if not check.passed)
+                return
+            flown = tuning.fly(SPACE.vector(proposal.gains), proposal.interval)
+            history.append(replace(flown, predicted=prediction_of(proposal)))
+
+    return run
 
 
-def _definition(strategy: str, options: Mapping[str, OptionValue], tuning: Tuning) -> Definition:
+def _definition(strategy: str, options: Mapping[str, OptionValue], tuning: Tuning, start: StartKind) -> Definition:
     definition = Definition(
         strategy=strategy,
         options=dict(options),
+        start=Start(kind=start),
         stop=StopRule(kind="budget", max_flights=tuning.budget),
         seed=tuning.campaign_seed,
     )
     check_definition(definition)
     return definition
+
+
+_STARTS: Final[Mapping[StartKind, str]] = MappingProxyType(
+    {"default": "the default gains", "simplex": "the simplex start"}
+)
+
+
+def _papers(name: str, line: str, *, scaled: bool) -> dict[str, Compared]:
+    """The paper's method from both starts, each as published and through the gate, which takes most of the time."""
+    found: dict[str, Compared] = {}
+    for start, origin in _STARTS.items():
+        key, title = name if start == "default" else f"{name}-{start}", f"The paper's method, {line}, from {origin}"
+        published, gated = _as_published(scaled=scaled, start=start), _campaign("gradient", {"scaled": scaled}, start)
+        found[key] = Compared(f"{title}, no gate", published, budget=10, most_twins=50)
+        found[f"{key}-gate"] = Compared(f"{title}, Gainline's gate", gated, budget=10, most_vehicles=50, most_twins=50)
+    return found
 
 
 SEARCHES: Final[Mapping[str, Callable[[Search], None]]] = MappingProxyType(
@@ -237,14 +273,23 @@ SEARCHES: Final[Mapping[str, Callable[[Search], None]]] = MappingProxyType(
 
 METHODS: Final[Mapping[str, Compared]] = MappingProxyType(
     {
-        "calibrated": Compared("Gainline: calibrated", _calibrated, budget=3, recommends_last=True),
-        "gradient": Compared(
-            "The paper's method, gains scaled",
-            _papers(scaled=True),
-            budget=10,
-            most_vehicles=50,
+        "calibrated": Compared(
+            "Gainline: calibrated",
+            _campaign("calibrated", {}, "default"),
+            budget=3,
+            recommends_last=True,
+            most_twins=None,
         ),
-        "gradient-raw": Compared("The paper's method, raw", _papers(scaled=False), budget=10, most_vehicles=50),
+        "calibrated-simplex": Compared(
+            "Gainline: calibrated, from the simplex start",
+            _campaign("calibrated", {}, "simplex"),
+            budget=3,
+            recommends_last=True,
+            most_twins=50,
+        ),
+        "simplex": Compared("The simplex start alone", _as_published(scaled=False, start="simplex"), budget=1),
+        **_papers("gradient-raw", "raw", scaled=False),
+        **_papers("gradient", "gains scaled", scaled=True),
         "nelder-mead": Compared("Nelder–Mead on the vehicle", _nelder_mead, budget=60),
         "finite-differences": Compared("Finite differences on the vehicle", _finite_differences, budget=60),
         "tpe": Compared("Optuna, TPE", _tpe, budget=60, needs=("optuna",)),

@@ -5,6 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from app.core.definition import Definition, Start
+from app.core.tuning.corrected_model import start_gains
+from bench.targets.flying import EXPERIMENT, SPACE
 from bench.targets.methods import METHODS
 from bench.targets.report import AT_FLIGHTS, TARGETS, Outcome
 from bench.targets.results import Results
@@ -33,14 +36,26 @@ _INTRODUCTION: Final = """\
 The number of takeoffs that a method needs until the error with its recommended gains is within 5 % or 2 % of the lowest
 that is possible on the vehicle.
 
-- All methods start with the default gains, search the same bounds, and tune the same vehicles with the same scatter.
+- All methods search the same bounds, and tune the same vehicles with the same scatter. They start with the default
+  gains; rows *from the simplex start* start with the optimum of the nominal model, found by Nelder–Mead before any
+  flight (kp {kp}, ki {ki}, kd {kd}, the same for all vehicles): the start that the paper recommends if no good gains
+  are known. Its own, kp 1624, ki 1356, kd 195, lies outside the bounds.
 - The error compared is that of the gains that a method recommends after a number of flights, without noise. Gainline
-  recommends the gains that it proposed last, the other methods the best that they have flown. The lowest possible error
-  is found by a search on the vehicle itself, without noise.
+  recommends the gains that it proposed last, the other methods the best that they have flown; after flight 1 that is
+  the start. The lowest possible error is found by a search on the vehicle itself, without noise.
 - A flight is unsafe if it rises above 3.75 m, is below 2.25 m more than 5 s after the command, or diverges. The first
-  flight and repeated flights of the default gains do not count.
-- Gainline's proposals pass its gate as in a campaign, and the processor time of the gate is included. A refused
-  proposal ends the tuning as a failure. The other methods have no gate.
+  flight and repeated flights of the default gains do not count; first flights have a column of their own.
+- *Gainline: calibrated* proposes and passes the gate as in a campaign. A refused proposal ends the tuning as a failure.
+- *The paper's method* is the strategy `gradient`: the model corrected by a bias outside the loop, its gradient, and the
+  line search from the best flight, with the gains raw as in the paper, or scaled. *No gate* is the method as published:
+  every step is flown. With *Gainline's gate* it is flown as in a campaign: steps that the gate refuses are halved, and
+  if none passes, the tuning ends with its best flight. Neither applies the paper's stop rule: both go on for ten
+  flights, or until the model predicts no better step.
+- *The simplex start alone* is one flight with these gains, and no tuning.
+- The remaining methods fly whatever they ask for inside the bounds: they know neither the model nor the gate.
+- Processor times of a proposal contain all that happens between two flights: with the gate also the fit of the
+  vehicle's parameters, which it needs, and the prediction's interval. They were measured on two processors that other
+  programs used at the same time; the longest ones contain the loading of compiled code.
 - Methods with slow proposals tuned fewer vehicles, the first ones of each population.
 - A method that ends early, or has fewer flights than the number in the column, is counted with its last
   recommendation.
@@ -50,6 +65,8 @@ that is possible on the vehicle.
 
 ![Share of vehicles within 5 % against flights]({figure})
 
+Dashed: from the simplex start. Dotted: after the last flight. The paper's method is drawn without the gate.
+
 To regenerate this page (takes hours; with `--results FILE` the second command can be interrupted and continued):
 
     ./dev exec uv pip install --require-hashes -r requirements/bench.txt
@@ -58,8 +75,11 @@ To regenerate this page (takes hours; with `--results FILE` the second command c
 Seed {seed}; {made}."""
 _COLOURS: Final[Mapping[str, str]] = {
     "calibrated": "#000000",
-    "gradient": "#0072B2",
+    "calibrated-simplex": "#000000",
     "gradient-raw": "#56B4E9",
+    "gradient-raw-simplex": "#56B4E9",
+    "gradient": "#0072B2",
+    "gradient-simplex": "#0072B2",
     "nelder-mead": "#E69F00",
     "finite-differences": "#8C564B",
     "tpe": "#009E73",
@@ -67,7 +87,8 @@ _COLOURS: Final[Mapping[str, str]] = {
     "gp": "#CC79A7",
     "bayes-opt": "#7F7F7F",
 }
-"""Okabe and Ito's palette, distinguishable also for colour-blind readers, with two neutral ones."""
+"""Okabe and Ito's palette, distinguishable also for colour-blind readers, with two neutral ones; methods without a
+colour are not drawn."""
 
 
 def summary(found: Mapping[str, Outcome], target: float) -> list[str]:
@@ -91,6 +112,7 @@ def safety(found: Mapping[str, Outcome]) -> list[str]:
     """Return the table of unsafe flights and computation times."""
     columns = (
         "method",
+        "first flight unsafe",
         "unsafe, of all flights after the first",
         "unsafe flights per vehicle until within 5 %",
         "processor time of a proposal, median and longest",
@@ -100,7 +122,8 @@ def safety(found: Mapping[str, Outcome]) -> list[str]:
     for name, outcome in found.items():
         middle, longest = outcome.compute_s
         lines.append(
-            f"| {METHODS[name].title} | {outcome.unsafe_flights.rounded(1)} | {outcome.unsafe_on_the_way(0.05):.2f} "
+            f"| {METHODS[name].title} | {outcome.unsafe_starts} | {outcome.unsafe_flights.rounded(1)} "
+            f"| {outcome.unsafe_on_the_way(0.05):.2f} "
             f"| {_duration(middle)}, {_duration(longest)} | {outcome.refused} |"
         )
     return lines
@@ -125,7 +148,8 @@ def own_lines(outcome: Outcome) -> list[str]:
 
 def page(all_found: Mapping[str, Mapping[str, Outcome]], results: Results, seed: int, figure: str) -> str:
     """Return the page in Markdown."""
-    lines = [_INTRODUCTION.format(figure=figure, seed=seed, made=_made(results, seed))]
+    start = start_gains(Definition(start=Start(kind="simplex")), EXPERIMENT, SPACE)
+    lines = [_INTRODUCTION.format(figure=figure, seed=seed, made=_made(results, seed), **start)]
     for population, found in all_found.items():
         lines += ["", f"## {TITLES[population]}", "", LINES[population]]
         for target in TARGETS:
@@ -178,27 +202,31 @@ def draw(all_found: Mapping[str, Mapping[str, Outcome]], file: Path, target: flo
 
     shown = [name for name in all_found if name != "twin"]
     with mpl.rc_context({"svg.hashsalt": "flights-to-target", "svg.fonttype": "none", "font.size": 9}):
-        figure = Figure(figsize=(11.0, 4.8), layout="constrained", facecolor="white")
+        figure = Figure(figsize=(11.0, 5.2), layout="constrained", facecolor="white")
         panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
         for axes, population in zip(panels, shown, strict=True):
             _panel(axes, TITLES[population], all_found[population], target)
         panels[0].set_ylabel(f"vehicles within {target * 100:.0f} % of their own optimum")
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
         file.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(file, format="svg", metadata={"Date": None})
 
 
 def _panel(axes: "Axes", title: str, found: Mapping[str, Outcome], target: float) -> None:
-    for name, outcome in found.items():
+    for name, colour in _COLOURS.items():
+        if name not in found:
+            continue
+        outcome, is_own = found[name], name.startswith("calibrated")
         last = outcome.budget
-        numbers = list(range(1, (60 if name == "calibrated" else last) + 1))
+        numbers = list(range(1, (60 if is_own else last) + 1))
         shares = [outcome.reached(target, number) for number in numbers]
         low, high = zip(*(share.interval for share in shares), strict=True)
-        values, colour = [share.value for share in shares], _COLOURS[name]
+        values, line = [share.value for share in shares], "--" if name.endswith("simplex") else "-"
         axes.fill_between(numbers, low, high, step="post", color=colour, alpha=0.12, linewidth=0)
-        weight, own = (2.6, last) if name == "calibrated" else (1.5, len(numbers))
-        axes.step(numbers[:own], values[:own], where="post", color=colour, lw=weight, label=METHODS[name].title)
+        weight, own = (2.6, last) if is_own else (1.5, len(numbers))
+        title = METHODS[name].title
+        axes.step(numbers[:own], values[:own], where="post", color=colour, lw=weight, ls=line, label=title)
         axes.step(numbers[own - 1 :], values[own - 1 :], where="post", color=colour, lw=1.0, ls=":")
     axes.set_xscale("log")
     axes.set_xlim(1, 60)

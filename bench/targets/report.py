@@ -13,7 +13,7 @@ from bench.targets.methods import METHODS
 from bench.targets.results import OPTIMUM, Results, Task
 
 TARGETS: Final = (0.05, 0.02)
-AT_FLIGHTS: Final = (2, 3, 5, 10, 20, 40)
+AT_FLIGHTS: Final = (1, 2, 3, 5, 10, 20, 40)
 _DEFAULT: Final = list(DEFAULT.values())
 
 
@@ -112,6 +112,11 @@ class Outcome:
             if counts
         ]
         return Share(sum(judged), len(judged))
+
+    @property
+    def unsafe_starts(self) -> Share:
+        """Unsafe first flights."""
+        return Share(sum(course.unsafe[0] for course in self.courses), len(self.courses))
 
     def unsafe_on_the_way(self, target: float) -> float:
         """Unsafe flights per vehicle until the target is reached."""
