@@ -225,8 +225,8 @@ def _panel(axes: "Axes", title: str, found: Mapping[str, Outcome], target: float
         values, line = [share.value for share in shares], "--" if name.endswith("simplex") else "-"
         axes.fill_between(numbers, low, high, step="post", color=colour, alpha=0.12, linewidth=0)
         weight, own = (2.6, last) if is_own else (1.5, len(numbers))
-        title = METHODS[name].title
-        axes.step(numbers[:own], values[:own], where="post", color=colour, lw=weight, ls=line, label=title)
+        label = METHODS[name].title
+        axes.step(numbers[:own], values[:own], where="post", color=colour, lw=weight, ls=line, label=label)
         axes.step(numbers[own - 1 :], values[own - 1 :], where="post", color=colour, lw=1.0, ls=":")
     axes.set_xscale("log")
     axes.set_xlim(1, 60)
