@@ -1,3 +1,4 @@
+<%! from app import __version__ %>\
 """${message}."""
 
 import sqlalchemy as sa
@@ -7,6 +8,7 @@ revision = ${repr(up_revision)}
 down_revision = ${repr(down_revision)}
 branch_labels = ${repr(branch_labels)}
 depends_on = ${repr(depends_on)}
+release = ${repr(__version__.removesuffix(".dev0"))}
 
 
 def upgrade() -> None:

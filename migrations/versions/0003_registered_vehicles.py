@@ -10,6 +10,7 @@ revision = "0003"
 down_revision = "0002"
 branch_labels = None
 depends_on = None
+release = "0.2.0"
 
 _UNDER_WAY = "state IN ('requested', 'running')"
 _KEPT = ("id", "kind", "title", "is_real", "state", "safe_gains", "concern", "created_at")

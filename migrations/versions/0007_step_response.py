@@ -7,6 +7,7 @@ revision = "0007"
 down_revision = "0006"
 branch_labels = None
 depends_on = None
+release = "0.3.0"
 
 _COLUMNS = ("rise_time_s", "settling_time_s", "steady_state_error_m")
 

@@ -9,6 +9,7 @@ revision = "0008"
 down_revision = "0007"
 branch_labels = None
 depends_on = None
+release = "0.3.0"
 
 _OLD = (
     *("connect", "disconnect", "check", "restore", "parameters", "release", "land", "motors off"),
