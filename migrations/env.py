@@ -13,7 +13,13 @@ from app.db.types import UtcDateTime
 
 def run_migrations(connection: Connection) -> None:
     """All in one transaction; SQLite changes tables by rebuilding them, hence batch mode."""
-    context.configure(connection=connection, target_metadata=Base.metadata, render_as_batch=True, render_item=in_plain)
+    context.configure(
+        connection=connection,
+        target_metadata=Base.metadata,
+        render_as_batch=True,
+        render_item=in_plain,
+        on_version_apply=context.config.attributes.get("on_version_apply"),
+    )
     with context.begin_transaction():
         context.run_migrations()
 

@@ -1,5 +1,5 @@
-"""Logs: one JSON object per line, with campaign and trial ids, to `<data_dir>/log/<role>.log` and to standard error;
-and the lines of one job, read from the worker's log files.
+"""Logs: one JSON object per line, with campaign and trial ids, to `<data_dir>/log/<role>.log`, and warnings and errors
+to standard error; and the lines of one job, read from the worker's log files. `say` prints what is no log.
 """
 
 import faulthandler
@@ -8,6 +8,7 @@ import logging.handlers
 import signal
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -30,7 +31,7 @@ _SHARED: Final[tuple[Processor, ...]] = (
 
 
 def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -> None:
-    """Send this process's logs, including the libraries', to its file and to standard error (readable on a terminal).
+    """Send this process's logs, including the libraries', to its file, and warnings and errors to standard error.
 
     On SIGUSR1 it writes the stack of every thread to standard error, to diagnose a hang.
     """
@@ -42,11 +43,8 @@ def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -
     )
     to_file.setFormatter(_formatter(structlog.processors.JSONRenderer()))
     to_stderr = logging.StreamHandler()
-    to_stderr.setFormatter(
-        _formatter(structlog.dev.ConsoleRenderer() if sys.stderr.isatty() else structlog.processors.JSONRenderer())
-    )
-    if sys.stderr.isatty():
-        to_stderr.setLevel(logging.WARNING)
+    to_stderr.setFormatter(_formatter(structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty())))
+    to_stderr.setLevel(logging.WARNING)
     logging.basicConfig(level=level.upper(), handlers=[to_file, to_stderr], force=True)
     logging.getLogger("alembic.runtime.plugins").setLevel(logging.WARNING)  # it names each of its plugins
     logging.raiseExceptions = False  # with a full disk, not every log line must become a traceback
@@ -60,6 +58,13 @@ def configure_logs(data_dir: Path, role: Literal["web", "worker"], level: str) -
         logger_factory=structlog.stdlib.LoggerFactory(),
         cache_logger_on_first_use=True,
     )
+
+
+def say(line: str) -> None:
+    """Print one line for a person, who may have stopped reading."""
+    with suppress(OSError):
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
 
 
 def _formatter(renderer: Processor) -> logging.Formatter:

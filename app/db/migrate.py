@@ -3,6 +3,8 @@
 Alembic is imported only when there is something to migrate: at most starts the database is up to date.
 """
 
+from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,13 +17,19 @@ from app.db.session import open_engine, translated
 
 if TYPE_CHECKING:
     from alembic.config import Config
+    from alembic.runtime.migration import MigrationInfo
 
 _APP: Final = Path(__file__).resolve().parent.parent
 _COMMAND: Final = "gainline serve"
 
 
-def migrate(database_file: Path) -> None:
-    """Create the database, or migrate it to the program's revision; nothing is changed when that fails.
+def _unheard(_line: str) -> None:
+    """Tell nobody."""
+
+
+def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> None:
+    """Create the database, or migrate it to the program's revision; nothing is changed when that fails. `announce` gets
+    a line at the beginning, and one after each revision.
 
     Raises SchemaError when it was written by a newer program, StorageError when it cannot be opened or written.
     """
@@ -29,15 +37,22 @@ def migrate(database_file: Path) -> None:
     held = revision_of(database_file)
     if held == REVISION:
         return
-    if held is not None and held not in _known_revisions():
+    known = _known_revisions()
+    if held is not None and held not in known:
         raise _newer(database_file, held)
     from alembic import command
+
+    number, total = count(1), len(known) if held is None else sum(each > held for each in known)
+    announce("Creating the database" if held is None else f"Migrating the database from revision {held} to {REVISION}")
+
+    def applied(step: "MigrationInfo", **_: object) -> None:
+        announce(f"  {next(number)} of {total}: {step.up_revision.doc if step.up_revision else ''}")
 
     engine = open_engine(database_file, foreign_keys=False)
     config = _config()
     try:
         with translated(database_file), engine.connect() as connection:
-            config.attributes["connection"] = connection
+            config.attributes |= {"connection": connection, "on_version_apply": applied}
             command.upgrade(config, "head")
             broken = connection.execute(text("PRAGMA foreign_key_check")).first()
             if broken is not None:

@@ -16,6 +16,7 @@ import structlog
 from sqlalchemy.orm import Session as Transaction
 
 from app.common.errors import ConflictError, StorageError
+from app.common.logging import say
 from app.common.states import GIVES_GAINS, ActKind
 from app.core.clock import REAL_TIME, Clock
 from app.core.errors import GainlineError
@@ -95,8 +96,9 @@ class VehicleConnectionManager:
         with self._database.write() as transaction:
             commands.withdraw_acts(transaction)
             commands.forget_connections(transaction)
-            if self._links:
-                commands.request_reconnections(transaction)
+            wanted = commands.request_reconnections(transaction) if self._links else []
+        if wanted:
+            say(f"Vehicles to connect to again: {len(wanted)}")
 
     def close(self) -> None:
         """Close all connections once nothing is being carried out; every vehicle is left with its safe gains. The

@@ -12,9 +12,10 @@ from contextlib import ExitStack
 from types import FrameType
 from typing import Final
 
+from app import __version__
 from app.common.data_folder import make_private, prepare_data_dir
 from app.common.errors import AddressError, AlreadyRunningError, Problem
-from app.common.logging import configure_logs
+from app.common.logging import configure_logs, say
 from app.common.settings import Settings
 from app.db.revision import is_current
 from app.processes import start_loading
@@ -36,14 +37,9 @@ THREAD_SWITCH_INTERVAL_S: Final = 0.001
 """Maximum time for which a thread that draws figures keeps the event loop waiting for the interpreter lock."""
 
 
-def say(line: str) -> None:
-    """Print one line and flush."""
-    sys.stdout.write(f"{line}\n")
-    sys.stdout.flush()
-
-
 def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[str], None] = say) -> None:
-    """Run the dashboard until SIGINT or SIGTERM; for the main thread only.
+    """Run the dashboard until SIGINT or SIGTERM; for the main thread only. `announce` gets a line for each stage of the
+    start; the worker prints its own.
 
     Raises AlreadyRunningError when another server uses this database, AddressError when the server cannot listen on
     host and port, and StorageError when the data folder cannot be used or the database cannot be opened or migrated.
@@ -62,11 +58,13 @@ def serve(settings: Settings, *, with_worker: bool = True, announce: Callable[[s
         listener = stack.enter_context(listen(settings.host, settings.port))
         sign(web_address(settings.host, listener.getsockname()[1]))
         configure_logs(settings.data_dir, "web", settings.log_level)
+        announce(f"Gainline {__version__}, data folder {settings.data_dir}")
         if not is_current(settings.database_file):
             from app.db.migrate import migrate  # noqa: PLC0415
 
-            migrate(settings.database_file)
+            migrate(settings.database_file, announce)
         if with_worker:
+            announce("Starting the worker and the dashboard")
             stack.enter_context(Supervisor(run_worker_process, settings, name="worker"))
         if (exposed := exposure(settings.host)) is not None:
             announce(exposed)

@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from multiprocessing import parent_process
 from types import FrameType
@@ -28,7 +28,7 @@ from app.campaigns.proposals import PROPOSAL_JOB
 from app.campaigns.tasks import LandscapeJob, ProposalJob
 from app.common.data_folder import make_private, prepare_data_dir
 from app.common.errors import AlreadyRunningError, StorageError
-from app.common.logging import configure_logs
+from app.common.logging import configure_logs, say
 from app.common.settings import Settings, is_loopback
 from app.core.clock import REAL_TIME, Clock
 from app.db.migrate import require_current
@@ -140,6 +140,11 @@ def _shut_down_with_parent(ending: ShutdownRequest) -> None:
         ending.set("the web process has exited")
 
 
+def _say_it_computes(first: Future[int]) -> None:
+    if not first.cancelled() and first.exception() is None:
+        say("The worker is ready to compute.")
+
+
 class Worker:
     """Everything that runs while the worker holds its lock."""
 
@@ -175,8 +180,9 @@ class Worker:
             flying = stack.enter_context(ThreadPoolExecutor(FLIGHTS_AT_ONCE, thread_name_prefix="flight"))
             stack.callback(self._ending.set, "the worker failed; see its log")
             self._until_stored(lambda: recover(database))
-            computing.submit(pool.run, os.getpid)
+            computing.submit(pool.run, os.getpid).add_done_callback(_say_it_computes)
             _log.info("worker ready", worker=self._name)
+            say("The worker is ready to fly.")
             self._loop(database, lambda: self._claim(flight_runner, flying, sessions, acting, job_runners, computing))
             _log.info("worker ends", why=self._ending.reason, flying=self._abort_registry.trial_ids())
 

@@ -94,7 +94,11 @@ def test_a_filled_first_database_is_brought_up_to_date_and_its_proposals_compute
                 (number, state),
             )
         connection.commit()
-    migrate(file)
+    told: list[str] = []
+    migrate(file, told.append)
+    steps = int(REVISION) - 1
+    assert told[0] == f"Migrating the database from revision 0001 to {REVISION}"
+    assert [line.partition(":")[0] for line in told[1:]] == [f"  {step} of {steps}" for step in range(1, steps + 1)]
     with sqlite3.connect(file) as connection:
         assert connection.execute("SELECT kind, state, campaign_id, done_share FROM job").fetchall() == [
             ("proposal", "queued", 1, None)
