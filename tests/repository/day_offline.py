@@ -80,8 +80,8 @@ def fly_without_a_network() -> None:
         assert json.loads(line)["event"]
     drone = start("exec", "gainline", "sim-drone")
     assert "Paparazzi" in "".join(lines_until(drone, "Paparazzi"))
-    drone.send_signal(signal.SIGTERM)
-    assert drone.wait(PATIENCE_S) == 0
+    drone.terminate()
+    drone.wait(PATIENCE_S)
     steps = DATA / "steps.bin"
     steps.write_bytes(gzip.decompress((LOGS / "arducopter_steps.bin.gz").read_bytes()))
     assert "Proposed" in gainline("analyze", steps)
