@@ -6,7 +6,6 @@ Fails with a traceback where something does not work.
 """
 
 import fcntl
-import gzip
 import json
 import os
 import re
@@ -82,10 +81,8 @@ def fly_without_a_network() -> None:
     assert "Paparazzi" in "".join(lines_until(drone, "Paparazzi"))
     drone.terminate()
     drone.wait(PATIENCE_S)
-    steps = DATA / "steps.bin"
-    steps.write_bytes(gzip.decompress((LOGS / "arducopter_steps.bin.gz").read_bytes()))
-    assert "Proposed" in gainline("analyze", steps)
-    assert "flight" in gainline("run", "ardrone-takeoff", "--max-flights", "1").lower()
+    assert "The model predicts" in gainline("analyze", log)
+    assert "flight" in gainline("run", "paper-ardrone-takeoff", "--max-flights", "1").lower()
 
 
 def survive_what_cannot_be_installed() -> None:
@@ -105,17 +102,17 @@ def survive_what_cannot_be_installed() -> None:
     lock.write_text(before)
     project.write_text(asked)
     assert "Going on" not in gainline("--help")
+    assert not (CLONE / ".venv" / "bin" / "pytest").exists()
     assert (CLONE / ".venv").resolve() == working
     lock = CLONE / "requirements" / "node.txt"
     lock.write_text(lock.read_text() + NONE_SUCH)
     refused = subprocess.run([CLONE / "dev", "up"], capture_output=True, text=True, check=False)
     assert refused.returncode == 1
     assert "Go back to the version that ran here last" in refused.stderr
-    missing = subprocess.run([CLONE / "dev", "exec", "pytest"], capture_output=True, text=True, check=False)
-    assert "./dev setup installs" in missing.stderr
 
 
 if __name__ == "__main__":
+    os.environ["UV_HTTP_RETRIES"] = "0"
     bring_loopback_up()
     fly_without_a_network()
     survive_what_cannot_be_installed()
