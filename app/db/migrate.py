@@ -46,7 +46,7 @@ def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> 
     announce("Creating the database" if held is None else f"Migrating the database from revision {held} to {REVISION}")
 
     def applied(step: "MigrationInfo", **_: object) -> None:
-        announce(f"  {next(number)} of {total}: {step.up_revision.doc if step.up_revision else ''}")
+        announce(f"  {next(number)} of {total}: {known[step.up_revision_id]}")
 
     engine = open_engine(database_file, foreign_keys=False)
     config = _config()
@@ -84,10 +84,11 @@ def revision_of(database_file: Path) -> str | None:
         return read_revision(database_file)
 
 
-def _known_revisions() -> set[str]:
+def _known_revisions() -> dict[str, str]:
+    """What each migration brings, by revision."""
     from alembic.script import ScriptDirectory
 
-    return {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
+    return {script.revision: script.doc for script in ScriptDirectory.from_config(_config()).walk_revisions()}
 
 
 def _config() -> "Config":

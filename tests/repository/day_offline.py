@@ -43,7 +43,7 @@ def gainline(*arguments: str | Path, works: bool = True) -> str:
 
 def lines_until(process: subprocess.Popen[str], last: str) -> list[str]:
     assert process.stdout is not None
-    lines = []
+    lines: list[str] = []
     while not lines or last not in lines[-1]:
         lines.append(process.stdout.readline())
         assert lines[-1], lines
