@@ -46,7 +46,7 @@ def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> 
     announce("Creating the database" if held is None else f"Migrating the database from revision {held} to {REVISION}")
 
     def applied(step: "MigrationInfo", **_: object) -> None:
-        announce(f"  {next(number)} of {total}: {known[step.up_revision_id]}")
+        announce(f"  {next(number)} of {total}: {known[step.up_revision_id or REVISION]}")
 
     engine = open_engine(database_file, foreign_keys=False)
     config = _config()
