@@ -29,7 +29,7 @@ def _unheard(_line: str) -> None:
 
 def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> None:
     """Create the database, or migrate it to the program's revision; nothing is changed when that fails. `announce` gets
-    a line at the beginning, and one after each revision.
+    a line at the beginning, and of a migration one after each revision.
 
     Raises SchemaError when it was written by a newer program, StorageError when it cannot be opened or written.
     """
@@ -42,7 +42,7 @@ def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> 
         raise _newer(database_file, held)
     from alembic import command
 
-    number, total = count(1), len(known) if held is None else sum(each > held for each in known)
+    number, total = count(1), sum(each > (held or "") for each in known)
     announce("Creating the database" if held is None else f"Migrating the database from revision {held} to {REVISION}")
 
     def applied(step: "MigrationInfo", **_: object) -> None:
@@ -52,7 +52,7 @@ def migrate(database_file: Path, announce: Callable[[str], None] = _unheard) -> 
     config = _config()
     try:
         with translated(database_file), engine.connect() as connection:
-            config.attributes |= {"connection": connection, "on_version_apply": applied}
+            config.attributes |= {"connection": connection, "on_version_apply": applied if held else None}
             command.upgrade(config, "head")
             broken = connection.execute(text("PRAGMA foreign_key_check")).first()
             if broken is not None:
