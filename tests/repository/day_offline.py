@@ -21,7 +21,7 @@ from typing import Any
 
 CLONE, DATA, LOGS = map(Path, sys.argv[1:])
 NONE_SUCH = f"no-such-package==1.0 --hash=sha256:{0:064}\n"
-PATIENCE_S = 60.0
+PATIENCE_S = 150.0
 SET_INTERFACE_FLAGS, UP = 0x8914, 0x1
 
 
