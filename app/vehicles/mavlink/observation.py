@@ -6,7 +6,7 @@ one, by itself or by its clock, is doubted until more of the same kind have arri
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from app.vehicles.mavlink.boot_clock import (
@@ -32,6 +32,7 @@ from app.vehicles.mavlink.events import (
     SecondaryAltitudeReceived,
 )
 from app.vehicles.mavlink.failures import GROUND_M, Limits
+from app.vehicles.mavlink.states import replace
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -77,7 +78,7 @@ MAX_DIFFERENCE_M: Final = 0.3
 _MAX_SECONDARY_AGE_S: Final = 0.5
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class SecondaryAltitude:
     """State of the second source; times in s by the ground's clock. `altitude_m` is on the vehicle's datum, None before
     the first valid sample; `blind_s` is the time for which its samples have not been new."""
@@ -89,7 +90,7 @@ class SecondaryAltitude:
     apart_since_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class TrialObservation:
     """State of a vehicle by its messages so far. Times are in s by the ground's clock, except inside a Position.
 

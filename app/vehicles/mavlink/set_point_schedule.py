@@ -5,7 +5,6 @@ Times are by the vehicle's clock, which is known from its positions and their la
 """
 
 import math
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -24,6 +23,7 @@ from app.vehicles.mavlink.events import (
     TargetAltitude,
 )
 from app.vehicles.mavlink.failures import Failure, Finding
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_reactions import Plan, SetPointChange, Step, Trial, note
 
 HELD_BEFORE_S: Final = 6.0

@@ -3,9 +3,9 @@
 It depends on no autopilot and no clock: events carry their time, and commands are data that `trial.py` carries out.
 """
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Final
 
 from app.vehicles.mavlink import limit_checks, set_point_schedule
@@ -36,6 +36,7 @@ from app.vehicles.mavlink.events import (
 )
 from app.vehicles.mavlink.failures import DESCENDING_M_S, REPEAT_S, Failure, Finding, land_every_s
 from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.states import replace
 from app.vehicles.mavlink.trial_reactions import (
     COMMANDED,
     Plan,
@@ -101,7 +102,7 @@ def advance(trial: Trial, event: Event) -> Step:
     if isinstance(event, PacketReceived):
         trial, kept = _process_packet(trial, event)
     elif isinstance(event, SecondaryAltitudeReceived):
-        sample = replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
+        sample = dataclasses.replace(event, altitude_m=event.altitude_m + trial.ground_shift_m)
         trial = replace(trial, watch=watching.update_secondary(trial.watch, sample))
     elif isinstance(event, DuplicateVehicleDetected):
         trial = replace(trial, watch=replace(trial.watch, duplicate_reason=event.why))

@@ -2,9 +2,10 @@
 a trial and the time. `trial_machine` decides when each transition is made.
 """
 
+import dataclasses
 import statistics
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
 from typing import Final, Literal
@@ -37,6 +38,7 @@ from app.vehicles.mavlink.failures import (
     Reaction,
 )
 from app.vehicles.mavlink.observation import TrialObservation
+from app.vehicles.mavlink.states import replace
 
 
 class State(StrEnum):
@@ -166,11 +168,12 @@ class Plan:
 
     def with_set_point(self, set_point_m: float) -> "Plan":
         """Return the plan with another current set point, on the vehicle's datum."""
-        return replace(self, limits=replace(self.limits, set_point_m=set_point_m))
+        limits = dataclasses.replace(self.limits, set_point_m=set_point_m)
+        return dataclasses.replace(self, limits=limits)
 
     def on_ground_at(self, ground_m: float) -> "Plan":
         """Return the plan with another height of the ground."""
-        moved = replace(self, ground_m=ground_m)
+        moved = dataclasses.replace(self, ground_m=ground_m)
         return moved.with_set_point(self.limits.set_point_m + moved.datum_m - self.datum_m)
 
 
@@ -188,7 +191,7 @@ class SetPointChange:
     times_s: tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Trial:
     """State of a trial.
 
