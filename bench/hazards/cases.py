@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
+from app.core.experiments.takeoff import WINDOW_S
 from bench.hazards.trial_states import State
 
 ABORT: Final = "abort"
@@ -122,7 +123,7 @@ class Case:
     """One trial and its faults; the first is the one under test.
 
     `powered_s` is how long the drone has been on before the connection, `staged_s` how long its gains are staged before
-    the takeoff, `pinned` whether the connection names the drone's system id.
+    the takeoff, `pinned` whether the connection names the drone's system id, `window_s` the scored time of the flight.
     """
 
     seed: int
@@ -132,6 +133,7 @@ class Case:
     powered_s: float
     staged_s: float
     pinned: bool
+    window_s: float = WINDOW_S
 
     @property
     def has_second_source(self) -> bool:

@@ -137,7 +137,7 @@ def _stage_and_fly(rig: Rig, vehicle: MavlinkVehicle) -> tuple[FlightRecord | No
 
 def _order(case: Case) -> FlightOptions:
     """Return the order for a takeoff, or for altitude steps of the same length."""
-    order = FlightOptions(seed=1)
+    order = FlightOptions(seed=1, window_s=case.window_s)
     if not case.flies_steps:
         return order
     name = _STEPS_OF[case.autopilot]

@@ -14,7 +14,7 @@ from app.core.records.trajectory import Trajectory
 from bench.hazards.cases import ABORT, FOR_GOOD_S, Case
 from bench.hazards.hostile_table import HARMLESS, HAZARDS, LEADS, NOT_SEEN, PILOTS, PROCESS_KILLED, Expected
 from bench.hazards.rig import InjectedFault, MotorStop
-from bench.hazards.trial_states import LIFTED_M, RECORDED_S, RESTING_M, State, TrialStates
+from bench.hazards.trial_states import LIFTED_M, RESTING_M, State, TrialStates
 from bench.hazards.wire import Command
 
 CEILING_M: Final = 5.5
@@ -225,13 +225,13 @@ def _record(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
     if took_off_s is None or not truth.rose:
         yield "a valid record without a flight"
         return
-    if record.time_s[-1] < RECORDED_S - 0.3:
+    if record.time_s[-1] < truth.states.recorded_s - 0.3:
         yield f"a valid record ends after {record.time_s[-1]:.1f} s"
     times_s, heights_m = (
         np.array(column) for column in zip(*((m.time_s, m.height_m) for m in truth.true_states), strict=True)
     )
     true_m = np.interp(record.time_s + took_off_s, times_s, heights_m)
-    hovering = (record.time_s > 10.0) & (record.time_s < RECORDED_S)
+    hovering = (record.time_s > 10.0) & (record.time_s < truth.states.recorded_s)
     if true_m[hovering].min() < HOVERS_M:
         yield f"a valid record, but the vehicle was at {true_m[hovering].min():.2f} m"
     if abs((stood_m := float(np.median(true_m[hovering]))) - SET_POINT_M) > RECORD_WITHIN_M:

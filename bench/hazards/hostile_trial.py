@@ -305,7 +305,8 @@ def _stage_and_fly(rig: HostileRig, vehicle: MavlinkVehicle) -> HostileResult:
         if held != rig.case.gains:
             raise VehicleError(f"it holds {held}", hint="")
         rig.identity, rig.is_flying = vehicle.identity, True
-        record = vehicle.fly(FlightOptions(seed=1), on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
+        order = FlightOptions(seed=1, window_s=rig.case.window_s)
+        record = vehicle.fly(order, on_sample=_ignore_sample, should_stop=lambda: rig.stop_request)
         outcome, reason, failure = outcome_of(record), record.reason, record.failure
     except VehicleError as error:
         reason = str(error)

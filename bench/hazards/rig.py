@@ -101,7 +101,7 @@ class Rig(Lockstep):
 
     def __init__(self, case: Case) -> None:
         self.case = case
-        self.states = TrialStates()
+        self.states = TrialStates(window_s=case.window_s)
         self.injected: list[InjectedFault] = []
         self.sent: list[tuple[float, Command]] = []
         self.stops: list[MotorStop] = []

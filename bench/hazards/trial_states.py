@@ -4,12 +4,13 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
+from app.core.experiments.takeoff import WINDOW_S
 from bench.hazards.wire import Command
 
 LIFTED_M: Final = 0.15
 RESTING_M: Final = 0.002
 """Greatest height of a vehicle that stands on the ground: above it, it is lifting off or touching down."""
-RECORDED_S: Final = 32.8
+_BEYOND_S: Final = 0.2
 _SILENT_S: Final = 0.9
 
 
@@ -42,6 +43,7 @@ class TrialStates:
     entered: list[tuple[State, float]] = field(default_factory=list)
     commands: list[tuple[float, Command]] = field(default_factory=list)
     ended_s: float = float("inf")
+    window_s: float = WINDOW_S
 
     @property
     def now(self) -> State | None:
@@ -50,6 +52,11 @@ class TrialStates:
     def begin(self, now_s: float) -> None:
         """Begin the timeline: the program opens the link."""
         self._enter(State.CONNECT, now_s)
+
+    @property
+    def recorded_s(self) -> float:
+        """Time from the takeoff command to the end of the record, less what it may be early."""
+        return self.window_s + _BEYOND_S
 
     def first_s(self, state: State) -> float | None:
         return next((since_s for each, since_s in self.entered if each is state), None)
@@ -118,6 +125,6 @@ class TrialStates:
             return State.LINK_LOST
         commanded_s = self.first_s(State.TAKEOFF)
         if self.now in AIR:
-            full = commanded_s is not None and now_s - commanded_s > RECORDED_S
+            full = commanded_s is not None and now_s - commanded_s > self.recorded_s
             return State.LAND if full else State.ABORT_LAND
         return State.ABORT_LAND if self.now in (State.LINK_LOST, State.DISARM) else None

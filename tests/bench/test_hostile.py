@@ -27,6 +27,7 @@ def case(autopilot: str, what: str, state: State, delay_s: float = 5.0, duration
         powered_s=POWERED_S,
         staged_s=0.0,
         pinned=True,
+        window_s=12.0,
     )
 
 
