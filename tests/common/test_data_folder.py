@@ -27,8 +27,14 @@ def where_no_folder_can_be(_tmp_path: Path) -> Path:
     return Path("/proc/gainline")
 
 
-@pytest.mark.parametrize("make", [a_file, below_a_file, where_no_folder_can_be])
-@pytest.mark.parametrize("command", [("serve", "--port", "0"), pytest.param(("worker",), marks=pytest.mark.complete)])
+@pytest.mark.parametrize(
+    ("command", "make"),
+    [
+        (("serve", "--port", "0"), a_file),
+        pytest.param(("serve", "--port", "0"), below_a_file, marks=pytest.mark.complete),
+        pytest.param(("worker",), where_no_folder_can_be, marks=pytest.mark.complete),
+    ],
+)
 def test_a_data_folder_that_cannot_be_used_is_named_with_its_option(
     command: tuple[str, ...], make: Callable[[Path], Path], tmp_path: Path
 ) -> None:

@@ -6,6 +6,7 @@ import sys
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import pytest
 from fastapi.testclient import TestClient
 
 from app.common.settings import Settings
@@ -64,6 +65,7 @@ migrate(folder / "gainline.sqlite3")
 """
 
 
+@pytest.mark.complete
 def test_the_first_start_logs_the_migration_and_not_the_plugins_of_alembic(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", MIGRATE, tmp_path], capture_output=True, text=True, check=True)
     lines = [json.loads(line) for line in (tmp_path / "log" / "web.log").read_text().splitlines()]

@@ -5,7 +5,6 @@ import socket
 import stat
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import httpx2
@@ -23,12 +22,6 @@ REAL = {
     "statement": "nobody has looked",
 }
 LAN = "192.168.178.20"
-
-
-@pytest.fixture(scope="module")
-def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    with Serving(tmp_path_factory.mktemp("access") / "data", "--no-worker") as one:
-        yield one
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +71,10 @@ def test_the_scripts_that_flew_a_real_vehicle_are_refused(serving: Serving, bee:
         for method, path, body in steps:
             refused = mallory.request(method, path, json=body)
             assert refused.status_code == 403, (path, refused.text)
-    (vehicle,) = serving.get("/vehicles")["items"]
+    vehicles = {vehicle["id"]: vehicle for vehicle in serving.get("/vehicles")["items"]}
+    vehicle = vehicles[bee]
     assert (vehicle["name"], vehicle["control"], vehicle["state"]) == ("Bee", None, "disconnected")
+    assert "Wasp" not in {each["name"] for each in vehicles.values()}
 
 
 def test_the_operator_does_the_same_in_the_unlocked_browser(serving: Serving, bee: int) -> None:

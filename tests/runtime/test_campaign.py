@@ -1,17 +1,10 @@
 """A whole campaign through web process, database, worker and vehicle."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from tests.runtime.processes import Serving, stream, wait_for
-
-
-@pytest.fixture(scope="module")
-def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    with Serving(tmp_path_factory.mktemp("data")) as one:
-        yield one
 
 
 def changes(url: str, last_event_id: str, until: str) -> list[tuple[str, str | None, Any]]:
@@ -43,18 +36,33 @@ def test_a_campaign_flies_to_its_stop_and_gets_better(serving: Serving) -> None:
     assert list((serving.data_dir / "spool").iterdir()) == [], "what is in the database needs no second keeping"
 
 
+def require_telemetry(heard: list[tuple[str, str | None, Any]], trial: Any) -> None:
+    """It came while the trial flew, with the error so far."""
+    telemetry = [data for name, _, data in heard if name == "telemetry"]
+    assert {identity for name, identity, _ in heard if name == "telemetry"} == {None}
+    phases = [data["phase"] for name, _, data in heard if name == "phase"]
+    assert phases == ["staging", "flying", "landed", "ended"]
+    assert {data["trial_id"] for data in telemetry} == {trial["id"]}
+    times = [row[0] for data in telemetry for row in data["samples"]]
+    assert times == sorted(times)
+    assert times[-1] > 32.6
+    # 50 Hz telemetry against the 512 Hz record
+    assert telemetry[-1]["error_so_far"] == pytest.approx(trial["error"], abs=2e-4)
+
+
 def test_two_streams_see_the_same_and_a_later_one_resumes_where_another_left(serving: Serving) -> None:
     with stream(serving.url) as first, stream(serving.url) as second:
         heard: list[list[tuple[str, str | None, Any]]] = [[], []]
         (hello, *_), (other, *_) = next(iter(first)), next(iter(second))
         assert hello == other == "hello"
         trial_id = serving.fly(serving.campaign(), speed=20.0)
-        serving.trial(trial_id, "valid")
+        trial = serving.trial(trial_id, "valid")
         for events, one in zip((first, second), heard, strict=True):
             for event in events:
                 one.append(event)
                 if event[0] == "phase" and event[2]["phase"] == "ended":
                     break
+    require_telemetry(heard[0], trial)
     told = [[event for event in one if event[0] == "change"] for one in heard]
     shared = min(len(one) for one in told)
     assert told[0][:shared] == told[1][:shared]
@@ -80,29 +88,6 @@ def test_a_stream_that_is_opened_after_a_change_tells_it_to_whoever_says_since_w
     assert (name, int(now or 0) > before) == ("hello", True), "without it, a stream begins now"
 
 
-def test_telemetry_comes_while_it_flies_with_the_error_so_far(serving: Serving) -> None:
-    campaign_id = serving.campaign()
-    with stream(serving.url) as events:
-        trial_id = serving.fly(campaign_id, speed=20.0)
-        telemetry, phases = [], []
-        for name, identity, data in events:
-            if name == "telemetry":
-                assert identity is None
-                telemetry.append(data)
-            if name == "phase":
-                phases.append(data["phase"])
-                if data["phase"] == "ended":
-                    break
-    assert phases == ["staging", "flying", "landed", "ended"]
-    assert {data["trial_id"] for data in telemetry} == {trial_id}
-    times = [row[0] for data in telemetry for row in data["samples"]]
-    assert times == sorted(times)
-    assert times[-1] > 32.6
-    trial = serving.trial(trial_id, "valid")
-    # 50 Hz telemetry against the 512 Hz record
-    assert telemetry[-1]["error_so_far"] == pytest.approx(trial["error"], abs=2e-4)
-
-
 def test_an_abort_lands_the_vehicle_and_the_flight_is_classed_aborted(serving: Serving) -> None:
     campaign_id = serving.campaign(kind="jsbsim")
     with stream(serving.url) as events:
@@ -119,7 +104,6 @@ def test_an_abort_lands_the_vehicle_and_the_flight_is_classed_aborted(serving: S
     assert 0.5 < record["time_s"][-1] < 32.0
     assert record["channels"]["altitude_m"][-1] < 0.1
     assert serving.proposal(campaign_id)["gains"], "the campaign goes on"
-    assert serving.trial(serving.fly(campaign_id), "valid")
 
 
 def test_an_unknown_event_id_is_answered_by_a_reset(serving: Serving) -> None:

@@ -21,7 +21,7 @@ FILES: Final = 256
 
 
 @pytest.fixture(scope="module")
-def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+def limited(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (FILES, hard))
     try:
@@ -53,35 +53,37 @@ def open_files(serving: Serving) -> int:
     return len(list(Path(f"/proc/{serving.process.pid}/fd").iterdir()))
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("first", [b"", b"GET /api/he", b"POST /api/campaigns HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
-def test_an_abort_is_answered_while_idle_connections_fill_every_place(serving: Serving, first: bytes) -> None:
-    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
+def test_an_abort_is_answered_while_idle_connections_fill_every_place(limited: Serving, first: bytes) -> None:
+    trial_id = in_the_air(limited, limited.campaign(), speed=1.0)
     with ExitStack() as stack:
-        idle = [stack.enter_context(connected(serving)) for _ in range(2 * FILES)]
+        idle = [stack.enter_context(connected(limited)) for _ in range(2 * FILES)]
         for connection in idle:
             if not is_closed(connection):
                 connection.setblocking(True)
                 connection.sendall(first)
-        with httpx2.Client(base_url=serving.url, timeout=20.0) as operator:
+        with httpx2.Client(base_url=limited.url, timeout=20.0) as operator:
             answer = operator.post(f"/api/trials/{trial_id}/abort", json={"reason": "too close"})
         assert (answer.status_code, answer.json()["accepted"]) == (202, True)
-        assert open_files(serving) < FILES
+        assert open_files(limited) < FILES
         places = room_for_connections(FILES) + RESERVED_FOR_ABORTS
         assert sum(not is_closed(connection) for connection in idle) <= places
-    assert serving.trial(trial_id, "aborted")["reason"] == "too close"
-    assert "connections cannot be accepted" not in serving.logged()
+    assert limited.trial(trial_id, "aborted")["reason"] == "too close"
+    assert "connections cannot be accepted" not in limited.logged()
 
 
-def test_event_streams_without_end_make_room_for_an_abort(serving: Serving) -> None:
+@pytest.mark.complete
+def test_event_streams_without_end_make_room_for_an_abort(limited: Serving) -> None:
     request = b"GET /api/events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
     with ExitStack() as stack:
         for _ in range(FILES):
-            stream = stack.enter_context(connected(serving))
+            stream = stack.enter_context(connected(limited))
             stream.sendall(request)
-        with httpx2.Client(base_url=serving.url, timeout=20.0) as operator:
+        with httpx2.Client(base_url=limited.url, timeout=20.0) as operator:
             answer = operator.post("/api/vehicles/4711/land")
         assert answer.status_code == 202
-        with httpx2.Client(base_url=serving.url, timeout=20.0) as somebody:
+        with httpx2.Client(base_url=limited.url, timeout=20.0) as somebody:
             try:
                 status = somebody.get("/api/health").status_code
             except httpx2.TransportError:

@@ -5,7 +5,6 @@ import signal
 import socket
 import sqlite3
 import time
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -14,12 +13,6 @@ import pytest
 from tests.runtime.processes import Serving, in_the_air, is_alive, wait_for
 
 pytestmark = pytest.mark.real_time
-
-
-@pytest.fixture
-def serving(tmp_path: Path) -> Iterator[Serving]:
-    with Serving(tmp_path / "data") as one:
-        yield one
 
 
 def started_by(pid: int) -> dict[int, bytes]:
@@ -63,8 +56,9 @@ def test_a_worker_killed_in_mid_flight_leaves_a_lost_trial_and_a_free_vehicle(se
     assert again["number"] == lost["number"] + 1
     vehicle = serving.get(f"/campaigns/{campaign_id}")["vehicle"]
     assert vehicle["state"] == "ready"
-    ledger = serving.get(f"/vehicles/{vehicle['id']}/ledger")["items"]
-    assert sorted(line["trial_id"] for line in ledger) == [trial_id, again["id"]], "the lost trial flew once only"
+    ledger = [line["trial_id"] for line in serving.get(f"/vehicles/{vehicle['id']}/ledger")["items"]]
+    flown = sorted(each for each in ledger if each in {trial_id, again["id"]})
+    assert flown == [trial_id, again["id"]], "the lost trial flew once only"
     assert serving.trial(trial_id, "lost")["record"] is None
     require_sound_database(serving.data_dir)
 

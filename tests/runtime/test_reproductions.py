@@ -2,8 +2,6 @@
 
 import os
 import signal
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,12 +10,6 @@ from tests.runtime.processes import Serving, is_alive, wait_for
 from tests.runtime.test_crashes import children
 
 LONG = "variability"
-
-
-@pytest.fixture
-def serving(tmp_path: Path) -> Iterator[Serving]:
-    with Serving(tmp_path / "data") as one:
-        yield one
 
 
 def running(serving: Serving, job_id: int) -> Any:

@@ -49,6 +49,7 @@ def imported(program: str, *arguments: Path) -> set[str]:
     return set(done.stdout.split())
 
 
+@pytest.mark.complete
 def test_the_first_pages_are_served_without_a_numeric_library(migrated_file: Path, tmp_path: Path) -> None:
     ui_dir = tmp_path / "ui"
     ui_dir.mkdir()
@@ -63,11 +64,12 @@ def test_help_is_printed_without_the_web_the_database_and_numbers() -> None:
     assert not imported(HELP).intersection((*NUMERICS, *DATABASE, "fastapi", "numpy", "structlog"))
 
 
-@pytest.mark.parametrize("module", ["app.campaigns.computation", "app.processes.pool", "app.flights.flight_process"])
-def test_processes_that_compute_and_fly_do_not_import_the_database(module: str) -> None:
-    assert not imported(f"import {module}").intersection((*NUMERICS, *DATABASE))
+def test_processes_that_compute_and_fly_do_not_import_the_database() -> None:
+    modules = "app.campaigns.computation, app.processes.pool, app.flights.flight_process"
+    assert not imported(f"import {modules}").intersection((*NUMERICS, *DATABASE))
 
 
+@pytest.mark.complete
 def test_the_worker_starts_without_what_only_its_processes_need() -> None:
     assert not imported("import app.runtime.worker").intersection((*NUMERICS, "alembic", "fastapi"))
 
@@ -78,5 +80,5 @@ def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
 
 def test_a_process_that_reads_a_file_loads_neither_the_web_nor_the_database() -> None:
     """Each file has a separate process, whose start the sender of the file waits for."""
-    for function in (read_content, examine_content):
-        assert not imported(f"import {function.__module__}").intersection(("fastapi", "plotly", *DATABASE))
+    modules = f"{read_content.__module__}, {examine_content.__module__}"
+    assert not imported(f"import {modules}").intersection(("fastapi", "plotly", *DATABASE))
