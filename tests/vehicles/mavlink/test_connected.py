@@ -18,7 +18,7 @@ from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
 
-ORDER = FlightOptions(seed=1)
+ORDER = FlightOptions(seed=1, window_s=12.0)
 START_ENGINE, TAKE_OFF, LAND_HERE = 3, 4, 13
 PINNED = Identity(system_id=31, autopilot="paparazzi", version="")
 
@@ -405,16 +405,15 @@ def test_gains_that_were_staged_before_a_restart_are_not_flown() -> None:
         assert vehicle.restore() == SAFE
 
 
-@pytest.mark.parametrize(
-    "autopilot", ["ardupilot", *(pytest.param(other, marks=pytest.mark.complete) for other in ("px4", "paparazzi"))]
-)
+@pytest.mark.complete
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4", "paparazzi"])
 def test_a_restart_between_flights_is_noticed_before_the_next_which_then_flies(autopilot: str) -> None:
     """Observed defect: a restarted ArduCopter sends heartbeats only. Its restart was noticed as it was about to take
     off, which failed."""
     with LockstepRig(autopilot) as rig, connected(rig) as vehicle:
         if autopilot != "paparazzi":
             rig.switch_on_failsafes()
-        vehicle.attend(40.0)
+        vehicle.attend(15.0)
         rig.drone.reboot()
         attend_until(vehicle, lambda: vehicle.condition().held == {}, within_s=8.0)
         assert "It restarted" in vehicle.condition().trouble
@@ -427,7 +426,7 @@ def test_a_restart_between_flights_is_noticed_before_the_next_which_then_flies(a
 def test_a_restart_is_noticed_by_staging_itself() -> None:
     with LockstepRig("ardupilot") as rig, connected(rig) as vehicle:
         rig.switch_on_failsafes()
-        vehicle.attend(40.0)
+        vehicle.attend(15.0)
         rig.drone.reboot()
         rig.wait_s(6.0)
         vehicle.stage(OWN_SAFE["ardupilot"])
@@ -605,7 +604,7 @@ def test_what_was_ordered_is_repeated_also_while_something_else_takes_its_time()
         assert blocks_told(rig).count(LAND_HERE) >= told + 5
 
 
-@pytest.mark.parametrize("raises_once", [False, True])
+@pytest.mark.parametrize("raises_once", [False, pytest.param(True, marks=pytest.mark.complete)])
 def test_motors_off_is_heard_also_after_the_program_failed_while_the_vehicle_lands(raises_once: bool) -> None:
     """Whoever watches the flight raises, perhaps whoever is asked whether to stop too; then a person acts."""
     asked: list[float] = []
@@ -667,7 +666,7 @@ def test_a_log_that_cannot_be_written_is_reported_and_the_previous_one_continues
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "paparazzi", "px4"])
-@pytest.mark.parametrize("away_s", [0.2, 2.2, 30.0])
+@pytest.mark.parametrize("away_s", [0.2, 2.2, pytest.param(30.0, marks=pytest.mark.complete)])
 def test_a_release_after_a_restart_leaves_no_doubt_about_the_gains(autopilot: str, away_s: float) -> None:
     """While it boots, as it answers again, and long after."""
     system = 31 if autopilot == "paparazzi" else 1

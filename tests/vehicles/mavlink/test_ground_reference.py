@@ -134,6 +134,7 @@ def test_a_vehicle_that_may_only_be_observed_is_not_told_to() -> None:
         assert blocks_told(rig) == []
 
 
+@pytest.mark.complete
 def test_after_a_reboot_in_the_air_and_its_landing_it_is_set_before_the_next_flight() -> None:
     with LockstepRig(faults=["reboot@3"]) as rig, connected(rig) as vehicle:
         vehicle.stage(TUNED)

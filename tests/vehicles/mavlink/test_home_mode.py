@@ -68,7 +68,7 @@ def test_one_heartbeat_of_a_pilot_keeps_no_quarantined_vehicle_from_being_told_t
 
 def fly(vehicle: MavlinkVehicle) -> FlightRecord:
     vehicle.stage(TUNED)
-    return vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
+    return vehicle.fly(FlightOptions(seed=1, window_s=16.0), on_sample=unwatched, should_stop=never)
 
 
 def is_land(message: Message) -> bool:
@@ -79,6 +79,7 @@ def lands(rig: LockstepRig, since_s: float) -> int:
     return sum(at_s > since_s and is_land(message) for at_s, message in rig.heard)
 
 
+@pytest.mark.complete
 def test_one_that_flies_home_is_quarantined_told_to_land_on_and_never_said_to_have_landed() -> None:
     with LockstepRig(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
         record = fly(vehicle)
@@ -148,6 +149,7 @@ def test_a_landing_that_is_obeyed_is_no_trouble() -> None:
         assert troubles == {""}
 
 
+@pytest.mark.complete
 def test_a_heartbeat_in_home_mode_is_a_separate_finding() -> None:
     make = old_plan(max_distance_m=4.0, sends_mode=True)
     with LockstepRig(make=make, faults=["carried-away:3@8"]) as rig, connected(rig) as vehicle:

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.experiments.takeoff import Takeoff
 from app.core.records.glitches import find_glitches
 from app.vehicles.base import FlightRecord, OptionValue, VehicleError
 from app.vehicles.mavlink_kind import MAVLINK
 from tests.ports import free_port
 from tests.vehicles.flying import SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig
-from tests.vehicles.mavlink.test_vehicle import fly
+from tests.vehicles.mavlink.test_vehicle import TAKEOFF, fly
 
 pytestmark = pytest.mark.real_time
 
@@ -44,7 +43,7 @@ def test_cameras_are_recorded_beside_the_vehicle_aligned_and_in_agreement() -> N
     np.testing.assert_allclose(both["altitude_2_m"], both["altitude_m"], atol=0.1)
     assert 0.0 < float(record.settings["second_delay_s"]) < 0.25
     assert float(record.settings["second_rms_m"]) < 0.02
-    assert not find_glitches(Takeoff(), both)
+    assert not find_glitches(TAKEOFF, both)
 
 
 @pytest.mark.complete
@@ -54,9 +53,10 @@ def test_cameras_can_be_the_ones_that_are_scored() -> None:
     assert (record.ending, record.reason) == ("completed", "")
     assert 1.0 / np.median(np.diff(both.time_s)) == pytest.approx(100.0, rel=0.2)
     own = replace(both, channels={**both.channels, "altitude_m": both["altitude_2_m"]})
-    assert Takeoff().error(both) == pytest.approx(Takeoff().error(own), rel=0.02)
+    assert TAKEOFF.error(both) == pytest.approx(TAKEOFF.error(own), rel=0.02)
 
 
+@pytest.mark.complete
 def test_odometry_on_the_vehicle_s_own_link_is_a_second_source_too() -> None:
     with LockstepRig(mocap="odometry") as rig:
         vehicle = rig.vehicle(second_source="odometry")
