@@ -129,7 +129,7 @@ class GroundTruth:
 
 def find_violations(truth: GroundTruth, reported: ReportedOutcome) -> tuple[str, ...]:
     """Return every violation; empty if there is none."""
-    return (*_vehicle(truth, reported), *_commands(truth), *_verdict(truth, reported), *_record(truth, reported))
+    return (*_vehicle(truth, reported), *_commands(truth), *judge(truth, reported), *_record(truth, reported))
 
 
 def _vehicle(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
@@ -187,7 +187,7 @@ def _waits(truth: GroundTruth) -> Iterator[float]:
         yield now.time_s - max(since_s, landed_s)
 
 
-def _verdict(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
+def judge(truth: GroundTruth, reported: ReportedOutcome) -> Iterator[str]:
     """Check the reported outcome and its failure against what happened."""
     kind, hazard, expected = truth.case.faults[0].kind, truth.hazard, truth.expected
     led = {each.kind for each in truth.injected if each.kind in LEADS}

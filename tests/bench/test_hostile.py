@@ -34,42 +34,35 @@ def case(autopilot: str, what: str, state: State, delay_s: float = 5.0, duration
 SEEN = [
     # flights of real autopilots, and an attacker on the link
     ("paparazzi", "foreign kill", State.RECORD, "invalid", "F10b", "quarantined"),
+    ("paparazzi", "process killed", State.RECORD, "lost", "", "quarantined"),
+    ("ardupilot", "stuck altitude", State.SET_GAINS, "invalid", "F9a", "safe"),
+    ("ardupilot", "copy from another port", State.RECORD, "completed", "", "safe"),
+    ("paparazzi", "lean oscillation", State.RECORD, "aborted", "F6", "safe"),
+]
+SEEN_ALIKE = [
     ("paparazzi", "drifts by 0.5 m/s", State.LAND, "completed", "", "safe"),
     ("px4", "drifts by 0.5 m/s unwitnessed", State.LAND, "completed", "", "safe"),
     ("paparazzi", "no SCRIPT_CURRENT", State.RECORD, "completed", "", "quarantined"),
-    ("paparazzi", "process killed", State.RECORD, "lost", "", "quarantined"),
     ("px4", "left in OFFBOARD", State.SET_GAINS, "completed", "", "safe"),
-    ("ardupilot", "stuck altitude", State.SET_GAINS, "invalid", "F9a", "safe"),
-    ("ardupilot", "copy from another port", State.RECORD, "completed", "", "safe"),
     ("px4", "moves to another port", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "one stamp +2 s", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "copies of all after 3 s", State.RECORD, "completed", "", "safe"),
     ("px4", "clock wraps after 30 s", State.CONNECT, "completed", "", "safe"),
     ("paparazzi", "x inf for 0.3 s", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "flies home", State.RECORD, "invalid", "F10b", "quarantined"),
-    ("paparazzi", "lean oscillation", State.RECORD, "aborted", "F6", "safe"),
-    # defects found before
-    ("paparazzi", "z nan", State.RECORD, "invalid", "F9d", "quarantined"),
-    ("paparazzi", "pilot", State.RECORD, "invalid", "F10a", "quarantined"),
-]
-SEEN_ALIKE = [
     ("ardupilot", "foreign kill", State.LAND, "invalid", "F10b", "quarantined"),
     ("ardupilot", "process killed", State.RECORD, "lost", "", "quarantined"),
-    ("paparazzi", "stuck altitude", State.RECORD, "invalid", "F9a", "quarantined"),
     ("paparazzi", "30 % are lost", State.PREFLIGHT, "refused", "", "safe"),
     ("paparazzi", "twin 0.4 s older", State.LAND, "invalid", "F12", "quarantined"),
     ("ardupilot", "twin 3600 s older", State.RECORD, "invalid", "F12", "quarantined"),
-    ("ardupilot", "reboot once", State.RECORD, "completed", "", "safe"),
-    ("paparazzi", "companion as autopilot", State.RECORD, "completed", "", "safe"),
-    ("ardupilot", "companion as autopilot", State.RECORD, "completed", "", "safe"),
     ("px4", "companion as autopilot", State.RECORD, "completed", "", "safe"),
-    ("paparazzi", "disarmed once", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "carried away", State.RECORD, "aborted", "F6", "safe"),
-    ("ardupilot", "clock wraps after 19 s", State.CONNECT, "completed", "", "safe"),
-    ("px4", "an hour ahead", State.RECORD, "completed", "", "safe"),
     ("ardupilot", "deaf", State.RECORD, "invalid", "F11", "quarantined"),
     ("px4", "mocap nan", State.RECORD, "invalid", "F9a", "safe"),
     ("px4", "pilot for 1 s", State.RECORD, "invalid", "F10c", "safe"),
+    # defects found before
+    ("paparazzi", "z nan", State.RECORD, "invalid", "F9d", "quarantined"),
+    ("paparazzi", "pilot", State.RECORD, "invalid", "F10a", "quarantined"),
 ]
 """Further ones, for the complete ring."""
 
@@ -86,31 +79,22 @@ def test_a_hazard_has_its_required_outcome(
     assert (ended.outcome, ended.failure, ended.vehicle) == (outcome, failure, vehicle)
 
 
+@pytest.mark.complete
 def test_a_flight_plan_that_another_station_hurries_sets_its_ground_reference_before_the_flight() -> None:
     """Seen: valid flights of 0.272 and 0.283 m in place of 0.325 m."""
     ended = run_trial(case("paparazzi", "geo init ended early", State.CONNECT, delay_s=0.1))
     assert (ended.outcome, ended.wrong) == ("completed", ())
 
 
-DROPPED = [
-    ("paparazzi", "later and later, to 2 s", State.ARM, 1.2),
-    ("px4", "replaced after 1.3 s", State.RECORD, 6.0),
-]
-DROPPED_ALIKE = [
-    ("paparazzi", "commands 1.2 s late", State.ARM, 0.9),
-    ("paparazzi", "on the ground after 0.6 s", State.RECORD, 6.0),
-    ("paparazzi", "later and later, to 1 s", State.ARM, 0.8),
-    ("paparazzi", "commands 2 s late", State.ARM, 0.9),
-    ("paparazzi", "on the ground after 0 s", State.ARM, 0.5),
-    ("paparazzi", "on the ground after 1 s", State.RECORD, 6.0),
-    ("paparazzi", "replaced after 1.3 s", State.RECORD, 6.0),
-    ("ardupilot", "replaced after 1.3 s", State.TAKEOFF, 0.5),
-]
-
-
+@pytest.mark.complete
 @pytest.mark.parametrize(
     ("autopilot", "what", "state", "delay_s"),
-    [*DROPPED, *(pytest.param(*one, marks=pytest.mark.complete) for one in DROPPED_ALIKE)],
+    [
+        ("paparazzi", "later and later, to 2 s", State.ARM, 1.2),
+        ("px4", "replaced after 1.3 s", State.RECORD, 6.0),
+        ("paparazzi", "commands 1.2 s late", State.ARM, 0.9),
+        ("paparazzi", "on the ground after 0.6 s", State.RECORD, 6.0),
+    ],
 )
 def test_what_once_stopped_motors_in_the_air_does_not_any_more(
     autopilot: str, what: str, state: State, delay_s: float
