@@ -361,6 +361,7 @@ def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_groun
     assert process._vehicle.read_gains() == SAFE
 
 
+@pytest.mark.complete
 def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_out_and_they_are_verified(
     rig: AnsweringRig, tmp_path: Path
 ) -> None:
@@ -443,6 +444,7 @@ def test_land_is_repeated_after_the_worker_died_until_the_vehicle_responds(rig: 
     assert rig.drone.body.stands
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("silenced", [{"deaf_until_s": math.inf}, {"muted": True}], ids=["never obeys", "falls silent"])
 def test_a_vehicle_in_the_air_that_does_not_respond_gets_the_command_for_a_minute(
     rig: AnsweringRig, tmp_path: Path, silenced: dict[str, float | bool]
@@ -468,6 +470,7 @@ def test_a_vehicle_that_got_land_unheard_for_a_minute_keeps_no_process_waiting(
     assert left_alone(process, line, rig) < 0.1
 
 
+@pytest.mark.complete
 def test_one_heartbeat_that_reports_it_disarmed_does_not_end_land_after_the_worker_died(
     rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
