@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Self
 
+from app.core.experiments.takeoff import WINDOW_S
 from tests.ports import free_port
 from tests.runtime.processes import PATIENCE_S, Serving, environment, stream, wait_for
 
@@ -94,13 +95,16 @@ class Registered:
         """To land or to stop its motors, as the books have them, the newest first."""
         return [act for act in self.acts() if act["kind"] in {"land", "motors off"}]
 
-    def campaign(self) -> int:
+    def campaign(self, window_s: float = WINDOW_S) -> int:
         created = self.serving.post(
             "/campaigns",
             {
                 "name": f"On vehicle {self.id}",
                 "vehicle": {"kind": "mavlink", "id": self.id},
-                "definition": {"stop": {"kind": "budget", "max_flights": 7}},
+                "definition": {
+                    "experiment_options": {"window_s": window_s},
+                    "stop": {"kind": "budget", "max_flights": 7},
+                },
             },
         )
         self.serving.proposal(created["id"])

@@ -1,19 +1,12 @@
 """An abort of a flight that is watched from several places; how soon it comes about: bench/abort.py."""
 
 import threading
-from collections.abc import Iterator
 
 import pytest
 
 from tests.runtime.processes import PATIENCE_S, Serving, stream
 
 WATCHERS = 5
-
-
-@pytest.fixture(scope="module")
-def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    with Serving(tmp_path_factory.mktemp("abort") / "data") as one:
-        yield one
 
 
 class Watching:

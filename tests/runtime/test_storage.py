@@ -18,11 +18,10 @@ SIZE_MB = 32
 LESS_THAN_A_RECORD_MB = 3
 
 
-@pytest.fixture
-def disk(tmp_path: Path) -> Iterator[Path]:
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """An empty file system of 32 MB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
+    folder = tmp_path_factory.mktemp("disk")
     command = ["mount", "-t", "tmpfs", "-o", f"size={SIZE_MB}m", "tmpfs", str(folder)]
     if os.geteuid() != 0 or subprocess.run(command, capture_output=True, check=False).returncode != 0:
         pytest.skip("mounting a small file system needs root")
@@ -30,8 +29,9 @@ def disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
-@pytest.fixture
-def serving(disk: Path) -> Iterator[Serving]:
+@pytest.fixture(scope="module")
+def small(disk: Path) -> Iterator[Serving]:
+    """A server on it."""
     with Serving(disk / "data") as one:
         yield one
 
@@ -73,67 +73,66 @@ def land_in_the_spool(serving: Serving, trial_id: int) -> None:
 
 @pytest.mark.complete
 def test_a_request_on_a_full_disk_is_refused_with_a_remedy_and_works_once_there_is_room(
-    disk: Path, serving: Serving
+    disk: Path, small: Serving
 ) -> None:
-    flown = serving.trial(serving.fly(serving.campaign()), "valid")
+    flown = small.trial(small.fly(small.campaign()), "valid")
     filler = fill(disk)
-    refused = serving.api.post("/campaigns", json={"name": "no room", "vehicle": {"kind": "twin"}, "definition": {}})
+    refused = small.api.post("/campaigns", json={"name": "no room", "vehicle": {"kind": "twin"}, "definition": {}})
     assert refused.status_code == 503
     assert "full" in refused.json()["detail"]
     assert "Free some disk space" in refused.json()["hint"]
-    assert serving.get(f"/trials/{flown['id']}") == flown, "what was there is there"
+    assert small.get(f"/trials/{flown['id']}") == flown, "what was there is there"
     filler.unlink()
-    serving.trial(serving.fly(serving.campaign()), "valid")
+    small.trial(small.fly(small.campaign()), "valid")
 
 
 @pytest.mark.complete
-def test_a_flight_whose_record_would_not_fit_does_not_start(disk: Path, serving: Serving) -> None:
-    campaign_id = serving.campaign()
-    serving.worker_pid()
+def test_a_flight_whose_record_would_not_fit_does_not_start(disk: Path, small: Serving) -> None:
+    campaign_id = small.campaign()
+    small.worker_pid()
     filler = fill(disk, leave_mb=LESS_THAN_A_RECORD_MB)
-    trial_id = serving.fly(campaign_id)
+    trial_id = small.fly(campaign_id)
     flight = wait_for(
         "the refusal",
-        lambda: (found := serving.get(f"/trials/{trial_id}")["flight"])["state"] == "failed" and found,
+        lambda: (found := small.get(f"/trials/{trial_id}")["flight"])["state"] == "failed" and found,
     )
     assert "no space for the flight record" in flight["problem"]
-    assert serving.trial(trial_id, "planned")["read_back"] is None
+    assert small.trial(trial_id, "planned")["read_back"] is None
     filler.unlink()
-    serving.post(f"/trials/{trial_id}/fly", {"speed": None})
-    serving.trial(trial_id, "valid")
+    small.post(f"/trials/{trial_id}/fly", {"speed": None})
+    small.trial(trial_id, "valid")
 
 
 @pytest.mark.complete
-def test_a_disk_that_fills_up_in_mid_flight_costs_no_record(disk: Path, serving: Serving) -> None:
-    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
-    fill(disk)
-    assert serving.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
-    landed = serving.trial(trial_id, "aborted")
+def test_a_disk_that_fills_up_in_mid_flight_costs_no_record(disk: Path, small: Serving) -> None:
+    trial_id = in_the_air(small, small.campaign(), speed=1.0)
+    filler = fill(disk)
+    assert small.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
+    landed = small.trial(trial_id, "aborted")
     assert landed["record"]["duration_s"] > 0.2, "the room that was claimed before lift-off is enough for the database"
     assert landed["reason"] == "enough"
+    filler.unlink()
 
 
 @pytest.mark.complete
-def test_a_record_waits_in_the_spool_while_the_database_takes_nothing(tmp_path: Path) -> None:
-    with Serving(tmp_path / "data") as serving:
-        trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
-        with locked(serving):
-            land_in_the_spool(serving, trial_id)
-        landed = serving.trial(trial_id, "aborted")
-        assert (landed["flight"]["state"], landed["reason"]) == ("aborted", "enough")
-        assert landed["record"]["duration_s"] > 0.2
-        wait_for("the spool to be empty", lambda: not list((serving.data_dir / "spool").iterdir()))
+def test_a_record_waits_in_the_spool_while_the_database_takes_nothing(serving: Serving) -> None:
+    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
+    with locked(serving):
+        land_in_the_spool(serving, trial_id)
+    landed = serving.trial(trial_id, "aborted")
+    assert (landed["flight"]["state"], landed["reason"]) == ("aborted", "enough")
+    assert landed["record"]["duration_s"] > 0.2
+    wait_for("the spool to be empty", lambda: not list((serving.data_dir / "spool").iterdir()))
 
 
 @pytest.mark.complete
-def test_a_record_in_the_spool_outlives_its_worker(tmp_path: Path) -> None:
-    with Serving(tmp_path / "data") as serving:
-        trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
-        with locked(serving):
-            land_in_the_spool(serving, trial_id)
-            os.kill(serving.worker_pid(), signal.SIGKILL)
-        recovered = serving.trial(trial_id, "aborted")
-        assert recovered["flight"]["state"] == "lost", "the ledger says what the worker knew"
-        assert recovered["reason"] == "enough"
-        assert recovered["record"]["duration_s"] > 0.2
-        wait_for("the spool to be empty", lambda: not list((serving.data_dir / "spool").iterdir()))
+def test_a_record_in_the_spool_outlives_its_worker(serving: Serving) -> None:
+    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
+    with locked(serving):
+        land_in_the_spool(serving, trial_id)
+        os.kill(serving.worker_pid(), signal.SIGKILL)
+    recovered = serving.trial(trial_id, "aborted")
+    assert recovered["flight"]["state"] == "lost", "the ledger says what the worker knew"
+    assert recovered["reason"] == "enough"
+    assert recovered["record"]["duration_s"] > 0.2
+    wait_for("the spool to be empty", lambda: not list((serving.data_dir / "spool").iterdir()))
