@@ -117,6 +117,7 @@ def test_disarming_in_the_air_is_refused_unless_it_is_forced(pilot: ArduPilot) -
     assert pilot.height_m() == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.complete
 def test_without_a_failsafe_a_lost_ground_station_changes_nothing(pilot: ArduPilot) -> None:
     pilot.beat()
     pilot.hover()
@@ -157,6 +158,7 @@ def test_without_its_integral_gain_it_does_not_arm(pilot: ArduPilot) -> None:
     assert pilot.words() == ["Arm: PSC_ACCZ_I must be > 0"]
 
 
+@pytest.mark.complete
 def test_its_gains_act_if_it_loses_its_integral_gain_it_floats_too_low(pilot: ArduPilot) -> None:
     """It believes to hover on 0.58 of its thrust and hovers on 0.61: 0.03 that the other gains must make up."""
     given = {"MOT_THST_HOVER": 0.58, "MOT_HOVER_LEARN": 0.0, "PSC_ACCZ_P": 0.6}

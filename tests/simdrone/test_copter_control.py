@@ -114,6 +114,7 @@ def test_arducopter_flies_position_targets_on_a_shaped_trajectory_and_reports_th
     }
 
 
+@pytest.mark.complete
 def test_arducopters_gains_decide_how_closely_it_follows(run: Run) -> None:
     tuned = steps_of_one_metre(PSC_POSZ_P=2.0, PSC_VELZ_P=7.0, PSC_ACCZ_P=1.0, PSC_ACCZ_I=2.0)
     errors_m = [
@@ -168,6 +169,7 @@ def stream(pilot: Px4, count: int, height_m: float, mask: int = POSITION_ONLY, a
         pilot.ground.listen(0.1)
 
 
+@pytest.mark.complete
 def test_px4_enters_offboard_only_if_it_is_streamed_to_follows_and_lands_when_the_stream_ends(px4_pilot: Px4) -> None:
     pilot, ground = px4_pilot, px4_pilot.ground
     assert pilot.command(SET_INTERVAL, CONTROLLER_OUTPUT, EVERY_20_MS) == 4
@@ -189,6 +191,7 @@ def test_px4_enters_offboard_only_if_it_is_streamed_to_follows_and_lands_when_th
     assert "No offboard signal" in pilot.words()
 
 
+@pytest.mark.complete
 def test_px4_adds_a_streamed_acceleration_as_a_push_that_it_holds_against(px4_pilot: Px4) -> None:
     """In the end the integral takes up the push of 1 m/s² downwards."""
     stream(px4_pilot, 12, 3.0)

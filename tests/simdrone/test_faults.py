@@ -204,7 +204,11 @@ def test_a_deaf_drone_ignores_all_commands_and_keeps_sending() -> None:
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "by_hand", "automatic"), [("paparazzi", (80, 0), (4, 0)), ("px4", (81, 3 << 16), (29, 0x03040000))]
+    ("autopilot", "by_hand", "automatic"),
+    [
+        ("paparazzi", (80, 0), (4, 0)),
+        pytest.param("px4", (81, 3 << 16), (29, 0x03040000), marks=pytest.mark.complete),
+    ],
 )
 def test_a_pilot_takes_it_over_holds_it_and_hands_it_back(
     autopilot: str, by_hand: tuple[int, int], automatic: tuple[int, int]
@@ -264,7 +268,9 @@ def test_in_a_fall_paparazzis_estimated_altitude_steps_as_in_the_recorded_one() 
     assert (-heard[-1].z, heard[-1].vz) == pytest.approx((GROUND_M, 0.0), abs=0.01)
 
 
-@pytest.mark.parametrize("autopilot", ["paparazzi", "ardupilot", "px4"])
+@pytest.mark.parametrize(
+    "autopilot", ["paparazzi", *(pytest.param(each, marks=pytest.mark.complete) for each in ("ardupilot", "px4"))]
+)
 def test_another_station_stops_the_motors_in_the_air(autopilot: str) -> None:
     ground = hovering(autopilot)
     drone_of(ground).inject_fault("foreign-kill")
@@ -318,7 +324,10 @@ def test_it_flies_home_by_itself(autopilot: str, height_m: float) -> None:
     assert drone_of(ground).body.altitude_m == pytest.approx(height_m, abs=0.1)
 
 
-@pytest.mark.parametrize(("autopilot", "kind"), [("paparazzi", "SCRIPT_CURRENT"), ("px4", "EXTENDED_SYS_STATE")])
+@pytest.mark.parametrize(
+    ("autopilot", "kind"),
+    [("paparazzi", "SCRIPT_CURRENT"), pytest.param("px4", "EXTENDED_SYS_STATE", marks=pytest.mark.complete)],
+)
 def test_a_silent_witness_does_not_tell_of_the_landing(autopilot: str, kind: str) -> None:
     ground = hovering(autopilot)
     assert any(each.get_type() == kind for each in ground.heard)

@@ -66,7 +66,7 @@ def test_its_takeoff_is_the_replicas_to_the_last_digit(pilot: Pilot) -> None:
     assert any(np.array_equal(heard[lifted : lifted + 600], model[first + late :: 10][:600]) for late in range(10))
 
 
-@pytest.mark.parametrize("gains", [(283, 13, 82), TUNED])
+@pytest.mark.parametrize("gains", [(283, 13, 82), pytest.param(TUNED, marks=pytest.mark.complete)])
 def test_in_the_body_of_jsbsim_it_flies_like_the_recorded_drone(gains: tuple[int, int, int]) -> None:
     name = "_".join(str(gain) for gain in gains)
     recorded = np.loadtxt(TAKEOFFS / f"paparazzi_{name}.csv", delimiter=",", skiprows=1)
@@ -106,7 +106,7 @@ def test_writing_ki_empties_the_integrator_and_writing_kp_does_not(pilot: Pilot)
     assert np.ptp(heights_m(pilot.ground.listen(2.0))) > 0.1
 
 
-@pytest.mark.parametrize("gains", [(283, 13, 82), TUNED])
+@pytest.mark.parametrize("gains", [(283, 13, 82), pytest.param(TUNED, marks=pytest.mark.complete)])
 def test_land_here_lands_in_realistic_time_and_says_so(gains: tuple[int, int, int], pilot: Pilot) -> None:
     """The recorded landings took 15.9 s with the first gains and 6.6 s with the second."""
     ground = pilot.ground
@@ -194,6 +194,7 @@ def test_failsafe_descends_at_one_point_three_metres_a_second(pilot: Pilot) -> N
     assert pilot.ground.expect("HEARTBEAT").base_mode == ARMED
 
 
+@pytest.mark.complete
 def test_with_a_silent_ground_it_hovers_until_the_blocks_own_limit_lands_it(pilot: Pilot) -> None:
     """After 45 s in the block without any message from the ground."""
     pilot.take_off()

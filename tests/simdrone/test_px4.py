@@ -94,6 +94,7 @@ def test_it_reports_that_it_may_arm_in_its_health_alone(pilot: Px4) -> None:
     assert (ready[0], ready[-1]) == (False, True)
 
 
+@pytest.mark.complete
 def test_after_a_flight_with_targets_it_is_in_offboard_again_and_does_not_arm(pilot: Px4) -> None:
     """px4_refused_in_offboard.tlog: custom_mode 0x60000, result 1."""
     pilot.hover()
@@ -141,6 +142,7 @@ def test_with_its_failsafe_it_lands_ten_seconds_after_the_last_heartbeat(pilot: 
     assert 9.5 < pilot.ground.elapsed_s - silent_from_s < 12.5
 
 
+@pytest.mark.complete
 def test_heartbeats_of_no_ground_station_do_not_keep_it_in_the_air(pilot: Px4) -> None:
     pilot.set("NAV_DLL_ACT", bytewise(3), INT32)
     pilot.hover()
@@ -162,6 +164,7 @@ def test_a_breached_fence_triggers_its_action(action: int, mode: int, pilot: Px4
     assert pilot.words() == ["Geofence violated: maximum altitude exceeded"]
 
 
+@pytest.mark.complete
 def test_its_gains_act_without_its_integral_gain_it_floats_too_low(pilot: Px4) -> None:
     """It believes to hover on 0.6 of its thrust, without another estimate, and hovers on 0.61: 0.16 m/s² that the other
     gains must make up."""
