@@ -75,6 +75,7 @@ def test_slow_methods_tune_the_first_vehicles() -> None:
         chosen_methods("luck")
 
 
+@pytest.mark.complete
 @compiled_only
 def test_a_search_flies_its_budget_and_is_judged_in_other_weather() -> None:
     tuning = StepsTuning("PX4", 0, 1, budget=3)

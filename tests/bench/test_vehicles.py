@@ -81,6 +81,7 @@ def test_what_is_unsafe(pieces: list[tuple[float, float]], unsafe: bool) -> None
     assert is_unsafe(altitudes(*pieces)) is unsafe
 
 
+@pytest.mark.complete
 def test_the_twins_own_optimum_is_at_least_as_good_as_the_reference_measurement() -> None:
     """0.1181 m near 1567, 1037, 173, which lies inside the default bounds."""
     twin = population("twin", 1, 1)[0]

@@ -1,4 +1,5 @@
-"""One real server, with its worker, for all tests of a process that leave it able to fly and compute."""
+"""One real server, with its worker, for all tests that leave it able to fly and compute: they are `real_time`, so that
+one process runs them, one after another."""
 
 from collections.abc import Iterator
 
@@ -7,7 +8,7 @@ import pytest
 from tests.runtime.processes import Serving
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def serving(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     with Serving(tmp_path_factory.mktemp("serving") / "data") as one:
         yield one

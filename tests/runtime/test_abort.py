@@ -6,6 +6,8 @@ import pytest
 
 from tests.runtime.processes import PATIENCE_S, Serving, stream
 
+pytestmark = pytest.mark.real_time
+
 WATCHERS = 5
 
 

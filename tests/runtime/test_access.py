@@ -14,6 +14,8 @@ from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Key
 from tests.runtime.processes import Serving, environment
 
+pytestmark = pytest.mark.real_time
+
 REAL = {
     "name": "Bee",
     "kind": "mavlink",

@@ -6,6 +6,8 @@ import pytest
 
 from tests.runtime.processes import Serving, stream, wait_for
 
+pytestmark = pytest.mark.real_time
+
 
 def changes(url: str, last_event_id: str, until: str) -> list[tuple[str, str | None, Any]]:
     """Every event from that one to the change with the id `until`."""

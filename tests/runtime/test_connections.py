@@ -16,6 +16,8 @@ import pytest
 from app.runtime.http_connections import RESERVED_FOR_ABORTS, room_for_connections
 from tests.runtime.processes import Serving, in_the_air
 
+pytestmark = pytest.mark.real_time
+
 FILES: Final = 256
 """That the server may have open."""
 

@@ -12,6 +12,8 @@ import pytest
 from app.web.addresses import addresses_elsewhere, exposure, web_address
 from tests.runtime.processes import PATIENCE_S, Serving, environment, stream
 
+pytestmark = pytest.mark.real_time
+
 
 def gainline(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
     """A command that is expected to end by itself; its words in one line each."""

@@ -9,6 +9,8 @@ import pytest
 from tests.runtime.processes import Serving, is_alive, wait_for
 from tests.runtime.test_crashes import children
 
+pytestmark = pytest.mark.real_time
+
 LONG = "variability"
 
 
