@@ -1,8 +1,8 @@
 """Altitude steps in the trial machine: the schedule, its limits, and every failure in every phase of it."""
 
 from collections.abc import Callable
-from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import cache
 
 import pytest
 
@@ -87,6 +87,11 @@ class Stepping(TrialDriver):
 
 
 def hovering(until_s: float = 5.0, *, unheard: bool = False) -> Stepping:
+    return _hovering(until_s, unheard).copied()
+
+
+@cache
+def _hovering(until_s: float, unheard: bool) -> Stepping:
     walk = Stepping(plan=STEPS, unheard=unheard)
     walk.lift_off()
     return walk.until_s(until_s)
@@ -193,7 +198,7 @@ FAILURES: list[tuple[Callable[[TrialDriver], None], State, Failure]] = [
 def test_every_failure_in_every_phase_leads_where_it_must_and_no_set_point_follows(phase: str) -> None:
     begun = PHASES[phase]()
     for happens, then, failure in FAILURES:
-        walk = deepcopy(begun)
+        walk = begun.copied()
         walk.moves = False
         happens(walk)
         assert (walk.state, walk.trial.failure) == (then, failure), happens
@@ -403,7 +408,7 @@ def test_every_failure_of_one_that_holds_first_leads_where_it_must_too(begin: Ca
     for happens, then, failure in FAILURES:
         if happens is land_by_itself:
             continue
-        walk = deepcopy(begun)
+        walk = begun.copied()
         walk.moves = False
         happens(walk)
         assert (walk.state, walk.trial.failure) == (then, failure), happens

@@ -35,33 +35,39 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_machine import Plan, begin
 from app.vehicles.mavlink.trial_reactions import TRANSITIONS, State
-from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver
+from tests.vehicles.mavlink.walking import GROUND_M, PLAN, SAFE_GAINS, STEP_S, TrialDriver, once
 
 ABORT = "the operator pressed Abort"
 
 
+@once
 def arming() -> TrialDriver:
     return TrialDriver().pass_s(0.2)
 
 
+@once
 def baseline() -> TrialDriver:
     walk = TrialDriver()
     walk.armed = True
     return walk.pass_s(1.0)
 
 
+@once
 def taking_off() -> TrialDriver:
     return TrialDriver().arm().pass_s(0.5)
 
 
+@once
 def recording() -> TrialDriver:
     return TrialDriver().lift_off().pass_s(2.0)
 
 
+@once
 def landing() -> TrialDriver:
     return TrialDriver().land()
 
 
+@once
 def aborting() -> TrialDriver:
     """Landing for a reason that does not speak against the gains."""
     walk = recording()
@@ -71,16 +77,19 @@ def aborting() -> TrialDriver:
     return walk.pass_s(0.5)
 
 
+@once
 def lost() -> TrialDriver:
     walk = recording()
     walk.mute = True
     return walk.pass_s(1.5)
 
 
+@once
 def disarming() -> TrialDriver:
     return TrialDriver().land().touch_down()
 
 
+@once
 def restoring() -> TrialDriver:
     return disarming().disarm()
 

@@ -1,6 +1,10 @@
 """A trial walked through by hand: a machine, a clock, and a vehicle that says what the test wants."""
 
+from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, field
+from functools import cache
+from typing import Self, TypeVar
 
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.boot_clock import WRAP_S
@@ -100,6 +104,14 @@ class TrialDriver:
     def when(self, action: Action) -> list[float]:
         return [at_s for at_s, command in self.told if isinstance(command, PerformAction) and command.action is action]
 
+    def copied(self) -> Self:
+        """One that goes its own way from here."""
+        other = copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, list):
+                setattr(other, name, list(value))
+        return other
+
     def give(self, event: Event) -> "TrialDriver":
         self.trial, commands = advance(self.trial, event)
         self._note(commands)
@@ -190,3 +202,12 @@ class TrialDriver:
 
     def restore(self, problem: str = "") -> "TrialDriver":
         return self.give(GainsRestored(self.now_s, problem))
+
+
+Driver = TypeVar("Driver", bound=TrialDriver)
+
+
+def once(make: Callable[[], Driver]) -> Callable[[], Driver]:
+    """A walk to some state is made once for all tests, each of which gets a copy."""
+    made = cache(make)
+    return lambda: made().copied()
