@@ -71,16 +71,20 @@ def test_the_real_paparazzi_hovers_at_its_hover_throttle_and_reports_none_on_the
     assert 0.6 <= float(np.median([share for share in shares if share > 0.0])) <= 0.65
 
 
-@cache
-def flown(
-    autopilot: str, fault: type[Fault] | None = None
-) -> tuple[FlightRecord, list[Sample], list[tuple[float, Message]]]:
+Flown = tuple[FlightRecord, list[Sample], list[tuple[float, Message]]]
+
+
+def flown(autopilot: str, fault: type[Fault] | None = None) -> Flown:
     """The record of a trial with the safe gains, its live samples, and what was sent to the drone with its time."""
+    return _flown(autopilot, "" if fault is None else fault.name)
+
+
+@cache
+def _flown(autopilot: str, fault: str) -> Flown:
     watcher = Watcher()
-    names = [] if fault is None else [f"{fault.name}@connect"]
     with (
-        mock.patch.object(faults, "FAULTS", {} if fault is None else {fault.name: fault}),
-        LockstepRig(autopilot, faults=names) as rig,
+        mock.patch.object(faults, "FAULTS", {kind.name: kind for kind in Hostile.__subclasses__()}),
+        LockstepRig(autopilot, faults=[f"{fault}@connect"] if fault else []) as rig,
     ):
         if autopilot != "paparazzi":
             rig.switch_on_failsafes()
