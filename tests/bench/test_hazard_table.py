@@ -487,10 +487,18 @@ RARE = {
     f"{which} {sign * by_s:+g} s"
     for which, by_s, sign in product(("one stamp", "all stamps"), (0.3, 0.5, 2.0, 3.0), (1, -1))
 }
+"""Further values of a hazard: on record alone, and not in the everyday ring."""
+
+
+def is_asked(name: str, state: State) -> bool:
+    is_further = name in RARE and state is not State.RECORD
+    return state in HAZARDS[name].states and (name, state) != LEFT_OUT and not is_further
+
+
 CELLS = [
     pytest.param(name, state, marks=() if state is State.RECORD and name not in RARE else pytest.mark.complete)
     for name, state in product(EFFECTS, BEGIN)
-    if state in HAZARDS[name].states and (name, state) != LEFT_OUT
+    if is_asked(name, state)
 ]
 
 

@@ -134,20 +134,34 @@ def test_a_server_killed_during_a_backup_leaves_no_copy_once_it_runs_again(tmp_p
 
 
 @pytest.mark.complete
-def test_a_flight_that_outlived_its_web_process_can_still_be_aborted(tmp_path: Path) -> None:
+def test_a_flight_that_outlived_its_web_process_can_still_be_aborted_and_one_whose_server_stops_lands(
+    tmp_path: Path,
+) -> None:
     first = Serving(tmp_path / "data")
-    trial_id = in_the_air(first, first.campaign(), speed=1.0)
+    campaign_id = first.campaign()
+    trial_id = in_the_air(first, campaign_id, speed=1.0)
     pids = children(first.worker_pid())
     for pid in pids:
         os.kill(pid, signal.SIGSTOP)  # the flight now takes as long as a server takes to start
+    old = first.worker_pid()
     os.kill(first.process.pid, signal.SIGKILL)
     first.stop()
-    with Serving(tmp_path / "data") as second:
-        second.worker_pid()
-        assert second.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
-        for pid in pids:
-            os.kill(pid, signal.SIGCONT)
-        assert second.trial(trial_id, "aborted")["reason"] == "enough"
+    second = Serving(tmp_path / "data")
+    second.worker_pid()
+    assert second.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
+    for pid in pids:
+        os.kill(pid, signal.SIGCONT)
+    assert second.trial(trial_id, "aborted")["reason"] == "enough"
+    wait_for("the old worker's end", lambda: not is_alive(old))
+
+    worker = second.worker_pid()
+    trial_id = in_the_air(second, campaign_id, speed=1.0)
+    assert second.stop() == 0
+    assert not is_alive(worker)
+    with Serving(tmp_path / "data") as third:
+        trial = third.trial(trial_id, "aborted")
+        assert (trial["reason"], trial["abort_cause"]) == ("Gainline was stopped", "something else")
+        assert trial["record"]["samples"] > 0
 
 
 @pytest.mark.complete
@@ -177,19 +191,6 @@ def test_a_proposal_whose_worker_is_killed_is_computed_again_and_is_the_same(ser
     done = serving.get(f"/jobs/{job['id']}")
     assert (done["state"], done["attempts"]) == ("done", 2)
     wait_for("the end of its processes", lambda: not any(is_alive(pid) for pid in pids))
-
-
-@pytest.mark.complete
-def test_stopping_the_server_in_mid_flight_lands_and_records_it(tmp_path: Path) -> None:
-    serving = Serving(tmp_path / "data")
-    worker = serving.worker_pid()
-    trial_id = in_the_air(serving, serving.campaign(), speed=1.0)
-    assert serving.stop() == 0
-    assert not is_alive(worker)
-    with Serving(tmp_path / "data") as again:
-        trial = again.trial(trial_id, "aborted")
-        assert (trial["reason"], trial["abort_cause"]) == ("Gainline was stopped", "something else")
-        assert trial["record"]["samples"] > 0
 
 
 @pytest.mark.complete

@@ -10,6 +10,7 @@ from app.simdrone.paparazzi import HOME, NAV, Paparazzi
 from app.simdrone.registry import Make
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, VehicleError
 from app.vehicles.mavlink.dialects import Message, number
+from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, never, unwatched
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -79,14 +80,35 @@ def lands(rig: LockstepRig, since_s: float) -> int:
     return sum(at_s > since_s and is_land(message) for at_s, message in rig.heard)
 
 
+class Watching(LockstepRig):
+    """Notes what is shown as the vehicle's trouble, with the time."""
+
+    vehicle_now: MavlinkVehicle | None = None
+
+    def read(self, timeout_s: float) -> list[tuple[bytes, Peer]]:
+        if self.vehicle_now is not None:
+            self.shown.append((self.now_s(), self.vehicle_now.condition().trouble))
+        return super().read(timeout_s)
+
+    def watch(self, vehicle: MavlinkVehicle) -> None:
+        self.shown: list[tuple[float, str]] = []
+        self.vehicle_now = vehicle
+
+
 @pytest.mark.complete
 def test_one_that_flies_home_is_quarantined_told_to_land_on_and_never_said_to_have_landed() -> None:
-    with LockstepRig(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
+    """The operator is told before the landing is given up; once a pilot has set its mode it lands."""
+    with Watching(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
+        rig.watch(vehicle)
         record = fly(vehicle)
         assert (record.ending, rig.drone.autopilot.held("aut_mod")) == ("aborted", HOME)
         assert "It has not landed within 40 s." in record.reason
         assert "Land was still being repeated when this record ended." in record.reason
         assert ADVICE in vehicle.concern
+        landed_s = next(at_s for at_s, each in rig.heard if is_land(each))
+        warned_s = next(at_s for at_s, trouble in rig.shown if ADVICE in trouble)
+        assert 4.9 < warned_s - landed_s < 15.0
+
         over_s = rig.now_s()
         vehicle.attend(20.0)
         assert lands(rig, over_s) >= 3
@@ -96,11 +118,6 @@ def test_one_that_flies_home_is_quarantined_told_to_land_on_and_never_said_to_ha
         with pytest.raises(VehicleError, match="armed"):
             vehicle.release()
 
-
-@pytest.mark.complete
-def test_once_a_pilot_has_set_its_mode_it_lands_and_the_trouble_is_over() -> None:
-    with LockstepRig(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
-        fly(vehicle)
         rig.drone.autopilot._set_mode(NAV)  # type: ignore[attr-defined]
         vehicle.attend(30.0)
         assert rig.drone.body.altitude_m < 0.1
@@ -112,41 +129,11 @@ def test_once_a_pilot_has_set_its_mode_it_lands_and_the_trouble_is_over() -> Non
 
 
 @pytest.mark.complete
-def test_while_it_does_not_come_down_the_operator_is_told_so_before_the_landing_is_given_up() -> None:
-    told: list[tuple[float, str]] = []
-
-    class Watching(LockstepRig):
-        vehicle_now: MavlinkVehicle | None = None
-
-        def read(self, timeout_s: float) -> list[tuple[bytes, tuple[str, int]]]:
-            if self.vehicle_now is not None:
-                told.append((self.now_s(), self.vehicle_now.condition().trouble))
-            return super().read(timeout_s)
-
-    with Watching(make=old_plan(), faults=["carried-away:5@8"]) as rig, connected(rig) as vehicle:
-        rig.vehicle_now = vehicle
-        fly(vehicle)
-        landed_s = next(at_s for at_s, each in rig.heard if is_land(each))
-        warned_s = next(at_s for at_s, trouble in told if ADVICE in trouble)
-        assert 4.9 < warned_s - landed_s < 15.0
-
-
-@pytest.mark.complete
 def test_a_landing_that_is_obeyed_is_no_trouble() -> None:
-    troubles: set[str] = set()
-
-    class Watching(LockstepRig):
-        vehicle_now: MavlinkVehicle | None = None
-
-        def read(self, timeout_s: float) -> list[tuple[bytes, tuple[str, int]]]:
-            if self.vehicle_now is not None:
-                troubles.add(self.vehicle_now.condition().trouble)
-            return super().read(timeout_s)
-
     with Watching() as rig, connected(rig) as vehicle:
-        rig.vehicle_now = vehicle
+        rig.watch(vehicle)
         assert fly(vehicle).ending == "completed"
-        assert troubles == {""}
+        assert {trouble for _, trouble in rig.shown} == {""}
 
 
 @pytest.mark.complete
