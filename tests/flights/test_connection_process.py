@@ -457,6 +457,7 @@ def test_a_vehicle_in_the_air_that_does_not_respond_gets_the_command_for_a_minut
     assert left_alone(process, line, rig, LAND) == pytest.approx(60.0, abs=0.1)
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_got_land_unheard_for_a_minute_keeps_no_process_waiting(
     rig: AnsweringRig, tmp_path: Path
 ) -> None:

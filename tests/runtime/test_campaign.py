@@ -91,7 +91,7 @@ def test_a_stream_that_is_opened_after_a_change_tells_it_to_whoever_says_since_w
 
 
 def test_an_abort_lands_the_vehicle_and_the_flight_is_classed_aborted(serving: Serving) -> None:
-    campaign_id = serving.campaign(kind="jsbsim")
+    campaign_id = serving.campaign()
     with stream(serving.url) as events:
         trial_id = serving.fly(campaign_id, speed=1.0)
         for name, _, data in events:

@@ -95,6 +95,7 @@ def run() -> Run:
     return steps_of_one_metre()
 
 
+@pytest.mark.complete
 def test_arducopter_flies_position_targets_on_a_shaped_trajectory_and_reports_the_error_to_it(run: Run) -> None:
     inputs, outputs = np.array(run.inputs), np.array(run.outputs)
     target_m, z_m, z_d_m = inputs[:, 0], inputs[:, 1], outputs[:, 0]

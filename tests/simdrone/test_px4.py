@@ -133,6 +133,7 @@ def test_disarming_in_the_air_is_refused_unless_it_is_forced(pilot: Px4) -> None
     assert pilot.height_m() == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.complete
 def test_with_its_failsafe_it_lands_ten_seconds_after_the_last_heartbeat(pilot: Px4) -> None:
     pilot.set("NAV_DLL_ACT", bytewise(3), INT32)
     pilot.hover()

@@ -122,9 +122,10 @@ def test_in_an_automatic_mode_that_is_not_the_trials_it_hears_nothing_until_its_
             assert min(at_s for at_s, message in rig.heard if message.get_type() == "HEARTBEAT") - begun_s > 4.0
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     "uid",
-    ["00112233", pytest.param("0000000000000007", marks=pytest.mark.complete)],
+    ["00112233", "0000000000000007"],
     ids=["another", "not reported"],
 )
 def test_a_vehicle_that_may_be_another_one_gets_no_land(uid: str) -> None:

@@ -120,6 +120,7 @@ def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_s
         )
 
 
+@pytest.mark.complete
 def test_motors_off_that_the_vehicle_ignores_is_not_reported_as_done() -> None:
     """Seen: recorded as stopped, while the drone hovered on."""
     slid: list[float] = []

@@ -240,6 +240,7 @@ def test_another_vehicle_s_throttle_and_late_reports_are_never_taken_for_saturat
     assert len(live) > 500
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("autopilot", FLOWN_ON)
 @pytest.mark.parametrize("fault", [WildThrottle, NoThrottle])
 def test_nothing_that_is_sent_and_nothing_else_recorded_depends_on_it(autopilot: str, fault: type[Fault]) -> None:
