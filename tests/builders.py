@@ -1,10 +1,13 @@
 """What tests build with: flights with known errors, campaigns over HTTP, and a worker's steps done by hand."""
 
+import hashlib
 import json
+import pickle
 import sqlite3
-from collections.abc import Mapping
-from contextlib import closing
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import httpx2
@@ -13,6 +16,7 @@ from numpy.typing import NDArray
 from sqlalchemy import text
 
 from app.campaigns import computation, proposals
+from app.campaigns.computation import CampaignHistory, ProposalComputation
 from app.core.records.trajectory import Trajectory
 from app.db.session import Database
 from app.flights import flight_rows
@@ -80,30 +84,42 @@ def create_campaign(client: httpx2.Client, *, vehicle: str = "twin", **fields: o
 def create_ready_campaign(
     client: httpx2.Client, database: Database, *, vehicle: str = "twin", **fields: object
 ) -> Json:
-    """A campaign whose first gains are known; one that a test begins with is made once for all tests of a process."""
-    begins = _is_empty(database)
-    wanted = json.dumps([vehicle, fields], sort_keys=True)
-    if begins and (made := _READY.get(wanted)):
-        _copy(made.database, database)
-        campaign_id = made.campaign_id
-    else:
-        campaign_id = create_campaign(client, vehicle=vehicle, **fields)["id"]
+    """A campaign whose first gains are known."""
+
+    def make() -> Json:
+        campaign = create_campaign(client, vehicle=vehicle, **fields)
         run_jobs(database)
-        if begins:
-            _READY[wanted] = ReadyCampaign(campaign_id, _copy_of(database))
-    ready: Json = get(client, f"/api/campaigns/{campaign_id}")
-    return ready
+        ready: Json = get(client, f"/api/campaigns/{campaign['id']}")
+        return ready
+
+    return made_once(database, json.dumps(["ready", vehicle, fields], sort_keys=True), make)
+
+
+def made_once(database: Database, what: str, make: Callable[[], Json]) -> Json:
+    """What `make` puts into the database, and its answer. What a test begins with, in an empty database, is made once
+    for all tests of a process that begin with the same, and copied for the others.
+    """
+    if not _is_empty(database):
+        return make()
+    if (made := _MADE.get(what)) is None:
+        answer = make()
+        made = _MADE[what] = _Made(json.dumps(answer), sqlite3.connect(":memory:", check_same_thread=False))
+        _copy(database.file, made.database)
+    else:
+        _copy(made.database, database.file)
+    copied: Json = json.loads(made.answer)
+    return copied
 
 
 @dataclass(frozen=True, slots=True)
-class ReadyCampaign:
-    """A campaign, and the database that holds it alone."""
+class _Made:
+    """An answer, as JSON, and the database that it is about."""
 
-    campaign_id: int
+    answer: str
     database: sqlite3.Connection
 
 
-_READY: dict[str, ReadyCampaign] = {}
+_MADE: dict[str, _Made] = {}
 
 
 def _is_empty(database: Database) -> bool:
@@ -111,16 +127,14 @@ def _is_empty(database: Database) -> bool:
         return not any(session.scalars(text("SELECT seq FROM sqlite_sequence")))
 
 
-def _copy_of(database: Database) -> sqlite3.Connection:
-    copy = sqlite3.connect(":memory:", check_same_thread=False)
-    with closing(sqlite3.connect(database.file)) as source:
-        source.backup(copy)
-    return copy
-
-
-def _copy(source: sqlite3.Connection, database: Database) -> None:
-    with closing(sqlite3.connect(database.file)) as target:
-        source.backup(target)
+def _copy(source: sqlite3.Connection | Path, target: sqlite3.Connection | Path) -> None:
+    with ExitStack() as stack:
+        taken, given = (
+            stack.enter_context(closing(sqlite3.connect(each))) if isinstance(each, Path) else each
+            for each in (source, target)
+        )
+        given.execute("PRAGMA synchronous = OFF")
+        taken.backup(given)
 
 
 def create_trial(client: httpx2.Client, campaign_id: int, **fields: object) -> Json:
@@ -140,6 +154,19 @@ def create_flown_trial(client: httpx2.Client, database: Database, campaign_id: i
     run_jobs(database)
     flown: Json = get(client, f"/api/trials/{trial['id']}")
     return flown
+
+
+def create_flown_campaign(client: httpx2.Client, database: Database, *settling_s: float, **fields: object) -> Json:
+    """A campaign with flights of known errors, one unless more are given, and the gains for the next; as it was before
+    them."""
+
+    def make() -> Json:
+        campaign = create_ready_campaign(client, database, **fields)
+        for each_s in settling_s or (1.0,):
+            create_flown_trial(client, database, campaign["id"], each_s)
+        return campaign
+
+    return made_once(database, json.dumps(["flown", settling_s, fields], sort_keys=True), make)
 
 
 def create_imported_trial(
@@ -182,11 +209,22 @@ def run_jobs(database: Database) -> int:
         assert campaign_id is not None
         with database.read() as session:
             past = proposals.read_history(session, campaign_id)
-        computed = computation.compute(past)
+        computed = compute(past)
         with database.write() as session:
             if jobs.finish_job(session, job_id, worker=WORKER):
                 proposals.store_proposal(session, campaign_id, computed)
     raise AssertionError("jobs make jobs for ever")
+
+
+def compute(past: CampaignHistory) -> ProposalComputation:
+    """Once for all tests of a process: the same history gives the same proposal, as `test_recomputing` sees."""
+    key = hashlib.sha256(pickle.dumps(past)).digest()
+    if key not in _COMPUTED:
+        _COMPUTED[key] = computation.compute(past)
+    return _COMPUTED[key]
+
+
+_COMPUTED: dict[bytes, ProposalComputation] = {}
 
 
 def claim(database: Database) -> FlightRequest:

@@ -14,7 +14,17 @@ from app.common.data_folder import telemetry_log
 from app.common.settings import Settings
 from app.db.models import CampaignRow, FlightRow, TrajectoryRow, TrialPhotoRow, TrialRow, VehicleRow
 from app.db.session import Database
-from tests.builders import Json, create_ready_campaign, create_record, create_trial, get, land, lift_off, run_jobs
+from tests.builders import (
+    Json,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    get,
+    land,
+    lift_off,
+    made_once,
+    run_jobs,
+)
 from tests.bundles.builders import download_bundle, import_bundle, parts_of, sealed, second_installation
 from tests.campaigns.test_recomputing import told
 from tests.campaigns.test_statistics import modelled
@@ -31,6 +41,10 @@ def elsewhere(tmp_path: Path, migrated_file: Path) -> Iterator[tuple[TestClient,
 
 @pytest.fixture
 def campaign(client: TestClient, database: Database) -> Json:
+    return made_once(database, "three flights, a note and a photo", lambda: make_campaign(client, database))
+
+
+def make_campaign(client: TestClient, database: Database) -> Json:
     """Three flights with the calibrated strategy, the first ruled out; a note, a photo."""
     ready = create_ready_campaign(
         client, database, definition={"strategy": "calibrated", "stop": {"kind": "noise", "max_flights": 8}}

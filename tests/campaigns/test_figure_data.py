@@ -9,12 +9,11 @@ from fastapi.testclient import TestClient
 from app.db.session import Database
 from tests.builders import (
     create_climb,
-    create_flown_trial,
+    create_flown_campaign,
     create_imported_trial,
     create_ready_campaign,
     csv_of,
     get,
-    run_jobs,
 )
 
 Json = dict[str, Any]
@@ -35,11 +34,7 @@ def trace(drawn: list[Json], role: str, **meta: object) -> Json:
 @pytest.fixture
 def campaign_id(client: TestClient, database: Database) -> int:
     """A campaign with two flights, the second one better."""
-    campaign = create_ready_campaign(client, database)
-    for settling_s in (2.0, 1.0):
-        create_flown_trial(client, database, campaign["id"], settling_s)
-        run_jobs(database)
-    return int(campaign["id"])
+    return int(create_flown_campaign(client, database, 2.0, 1.0)["id"])
 
 
 def test_the_takeoff_curves_are_the_stored_records(client: TestClient, campaign_id: int) -> None:

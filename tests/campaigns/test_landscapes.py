@@ -12,7 +12,7 @@ from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
-from tests.builders import WORKER, create_flown_trial, create_ready_campaign, get
+from tests.builders import WORKER, create_flown_campaign, create_flown_trial, get
 
 Json = dict[str, Any]
 
@@ -60,9 +60,7 @@ def traces(card: Json, role: str) -> list[Json]:
 @pytest.fixture
 def campaign_id(client: TestClient, database: Database) -> int:
     """A campaign with one flight and the gains for the next."""
-    campaign = create_ready_campaign(client, database, definition={"strategy": "gradient"})
-    create_flown_trial(client, database, campaign["id"], 2.0)
-    return int(campaign["id"])
+    return int(create_flown_campaign(client, database, 2.0)["id"])
 
 
 def test_asked_for_twice_it_is_computed_once_and_drawn_when_done(

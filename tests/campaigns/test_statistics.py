@@ -21,6 +21,7 @@ from tests.builders import (
     get,
     land,
     lift_off,
+    made_once,
     problems_of,
     run_jobs,
 )
@@ -40,7 +41,6 @@ def modelled(gains: Gains) -> FlightRecord:
 def fly(client: TestClient, database: Database, campaign_id: int, settling_s: float, **chosen: object) -> int:
     trial = create_trial(client, campaign_id, fly={"speed": None}, **chosen)
     land(database, lift_off(database), create_record(settling_s))
-    run_jobs(database)
     identity: int = trial["id"]
     return identity
 
@@ -126,7 +126,6 @@ def test_the_error_is_told_against_the_battery_voltage(client: TestClient, datab
         battery_v = np.full(len(record.trajectory), volts)
         trajectory = replace(record.trajectory, channels={**record.trajectory.channels, "battery_v": battery_v})
         land(database, lift_off(database), replace(record, trajectory=trajectory))
-        run_jobs(database)
     trend = get(client, f"/api/campaigns/{campaign['id']}/statistics")["battery_trend"]
     assert trend["slope"] == pytest.approx((climb_error(1.0) - climb_error(1.3)) / 3, rel=1e-2)
     assert trend["upper"] < 0.0
@@ -268,11 +267,14 @@ def test_a_smaller_step_waits_for_the_proposal_that_it_is_half_of(client: TestCl
 @pytest.fixture
 def donor(client: TestClient, database: Database) -> int:
     """A campaign whose second flight is its best."""
-    campaign = create_ready_campaign(client, database, definition=LONG)
-    fly(client, database, campaign["id"], 2.0)
-    fly(client, database, campaign["id"], 1.0, gains=OTHER)
-    identity: int = campaign["id"]
-    return identity
+
+    def make() -> Json:
+        campaign = create_ready_campaign(client, database, definition=LONG)
+        fly(client, database, campaign["id"], 2.0)
+        fly(client, database, campaign["id"], 1.0, gains=OTHER)
+        return campaign
+
+    return int(made_once(database, "donor", make)["id"])
 
 
 def test_a_clone_on_another_vehicle_starts_from_the_best_flight(

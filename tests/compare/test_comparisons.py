@@ -44,7 +44,6 @@ def fly(
 ) -> int:
     trial = create_trial(client, campaign_id, fly={"speed": None}, gains=gains)
     land(database, lift_off(database), create_record(settling_s, **record))
-    run_jobs(database)
     return int(trial["id"])
 
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from app.cli.commands import app
 from app.common.settings import Settings
 from app.db.session import Database
-from tests.builders import Json, create_flown_trial, create_ready_campaign, get
+from tests.builders import Json, create_flown_campaign, get
 
 
 def damage(settings: Settings, trial: Json) -> None:
@@ -40,10 +40,8 @@ def damaged(client: TestClient, settings: Settings, campaign: Json) -> Json:
 
 @pytest.fixture
 def campaign(client: TestClient, database: Database) -> Json:
-    ready = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 9}})
-    for settling_s in (1.5, 1.2, 0.9):
-        create_flown_trial(client, database, ready["id"], settling_s)
-    return ready
+    definition = {"stop": {"kind": "budget", "max_flights": 9}}
+    return create_flown_campaign(client, database, 1.5, 1.2, 0.9, definition=definition)
 
 
 def test_a_backup_of_a_damaged_record_is_refused_and_names_its_trial(

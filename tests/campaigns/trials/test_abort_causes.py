@@ -11,6 +11,7 @@ from app.flights.flight_loop import mark_if_requested
 from app.flights.record_spool import Spool
 from tests.builders import (
     Json,
+    create_flown_campaign,
     create_flown_trial,
     create_ready_campaign,
     create_record,
@@ -27,9 +28,7 @@ CALIBRATED = {"strategy": "calibrated", "stop": {"kind": "budget", "max_flights"
 @pytest.fixture
 def campaign(client: TestClient, database: Database) -> Json:
     """One flight has counted, and the whole step from it is proposed."""
-    ready = create_ready_campaign(client, database, definition=CALIBRATED)
-    create_flown_trial(client, database, ready["id"])
-    return ready
+    return create_flown_campaign(client, database, definition=CALIBRATED)
 
 
 def proposal(client: TestClient, campaign: Json) -> Json:

@@ -10,6 +10,7 @@ from app.db.models import TrialRow
 from app.db.session import Database
 from tests.builders import (
     Json,
+    create_flown_campaign,
     create_flown_trial,
     create_ready_campaign,
     create_record,
@@ -29,10 +30,7 @@ OWN = {"kp": 350, "ki": 30, "kd": 90}
 @pytest.fixture
 def campaign(client: TestClient, database: Database) -> Json:
     """A campaign with one flight."""
-    created = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 9}})
-    create_flown_trial(client, database, created["id"])
-    run_jobs(database)
-    return created
+    return create_flown_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 9}})
 
 
 def prediction(client: TestClient, campaign_id: int, gains: Json) -> Json:
