@@ -251,6 +251,7 @@ def test_exactly_one_of_proposal_gains_and_variant_is_taken(client: TestClient, 
 def test_half_of_no_step_is_refused(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=LONG)
     fly(client, database, campaign["id"], 1.0)
+    run_jobs(database)
     answer = client.post(f"/api/campaigns/{campaign['id']}/trials", json={"variant": "smaller step"})
     assert answer.status_code == 409
     assert "cannot be made smaller" in answer.json()["detail"]

@@ -6,7 +6,17 @@ from app.common.states import TrialState
 from app.db.models import VehicleRow
 from app.db.session import Database
 from app.flights import flight_rows
-from tests.builders import Json, create_ready_campaign, create_record, create_trial, csv_of, land, lift_off, stage
+from tests.builders import (
+    Json,
+    create_ready_campaign,
+    create_record,
+    create_trial,
+    csv_of,
+    land,
+    lift_off,
+    made_once,
+    stage,
+)
 
 
 def make_vehicle_real(database: Database, kind: str = "twin") -> None:
@@ -23,15 +33,18 @@ def csv_with_a_gap(gap_s: float = 1.0) -> bytes:
 
 def create_trial_in(state: TrialState, client: TestClient, database: Database) -> Json:
     """A trial of a new campaign on the twin, in that state; its class is the program's wherever it may be."""
+    return made_once(database, f"a trial that is {state}", lambda: _create_trial_in(state, client, database))
+
+
+def _create_trial_in(state: TrialState, client: TestClient, database: Database) -> Json:
     campaign = create_ready_campaign(client, database)
-    if state == TrialState.PLANNED:
-        return create_trial(client, campaign["id"])
-    if state == TrialState.CANCELLED:
+    if state in {TrialState.PLANNED, TrialState.CANCELLED}:
         trial = create_trial(client, campaign["id"])
-        client.post(f"/api/trials/{trial['id']}/cancel")
     else:
         trial = create_trial(client, campaign["id"], fly={"speed": None})
         _fly(state, database)
+    if state == TrialState.CANCELLED:
+        client.post(f"/api/trials/{trial['id']}/cancel")
     found: Json = client.get(f"/api/trials/{trial['id']}").json()
     assert found["state"] == state
     return found
