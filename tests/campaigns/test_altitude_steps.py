@@ -104,6 +104,7 @@ def test_two_flights_are_flown_to_the_schedule_scored_against_the_reference_pred
     assert [trial["error"] for trial in theirs] == [first["error"], second["error"]]
 
 
+@pytest.mark.complete
 @compiled_only
 def test_its_error_landscape_is_computed_and_drawn(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={**SHORT, "strategy": "gradient"})

@@ -24,6 +24,7 @@ def definition_of(experiment: str) -> Json:
     return {"experiment": experiment, "experiment_options": options, "strategy": "calibrated", "stop": stop}
 
 
+@pytest.mark.complete
 @compiled_only
 @pytest.mark.parametrize(
     ("autopilot", "experiment", "share"),

@@ -127,6 +127,7 @@ def test_the_share_that_is_done_is_that_of_the_gain_sets_evaluated(
         assert share == int(done) / int(points)
 
 
+@pytest.mark.complete
 def test_another_proposal_has_a_landscape_of_its_own(client: TestClient, database: Database, campaign_id: int) -> None:
     card_of(client, campaign_id)
     run_landscapes(database)

@@ -25,6 +25,7 @@ def test_a_vehicle_of_another_experiment_is_refused_naming_both_fields(client: T
     assert set(problems_of(answer)) == {"definition.experiment", "vehicle.kind"}
 
 
+@pytest.mark.complete
 def test_the_second_flight_is_at_the_optimum_and_every_figure_is_drawn(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="lti", definition=DEFINITION)
     errors: list[float] = []

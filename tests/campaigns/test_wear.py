@@ -116,6 +116,7 @@ def test_a_vehicle_that_needs_more_throttle_than_when_it_was_tuned_is_due(
     assert retune["sentence"] in about(client, tuned, "figures/calibration")["summary"]
 
 
+@pytest.mark.complete
 def test_a_finished_campaign_tunes_it_again(client: TestClient, database: Database) -> None:
     fly_campaign(client, database)
     again = fly_campaign(client, database, WORN)

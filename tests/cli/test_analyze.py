@@ -32,6 +32,13 @@ def steps(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def takeoff(tmp_path: Path) -> Path:
+    path = tmp_path / "takeoff.tlog"
+    path.write_bytes(recorded("paparazzi_283_13_82.tlog"))
+    return path
+
+
 def test_a_log_gives_a_table_a_document_and_a_parameter_file(steps: Path, tmp_path: Path) -> None:
     """The binary flew 27 mm with its defaults, and 4.2 mm with 3, 8, 0.5, 3."""
     document, parameters = tmp_path / "steps.json", tmp_path / "gains.param"
@@ -81,9 +88,9 @@ def test_the_log_of_px4_gives_a_file_for_its_ground_station(tmp_path: Path) -> N
     assert {len(row) for row in rows} == {5}
 
 
-def test_the_document_alone_can_be_printed(steps: Path) -> None:
-    result = analyze(steps, "--json", "-")
-    assert json.loads(result.stdout)["file_name"] == "steps.bin"
+def test_the_document_alone_can_be_printed(takeoff: Path) -> None:
+    result = analyze(takeoff, "--json", "-")
+    assert json.loads(result.stdout)["file_name"] == "takeoff.tlog"
 
 
 @pytest.mark.complete
@@ -123,6 +130,7 @@ def test_a_flight_with_the_throttle_at_its_limit_for_a_moment_says_so(tmp_path: 
     assert "throttle at a limit in 2 % of the samples." in " ".join(analyze(path).output.split())
 
 
+@pytest.mark.complete
 def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> None:
     path, parameters = tmp_path / "gusty.bin", tmp_path / "gains.param"
     told = replace(GUSTY, gust_m_s2=0.6, quadratic=0.4, assumed_hover_throttle=0.4)
@@ -151,14 +159,13 @@ def test_the_other_recorded_logs_are_refused_with_the_reason(name: str, reason: 
     assert reason in result.output
 
 
-def test_takeoffs_under_paparazzi_give_a_section_of_the_airframe_file(tmp_path: Path) -> None:
-    path, section = tmp_path / "takeoff.tlog", tmp_path / "gains.xml"
-    path.write_bytes(recorded("paparazzi_283_13_82.tlog"))
-    result = analyze(path, "--params", section)
+def test_takeoffs_under_paparazzi_give_a_section_of_the_airframe_file(takeoff: Path, tmp_path: Path) -> None:
+    section = tmp_path / "gains.xml"
+    result = analyze(takeoff, "--params", section)
     assert result.exit_code == 0, result.output
     assert "1 takeoff analysed over 32.6 s, mean distance from 3 m 0.330 m" in " ".join(result.output.split())
     assert '<define name="HOVER_KP" value="' in section.read_text()
-    assert analyze(path, "--params", section).exit_code == 0
+    assert analyze(takeoff, "--params", section).exit_code == 0
 
 
 def test_the_log_file_beside_a_data_file_is_read_too(tmp_path: Path) -> None:
@@ -167,11 +174,11 @@ def test_the_log_file_beside_a_data_file_is_read_too(tmp_path: Path) -> None:
     assert "has a companion file that is not XML" in analyze(path).output
 
 
-def test_files_that_cannot_be_read_or_written_are_named(steps: Path, tmp_path: Path) -> None:
+def test_files_that_cannot_be_read_or_written_are_named(takeoff: Path, tmp_path: Path) -> None:
     missing = analyze(tmp_path / "missing.bin")
     assert missing.exit_code == 1
     assert "missing.bin could not be read: No such file or directory." in missing.output
     assert "FILE" not in missing.output
-    nowhere = analyze(steps, "--params", tmp_path / "none" / "gains.param")
+    nowhere = analyze(takeoff, "--params", tmp_path / "none" / "gains.param")
     assert nowhere.exit_code == 1
     assert "could not be written" in nowhere.output

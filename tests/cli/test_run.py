@@ -62,6 +62,7 @@ def test_the_simplex_start_is_near_the_best_from_the_first_flight(tmp_path: Path
     )
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(("start", "limit"), [("default", 0.1400), ("simplex", 0.1250)])
 def test_a_hover_throttle_the_model_gets_wrong_is_overcome_on_the_twin(
     tmp_path: Path, start: str, limit: float
@@ -244,6 +245,7 @@ def test_flights_that_cannot_count_end_with_the_budget(tmp_path: Path, monkeypat
     assert campaign["stopped_because"] == "All 2 flights have been flown; 2 of them could not be scored."
 
 
+@pytest.mark.complete
 def test_a_strategy_without_a_further_step_is_said_to_propose_none(tmp_path: Path) -> None:
     named = ("--strategy", "simplex", "--set", "stop=budget", "--max-flights", "3")
     campaign = flown(tmp_path, *RUN_ON_TWIN, *named)

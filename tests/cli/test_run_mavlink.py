@@ -63,6 +63,7 @@ def test_a_real_vehicle_is_refused_before_anything_is_opened(arguments: tuple[st
     assert said in " ".join(result.output.split())
 
 
+@pytest.mark.complete
 def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains_the_vehicle_holds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

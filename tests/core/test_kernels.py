@@ -24,6 +24,7 @@ def output(**environment: str) -> str:
     return done.stdout
 
 
+@pytest.mark.complete
 def test_compiled_and_interpreted_rollouts_are_equal_bit_for_bit() -> None:
     assert output(NUMBA_DISABLE_JIT="0") == output(NUMBA_DISABLE_JIT="1")
 

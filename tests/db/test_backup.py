@@ -35,6 +35,7 @@ class Copying(subprocess.Popen[str]):
         return Path(self.stdout.readline().strip())
 
 
+@pytest.mark.complete
 def test_copies_of_killed_backups_are_deleted_but_never_one_that_is_being_made(
     database: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

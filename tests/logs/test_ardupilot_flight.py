@@ -3,6 +3,7 @@
 import io
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,7 +29,10 @@ from tests.logs.written import (
     ardupilot_log,
 )
 
-FLIGHT = simulated_flight(GUSTY)
+
+@cache
+def gusty() -> LoggedFlight:
+    return simulated_flight(GUSTY)
 
 
 def read(content: bytes) -> LoggedFlight:
@@ -66,8 +70,8 @@ def test_the_recorded_flight_is_read_from_takeoff_to_landing() -> None:
 
 
 def test_a_simulated_flight_is_read_as_it_was_flown() -> None:
-    flight = read(ardupilot_log(FLIGHT))
-    (segment,), (flown,) = flight.segments, FLIGHT.segments
+    flight = read(ardupilot_log(gusty()))
+    (segment,), (flown,) = flight.segments, gusty().segments
     for name in ("z_m", "v_m_s", "a_m_s2", "z_d_m", "v_d_m_s", "a_d_m_s2", "v_t_m_s", "throttle", "throttle_filtered"):
         assert np.asarray(getattr(segment, name)) == pytest.approx(getattr(flown, name), rel=1e-6, abs=1e-6), name
     assert loop_of(flight).parameters.hover_throttle == pytest.approx(0.35)
@@ -75,7 +79,7 @@ def test_a_simulated_flight_is_read_as_it_was_flown() -> None:
 
 
 def test_parameters_of_release_4_7_are_read_by_their_new_names_and_units() -> None:
-    older, newer = (read(ardupilot_log(FLIGHT, parameters=each)) for each in (PARAMETERS, NEWER_PARAMETERS))
+    older, newer = (read(ardupilot_log(gusty(), parameters=each)) for each in (PARAMETERS, NEWER_PARAMETERS))
     assert (loop_of(older).has_newer_names, loop_of(newer).has_newer_names) == (False, True)
     assert loop_of(newer).parameters == loop_of(older).parameters
     assert newer.loop.named({"PSC_ACCZ_P": 0.5}) == {"PSC_D_ACC_P": 0.05}
@@ -83,66 +87,69 @@ def test_parameters_of_release_4_7_are_read_by_their_new_names_and_units() -> No
 
 def test_every_mode_that_holds_altitude_counts_and_landing_does_not() -> None:
     log = ardupilot_log(
-        FLIGHT, modes=((0.0, LOITER), (15.0, GUIDED), (22.0, LAND)), events=((0.0, NOT_LANDED), (26.0, LANDED))
+        gusty(), modes=((0.0, LOITER), (15.0, GUIDED), (22.0, LAND)), events=((0.0, NOT_LANDED), (26.0, LANDED))
     )
     assert spans_s(read(log)) == [(10.0, 21.9)]
 
 
 def test_the_seconds_around_takeoff_and_landing_are_left_out() -> None:
-    log = ardupilot_log(FLIGHT, events=((11.0, NOT_LANDED), (26.0, LANDED)))
+    log = ardupilot_log(gusty(), events=((11.0, NOT_LANDED), (26.0, LANDED)))
     assert spans_s(read(log)) == [(13.0, 22.9)]
 
 
 def test_a_manual_mode_is_refused() -> None:
-    assert refusal(ardupilot_log(FLIGHT, modes=((0.0, STABILIZE),))) == (
+    assert refusal(ardupilot_log(gusty(), modes=((0.0, STABILIZE),))) == (
         "MODE",
         "has no mode that holds altitude in flight",
     )
 
 
 def test_a_log_that_never_left_the_ground_is_refused() -> None:
-    assert refusal(ardupilot_log(FLIGHT, events=())) == ("EV", "has no takeoff, or nothing between takeoff and landing")
+    assert refusal(ardupilot_log(gusty(), events=())) == (
+        "EV",
+        "has no takeoff, or nothing between takeoff and landing",
+    )
 
 
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:
     """The step up is at 14 s, the one down at 20.5 s; other gains from 12 s on are those of the flight."""
-    flight = read(ardupilot_log(FLIGHT, changes=((12.0, "PSC_ACCZ_P", 0.8),)))
+    flight = read(ardupilot_log(gusty(), changes=((12.0, "PSC_ACCZ_P", 0.8),)))
     assert loop_of(flight).parameters.acceleration_p == pytest.approx(0.8)
     assert spans_s(flight) == [(12.0, 26.9)]
 
 
 def test_learned_hover_throttle_does_not_end_a_part() -> None:
-    flight = read(ardupilot_log(FLIGHT, changes=((15.0, "MOT_THST_HOVER", 0.36),)))
+    flight = read(ardupilot_log(gusty(), changes=((15.0, "MOT_THST_HOVER", 0.36),)))
     assert spans_s(flight) == [(10.0, 26.9)]
     assert loop_of(flight).parameters.hover_throttle == pytest.approx(0.35)
 
 
 def test_parts_with_the_same_parameters_count_together() -> None:
     """Back in STABILIZE for a second: two parts of the same flight, in order."""
-    flight = read(ardupilot_log(FLIGHT, modes=((0.0, GUIDED), (17.0, STABILIZE), (18.0, GUIDED))))
+    flight = read(ardupilot_log(gusty(), modes=((0.0, GUIDED), (17.0, STABILIZE), (18.0, GUIDED))))
     assert spans_s(flight) == [(10.0, 16.9), (18.0, 26.9)]
 
 
 def changed(**signals: Samples) -> LoggedFlight:
     """The flight with other signals."""
-    (segment,) = FLIGHT.segments
-    return replace(FLIGHT, segments=[replace(segment, **signals)])
+    (segment,) = gusty().segments
+    return replace(gusty(), segments=[replace(segment, **signals)])
 
 
 def test_of_a_long_flight_the_two_minutes_with_most_manoeuvres_are_read() -> None:
     """140 s of hover, then the steps: 17 s at the end."""
-    (segment,) = FLIGHT.segments
+    (segment,) = gusty().segments
     hover = {name: np.tile(getattr(segment, name)[20:40], 70) for name in type(segment).__slots__}
     joined = {name: np.append(hover[name], getattr(segment, name)) for name in hover}
     time_s = 0.1 * np.arange(len(joined["time_s"]))
-    log = ardupilot_log(replace(FLIGHT, segments=[replace(segment, **{**joined, "time_s": time_s})]))
+    log = ardupilot_log(replace(gusty(), segments=[replace(segment, **{**joined, "time_s": time_s})]))
     ((begin_s, end_s),) = spans_s(read(log))
     assert end_s - begin_s <= 120.0
     assert (begin_s < 10.0 + 140.0 + 4.0, end_s > 10.0 + 140.0 + 13.0) == (True, True)
 
 
 def test_a_hundred_rows_a_second_are_thinned_to_ten() -> None:
-    (logged,) = FLIGHT.segments
+    (logged,) = gusty().segments
     time_s = np.arange(0.0, logged.duration_s, 0.01)
     names = [name for name in type(logged).__slots__ if name != "time_s"]
     often = {name: np.interp(time_s, logged.time_s, getattr(logged, name)) for name in names}
@@ -151,12 +158,12 @@ def test_a_hundred_rows_a_second_are_thinned_to_ten() -> None:
 
 
 def test_an_older_release_without_the_shaped_altitude_is_read_by_its_target() -> None:
-    older, newer = (read(ardupilot_log(FLIGHT, has_shaped_altitude=each)) for each in (False, True))
+    older, newer = (read(ardupilot_log(gusty(), has_shaped_altitude=each)) for each in (False, True))
     assert older.segments[0].z_d_m == pytest.approx(newer.segments[0].z_d_m)
 
 
 def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_named() -> None:
-    log = ardupilot_log(FLIGHT)
+    log = ardupilot_log(gusty())
     assert "PSCZ of an older release" in refusal(log.replace(b"PSCD", b"PSCZ"))[1]
     assert refusal(log.replace(b",TVD", b",XVD")) == ("PSCD.TVD", "is missing: this release is not supported")
     assert refusal(log.replace(b",DPD,TPD", b",XPD,YPD"))[0] == "PSCD.DPD"
@@ -164,7 +171,7 @@ def test_a_release_that_logs_the_loop_by_another_name_or_without_a_column_is_nam
 
 def moved(name: str, at_s: float, by: float, *, rows: int | None = None) -> LoggedFlight:
     """The flight with a signal moved from that time on, or for some rows."""
-    (segment,) = FLIGHT.segments
+    (segment,) = gusty().segments
     values = getattr(segment, name).copy()
     first = round(10.0 * at_s)
     values[first : None if rows is None else first + rows] += by
@@ -183,41 +190,41 @@ def test_a_row_that_cannot_be_is_left_out() -> None:
 
 
 def test_rows_without_a_throttle_beside_them_are_left_out() -> None:
-    assert spans_s(read(ardupilot_log(FLIGHT, without_throttle_s=(18.05, 19.05)))) == [(10.0, 18.0), (19.2, 26.9)]
+    assert spans_s(read(ardupilot_log(gusty(), without_throttle_s=(18.05, 19.05)))) == [(10.0, 18.0), (19.2, 26.9)]
 
 
 def test_rows_that_came_twice_count_once() -> None:
-    (segment,) = FLIGHT.segments
+    (segment,) = gusty().segments
     twice = {name: np.repeat(getattr(segment, name), 2) for name in type(segment).__slots__}
-    flight = read(ardupilot_log(replace(FLIGHT, segments=[replace(segment, **twice)])))
+    flight = read(ardupilot_log(replace(gusty(), segments=[replace(segment, **twice)])))
     assert spans_s(flight) == [(10.0, 26.9)]
 
 
 def test_after_a_restart_of_the_clock_the_last_flight_counts() -> None:
     """Two boots in one file, the first with 8 s more of it."""
-    first, second = ardupilot_log(FLIGHT, begin_s=18.0), ardupilot_log(FLIGHT)
+    first, second = ardupilot_log(gusty(), begin_s=18.0), ardupilot_log(gusty())
     assert spans_s(read(first + second)) == [(10.0, 26.9)]
 
 
 def test_a_leaning_vehicle_carries_by_the_cosine_of_its_throttle() -> None:
-    level = read(ardupilot_log(FLIGHT)).segments[0]
+    level = read(ardupilot_log(gusty())).segments[0]
     lean = [(0.2 * step, 12.0, 16.0) for step in range(200)]
-    leaning = read(ardupilot_log(FLIGHT, attitude=lean)).segments[0]
+    leaning = read(ardupilot_log(gusty(), attitude=lean)).segments[0]
     share = math.cos(math.radians(12.0)) * math.cos(math.radians(16.0))
     assert leaning.throttle_filtered == pytest.approx(share * level.throttle_filtered)
     steep = [(0.2 * step, 40.0 if 10.0 < 0.2 * step < 14.0 else 0.0, 0.0) for step in range(200)]
-    assert spans_s(read(ardupilot_log(FLIGHT, attitude=steep))) == [(13.9, 26.9)]
-    assert refusal(ardupilot_log(FLIGHT, attitude=[(at_s, 40.0, 0.0) for at_s, *_ in lean]))[0] == "ATT"
+    assert spans_s(read(ardupilot_log(gusty(), attitude=steep))) == [(13.9, 26.9)]
+    assert refusal(ardupilot_log(gusty(), attitude=[(at_s, 40.0, 0.0) for at_s, *_ in lean]))[0] == "ATT"
 
 
 def test_rows_while_vibration_is_compensated_are_left_out() -> None:
-    log = ardupilot_log(FLIGHT, errors=((12.0, VIBRATION_FAILSAFE, 1), (18.0, VIBRATION_FAILSAFE, 0), (20.0, 2, 1)))
+    log = ardupilot_log(gusty(), errors=((12.0, VIBRATION_FAILSAFE, 1), (18.0, VIBRATION_FAILSAFE, 0), (20.0, 2, 1)))
     assert spans_s(read(log)) == [(18.0, 26.9)]
-    assert refusal(ardupilot_log(FLIGHT, errors=((0.0, VIBRATION_FAILSAFE, 1),)))[0] == "ERR"
+    assert refusal(ardupilot_log(gusty(), errors=((0.0, VIBRATION_FAILSAFE, 1),)))[0] == "ERR"
 
 
 def test_another_thrust_curve_ends_a_part() -> None:
-    flight = read(ardupilot_log(FLIGHT, changes=((12.0, "MOT_THST_EXPO", 0.2),)))
+    flight = read(ardupilot_log(gusty(), changes=((12.0, "MOT_THST_EXPO", 0.2),)))
     assert spans_s(flight) == [(12.0, 26.9)]
 
 
@@ -229,7 +236,7 @@ def test_another_thrust_curve_ends_a_part() -> None:
     ],
 )
 def test_a_missing_message_is_named_with_what_to_switch_on(message: bytes, reason: str) -> None:
-    content = ardupilot_log(FLIGHT).replace(message, b"X" + message[1:])
+    content = ardupilot_log(gusty()).replace(message, b"X" + message[1:])
     assert refusal(content) == (message.decode(), reason)
 
 
@@ -244,30 +251,30 @@ def test_a_missing_message_is_named_with_what_to_switch_on(message: bytes, reaso
 )
 def test_a_log_without_a_gain_or_with_none_of_it_is_refused(gain: str, newer: str) -> None:
     without = {name: value for name, value in PARAMETERS.items() if name != gain}
-    refused = refusal(ardupilot_log(FLIGHT, parameters=without))
+    refused = refusal(ardupilot_log(gusty(), parameters=without))
     assert refused == (gain, f"is missing, and {newer} of release 4.7 too")
-    assert refusal(ardupilot_log(FLIGHT, parameters={**PARAMETERS, gain: 0.0})) == (gain, "must be positive, got 0")
+    assert refusal(ardupilot_log(gusty(), parameters={**PARAMETERS, gain: 0.0})) == (gain, "must be positive, got 0")
 
 
 def test_a_log_without_parameters_is_refused() -> None:
-    assert refusal(ardupilot_log(FLIGHT).replace(b"PARM", b"XARM"))[0] == "PSC_POSZ_P"
+    assert refusal(ardupilot_log(gusty()).replace(b"PARM", b"XARM"))[0] == "PSC_POSZ_P"
 
 
 def test_a_limit_that_the_replica_lacks_is_named() -> None:
     with pytest.raises(InputError) as refused:
-        read(ardupilot_log(FLIGHT, parameters={**PARAMETERS, "PSC_ACCZ_SMAX": 5.0}))
+        read(ardupilot_log(gusty(), parameters={**PARAMETERS, "PSC_ACCZ_SMAX": 5.0}))
     assert [problem.field for problem in refused.value.problems] == ["PSC_ACCZ_SMAX"]
 
 
 def test_a_loop_rate_that_cannot_be_is_refused() -> None:
-    assert refusal(ardupilot_log(FLIGHT, parameters={**PARAMETERS, "SCHED_LOOP_RATE": 1e9})) == (
+    assert refusal(ardupilot_log(gusty(), parameters={**PARAMETERS, "SCHED_LOOP_RATE": 1e9})) == (
         "SCHED_LOOP_RATE",
         "must be 50 to 2000 Hz, got 1e+09",
     )
 
 
 def test_rows_that_are_rare_or_not_numbers_are_refused() -> None:
-    assert refusal(ardupilot_log(FLIGHT, rows=slice(0, None, 4)))[0] == "PSCD"
+    assert refusal(ardupilot_log(gusty(), rows=slice(0, None, 4)))[0] == "PSCD"
     flight = simulated_flight(GUSTY)
     flight.segments[0].v_m_s[:] = np.nan
     assert refusal(ardupilot_log(flight))[0] == "PSCD"
@@ -275,7 +282,7 @@ def test_rows_that_are_rare_or_not_numbers_are_refused() -> None:
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.7])
 def test_a_log_that_was_cut_off_is_read_as_far_as_it_goes_or_refused(share: float) -> None:
-    whole = ardupilot_log(FLIGHT)
+    whole = ardupilot_log(gusty())
     content = whole[: round(share * len(whole))]
     if share < 0.5:
         assert refusal(content)[0] == "PSCD"

@@ -1,6 +1,7 @@
 """Altitude steps in telemetry logs: what reaches the analysis, however the log was recorded."""
 
 import io
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -53,15 +54,15 @@ def test_the_flight_is_the_one_that_the_vehicle_flew(flight: LoggedFlight) -> No
 
 
 @pytest.mark.parametrize(
-    "log",
+    "written",
     [
-        repeated_and_late(STEPS.content),
-        STEPS.content[:-9],
-        replace(STEPS, parameters_after=True).content,
-        replace(STEPS, boots_at_s=2.0).content,
-        replace(STEPS, changes=((2.0, "PSC_POSZ_P", 1.0),)).content,
-        replace(STEPS, set_points=(*CLIMB_AND_DESCENT, (17.9, 7.0))).content,
-        b"".join((STEPS.content, replace(STEPS, set_points=((0.0, 5.0),), lasts_s=6.0).content)),
+        lambda: repeated_and_late(STEPS.content),
+        lambda: STEPS.content[:-9],
+        lambda: replace(STEPS, parameters_after=True).content,
+        lambda: replace(STEPS, boots_at_s=2.0).content,
+        lambda: replace(STEPS, changes=((2.0, "PSC_POSZ_P", 1.0),)).content,
+        lambda: replace(STEPS, set_points=(*CLIMB_AND_DESCENT, (17.9, 7.0))).content,
+        lambda: b"".join((STEPS.content, replace(STEPS, set_points=((0.0, 5.0),), lasts_s=6.0).content)),
     ],
     ids=[
         "repeated and late",
@@ -73,8 +74,8 @@ def test_the_flight_is_the_one_that_the_vehicle_flew(flight: LoggedFlight) -> No
         "two flights",
     ],
 )
-def test_how_the_log_was_recorded_makes_no_difference(log: bytes, flight: LoggedFlight) -> None:
-    found = read(log)
+def test_how_the_log_was_recorded_makes_no_difference(written: Callable[[], bytes], flight: LoggedFlight) -> None:
+    found = read(written())
     assert found.loop.gains == flight.loop.gains
     assert found.error_m == pytest.approx(flight.error_m, abs=5e-4)
     assert found.throttle_mean == pytest.approx(flight.throttle_mean, abs=1e-3)

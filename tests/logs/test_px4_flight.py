@@ -3,6 +3,7 @@
 import io
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,22 @@ from tests.logs.recorded import recorded
 from tests.logs.written_px4 import FLIGHT as IN_FLIGHT
 from tests.logs.written_px4 import HOLD, LAND, MISSION, PARAMETERS, POSITION, RAMP_UP, READY, TAKEOFF, px4_log
 
-FLIGHT = simulated_px4()
-OFFBOARD = simulated_px4(manoeuvre="offboard")
-(LOGGED,) = FLIGHT.segments
+
+@cache
+def flown() -> LoggedFlight:
+    return simulated_px4()
+
+
+@cache
+def whole() -> bytes:
+    """Its log."""
+    return px4_log(flown())
+
+
+def logged() -> Segment:
+    """The flight's one segment."""
+    (segment,) = flown().segments
+    return segment
 
 
 def read(content: bytes) -> LoggedFlight:
@@ -56,11 +70,11 @@ def without_parameter(name: str) -> dict[str, float]:
 
 def test_a_simulated_flight_is_read_as_it_was_flown() -> None:
     """Climb rate and acceleration fed forward are logged in every second row: to 0.03 m/s and 0.3 m/s²."""
-    flight = read(px4_log(FLIGHT))
+    flight = read(px4_log(flown()))
     (segment,) = flight.segments
     close = {"v_d_m_s": 0.03, "a_d_m_s2": 0.3}
     for name in set(Segment.__slots__) - {"time_s"}:
-        expected = pytest.approx(getattr(LOGGED, name), abs=close.get(name, 1e-5))
+        expected = pytest.approx(getattr(logged(), name), abs=close.get(name, 1e-5))
         assert np.asarray(getattr(segment, name)) == expected, name
     loop = loop_of(flight)
     assert replace(loop.parameters, hover_thrust=0.5) == Parameters()
@@ -69,7 +83,7 @@ def test_a_simulated_flight_is_read_as_it_was_flown() -> None:
 
 
 def test_steps_of_offboard_control_have_no_rates() -> None:
-    (segment,) = read(px4_log(OFFBOARD, feed_forward=False)).segments
+    (segment,) = read(px4_log(simulated_px4(manoeuvre="offboard"), feed_forward=False)).segments
     assert np.ptp(segment.z_d_m) == pytest.approx(1.0)
     assert not segment.v_d_m_s.any()
     assert not segment.a_d_m_s2.any()
@@ -114,20 +128,20 @@ def test_of_the_recorded_takeoff_nothing_is_left() -> None:
 def test_a_log_that_cannot_be_used_is_refused_by_what_is_missing(
     options: dict[str, Any], field: str, reason: str
 ) -> None:
-    found = refusal(px4_log(FLIGHT, **options))
+    found = refusal(px4_log(flown(), **options))
     assert (found[0], found[1][: len(reason)]) == (field, reason)
 
 
 def test_a_log_with_a_single_row_is_refused() -> None:
-    first = replace(LOGGED, **{name: getattr(LOGGED, name)[:1] for name in Segment.__slots__})
-    assert refusal(px4_log(replace(FLIGHT, segments=[first])))[0] in {
+    first = replace(logged(), **{name: getattr(logged(), name)[:1] for name in Segment.__slots__})
+    assert refusal(px4_log(replace(flown(), segments=[first])))[0] in {
         "vehicle_local_position_setpoint", "vehicle_local_position_setpoint.z"
     }  # fmt: skip
 
 
 def test_thrust_without_numbers_is_refused() -> None:
-    unknown = replace(LOGGED, throttle=np.full_like(LOGGED.throttle, np.nan))
-    assert refusal(px4_log(replace(FLIGHT, segments=[unknown]))) == (
+    unknown = replace(logged(), throttle=np.full_like(logged().throttle, np.nan))
+    assert refusal(px4_log(replace(flown(), segments=[unknown]))) == (
         "vehicle_local_position_setpoint",
         "has no rows of numbers beside positions",
     )
@@ -135,27 +149,27 @@ def test_thrust_without_numbers_is_refused() -> None:
 
 def test_the_notch_filter_of_the_velocity_is_refused_by_its_parameter() -> None:
     with pytest.raises(InputError, match="MPC_VEL_NF_FRQ: must be 0"):
-        read(px4_log(FLIGHT, parameters={**PARAMETERS, "MPC_VEL_NF_FRQ": 8.0}))
+        read(px4_log(flown(), parameters={**PARAMETERS, "MPC_VEL_NF_FRQ": 8.0}))
 
 
 def test_takeoff_and_landing_are_left_out() -> None:
-    log = px4_log(FLIGHT, modes=((0.0, TAKEOFF), (3.0, HOLD), (9.0, MISSION), (20.0, LAND)))
+    log = px4_log(flown(), modes=((0.0, TAKEOFF), (3.0, HOLD), (9.0, MISSION), (20.0, LAND)))
     assert spans_s(read(log)) == [(3.1, 20.0)]
 
 
 def test_the_ramp_of_a_takeoff_and_the_ground_are_left_out() -> None:
-    log = px4_log(FLIGHT, takeoff=((0.0, RAMP_UP), (2.0, IN_FLIGHT)), landed=((0.0, False), (21.0, True)))
+    log = px4_log(flown(), takeoff=((0.0, RAMP_UP), (2.0, IN_FLIGHT)), landed=((0.0, False), (21.0, True)))
     assert spans_s(read(log)) == [(2.0, 20.9)]
 
 
 def test_a_change_of_the_gains_ends_a_part_and_the_one_with_the_steps_counts() -> None:
-    flight = read(px4_log(FLIGHT, changes=((8.0, "MPC_Z_VEL_P_ACC", 5.0),)))
+    flight = read(px4_log(flown(), changes=((8.0, "MPC_Z_VEL_P_ACC", 5.0),)))
     assert loop_of(flight).parameters.velocity_p_1_s == pytest.approx(5.0)
     assert spans_s(flight) == [(8.0, 23.9)]
 
 
 def test_a_reset_of_the_estimator_ends_a_part() -> None:
-    flight = read(px4_log(FLIGHT, resets=((0.0, 3), (12.0, 4))))
+    flight = read(px4_log(flown(), resets=((0.0, 3), (12.0, 4))))
     assert spans_s(flight) == [(0.0, 11.9), (12.0, 23.9)]
 
 
@@ -163,51 +177,51 @@ def test_a_reset_of_the_estimator_ends_a_part() -> None:
 def test_the_loop_runs_in_whole_intervals_of_the_imu(parameters: dict[str, float]) -> None:
     others = without_parameter("EKF2_PREDICT_US")
     del others["IMU_INTEG_RATE"]
-    assert read(px4_log(FLIGHT, parameters={**others, **parameters})).loop.step_s == pytest.approx(0.01)
+    assert read(px4_log(flown(), parameters={**others, **parameters})).loop.step_s == pytest.approx(0.01)
 
 
 def test_where_every_position_was_logged_their_interval_is_the_step() -> None:
     """Rows of 10 ms, of which the analysis takes ten a second."""
-    time_s = np.arange(0.0, LOGGED.duration_s, 0.01)
+    time_s = np.arange(0.0, logged().duration_s, 0.01)
     names = [name for name in Segment.__slots__ if name != "time_s"]
-    often = Segment(time_s=time_s, **{name: np.interp(time_s, LOGGED.time_s, getattr(LOGGED, name)) for name in names})
-    flight = read(px4_log(replace(FLIGHT, segments=[often])))
+    often = Segment(
+        time_s=time_s, **{name: np.interp(time_s, logged().time_s, getattr(logged(), name)) for name in names}
+    )
+    flight = read(px4_log(replace(flown(), segments=[often])))
     assert flight.loop.step_s == pytest.approx(0.01)
     assert loop_of(flight).row_s == pytest.approx(0.1, abs=0.015)
 
 
 def test_thrust_that_was_logged_more_often_is_used_between_the_rows() -> None:
-    (finer,) = read(px4_log(FLIGHT, finer_thrust=lambda time_s: 0.3 + 0.0 * time_s)).segments
+    (finer,) = read(px4_log(flown(), finer_thrust=lambda time_s: 0.3 + 0.0 * time_s)).segments
     middle_s = 0.5 * (finer.time_s[100] + finer.time_s[101])
     assert finer.motor_throttle(np.array([middle_s]))[0] == pytest.approx(0.3, abs=1e-6)
-    (rows,) = read(px4_log(FLIGHT)).segments
+    (rows,) = read(px4_log(flown())).segments
     assert rows.motor_throttle(rows.time_s) == pytest.approx(rows.throttle_filtered)
 
 
 def test_a_single_set_point_gives_no_rates() -> None:
-    assert refusal(px4_log(FLIGHT, set_points=1))[0] == "vehicle_local_position_setpoint.z"
+    assert refusal(px4_log(flown(), set_points=1))[0] == "vehicle_local_position_setpoint.z"
 
 
 def test_the_limits_are_the_parameters_where_they_were_not_logged() -> None:
-    assert loop_of(read(px4_log(FLIGHT, without=["vehicle_constraints"]))).descent_m_s == pytest.approx(1.5)
+    assert loop_of(read(px4_log(flown(), without=["vehicle_constraints"]))).descent_m_s == pytest.approx(1.5)
 
 
 def test_a_file_that_was_cut_off_says_so_where_it_does_not_suffice() -> None:
-    content = px4_log(FLIGHT)
+    content = px4_log(flown())
     _, reason = refusal(content[: len(content) // 8 - 7])
     assert reason.endswith("; the file ends in the middle of a message")
 
 
-LOG = px4_log(FLIGHT)
-
-
-@given(st.integers(16, len(LOG)), st.lists(st.tuples(st.integers(0, len(LOG) - 1), st.integers(0, 255)), max_size=20))
+@given(st.data())
 @settings(max_examples=25, deadline=None)
-def test_a_damaged_log_is_read_or_refused(length: int, changes: list[tuple[int, int]]) -> None:
-    content = bytearray(LOG[:length])
-    for place, value in changes:
-        if place < length:
-            content[place] = value
+def test_a_damaged_log_is_read_or_refused(data: st.DataObject) -> None:
+    log = whole()
+    length = data.draw(st.integers(16, len(log)))
+    content = bytearray(log[:length])
+    for place, value in data.draw(st.lists(st.tuples(st.integers(0, length - 1), st.integers(0, 255)), max_size=20)):
+        content[place] = value
     with suppress(InputError):
         for segment in read(bytes(content)).segments:
             assert (np.diff(segment.time_s) > 0.0).all()

@@ -198,6 +198,7 @@ def test_ten_million_rows_are_refused_without_being_read() -> None:
     assert stream.lines_read == MAX_ROWS + 2
 
 
+@pytest.mark.complete
 def test_the_largest_file_that_may_be_read_is_read() -> None:
     rows = "\n".join(f"{i * 0.001:.3f},1" for i in range(MAX_ROWS))
     assert len(read_takeoff_csv(f"time_s,altitude_m\n{rows}\n".encode())) == MAX_ROWS

@@ -1,10 +1,9 @@
 """The glossary's rejected words stay out of identifiers and prose."""
 
 import ast
-import io
 import re
-import tokenize
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -59,9 +58,15 @@ def is_python(path: Path) -> bool:
     return path.suffix in {".py", ""}
 
 
+@cache
+def nodes(source: str) -> list[ast.AST]:
+    """Read once for both checks."""
+    return list(ast.walk(ast.parse(source)))
+
+
 def python_identifiers(source: str) -> Iterator[str]:
     """Names that this source defines or uses, attributes included."""
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes(source):
         match node:
             case ast.Name(id=name) | ast.arg(arg=name) | ast.Attribute(attr=name):
                 yield name
@@ -88,28 +93,26 @@ def identifiers(path: Path, source: str) -> set[str]:
 
 
 def prose(path: Path, source: str) -> str:
-    """The text for people, with single spaces: strings and comments of Python, anything of other files."""
+    """The text for people, with single spaces: strings and what follows a # of Python, anything of other files."""
     if not is_python(path):
         return " ".join(re.sub(r"^\s*(?://|\*|#)\s?", " ", source, flags=re.MULTILINE).split())
-    tree = ast.parse(source)
-    strings = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
-    comments = [
-        token.string.lstrip("# ")
-        for token in tokenize.generate_tokens(io.StringIO(source).readline)
-        if token.type == tokenize.COMMENT
-    ]
-    return " | ".join(" ".join(text.split()) for text in [*strings, *comments])
+    strings = [node.value for node in nodes(source) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    return " | ".join(" ".join(text.split()) for text in [*strings, *re.findall(r"#+ *(.*)", source)])
 
 
 def rejected_identifiers(path: Path, source: str) -> list[str]:
-    patterns = list(IDENTIFIERS.values())
-    if (
+    is_local = (
         is_python(path)
         and place(path).startswith("app/")
         and not place(path).startswith(("app/vehicles/", "app/simdrone/"))
-    ):
-        patterns.append(LOCAL_NAMES)
-    return [name for name in sorted(identifiers(path, source)) if any(re.search(pattern, name) for pattern in patterns)]
+    )
+    return [name for name in sorted(identifiers(path, source)) if is_rejected(name, is_local=is_local)]
+
+
+@cache
+def is_rejected(name: str, *, is_local: bool) -> bool:
+    patterns = [*IDENTIFIERS.values(), *([LOCAL_NAMES] if is_local else [])]
+    return any(re.search(pattern, name) for pattern in patterns)
 
 
 def rejected_prose(path: Path, source: str) -> list[str]:

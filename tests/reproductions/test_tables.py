@@ -5,6 +5,8 @@ import pytest
 from app.reproductions.results import OVERRULE, Result, Row
 from app.reproductions.tables import TABLES, run_table
 
+pytestmark = pytest.mark.complete
+
 
 @pytest.fixture(scope="module")
 def told() -> list[float]:

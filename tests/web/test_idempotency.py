@@ -111,19 +111,19 @@ def test_the_same_key_from_many_threads_at_once_makes_one_campaign(client: TestC
 
 
 def test_many_threads_writing_at_once_lose_nothing(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database, definition={"stop": {"max_flights": 40}})
+    campaign = create_ready_campaign(client, database, definition={"stop": {"max_flights": 16}})
     path = f"/api/campaigns/{campaign['id']}/trials"
 
     def plan(index: int) -> int:
         return client.post(path, json={"gains": {"kp": 283 + index, "ki": 13, "kd": 82}}).status_code
 
     with ThreadPoolExecutor(8) as pool:
-        statuses = list(pool.map(plan, range(40)))
-    assert statuses == [201] * 40
+        statuses = list(pool.map(plan, range(16)))
+    assert statuses == [201] * 16
     with database.read() as session:
         found = session.query(TrialRow).order_by(TrialRow.number).all()
-    assert [row.number for row in found] == list(range(1, 41))
-    assert {row.gains["kp"] for row in found} == {283 + index for index in range(40)}
+    assert [row.number for row in found] == list(range(1, 17))
+    assert {row.gains["kp"] for row in found} == {283 + index for index in range(16)}
 
 
 def test_many_threads_that_want_one_vehicle_get_one_flight(client: TestClient, database: Database) -> None:

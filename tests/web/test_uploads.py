@@ -86,6 +86,7 @@ def ten_million_rows() -> Iterator[bytes]:
         yield b"".join(b"%d,1\n" % number for number in range(start, start + 100_000))
 
 
+@pytest.mark.complete
 def test_ten_million_rows_are_refused_without_filling_the_memory(client: TestClient, trial: Json) -> None:
     before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     answer = client.post(

@@ -85,6 +85,7 @@ def test_a_flight_with_custom_gains_grows_over_its_own_prediction(
     run_jobs(database)
 
 
+@pytest.mark.complete
 def test_the_chart_of_a_reviewed_flight_has_its_own_prediction_and_never_the_next_ones(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
@@ -126,10 +127,8 @@ CHOICES: dict[str, Json] = {
 }
 
 
-@pytest.mark.parametrize(
-    "choice",
-    ["repeat", *(pytest.param(other, marks=pytest.mark.complete) for other in sorted({*CHOICES} - {"repeat"}))],
-)
+@pytest.mark.complete
+@pytest.mark.parametrize("choice", CHOICES)
 def test_a_flight_keeps_the_curve_and_the_band_with_which_it_was_planned(
     client: TestClient, database: Database, choice: str
 ) -> None:

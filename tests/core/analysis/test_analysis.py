@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.core.analysis.analysis import analyze
+from app.core.analysis.analysis import Analysis, analyze
 from app.core.analysis.flight import LoggedFlight
 from app.core.analysis.hover import advise_hover
 from app.core.analysis.segment import Segment
@@ -36,9 +36,14 @@ def refusal(flight: LoggedFlight) -> str:
     return problem.reason
 
 
-def test_the_log_of_the_real_binary_gives_gains_six_times_better() -> None:
+@pytest.fixture(scope="module")
+def found() -> Analysis:
+    """What the log of the real binary gives."""
+    return analyze(recorded_steps())
+
+
+def test_the_log_of_the_real_binary_gives_gains_six_times_better(found: Analysis) -> None:
     """SITL flew 4.2 mm with its own proposal from such a flight, and 27 mm with the defaults."""
-    found = analyze(recorded_steps())
     assert found.insufficient is None
     assert found.proposed is not None
     present = found.assessments[0]
@@ -82,6 +87,7 @@ TURBULENCE = replace(QUIET, gust_m_s2=0.6, gust_s=0.04, noise_m_s2=0.02, assumed
 """As ArduPilot's simulation makes it: gusts shorter than a row of the log."""
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("seed", [2, 3])
 def test_turbulence_within_a_row_is_answered(seed: int) -> None:
     """Taken for noise, such gusts made the model deviate by half as much again as the flight, which was refused."""
@@ -97,6 +103,7 @@ def test_other_gains_are_refused_in_turbulence_too(factor: float) -> None:
     assert "perhaps it flew with other gains" in refusal(replace(flown, loop=logged))
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_no_gains_suit_is_told() -> None:
     """Motors so strong that they hover at 5 % of the throttle: even the smallest documented gains lack the margin."""
     strong = replace(QUIET, hover_throttle=0.05, assumed_hover_throttle=0.125)
@@ -180,6 +187,7 @@ def test_good_gains_are_kept() -> None:
     assert lines[1:] == [f"# {advice.reason}", "# MOT_THST_HOVER was 0.4", "MOT_THST_HOVER,0.5"]
 
 
+@pytest.mark.complete
 def test_gains_that_lack_the_margin_are_answered_by_some_that_have_it() -> None:
     found = analyze(stiff_flight(1.2))
     assert found.assessments[0].margin < 2.0
@@ -188,8 +196,7 @@ def test_gains_that_lack_the_margin_are_answered_by_some_that_have_it() -> None:
     assert "about the same for the proposed gains, with a margin of 2.5 instead of 1.8" in found.answer
 
 
-def test_the_answer_tells_what_was_measured_and_what_is_predicted() -> None:
-    found = analyze(recorded_steps())
+def test_the_answer_tells_what_was_measured_and_what_is_predicted(found: Analysis) -> None:
     assert found.proposed is not None
     low, high = (f"{1e3 * each:.1f}" for each in (found.proposed.prediction.low_m, found.proposed.prediction.high_m))
     assert found.answer == (

@@ -45,6 +45,7 @@ def test_a_proposal_is_allowed_and_better_than_what_it_began_with(copter: Simula
         assert least_damping(loop.with_fast_gains(REQUIRED_MARGIN), each) >= RINGING_DAMPING
 
 
+@pytest.mark.complete
 def test_slow_motors_get_less_gain() -> None:
     """With 0.12 s in place of 0.03 s the stiff set rings, and the search stays below it."""
     nimble, slow = (
@@ -63,6 +64,7 @@ def test_proposed_gains_have_three_digits() -> None:
     assert gains == {name: float(f"{value:.3g}") for name, value in gains.items()}
 
 
+@pytest.mark.complete
 def test_nothing_is_proposed_where_every_start_rings() -> None:
     """Motors so strong that they hover at 3 % of the throttle."""
     flight = simulated_flight(QUIET)

@@ -94,6 +94,7 @@ def test_soft_gains_are_answered_by_better_ones_than_the_defaults_within_the_lim
     assert sum(within) >= 7
 
 
+@pytest.mark.complete
 def test_a_hover_throttle_that_the_estimator_cannot_reach_is_told_and_the_gains_are_judged_with_a_better_one() -> None:
     """The vehicle hovers at 0.40, PX4's estimate stops at 0.45, and makes the loop 1.125 times as stiff."""
     found = analyze(simulated_px4(replace(CALM, assumed_hover_throttle=0.65)))

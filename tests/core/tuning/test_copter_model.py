@@ -192,6 +192,7 @@ def test_a_proposal_says_that_other_parameters_changed_between_the_flights() -> 
     assert changed_parameters(rig.experiment, flights[:1]) == changed_parameters(rig.experiment, []) == ""
 
 
+@pytest.mark.complete
 @compiled_only
 def test_a_hover_throttle_outside_what_px4_finds_is_told_until_the_parameter_is_set() -> None:
     """The vehicle hovers at 0.40; with MPC_THR_HOVER 0.65 the estimate stops at 0.45."""

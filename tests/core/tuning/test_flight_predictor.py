@@ -60,6 +60,7 @@ def test_a_warm_start_predicts_with_the_other_vehicles_model() -> None:
         assert predicts_the_same(predictor_of(definition, flights, donor).predict(proposal.gains), proposal)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("recorded", [True, False])
 def test_the_identified_model_predicts_as_in_the_proposal(recorded: bool) -> None:
     experiment = PitchTracking()

@@ -72,6 +72,7 @@ def test_a_slice_holds_every_flown_and_proposed_gain_set_and_stays_within_the_bo
                 assert (values[0], values[-1]) == (0, 450)
 
 
+@pytest.mark.complete
 @compiled_only
 def test_the_grid_holds_the_errors_that_the_calibrated_model_predicts() -> None:
     flights = [flight(), flight(2, {"kp": 900, "ki": 300, "kd": 120})]

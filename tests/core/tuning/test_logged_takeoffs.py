@@ -68,6 +68,7 @@ def test_gains_that_can_overflow_are_replaced_even_by_equally_good_ones() -> Non
     assert found.answer.endswith("for the proposed gains. The gate refuses the gains flown.")
 
 
+@pytest.mark.complete
 def test_gains_that_are_already_good_are_kept() -> None:
     first = analyze_takeoffs([flown(DEFAULT)])
     assert first.proposed is not None

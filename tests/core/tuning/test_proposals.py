@@ -47,12 +47,14 @@ def same(one: Proposal, other: Proposal) -> bool:
     ) and one.predicted["altitude_m"].tobytes() == other.predicted["altitude_m"].tobytes()
 
 
+@pytest.mark.complete
 def test_from_the_default_gains_the_fourth_flight_of_the_ardrone_is_near_the_optimum() -> None:
     """At most 0.1000 m; the paper's fourth flight scored 0.1733 m, its best 0.1521 m."""
     flights, _ = campaign(Definition(stop=PAPER), ARDRONE)
     assert min(errors(flights)[:4]) <= 0.1000
 
 
+@pytest.mark.complete
 def test_the_raw_option_beats_the_papers_best_within_seven_flights() -> None:
     flights, _ = campaign(Definition(options=RAW, stop=PAPER), ARDRONE)
     assert len(flights) <= 7
@@ -198,7 +200,8 @@ def test_under_the_rule_noise_the_winner_and_the_first_gains_are_flown_again() -
     assert proposals[-1].explanation.summary.startswith("Better with more than 99.9\u00a0% confidence")
 
 
-@pytest.mark.parametrize("strategy", ["calibrated", pytest.param("gradient", marks=pytest.mark.complete)])
+@pytest.mark.complete
+@pytest.mark.parametrize("strategy", ["calibrated", "gradient"])
 def test_under_the_rule_noise_gains_outside_the_bounds_are_not_flown_again(strategy: str) -> None:
     """The second flight, the best until then, was flown over the gate's refusal."""
     bounds: dict[str, tuple[float, float]] = {"kp": (0, 1000), "ki": (0, 400)}

@@ -58,6 +58,7 @@ def landed(number: int, proposal: Proposal, flown: tuple[tuple[float, ...], floa
 Flying = list[tuple[tuple[float, ...], float, int]]
 
 
+@pytest.mark.complete
 @settings(max_examples=4)
 @given(DEFINITIONS, FLYING)
 def test_every_proposal_and_every_advice_is_recomputed_bit_for_bit(definition: Definition, flying: Flying) -> None:

@@ -5,6 +5,7 @@ from functools import cache
 from typing import Final
 
 import numpy as np
+import pytest
 
 from app.core.definition import Definition, Flight
 from app.core.experiments.altitude_steps import AltitudeSteps
@@ -57,6 +58,7 @@ def proposal() -> Proposal:
     return next_proposal(DEFINITION, [first()[0]])
 
 
+@pytest.mark.complete
 def test_the_interval_holds_the_flights_of_the_proposal_in_other_weather() -> None:
     """With the gusts and the noise of the first flight, although its thrust command was not recorded: without them two
     of these were above it."""

@@ -35,6 +35,7 @@ def fly(number: int, proposal: Proposal, log_noise: float = 0.0) -> Flight:
     return flight(number, proposal.gains, log_noise)
 
 
+@pytest.mark.complete
 def test_the_second_flight_is_at_the_true_optimum_and_nothing_is_left_after_it() -> None:
     """Seed 1, whose model's optimum is 19.6 times as bad on the truth."""
     campaign = definition(1, fit="least-squares")
