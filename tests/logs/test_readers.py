@@ -139,7 +139,7 @@ def repeated(head: bytes, body: bytes, path: Path, size: int) -> Path:
 
 @pytest.mark.complete
 @pytest.mark.parametrize("kind", sorted(ORIGINALS))
-def test_a_hundred_megabytes_take_bounded_time_and_memory(kind: str, tmp_path: Path) -> None:
+def test_tens_of_megabytes_take_bounded_time_and_memory(kind: str, tmp_path: Path) -> None:
     whole = {
         ".tlog": recorded("paparazzi_283_13_82.tlog"),
         ".bin": recorded("arducopter_takeoff.bin"),
@@ -147,9 +147,9 @@ def test_a_hundred_megabytes_take_bounded_time_and_memory(kind: str, tmp_path: P
         ".data": data_of(Flight(GAINS)).encode(),
     }[kind]
     head = whole[:16] if kind == ".ulg" else b""
-    path = repeated(head, whole[len(head) :], tmp_path / f"huge{kind}", 100_000_000)
+    path = repeated(head, whole[len(head) :], tmp_path / f"huge{kind}", 40_000_000)
     before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     began_s = time.process_time()
     read_or_refuse(path)
-    assert time.process_time() - began_s < 120.0
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib < 700_000
+    assert time.process_time() - began_s < 48.0
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib < 280_000
