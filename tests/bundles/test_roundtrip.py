@@ -286,6 +286,7 @@ def test_nothing_is_left_of_a_bundle_whose_storing_fails(
         assert session.query(TrialRow).count() == 3
 
 
+@pytest.mark.complete
 def test_the_curve_with_which_custom_gains_were_planned_goes_along(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:

@@ -172,6 +172,7 @@ def test_a_ceiling_below_the_highest_step_is_refused_by_its_field(client: TestCl
     assert refused(client, {"kind": "twin"}, high) == {"definition.ceiling_m": "must be between 5.2 and 100 m, got 4.5"}
 
 
+@pytest.mark.complete
 def test_flights_of_other_steps_or_of_a_takeoff_are_not_compared_and_start_no_campaign(
     client: TestClient, database: Database
 ) -> None:

@@ -73,6 +73,7 @@ def test_after_one_flight_its_gains_are_offered_once(client: TestClient, databas
     assert kinds == ["step", "smaller step", "repeat"]
 
 
+@pytest.mark.complete
 def test_gains_chosen_by_hand_start_from_the_best_flown(client: TestClient, database: Database) -> None:
     campaign_id = create_ready_campaign(client, database, definition={"strategy": "manual", **PATIENT})["id"]
     create_flown_trial(client, database, campaign_id, 2.0)

@@ -61,6 +61,7 @@ def test_its_figures_and_statistics_stand_without_predictions(client: TestClient
     assert said["track_record"]["of"] == 0
 
 
+@pytest.mark.complete
 def test_nothing_is_better_before_a_gain_set_was_flown_twice_under_an_autopilot_whose_scatter_nobody_measured(
     client: TestClient, database: Database
 ) -> None:

@@ -137,6 +137,7 @@ def test_another_proposal_has_a_landscape_of_its_own(client: TestClient, databas
     assert len(traces(card_of(client, campaign_id), "path")[0]["x"]) == 2
 
 
+@pytest.mark.complete
 def test_one_that_the_flights_overtake_is_withdrawn_and_asked_for_anew_once_its_gains_hold_again(
     client: TestClient, database: Database, campaign_id: int
 ) -> None:

@@ -66,8 +66,11 @@ def test_the_list_can_be_searched_filtered_and_sorted(client: TestClient, databa
 
 def test_a_card_shows_what_matters(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 20}})
+    others, best = {"kp": 283, "ki": 13, "kd": 82}, {"kp": 290, "ki": 20, "kd": 82}
     for settling_s in (2.0, 0.5, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6):
-        create_flown_trial(client, database, campaign["id"], settling_s)
+        create_trial(client, campaign["id"], fly={"speed": None}, gains=best if settling_s == 0.5 else others)
+        land(database, lift_off(database), create_record(settling_s))
+    run_jobs(database)
     (card,) = get(client, "/api/campaigns")["items"]
     assert (card["flights"], card["best"]["trial_number"], card["next_action"]) == (9, 2, "Fly the next flight")
     assert card["first_error"] > card["best"]["error"]

@@ -1,5 +1,6 @@
 """The best gains of a campaign become its vehicle's safe ones, once flights have shown that they are better."""
 
+import pytest
 from fastapi.testclient import TestClient
 
 from app.db.session import Database
@@ -47,6 +48,7 @@ def test_gains_that_flew_better_become_the_safe_ones_and_the_act_says_from_which
     assert promote(client, campaign, header)["status"] == 409  # the vehicle's version is 2 now
 
 
+@pytest.mark.complete
 def test_gains_that_are_not_shown_to_be_better_stay_what_they_are(client: TestClient, database: Database) -> None:
     vehicle = create_connected(client, database)
     patient = {"stop": {"kind": "budget", "max_flights": 4}}

@@ -70,6 +70,7 @@ def test_an_edit_that_changes_nothing_is_none(client: TestClient) -> None:
     assert client.patch(path, json={"version": 1}).json()["version"] == 1
 
 
+@pytest.mark.complete
 def test_the_frozen_digest_covers_the_vehicle(client: TestClient, database: Database) -> None:
     digests = set()
     for vehicle in ({"kind": "twin"}, {"kind": "twin", "options": {"scatter": 0.0}}, {"kind": "jsbsim"}):
@@ -143,6 +144,7 @@ def test_a_finished_campaign_is_reopened_for_more_flights_and_ends_after_them(
     assert client.post(f"{path}/trials", json={"variant": "repeat"}).status_code == 409
 
 
+@pytest.mark.complete
 def test_a_campaign_that_its_rule_would_end_at_once_stays_open_for_the_flights_asked_for(
     client: TestClient, database: Database
 ) -> None:
@@ -245,6 +247,7 @@ def sagged(volts: float, *, until_s: float = 33.0) -> FlightRecord:
     return replace(record, trajectory=replace(record.trajectory, channels=channels))
 
 
+@pytest.mark.complete
 def test_a_low_battery_ends_a_campaign_whatever_its_last_flight_is_worth(
     client: TestClient, database: Database
 ) -> None:

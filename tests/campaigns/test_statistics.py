@@ -198,6 +198,7 @@ def test_repeats_of_a_simulation_without_scatter_get_none(client: TestClient, da
     assert last["group"] == {"mean": last["error"], "standard_error": None, "n": 3}
 
 
+@pytest.mark.complete
 def test_a_variant_is_computed_from_the_flights(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 50}})
     path = f"/api/campaigns/{campaign['id']}/trials"
@@ -310,6 +311,7 @@ def test_a_warm_start_takes_the_best_gains_and_not_those_of_one_lucky_flight(
     assert start["donor"]["trial_number"] == card["best"]["trial_number"] == 2
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     ("settling_s", "decided", "agreement"),
     [

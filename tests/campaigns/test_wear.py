@@ -65,6 +65,7 @@ def about(client: TestClient, campaign: Json, what: str) -> Json:
     return found
 
 
+@pytest.mark.complete
 def test_the_findings_of_the_proposal_follow_each_flight(client: TestClient, database: Database) -> None:
     campaign = fly_campaign(client, database)
     known = about(client, campaign, "calibration")
@@ -124,6 +125,7 @@ def test_a_finished_campaign_tunes_it_again(client: TestClient, database: Databa
     assert (retune["due"], retune["since"]) == (False, 4)
 
 
+@pytest.mark.complete
 def test_a_simulation_with_other_settings_is_another_vehicle(client: TestClient, database: Database) -> None:
     first = fly_campaign(client, database)
     other = fly_campaign(client, database, WORN, flights=1, battery_sag=0.05)
@@ -133,6 +135,7 @@ def test_a_simulation_with_other_settings_is_another_vehicle(client: TestClient,
     assert (known["retune"]["due"], known["retune"]["since"]) == (False, 1)
 
 
+@pytest.mark.complete
 def test_the_batteries_stand_as_the_flights_have_them(client: TestClient, database: Database) -> None:
     campaign = fly_campaign(client, database, sag_v=0.75)
     with database.write() as session:

@@ -240,6 +240,7 @@ def test_gains_that_are_none_and_a_form_without_a_file_are_refused_naming_the_fi
     assert client.post(PATH, json={}).status_code == 415
 
 
+@pytest.mark.complete
 def test_a_small_file_that_unpacks_to_a_huge_one_is_refused(client: TestClient) -> None:
     bomb = gzip.compress(b"step,mode\n" + bytes(300 * 2**20), compresslevel=1)
     answer = send(client, "bomb.csv.gz", bomb)

@@ -36,6 +36,7 @@ def test_the_definition_gives_the_errors_it_was_checked_with() -> None:
     assert best.measured == pytest.approx(0.204716, abs=2e-4)
 
 
+@pytest.mark.complete
 def test_the_optimum_lies_on_three_bounds_of_ours() -> None:
     space, optimum = PitchTracking.space, _optimum()
     assert space.names_where((optimum == space.lower) | (optimum == space.upper)) == ("theta_1", "theta_2", "theta_3")

@@ -10,6 +10,7 @@ from tests.core.tuning.flying import compiled_only
 pytestmark = compiled_only
 
 
+@pytest.mark.complete
 def test_identified_again_the_optimum_is_flown_second() -> None:
     heard: list[tuple[int, int]] = []
     (result,) = study(0.45, (10,), ("identified",), lambda done, total: heard.append((done, total)))

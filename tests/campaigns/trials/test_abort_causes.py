@@ -150,6 +150,7 @@ def test_an_abort_from_before_its_cause_was_recorded_counts_until_its_operator_s
     assert trust(client, campaign) == 1.0
 
 
+@pytest.mark.complete
 def test_an_abort_is_reported_once_without_repeating_the_word(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
@@ -161,6 +162,7 @@ def test_an_abort_is_reported_once_without_repeating_the_word(
     assert "Vehicle problem" not in report
 
 
+@pytest.mark.complete
 def test_an_aborted_flight_that_is_marked_invalid_stays_an_abort_in_the_report(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

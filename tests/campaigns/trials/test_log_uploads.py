@@ -96,6 +96,7 @@ def test_a_trial_that_cannot_be_planned_is_refused_by_field(
     assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"] == []
 
 
+@pytest.mark.complete
 def test_gains_beyond_the_bounds_that_flew_all_the_same_count_and_the_next_ones_stay_inside(
     client: TestClient, database: Database, campaign: Json, trial: Json
 ) -> None:
@@ -107,6 +108,7 @@ def test_gains_beyond_the_bounds_that_flew_all_the_same_count_and_the_next_ones_
     assert found["proposal"]["gains"]["ki"] <= 1073
 
 
+@pytest.mark.complete
 def test_a_step_starts_from_the_best_gains_within_the_bounds(
     client: TestClient, database: Database, campaign: Json, trial: Json
 ) -> None:

@@ -70,6 +70,7 @@ def fly(client: TestClient, campaign_id: int, gains: Json) -> Json:
     return create_trial(client, campaign_id, gains=gains, fly={"speed": None})
 
 
+@pytest.mark.complete
 def test_a_flight_with_custom_gains_grows_over_its_own_prediction(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

@@ -10,6 +10,7 @@ from tests.builders import create_csv, create_imported_trial, create_ready_campa
 PATIENT = {"stop": {"kind": "budget", "max_flights": 9}}
 
 
+@pytest.mark.complete
 def test_a_difference_is_shown_only_where_the_printed_errors_differ(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import", definition=PATIENT)
     for kp, settling_s in ((300, 1.0), (301, 1.0001), (302, 2.0)):

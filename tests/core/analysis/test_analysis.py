@@ -175,6 +175,7 @@ def stiff_flight(acceleration_p: float) -> LoggedFlight:
     )
 
 
+@pytest.mark.complete
 def test_good_gains_are_kept() -> None:
     found = analyze(stiff_flight(0.8))
     assert found.assessments[0].margin > 2.0

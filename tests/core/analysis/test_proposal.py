@@ -57,6 +57,7 @@ def test_slow_motors_get_less_gain() -> None:
     assert slow["PSC_VELZ_P"] * slow["PSC_ACCZ_P"] < 0.8 * nimble["PSC_VELZ_P"] * nimble["PSC_ACCZ_P"]
 
 
+@pytest.mark.complete
 def test_proposed_gains_have_three_digits() -> None:
     flight = recorded_steps()
     gains = propose(flight, fit_copter(flight).few, [DEFAULTS])

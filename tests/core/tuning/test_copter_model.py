@@ -62,7 +62,7 @@ def flown(autopilot: str) -> tuple[Flight, Proposal]:
 
 
 @compiled_only
-@pytest.mark.parametrize("autopilot", list(RIGS))
+@pytest.mark.parametrize("autopilot", ["PX4", pytest.param("ArduCopter", marks=pytest.mark.complete)])
 def test_the_second_flight_is_better_and_where_it_was_predicted(autopilot: str) -> None:
     rig, (first, proposal) = RIGS[autopilot], flown(autopilot)
     steps = rig.experiment.configured(OPTIONS)

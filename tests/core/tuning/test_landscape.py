@@ -49,6 +49,7 @@ def error_by_hand(gains: Gains, by: Flight) -> float:
     return float(np.trapezoid([*off[inside], end], [*times[inside], WINDOW_S]) / WINDOW_S)
 
 
+@pytest.mark.complete
 @compiled_only
 def test_the_grid_holds_what_the_model_corrected_by_the_best_flight_predicts() -> None:
     first = flight()

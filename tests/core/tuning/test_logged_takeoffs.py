@@ -123,6 +123,7 @@ def test_gains_that_the_autopilot_cannot_hold_are_refused() -> None:
     assert "takeoff with kp that" in reason_of(refused)
 
 
+@pytest.mark.complete
 def test_the_same_log_gives_the_same_answer() -> None:
     one, other = (analyze_takeoffs([from_log("paparazzi_283_13_82.tlog")]) for _ in range(2))
     assert one.proposed == other.proposed

@@ -66,9 +66,10 @@ def test_from_the_models_optimum_the_ardrone_reaches_the_papers_best() -> None:
     assert min(errors(flights)) <= 0.0940
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     ("start", "ended", "count"),
-    [(Start(), "not improving", 5), pytest.param(SIMPLEX_START, "not improving", 3, marks=pytest.mark.complete)],
+    [(Start(), "not improving", 5), (SIMPLEX_START, "not improving", 3)],
 )
 def test_who_follows_the_advice_under_the_papers_rule_flies_the_papers_loop(
     start: Start, ended: str, count: int

@@ -69,6 +69,7 @@ def test_the_interval_holds_the_flights_of_the_proposal_in_other_weather() -> No
     assert max(filter(None, errors)) < 0.1 * (first()[0].error or 0.0)
 
 
+@pytest.mark.complete
 def test_the_throttle_moves_little_more_than_in_the_first_flight_and_no_vehicle_nearly_rings() -> None:
     """The largest gains move it 1.6 times as much, and ring with 30 ms more delay and twice the gains."""
     activity = [np.mean([flight(number, gains)[1] for number in (2, 3)]) for gains in (proposal().gains, LARGEST)]

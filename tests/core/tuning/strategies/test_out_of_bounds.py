@@ -31,6 +31,7 @@ def test_the_region_of_a_base_outside_lies_at_the_nearest_edge() -> None:
     assert high.tolist() == [4000.0, 281.0, 102.0]
 
 
+@pytest.mark.complete
 def test_the_identified_optimum_lies_inside_narrow_bounds() -> None:
     """The flown gains lie below the bounds, by more than the step limit."""
     first = flight(1, HAND)
