@@ -105,6 +105,7 @@ def test_every_number_and_every_sample_arrives_as_it_was(
         assert [row.data for row in other_session.query(TrialPhotoRow)] == [PNG]
 
 
+@pytest.mark.complete
 def test_the_next_gains_are_computed_again_to_the_last_bit(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
@@ -117,6 +118,7 @@ def test_the_next_gains_are_computed_again_to_the_last_bit(
     assert without(ours, {"id", "campaign_id"}) == without(theirs, {"id", "campaign_id"})
 
 
+@pytest.mark.complete
 def test_a_warm_start_brings_the_campaign_that_it_came_from(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
@@ -311,6 +313,7 @@ def test_the_curve_with_which_custom_gains_were_planned_goes_along(
     assert drawn(there, brought(there, sealed(old))["id"]) == []
 
 
+@pytest.mark.complete
 def test_why_a_flight_was_broken_off_goes_along_and_bundles_from_before_it_was_recorded_are_still_read(
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:

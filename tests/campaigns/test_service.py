@@ -123,6 +123,7 @@ def test_marking_a_flight_invalid_reopens_a_campaign_and_marking_it_valid_ends_i
     assert (again["state"], again["outcome"], again["stop_reason"]) == ("finished", "budget", done["stop_reason"])
 
 
+@pytest.mark.complete
 def test_a_finished_campaign_is_reopened_for_more_flights_and_ends_after_them(
     client: TestClient, database: Database
 ) -> None:

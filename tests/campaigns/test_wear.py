@@ -88,6 +88,7 @@ def test_the_findings_of_the_proposal_follow_each_flight(client: TestClient, dat
     assert {shape["x0"] for shape in card["figure"]["layout"]["shapes"]} == {2}
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_needs_more_throttle_than_when_it_was_tuned_is_due(
     client: TestClient, database: Database
 ) -> None:

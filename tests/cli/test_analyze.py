@@ -74,6 +74,7 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
     assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3], values[0][4]])
 
 
+@pytest.mark.complete
 def test_the_log_of_px4_gives_a_file_for_its_ground_station(tmp_path: Path) -> None:
     log, parameters = tmp_path / "flight.ulg", tmp_path / "gains.params"
     log.write_bytes(px4_log(simulated_px4()))

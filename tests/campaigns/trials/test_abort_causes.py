@@ -59,6 +59,7 @@ def judge(client: TestClient, trial: Json, cause: str, *, version: int | None = 
     return client.post(f"/api/trials/{trial['id']}/judge-abort", json=body).status_code
 
 
+@pytest.mark.complete
 def test_three_cautious_aborts_leave_the_proposal_as_it_was(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
