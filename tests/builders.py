@@ -156,17 +156,19 @@ def create_flown_trial(client: httpx2.Client, database: Database, campaign_id: i
     return flown
 
 
-def create_flown_campaign(client: httpx2.Client, database: Database, *settling_s: float, **fields: object) -> Json:
+def create_flown_campaign(
+    client: httpx2.Client, database: Database, *settling_s: float, definition: Json | None = None
+) -> Json:
     """A campaign with flights of known errors, one unless more are given, and the gains for the next; as it was before
     them."""
 
     def make() -> Json:
-        campaign = create_ready_campaign(client, database, **fields)
+        campaign = create_ready_campaign(client, database, definition=definition or {})
         for each_s in settling_s or (1.0,):
             create_flown_trial(client, database, campaign["id"], each_s)
         return campaign
 
-    return made_once(database, json.dumps(["flown", settling_s, fields], sort_keys=True), make)
+    return made_once(database, json.dumps(["flown", settling_s, definition], sort_keys=True), make)
 
 
 def create_imported_trial(
