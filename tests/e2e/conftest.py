@@ -19,7 +19,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page, expect, sync_playwright
 
-from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport
+from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport, Waits
 from tests.e2e.states import States
 from tests.runtime.processes import wait_for
 from tests.unlocking import new_link
@@ -28,16 +28,13 @@ HERE = Path(__file__).parent
 BUILT = HERE.parents[1] / "frontend" / "dist" / "index.html"
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
-PATIENCE_MS = 60_000
-"""On a machine that has other things to do as well."""
-ENDS_WITHIN_S = 90
-"""Longer than a server waits for its worker."""
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 
 EVERYDAY = {
-    "test_fly_real.py::test_a_flight_that_ran_to_its_end_wants_a_persons_word",
+    "test_flight_day.py::test_a_day_from_the_wizard_to_the_report",
     "test_pages.py::test_the_ui_stays_light_before_its_charts",
+    "test_pages.py::test_every_route_of_the_dashboard_is_among_these_pages",
 }
 """What `./dev test` runs of the browser tests; all others belong to the complete ring."""
 DATA_DIRS: dict[str, Path] = {}
@@ -72,14 +69,23 @@ class SharedResources:
 STARTED = SharedResources()
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Whatever a test waits for, its own time limit alone decides how long: --timeout, or the project's. A wait ends
+    a sixth before that, so that it can say what it waited for."""
+    chosen_s = config.getoption("timeout")
+    limit_s = float(config.getini("timeout") if chosen_s is None else chosen_s)
+    Waits.at_most_s = limit_s * 5 / 6 if limit_s else Waits.at_most_s
+    expect.set_options(timeout=1000 * Waits.at_most_s)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if HERE in item.path.parents:
             item.add_marker(pytest.mark.browser)
             if f"{item.path.name}::{getattr(item, 'originalname', item.name)}" not in EVERYDAY:
                 item.add_marker(pytest.mark.complete)
-            # What a module's tests share takes as long as all its campaigns, and has limits of its own.
-            item.add_marker(pytest.mark.timeout(180, func_only=True))
+            # What a module's tests share takes as long as all its campaigns.
+            item.add_marker(pytest.mark.timeout(func_only=True))
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -102,7 +108,6 @@ def chromium() -> str:
 
 @contextmanager
 def launched(chromium: str) -> Iterator[Browser]:
-    expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         yield browser
@@ -159,7 +164,7 @@ class Server:
     def stop(self) -> None:
         if self._process is not None:
             self._process.send_signal(signal.SIGTERM)
-            self._process.wait(timeout=ENDS_WITHIN_S)
+            self._process.wait(timeout=Waits.at_most_s)
             self._process = None
 
 
@@ -256,6 +261,7 @@ class TabPool:
 def new_context(browser: Browser, url: str, *, unlocked: bool = True) -> BrowserContext:
     """A browser profile of its own; whoever sits before it has opened a link of `gainline unlock`."""
     context = browser.new_context(base_url=url, viewport=TABLET, accept_downloads=True, reduced_motion="reduce")
+    context.set_default_timeout(1000 * Waits.at_most_s)
     if unlocked and url in DATA_DIRS:
         opened = context.request.get(new_link(DATA_DIRS[url]), max_redirects=0)
         assert opened.status == 303, opened.text()
@@ -300,7 +306,6 @@ def open_dashboard(browser: Browser, tabs: TabPool) -> Iterator[Opener]:
             else:
                 page = tabs.take(url)
                 taken.append((url, page))
-            page.set_default_timeout(PATIENCE_MS)
             page.emulate_media(color_scheme=theme)
             page.set_viewport_size(viewport)
             return Dashboard(page, url)

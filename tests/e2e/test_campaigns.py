@@ -35,12 +35,12 @@ def test_a_campaign_is_created_by_one_click_and_flown_to_its_stop(open_dashboard
     for number in range(1, 8):
         dashboard.fly()
         row = page.get_by_role("row").filter(has=page.get_by_role("rowheader", name=re.compile(rf"^Flight {number}\b")))
-        expect(row.get_by_text("Valid", exact=True)).to_be_visible(timeout=30_000)
+        expect(row.get_by_text("Valid", exact=True)).to_be_visible()
         trial = dashboard.trials(campaign_id)[number - 1]
         expect(row).to_contain_text(f"{trial['error']:.3f} m")
         dashboard.wait_for_flight(number)
         assert_drawn_as_recorded(dashboard, trial)
-        expect(finished.or_(dashboard.button(f"Fly flight {number + 1}"))).to_be_visible(timeout=30_000)
+        expect(finished.or_(dashboard.button(f"Fly flight {number + 1}"))).to_be_visible()
         if finished.is_visible():
             break
     trials = dashboard.trials(campaign_id)
@@ -243,7 +243,7 @@ def test_wrong_settings_are_refused_at_their_field(dashboard: Dashboard) -> None
     expect(page.get_by_role("heading", name="AR.Drone takeoff to 3 m, simulated")).to_be_visible()
     made = dashboard.get(f"/campaigns/{dashboard.campaign_id}")
     assert made["definition"]["bounds"] == {"kp": [0, 2000]}
-    expect(page.get_by_text("Scored window: 20 s from the takeoff command")).to_be_visible(timeout=30_000)
+    expect(page.get_by_text("Scored window: 20 s from the takeoff command")).to_be_visible()
 
 
 def test_what_blocks_a_new_campaign_stands_beside_its_button(dashboard: Dashboard) -> None:

@@ -23,7 +23,7 @@ def fly_on(dashboard: Dashboard, campaign_id: int, *, steps: bool = False) -> No
         number = max(flown, default=0) + 1
         card = page.locator("section").filter(has=page.get_by_role("heading", name=re.compile(rf"\b{number}\b")))
         fly = card.get_by_role("button", name=re.compile(rf"^Fly flight {number}$")).and_(page.locator(":enabled"))
-        expect(finished.or_(fly)).to_be_visible(timeout=30_000)
+        expect(finished.or_(fly)).to_be_visible()
         if finished.is_visible():
             return
         if steps:
@@ -48,7 +48,7 @@ def test_a_noisy_twin_is_flown_to_a_candidate_confirmed_reviewed_and_confirmed_a
 
     flown = len(dashboard.trials(campaign_id))
     dashboard.button("Confirm with 2 flights").click()
-    expect(page.get_by_role("heading", name=f"Flight {flown + 1} is planned")).to_be_visible(timeout=30_000)
+    expect(page.get_by_role("heading", name=f"Flight {flown + 1} is planned")).to_be_visible()
     fly_on(dashboard, campaign_id)
     expect(page.get_by_text(CONFIRMED)).to_be_visible()
     trials = dashboard.trials(campaign_id)
@@ -59,6 +59,6 @@ def test_a_noisy_twin_is_flown_to_a_candidate_confirmed_reviewed_and_confirmed_a
     review.get_by_text("Wind gust").click()
     review.get_by_role("button", name="Mark invalid").click()
     dashboard.open_campaign(campaign_id)
-    expect(page.get_by_role("heading", name=f"Next: flight {len(trials) + 1}")).to_be_visible(timeout=30_000)
+    expect(page.get_by_role("heading", name=f"Next: flight {len(trials) + 1}")).to_be_visible()
     fly_on(dashboard, campaign_id)
     expect(page.get_by_text(CONFIRMED)).to_be_visible()

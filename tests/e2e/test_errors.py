@@ -364,7 +364,7 @@ def test_an_error_states_what_happened_and_what_to_do(
 def _is_told(dashboard: Dashboard, told: list[Json], title: str, kind: type[GainlineError] | str) -> None:
     """One of the refusals of that title stands on the page, with what to do and where; code without its backticks."""
     of_form = OF_FORMS.get(kind)
-    expect(dashboard.page.get_by_role("alert").first).to_be_visible(timeout=RETRIED_MS)
+    expect(dashboard.page.get_by_role("alert").first).to_be_visible()
 
     def shown() -> list[Json]:
         """The page shows one of several failed reads."""

@@ -1,12 +1,10 @@
 """The fly screen with a REAL vehicle: a simulated drone over loopback UDP, registered as real and flown by hand."""
 
 import re
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, Route, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.e2e.conftest import Opener, Server, new_context
 from tests.e2e.dashboard import PHONE, TABLET, Dashboard
@@ -106,59 +104,8 @@ def test_it_is_staged_held_flown_and_aborted_with_one_tap(dashboard: Dashboard, 
     expect(line_of(dashboard)).to_contain_text("[283 13 82]safe")
 
 
-def test_a_flight_that_ran_to_its_end_wants_a_persons_word(
-    dashboard: Dashboard, vehicle_id: int, trial_id: int
-) -> None:
-    take_control(dashboard)
-    stage(dashboard, len(TRIED))
-    hold_until_it_flies(dashboard, trial_id)
-    expect(dashboard.page.get_by_text("Suggested: valid")).to_be_visible(timeout=60_000)
-    expect(word(dashboard)).to_have_text("Landed")
-    assert state_of(dashboard, trial_id) == "captured"
-    dashboard.until(lambda: dashboard.trace("Live curve", "flight", trial=1, standing="unjudged") is not None)
-    in_sight_and_large_enough(dashboard)
-    with slow_answers(dashboard.page):
-        dashboard.button("Mark valid").click()
-        dashboard.page.get_by_role("link", name="Next flight").click()
-        headings = dashboard.page.get_by_role("heading", level=2)
-        said: set[str] = set()
-
-        def is_over() -> bool:
-            said.update(text.strip() for text in headings.all_inner_texts())
-            return "Flight budget used" in said
-
-        dashboard.until(is_over)
-    assert "Review flight 1" not in said
-    expect(dashboard.panel("Flight budget used")).to_contain_text("Best gains (flight 1)")
-    assert state_of(dashboard, trial_id) == "valid"
-
-
-def in_sight_and_large_enough(dashboard: Dashboard) -> None:
-    """The reasons for which a flight does not count, and the way back, on the fly screen."""
-    page = dashboard.page
-    dashboard.button("Mark invalid").click()
-    for label in page.get_by_label("Next action").locator("form label:visible").filter(has_not_text="Reason").all():
-        box = label.bounding_box()
-        assert box is not None
-        assert box["height"] >= 48, label.inner_text()
-    expect(dashboard.button("Cancel")).to_be_in_viewport(ratio=1)
-    dashboard.button("Cancel").click()
-
-
-@contextmanager
-def slow_answers(page: Page) -> Iterator[None]:
-    """What is read of a campaign comes late, its list of flights last."""
-
-    def late(route: Route) -> None:
-        time.sleep(0.3)
-        route.continue_()
-
-    page.route(re.compile("/api/campaigns/[0-9]+/(proposal|trials)"), late)
-    yield
-    page.unroute(re.compile("/api/campaigns/[0-9]+/(proposal|trials)"), late)
-
-
 def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: int, trial_id: int) -> None:
+    fits(dashboard)
     take_control(dashboard)
     stage(dashboard, len(TRIED))
     hold(dashboard, HOLD_MS - 300)
@@ -175,6 +122,17 @@ def test_nothing_but_a_whole_hold_lets_it_fly(dashboard: Dashboard, vehicle_id: 
     dashboard.button("Unstage (restore safe gains)").click()
     expect(dashboard.button("Stage gains")).to_be_enabled()
     assert dashboard.get(f"/vehicles/{vehicle_id}")["held"] == SAFE
+
+
+def fits(dashboard: Dashboard) -> None:
+    """All of it on a tablet, and never sideways on a phone."""
+    page = dashboard.page
+    expect(dashboard.button("Stage gains")).to_be_visible()
+    assert page.evaluate("(m => m.scrollHeight <= m.clientHeight)(document.querySelector('main'))")
+    assert page.evaluate("document.documentElement.scrollHeight <= window.innerHeight")
+    for viewport in (PHONE, TABLET):
+        page.set_viewport_size(viewport)
+        assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), viewport
 
 
 def test_one_operator_is_in_control_and_a_take_over_is_seen(
@@ -234,16 +192,3 @@ def slide(page: Page, knob: Locator, by_px: float) -> None:
     page.mouse.down()
     page.mouse.move(x + by_px, y, steps=8)
     page.mouse.up()
-
-
-def test_it_all_fits_on_a_tablet_and_never_scrolls_sideways(
-    open_dashboard: Opener, dashboard: Dashboard, vehicle_id: int, trial_id: int
-) -> None:
-    for viewport in (TABLET, PHONE):
-        tab = open_dashboard(dashboard.url, viewport=viewport)
-        tab.open(f"/fly/{trial_id}")
-        expect(tab.button("Stage gains")).to_be_visible()
-        assert tab.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
-        if viewport is TABLET:
-            assert tab.page.evaluate("(m => m.scrollHeight <= m.clientHeight)(document.querySelector('main'))")
-            assert tab.page.evaluate("document.documentElement.scrollHeight <= window.innerHeight")

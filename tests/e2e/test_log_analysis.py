@@ -40,7 +40,7 @@ def test_a_log_that_is_dropped_gives_gains_to_load(page_of_analysis: Dashboard, 
     dropped = page.evaluate_handle(DROP, ["steps.bin", content])
     page.get_by_role("heading", name="Log analysis").dispatch_event("drop", {"dataTransfer": dropped})
     article = page.get_by_role("article", name="Analysis of steps.bin")
-    expect(article).to_contain_text("Mean deviation: 23.4 mm measured.", timeout=60_000)
+    expect(article).to_contain_text("Mean deviation: 23.4 mm measured.")
     expect(article).to_contain_text("thrust slope 1.00 ± 0.01")
     rows = article.get_by_role("region", name="Gains compared").locator("tbody tr")
     expect(rows).to_have_count(6)
@@ -65,7 +65,7 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(page_o
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"))
     article = page.get_by_role("article", name="Analysis of takeoff.tlog")
-    expect(article).to_contain_text("Mean distance from 3 m: 0.330 m measured.", timeout=60_000)
+    expect(article).to_contain_text("Mean distance from 3 m: 0.330 m measured.")
     expect(article).to_contain_text("hover throttle 0.63")
     rows = article.get_by_role("region", name="Gains compared").locator("tbody tr")
     expect(rows).to_have_count(2)
@@ -84,7 +84,7 @@ def test_a_campaign_starts_from_the_log_and_proposes_what_the_analysis_did(page_
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"))
     rows = page.get_by_role("region", name="Gains compared").locator("tbody tr")
-    expect(rows).to_have_count(2, timeout=60_000)
+    expect(rows).to_have_count(2)
     proposed = rows.nth(1).locator("td").all_inner_texts()[1:4]
     dashboard.button("Start campaign").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("takeoff")
@@ -101,7 +101,7 @@ def test_a_log_that_cannot_be_analysed_is_refused_and_the_next_one_is_not(page_o
     choose(dashboard, "takeoff.bin", recorded("px4_takeoff.ulg"))
     expect(page.get_by_role("alert")).to_contain_text("Takeoffs are left out: their ramp decides, not the gains.")
     choose(dashboard, "flight.bin", ardupilot_log(simulated_flight(GUSTY)))
-    expect(page.get_by_role("article", name="Analysis of flight.bin")).to_be_visible(timeout=60_000)
+    expect(page.get_by_role("article", name="Analysis of flight.bin")).to_be_visible()
     expect(page.get_by_role("alert")).to_have_count(0)
 
 

@@ -1,4 +1,5 @@
-"""No internet at the field: every page loads on a machine whose network is unplugged, and asks nothing elsewhere."""
+"""No internet at the field: server and dashboard work on a machine whose network is unplugged. That no page asks
+anything elsewhere is seen in every browser test."""
 
 import json
 import shutil
@@ -7,8 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from tests.e2e.unplugged import pages
 
 
 def own_network() -> list[str]:
@@ -21,15 +20,8 @@ def own_network() -> list[str]:
     pytest.skip("this user may not make a network namespace (needs root, or unprivileged user namespaces)")
 
 
-@pytest.mark.timeout(600, func_only=True)
-def test_every_page_loads_with_the_network_unplugged_and_asks_nothing_elsewhere(chromium: str) -> None:
+def test_a_campaign_is_flown_and_drawn_with_the_network_unplugged(chromium: str) -> None:
     command = [*own_network(), sys.executable, "-m", "tests.e2e.unplugged", chromium]
     done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], check=False)
     assert done.returncode == 0, done.stderr
-    seen = json.loads(done.stdout)
-    assert seen["unplugged"]
-    assert len(seen["pages"]) == len(pages())
-    for page in seen["pages"]:
-        assert page["elsewhere"] == [], page
-        assert page["alerts"] == [], page
-        assert ":" not in page["path"], f"{page['path']}: say in unplugged.py what stands for this parameter"
+    assert json.loads(done.stdout) == {"unplugged": True, "wrong": [], "alerts": []}

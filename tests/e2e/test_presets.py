@@ -33,7 +33,7 @@ def fly_on_green(dashboard: Dashboard, campaign_id: int, most: int) -> list[Json
     finished = dashboard.page.get_by_role("heading", name=FINISHED)
     for number in range(1, most + 2):
         green = green_button(dashboard, number)
-        expect(finished.or_(green)).to_be_visible(timeout=30_000)
+        expect(finished.or_(green)).to_be_visible()
         if finished.is_visible():
             return dashboard.trials(campaign_id)
         green.click()

@@ -134,7 +134,7 @@ def test_the_pdf_is_saved_from_the_campaign(
 ) -> None:
     dashboard = open_dashboard(shared_server.url)
     dashboard.open_campaign(campaign_id)
-    with dashboard.page.expect_download(timeout=60_000) as coming:
+    with dashboard.page.expect_download() as coming:
         dashboard.button("PDF").click()
     assert coming.value.suggested_filename == f"campaign-{campaign_id}-report.pdf"
     coming.value.save_as(tmp_path / "report.pdf")

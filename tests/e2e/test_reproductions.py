@@ -24,7 +24,7 @@ def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, 
     expect(card.get_by_role("progressbar")).to_be_visible()
     expect(dashboard.button(f"Cancel: {FIG6}")).to_be_visible()
     table = card.get_by_role("table").first
-    expect(table).to_be_visible(timeout=60_000)
+    expect(table).to_be_visible()
     found = dashboard.get("/reproductions/controller")
     shown = [row.inner_text().split() for row in table.locator("tbody tr").all()][1:]
     assert [cells[0] for cells in shown] == [row["label"] for row in found["rows"]]
@@ -48,7 +48,7 @@ def test_a_job_is_watched_cancelled_and_retried(open_dashboard: Opener, empty_se
     job_id = dashboard.post("/reproductions/variability/run")["id"]
     card = page.locator("tbody").filter(has_text=f"Job {job_id}")
     expect(card.get_by_role("link", name=FIG12)).to_be_visible()
-    expect(card.get_by_text(re.compile(r"^[1-9]\d?\s% · .*battery \d+ of 240 flown"))).to_be_visible(timeout=60_000)
+    expect(card.get_by_text(re.compile(r"^[1-9]\d?\s% · .*battery \d+ of 240 flown"))).to_be_visible()
     card.get_by_role("button", name=f"Cancel job {job_id}").click()
     expect(card.get_by_text("Cancelled", exact=True)).to_be_visible()
     page.get_by_role("radiogroup", name="Jobs shown").get_by_text("Active").click()

@@ -151,7 +151,7 @@ def test_a_vehicle_that_was_left_in_the_air_is_landed_looked_at_and_released(
         expect(page.get_by_text("Land is repeated until the vehicle descends.")).to_be_visible()
         expect(dashboard.button("Restore safe gains")).to_be_disabled()
         expect(page.get_by_text("while it is armed, the vehicle is only monitored")).to_be_visible()
-        expect(fact(dashboard, "Connection", "Altitude")).to_have_text(re.compile(r"^-?0\.[01]\d m$"), timeout=60_000)
+        expect(fact(dashboard, "Connection", "Altitude")).to_have_text(re.compile(r"^-?0\.[01]\d m$"))
         slide_to_its_end(dashboard, page.get_by_role("button", name="Motors off – the drone falls"))
         expect(fact(dashboard, "Connection", "Motors")).to_have_text("disarmed")
         expect(page.get_by_text("The motors are off.")).to_be_visible()
