@@ -51,51 +51,6 @@ def best_of(dashboard: Dashboard) -> Json:
     return best
 
 
-def test_a_thousand_flights_are_drawn_as_an_envelope_with_those_that_matter(page_of_many: Dashboard) -> None:
-    best = best_of(page_of_many)
-    drawn = page_of_many.traces("takeoffs")
-    roles = [trace["meta"]["role"] for trace in drawn]
-    assert roles.count("envelope") == 3
-    assert 5 < roles.count("flight") < 15
-    mine = page_of_many.trace("takeoffs", "flight", trial=best["trial_number"], standing="best")
-    assert mine is not None
-    time_s, altitude_m = page_of_many.record(best["trial_id"])
-    np.testing.assert_allclose(mine["y"], np.interp(mine["x"], time_s, altitude_m), atol=5e-3)
-    measured = page_of_many.trace("errors", "measured")
-    assert measured is not None
-    first_page = {trial["number"]: trial["error"] for trial in page_of_many.trials(page_of_many.campaign_id)}
-    shown = dict(zip(measured["x"], measured["y"], strict=True))
-    assert all(shown[number] == pytest.approx(error, abs=1e-6) for number, error in first_page.items() if error)
-    page_of_many.open_tab("Flights")
-    rows = page_of_many.page.locator("tbody tr[data-flight]")
-    expect(row(page_of_many, FLIGHTS)).to_be_visible()
-    assert 50 <= rows.count() <= 52
-    page_of_many.button(f"Show 200 earlier flights ({FLIGHTS - 50} hidden)").click()
-    expect(row(page_of_many, FLIGHTS - 249)).to_be_attached()
-
-
-def test_a_chart_finds_room_for_its_axes_and_is_drawn_once(page_of_many: Dashboard) -> None:
-    """Where a label does not fit its margin, Plotly makes room, draws all of it again, and counts that."""
-    for chart in ("takeoffs", "errors", "gains"):
-        again = page_of_many.plot(chart).evaluate("chart => chart._fullLayout._redrawFromAutoMarginCount ?? null")
-        assert again is None, chart
-
-
-def test_a_flight_that_is_pointed_at_stands_out_as_curve_and_row(page_of_many: Dashboard) -> None:
-    number = best_of(page_of_many)["trial_number"]
-    page_of_many.open_tab("Flights")
-    row(page_of_many, number).hover()
-    expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
-    row(page_of_many, number).get_by_role("button").focus()
-    expect(row(page_of_many, number)).to_have_attribute("data-pointed", "")
-    plain = FLIGHTS - 20
-    row(page_of_many, plain).hover()
-    lent = page_of_many.until(lambda: lent_curve(page_of_many, plain))
-    best = best_of(page_of_many)
-    time_s, altitude_m = page_of_many.record(best["trial_id"] - best["trial_number"] + plain)
-    np.testing.assert_allclose(lent["y"], np.interp(lent["x"], time_s, altitude_m), atol=5e-3)
-
-
 _POINTED = """chart => Array.from(chart.querySelectorAll("[data-pointed]"), curve => {
   const {role, trial} = curve.__data__[0].trace.meta;
   return [role, trial];
@@ -167,37 +122,21 @@ def point_at(dashboard: Dashboard, chart: Locator, flight: int) -> None:
     dashboard.until(is_pointed_at)
 
 
-def test_a_mark_points_at_its_curve_and_its_gains_and_chooses_its_flight(page_of_many: Dashboard) -> None:
-    number = best_of(page_of_many)["trial_number"]
-    chart = page_of_many.plot("errors")
-    chart.scroll_into_view_if_needed()
-    page_of_many.settled()
-    x, y = place_of(chart, number)
-    brush(page_of_many, (x - 15, y - 60), (x + 15, y - 60))  # else a pixel holds three flights
-    page_of_many.settled()
-    point_at(page_of_many, chart, number)
-    label = page_of_many.plot("gains").locator(".hoverlayer .hovertext")
-    expect(label.first).to_contain_text(f"Flight {number}")
-    page_of_many.page.mouse.move(5, 5)
-    expect(curve(page_of_many, number)).not_to_have_attribute("data-pointed", "")
-    point_at(page_of_many, chart, number)
-    page_of_many.page.mouse.click(*place_of(chart, number))
-    expect(page_of_many.panel(f"Flight {number}")).to_be_visible()
+def test_the_crowd_is_drawn_as_an_envelope_once_and_zoomed(page_of_many: Dashboard) -> None:
+    finds_room_for_its_axes_and_draws_once(page_of_many)
+    opens_at_the_first_8_s_and_shows_the_whole_flight_on_request(page_of_many)
+    zooms_for_more_of_each_record_and_back_by_a_double_click(page_of_many)
+    sees_an_envelope_with_those_that_matter(page_of_many)
 
 
-def test_choosing_a_flight_of_the_crowd_gives_it_a_curve_of_its_own(page_of_many: Dashboard) -> None:
-    plain = FLIGHTS - 20
-    page_of_many.open_tab("Flights")
-    assert page_of_many.trace("takeoffs", "flight", trial=plain) is None
-    row(page_of_many, plain).get_by_role("button").click()
-    page_of_many.wait_for_flight(plain)
-    others = [trace["width"] for trace in page_of_many.traces("takeoffs") if trace["meta"].get("standing") == "earlier"]
-    chosen = page_of_many.trace("takeoffs", "flight", trial=plain)
-    assert chosen is not None
-    assert chosen["width"] == max(others)
+def finds_room_for_its_axes_and_draws_once(page_of_many: Dashboard) -> None:
+    """Where a label does not fit its margin, Plotly makes room, draws all of it again, and counts that."""
+    for chart in ("takeoffs", "errors", "gains"):
+        again = page_of_many.plot(chart).evaluate("chart => chart._fullLayout._redrawFromAutoMarginCount ?? null")
+        assert again is None, chart
 
 
-def test_the_chart_opens_at_the_first_8_s_and_shows_the_whole_flight_on_request(page_of_many: Dashboard) -> None:
+def opens_at_the_first_8_s_and_shows_the_whole_flight_on_request(page_of_many: Dashboard) -> None:
     def seconds() -> list[float]:
         shown: list[float] = page_of_many.plot("takeoffs").evaluate("chart => chart.layout.xaxis.range")
         return shown
@@ -215,7 +154,7 @@ def test_the_chart_opens_at_the_first_8_s_and_shows_the_whole_flight_on_request(
     page_of_many.until(lambda: seconds() == [-0.3, 8])
 
 
-def test_a_zoom_shows_more_of_each_record_and_a_double_click_the_whole_flight(page_of_many: Dashboard) -> None:
+def zooms_for_more_of_each_record_and_back_by_a_double_click(page_of_many: Dashboard) -> None:
     best = best_of(page_of_many)
 
     def drawn() -> Json:
@@ -253,3 +192,77 @@ def test_a_zoom_shows_more_of_each_record_and_a_double_click_the_whole_flight(pa
 
     page_of_many.until(is_whole)
     page_of_many.until(lambda: len(drawn()["x"]) == 500)
+
+
+def sees_an_envelope_with_those_that_matter(page_of_many: Dashboard) -> None:
+    best = best_of(page_of_many)
+    drawn = page_of_many.traces("takeoffs")
+    roles = [trace["meta"]["role"] for trace in drawn]
+    assert roles.count("envelope") == 3
+    assert 5 < roles.count("flight") < 15
+    mine = page_of_many.trace("takeoffs", "flight", trial=best["trial_number"], standing="best")
+    assert mine is not None
+    time_s, altitude_m = page_of_many.record(best["trial_id"])
+    np.testing.assert_allclose(mine["y"], np.interp(mine["x"], time_s, altitude_m), atol=5e-3)
+    measured = page_of_many.trace("errors", "measured")
+    assert measured is not None
+    first_page = {trial["number"]: trial["error"] for trial in page_of_many.trials(page_of_many.campaign_id)}
+    shown = dict(zip(measured["x"], measured["y"], strict=True))
+    assert all(shown[number] == pytest.approx(error, abs=1e-6) for number, error in first_page.items() if error)
+    page_of_many.open_tab("Flights")
+    rows = page_of_many.page.locator("tbody tr[data-flight]")
+    expect(row(page_of_many, FLIGHTS)).to_be_visible()
+    assert 50 <= rows.count() <= 52
+    page_of_many.button(f"Show 200 earlier flights ({FLIGHTS - 50} hidden)").click()
+    expect(row(page_of_many, FLIGHTS - 249)).to_be_attached()
+
+
+def test_one_flight_of_the_crowd_is_pointed_at_and_chosen(page_of_many: Dashboard) -> None:
+    points_at_a_mark_and_chooses_its_flight(page_of_many)
+    points_at_a_row_and_its_curve_stands_out(page_of_many)
+    chooses_a_flight_of_the_crowd_which_gets_a_curve(page_of_many)
+
+
+def points_at_a_mark_and_chooses_its_flight(page_of_many: Dashboard) -> None:
+    number = best_of(page_of_many)["trial_number"]
+    chart = page_of_many.plot("errors")
+    chart.scroll_into_view_if_needed()
+    page_of_many.settled()
+    x, y = place_of(chart, number)
+    brush(page_of_many, (x - 15, y - 60), (x + 15, y - 60))  # else a pixel holds three flights
+    page_of_many.settled()
+    point_at(page_of_many, chart, number)
+    label = page_of_many.plot("gains").locator(".hoverlayer .hovertext")
+    expect(label.first).to_contain_text(f"Flight {number}")
+    page_of_many.page.mouse.move(5, 5)
+    expect(curve(page_of_many, number)).not_to_have_attribute("data-pointed", "")
+    point_at(page_of_many, chart, number)
+    page_of_many.page.mouse.click(*place_of(chart, number))
+    expect(page_of_many.panel(f"Flight {number}")).to_be_visible()
+
+
+def points_at_a_row_and_its_curve_stands_out(page_of_many: Dashboard) -> None:
+    number = best_of(page_of_many)["trial_number"]
+    page_of_many.open_tab("Flights")
+    row(page_of_many, number).hover()
+    expect(curve(page_of_many, number)).to_have_attribute("data-pointed", "")
+    row(page_of_many, number).get_by_role("button").focus()
+    expect(row(page_of_many, number)).to_have_attribute("data-pointed", "")
+    plain = FLIGHTS - 20
+    row(page_of_many, plain).hover()
+    lent = page_of_many.until(lambda: lent_curve(page_of_many, plain))
+    best = best_of(page_of_many)
+    time_s, altitude_m = page_of_many.record(best["trial_id"] - best["trial_number"] + plain)
+    np.testing.assert_allclose(lent["y"], np.interp(lent["x"], time_s, altitude_m), atol=5e-3)
+
+
+def chooses_a_flight_of_the_crowd_which_gets_a_curve(page_of_many: Dashboard) -> None:
+    plain = FLIGHTS - 20
+    page_of_many.open_tab("Flights")
+    assert page_of_many.trace("takeoffs", "flight", trial=plain) is None
+    row(page_of_many, plain).get_by_role("button").click()
+    page_of_many.wait_for_flight(plain)
+    others = [trace["width"] for trace in page_of_many.traces("takeoffs") if trace["meta"].get("standing") == "earlier"]
+    chosen = page_of_many.trace("takeoffs", "flight", trial=plain)
+    assert chosen is not None
+    assert chosen["width"] == max(others)

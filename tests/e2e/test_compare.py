@@ -110,7 +110,9 @@ def test_flights_are_picked_from_their_campaigns_and_drawn_as_they_are_stored(
     assert len(pens) == 3, "not by colour alone"
 
 
-def test_the_verdict_and_what_differs_are_the_apis(dashboard: Dashboard, flown: Flown) -> None:
+def test_the_verdict_and_what_differs_are_the_apis_and_curves_and_figure_are_taken_along_as_files(
+    dashboard: Dashboard, flown: Flown, tmp_path: Path
+) -> None:
     page = dashboard.page
     trials = [flown.early[0], flown.early[1], flown.late[0]]
     found = compare(dashboard, trials)
@@ -139,36 +141,7 @@ def test_the_verdict_and_what_differs_are_the_apis(dashboard: Dashboard, flown: 
     expect(row(page, 2)).to_contain_text("+117")
     page.get_by_text("Comparisons with A").click()
     expect(page.get_by_text(pair["sentence"]).last).to_be_visible()
-
-
-def test_the_address_can_be_sent_and_another_flight_made_the_first(
-    open_dashboard: Opener, shared_server: Server, flown: Flown
-) -> None:
-    dashboard = open_dashboard(shared_server.url)
-    page = dashboard.page
-    one, other = flown.early[0], flown.late[0]
-    compare(dashboard, [one, other])
-    dashboard.button("Use flight 1 of Compared in the evening as reference").click()
-    dashboard.until(lambda: chosen(page) == [other, one])
-    dashboard.until(lambda: dashboard.trace(CURVES, "difference", trial=one) is not None)
-    expect(row(page, 0)).to_contain_text("reference")
-    page.get_by_role("link", name="Gainline, all campaigns").click()
-    expect(page.get_by_role("heading", name="Campaigns", exact=True)).to_be_visible()
-    page.goto("/compare")
-    dashboard.until(lambda: chosen(page) == [other, one])
-    dashboard.button("Remove flight 1 of Compared in the morning").click()
-    expect(page.get_by_text("Flight 1 is selected.")).to_be_visible()
-    dashboard.button("Clear selection").click()
-    expect(page.get_by_text("Select two or more flights.")).to_be_visible()
-    assert chosen(page) == []
-    elsewhere = open_dashboard(shared_server.url, theme="dark", viewport=PHONE)
-    compare(elsewhere, [other, one])
-    assert elsewhere.trace(CURVES, "flight", trial=one) is not None
-
-
-def test_curves_and_figure_are_taken_along_as_files(dashboard: Dashboard, flown: Flown, tmp_path: Path) -> None:
-    trials = [flown.early[0], flown.late[0]]
-    stem = compare(dashboard, trials)["file_stem"]
+    stem = found["file_stem"]
 
     def download(name: str, ending: str) -> Path:
         with dashboard.page.expect_download() as caught:
@@ -197,7 +170,34 @@ def test_curves_and_figure_are_taken_along_as_files(dashboard: Dashboard, flown:
     assert "Altitude (m)" in words
 
 
-def test_what_cannot_be_compared_is_said_and_can_be_left_out(dashboard: Dashboard, flown: Flown) -> None:
+def test_the_address_can_be_sent_and_another_flight_made_the_first(
+    open_dashboard: Opener, shared_server: Server, flown: Flown
+) -> None:
+    dashboard = open_dashboard(shared_server.url)
+    page = dashboard.page
+    one, other = flown.early[0], flown.late[0]
+    compare(dashboard, [one, other])
+    dashboard.button("Use flight 1 of Compared in the evening as reference").click()
+    dashboard.until(lambda: chosen(page) == [other, one])
+    dashboard.until(lambda: dashboard.trace(CURVES, "difference", trial=one) is not None)
+    expect(row(page, 0)).to_contain_text("reference")
+    page.get_by_role("link", name="Gainline, all campaigns").click()
+    expect(page.get_by_role("heading", name="Campaigns", exact=True)).to_be_visible()
+    page.goto("/compare")
+    dashboard.until(lambda: chosen(page) == [other, one])
+    dashboard.button("Remove flight 1 of Compared in the morning").click()
+    expect(page.get_by_text("Flight 1 is selected.")).to_be_visible()
+    dashboard.button("Clear selection").click()
+    expect(page.get_by_text("Select two or more flights.")).to_be_visible()
+    assert chosen(page) == []
+    elsewhere = open_dashboard(shared_server.url, theme="dark", viewport=PHONE)
+    compare(elsewhere, [other, one])
+    assert elsewhere.trace(CURVES, "flight", trial=one) is not None
+
+
+def test_what_cannot_be_compared_is_said_and_can_be_left_out_also_a_flight_of_a_deleted_campaign(
+    dashboard: Dashboard, states: States, flown: Flown
+) -> None:
     page = dashboard.page
     one, other = flown.early[0], flown.early[2]
     dashboard.open(address([one, flown.pitch, other]))
@@ -205,11 +205,6 @@ def test_what_cannot_be_compared_is_said_and_can_be_left_out(dashboard: Dashboar
     dashboard.button("Remove 1 flight").click()
     expect(dashboard.plot(CURVES)).to_be_visible()
     assert chosen(page) == [one, other]
-
-
-def test_a_flight_of_a_deleted_campaign_is_reported_as_gone(dashboard: Dashboard, states: States, flown: Flown) -> None:
-    page = dashboard.page
-    one, other = flown.early[0], flown.early[2]
     doomed = states.campaign("import", name="Deleted soon")
     proposal = dashboard.get(f"/campaigns/{doomed}/proposal")["proposal"]
     gone = dashboard.post(f"/campaigns/{doomed}/trials", {"proposal_id": proposal["id"]})["id"]

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import FilePayload, expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, Dashboard, Json
+from tests.e2e.dashboard import Dashboard, Json
 from tests.logs.paparazzi_flights import COMPANION, Flight, data_of
 from tests.logs.recorded import recorded
 
@@ -122,18 +122,14 @@ def test_the_log_of_an_arducopter_is_compared_with_its_own_replica(page_of_check
     assert_drawn_as_told(dashboard, check)
 
 
-def test_what_is_no_recording_is_refused_in_words(page_of_checks: Dashboard) -> None:
+def test_what_is_no_recording_is_refused_in_words_above_the_verdict_on_an_earlier_one(
+    page_of_checks: Dashboard,
+) -> None:
     dashboard, page = page_of_checks, page_of_checks.page
-    choose(dashboard, file_of("alive.data", "1.0 31 ALIVE 1\n"))
-    expect(page.get_by_role("alert")).to_contain_text("contains no VERT_LOOP")
     choose(dashboard, FilePayload(name="cut.csv.gz", mimeType="application/gzip",
                                   buffer=(TRACES / "climb_rates.csv.gz").read_bytes()[:4000]))  # fmt: skip
     expect(page.get_by_role("alert")).to_contain_text("cut.csv.gz is damaged or not a text file")
     assert dashboard.get("/controller-checks")["total"] == 0
-
-
-def test_a_refused_file_is_named_above_the_verdict_on_an_earlier_one(page_of_checks: Dashboard) -> None:
-    dashboard, page = page_of_checks, page_of_checks.page
     dashboard.button("Check example").click()
     result = page.get_by_text(re.compile("^The replica agrees"))
     expect(result).to_be_visible()
@@ -145,6 +141,7 @@ def test_a_refused_file_is_named_above_the_verdict_on_an_earlier_one(page_of_che
     assert verdict is not None
     assert refusal["y"] < verdict["y"]
     expect(page.get_by_role("alert")).to_contain_text("contains no VERT_LOOP")
+    assert dashboard.get("/controller-checks")["total"] == 1
 
 
 def test_a_file_may_be_dropped_on_the_page(page_of_checks: Dashboard) -> None:
@@ -160,12 +157,3 @@ def test_a_file_may_be_dropped_on_the_page(page_of_checks: Dashboard) -> None:
     page.get_by_role("heading", name="Controller check").dispatch_event("drop", {"dataTransfer": dropped})
     expect(page.get_by_role("article", name="Check of dropped.data")).to_be_visible()
     assert newest(dashboard)["gains_from"] == "computed from the commands"
-
-
-def test_on_a_phone_nothing_is_cut_off(open_dashboard: Opener, empty_server: Server) -> None:
-    dashboard = open_dashboard(empty_server.url, viewport=PHONE)
-    dashboard.open("/controller")
-    dashboard.button("Check example").click()
-    expect(dashboard.page.get_by_text(re.compile("^The replica agrees"))).to_be_visible()
-    expect(dashboard.plot("Commands")).to_be_visible()
-    assert dashboard.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

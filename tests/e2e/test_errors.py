@@ -32,7 +32,7 @@ from app.common.errors import (
 )
 from app.live.link import LinkDownError
 from app.web import errors as over_http
-from tests.e2e.conftest import Opener, Server, served
+from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard, Json, open_details
 from tests.e2e.states import States
 from tests.logs.recorded import recorded
@@ -50,9 +50,6 @@ OF_FORMS: Final[dict[object, str]] = {
     "invalid": "Correct the marked field: Maximum flights.",
 }
 """What a form says instead of the API's sentence and hint, because every reason stands at its field."""
-RETRIED_MS: Final = 40_000
-"""A read that failed at the server is tried three times more before the page says so."""
-
 Undo = Callable[[], None]
 Provoke = Callable[[Dashboard, Server, States], Undo | None]
 """What it returns is called once the page has been read: until then the error has to last."""
@@ -107,7 +104,12 @@ def create_instead(
 ) -> None:
     """Press "Create campaign" on its page, with another request behind it."""
     instead(dashboard, "/campaigns", path=path, url=url, method=method, body=body, headers=headers)
-    dashboard.open("/new")
+    create(dashboard)
+
+
+def create(dashboard: Dashboard) -> None:
+    if not dashboard.page.url.endswith("/new"):
+        dashboard.open("/new")
     dashboard.button("Create campaign").click()
 
 
@@ -126,7 +128,8 @@ def stopped_worker(server: Server) -> Iterator[None]:
 
 
 def hand_in(dashboard: Dashboard, states: States, name: str, content: bytes | Path) -> None:
-    dashboard.open_campaign(states.campaign("import"))
+    if "/campaigns/" not in dashboard.page.url:
+        dashboard.open_campaign(states.campaign("import"))
     with dashboard.page.expect_file_chooser() as chooser:
         dashboard.button("Upload flight record").click()
     if isinstance(content, Path):
@@ -154,18 +157,6 @@ def _a_real_vehicle_ordered_off_at_once(dashboard: Dashboard, _server: Server, s
 @provokes(NotFoundError)
 def _a_campaign_that_never_was(dashboard: Dashboard, _server: Server, _states: States) -> None:
     dashboard.open("/campaigns/999999")
-
-
-@provokes(BusyError)
-def _a_vehicle_asked_while_it_is_still_being_asked(dashboard: Dashboard, server: Server, states: States) -> None:
-    options = {"address": "udp:127.0.0.1:14993@14992", "simulated": True}
-    vehicle = states.vehicle("Busy", options=options)
-    instead(dashboard, "/campaigns", path=f"/vehicles/{vehicle}/connect", body="{}")
-    dashboard.open("/new")
-    with stopped_worker(server):
-        dashboard.post(f"/vehicles/{vehicle}/connect")
-        dashboard.button("Create campaign").click()
-        expect(dashboard.page.get_by_role("alert")).to_be_visible()
 
 
 @provokes(ConflictError)
@@ -221,30 +212,6 @@ def _bounds_the_wrong_way_round(dashboard: Dashboard, _server: Server, _states: 
     dashboard.button("Create campaign").click()
 
 
-@provokes(UnavailableError)
-def _a_pdf_without_a_browser_to_print_it(dashboard: Dashboard, server: Server, _states: States) -> Undo:
-    """From a server that finds none; nothing is computed there."""
-    with ExitStack() as stack:
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("PATH", "/nowhere")
-            other = stack.enter_context(served(server.data_dir.parent / "browserless", 0, "--no-worker"))
-        states = States(other.data_dir)
-        stack.callback(states.close)
-        path = f"/campaigns/{states.campaign()}/report.pdf"
-        create_instead(dashboard, path=path, url=other.url, method="GET", headers={"origin": other.url})
-        return stack.pop_all().close
-
-
-@provokes(StorageError)
-def _a_database_that_somebody_else_holds(dashboard: Dashboard, server: Server, _states: States) -> None:
-    dashboard.open("/new")
-    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", isolation_level=None)) as other:
-        other.execute("BEGIN IMMEDIATE")
-        dashboard.button("Create campaign").click()
-        expect(dashboard.page.get_by_role("alert")).to_be_visible()
-        other.execute("ROLLBACK")
-
-
 @provokes(LinkDownError)
 def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server, states: States) -> Undo:
     campaign_id = states.campaign()
@@ -262,20 +229,31 @@ def _an_abort_while_the_worker_is_stopped(dashboard: Dashboard, server: Server, 
         return stack.pop_all().close
 
 
-@provokes(GainlineError)
-def _one_without_a_kind_of_its_own(dashboard: Dashboard, _server: Server, _states: States) -> None:
-    """None reaches the API at present, so the program's own answer to one is made here."""
-    made = over_http.problem_response(GainlineError("The order cannot be read.", hint="Run the reproduction again."))
-    dashboard.page.route(
-        "**/api/campaigns",
-        lambda route: (
-            route.fallback()
-            if route.request.method == "GET"
-            else route.fulfill(status=made.status_code, content_type=over_http.MEDIA_TYPE, body=bytes(made.body))
-        ),
-    )
-    dashboard.open("/new")
-    dashboard.button("Create campaign").click()
+def _answer(error: GainlineError) -> Provoke:
+    """The program's own answer to that error, which is slow to provoke, and is provoked over HTTP."""
+
+    def provoke(dashboard: Dashboard, _server: Server, _states: States) -> None:
+        made = over_http.problem_response(error)
+
+        def answer(route: Route) -> None:
+            if route.request.method == "GET":
+                route.fallback()
+            else:
+                route.fulfill(status=made.status_code, content_type=over_http.MEDIA_TYPE, body=bytes(made.body))
+
+        dashboard.page.route("**/api/campaigns", answer)
+        create(dashboard)
+
+    return provoke
+
+
+for _error in (
+    GainlineError("The order cannot be read.", hint="Run the reproduction again."),
+    BusyError("Bee is still being connected.", hint="Wait until that is over."),
+    UnavailableError("No browser was found that prints a PDF.", hint="Install Chromium."),
+    StorageError("The database is locked by another program.", hint="Close that program, then try again."),
+):
+    PROVOKED[type(_error)] = _answer(_error)
 
 
 @provokes("400")
@@ -340,9 +318,18 @@ def test_every_kind_of_error_has_a_story_that_provokes_it() -> None:
     assert set(map(_name, PROVOKED)) == set(map(_name, answered_kinds()))
 
 
-@pytest.mark.parametrize("kind", sorted(PROVOKED, key=_name), ids=_name)
+ON_A_PAGE_OF_THEIR_OWN: Final = {InputError, "invalid", NotFoundError, GainsError, LinkDownError, "unexpected"}
+OF_A_FILE: Final = {TooLargeError, TrajectoryError, UnconfirmedError}
+PAGES: Final = {_name(kind): {kind} for kind in ON_A_PAGE_OF_THEIR_OWN} | {
+    "a file": OF_A_FILE,
+    "a request": PROVOKED.keys() - ON_A_PAGE_OF_THEIR_OWN - OF_A_FILE,
+}
+"""Errors that are read on one page, one after another."""
+
+
+@pytest.mark.parametrize("of", sorted(PAGES))
 def test_an_error_states_what_happened_and_what_to_do(
-    dashboard: Dashboard, shared_server: Server, states: States, kind: type[GainlineError] | str
+    dashboard: Dashboard, shared_server: Server, states: States, of: str
 ) -> None:
     told: list[Json] = []
 
@@ -351,14 +338,17 @@ def test_an_error_states_what_happened_and_what_to_do(
             told.append(answer.json())
 
     dashboard.page.on("response", note)
-    undo = PROVOKED[kind](dashboard, shared_server, states)
-    try:
-        title = TITLES[kind] if isinstance(kind, str) else over_http._KINDS[kind][1]
-        _is_told(dashboard, told, title, kind)
-    finally:
-        dashboard.page.remove_listener("response", note)
-        if undo is not None:
-            undo()
+    for kind in sorted(PAGES[of], key=_name):
+        dashboard.page.unroute_all()
+        told.clear()
+        undo = PROVOKED[kind](dashboard, shared_server, states)
+        try:
+            title = TITLES[kind] if isinstance(kind, str) else over_http._KINDS[kind][1]
+            _is_told(dashboard, told, title, kind)
+        finally:
+            if undo is not None:
+                undo()
+    dashboard.page.remove_listener("response", note)
 
 
 def _is_told(dashboard: Dashboard, told: list[Json], title: str, kind: type[GainlineError] | str) -> None:

@@ -132,6 +132,7 @@ def fits(dashboard: Dashboard) -> None:
     assert page.evaluate("document.documentElement.scrollHeight <= window.innerHeight")
     for viewport in (PHONE, TABLET):
         page.set_viewport_size(viewport)
+        dashboard.settled()
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), viewport
 
 

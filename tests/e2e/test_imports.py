@@ -20,16 +20,6 @@ def hand_in(dashboard: Dashboard, *files: tuple[str, bytes]) -> None:
     )
 
 
-def test_a_telemetry_log_is_handed_in_and_scored_with_its_own_gains(dashboard: Dashboard, states: States) -> None:
-    campaign_id = states.campaign("import")
-    dashboard.open_campaign(campaign_id)
-    hand_in(dashboard, (DEFAULT, recorded(DEFAULT)))
-    dashboard.until(lambda: any(trial["state"] == "valid" for trial in dashboard.trials(campaign_id)))
-    [trial] = dashboard.trials(campaign_id)
-    assert round(trial["error"], 4) == 0.3297
-    assert trial["read_back"] == {"kp": 283, "ki": 13, "kd": 82}
-
-
 def test_of_several_takeoffs_one_is_chosen_and_gains_that_were_not_planned_are_confirmed(
     dashboard: Dashboard, states: States
 ) -> None:

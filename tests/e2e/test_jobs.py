@@ -51,13 +51,17 @@ def kill_until_given_up(dashboard: Dashboard, server: Server, job_id: int) -> No
     dashboard.until(killed)
 
 
-def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is_retried(
+def test_a_job_is_watched_fails_when_its_process_is_killed_again_and_again_is_retried_and_cancelled(
     open_dashboard: Opener, empty_server: Server, states: States
 ) -> None:
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
     dashboard.open("/jobs")
-    job_id = dashboard.post("/reproductions/f16/run")["id"]  # lasts until it is cancelled
+    expect(page.get_by_text("No jobs yet.")).to_be_visible()
+    job_id = dashboard.post("/reproductions/variability/run")["id"]
+    card = page.locator("tbody").filter(has_text=f"Job {job_id}")
+    expect(card.get_by_role("link", name="Fig. 12: takeoffs repeated over a battery")).to_be_visible()
+    expect(card.get_by_text(re.compile(r"^[1-9]\d?\s% · .*battery \d+ of 240 flown"))).to_be_visible()
     kill_until_given_up(dashboard, empty_server, job_id)
     states.reproduce("controller")
     groups = page.get_by_role("main").get_by_role("region", name=re.compile("jobs$"))
@@ -83,20 +87,9 @@ def test_a_job_whose_process_is_killed_again_and_again_fails_with_its_log_and_is
     active.get_by_role("button", name=f"Cancel job {job_id}").click()
     over = page.get_by_role("region", name="Finished jobs")
     expect(over.get_by_text("Cancelled", exact=True)).to_be_visible()
-
-
-def test_jobs_are_filtered_by_what_became_of_them(open_dashboard: Opener, empty_server: Server) -> None:
-    dashboard = open_dashboard(empty_server.url)
-    page = dashboard.page
-    dashboard.post("/reproductions/controller/run")
-    dashboard.until(lambda: bool(dashboard.get("/reproductions/controller")["rows"]))
-    dashboard.open("/jobs")
     filters = page.get_by_role("radiogroup", name="Jobs shown")
-    expect(page.get_by_role("region", name="Finished jobs").locator("tbody").first).to_be_visible()
-    filters.get_by_text("Failed", exact=True).click()
-    expect(page.get_by_text("No failed jobs.")).to_be_visible()
+    for shown in ("Active", "Failed"):
+        filters.get_by_text(shown, exact=True).click()
+        expect(page.get_by_text(f"No {shown.lower()} jobs.")).to_be_visible()
     filters.get_by_text("Finished", exact=True).click()
-    [job] = dashboard.get("/jobs")["items"]
-    log = page.get_by_role("button", name=f"Log of job {job['id']}")
-    log.click()
-    expect(page.get_by_text("reproduction stored")).to_be_visible()
+    expect(card.get_by_text("Cancelled", exact=True)).to_be_visible()

@@ -61,7 +61,9 @@ def test_a_log_that_is_dropped_gives_gains_to_load(page_of_analysis: Dashboard, 
     expect(dashboard.button("Start campaign")).to_be_visible()
 
 
-def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(page_of_analysis: Dashboard) -> None:
+def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file_and_starts_a_campaign(
+    page_of_analysis: Dashboard,
+) -> None:
     dashboard, page = page_of_analysis, page_of_analysis.page
     choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"))
     article = page.get_by_role("article", name="Analysis of takeoff.tlog")
@@ -78,20 +80,12 @@ def test_a_telemetry_log_of_takeoffs_gives_a_section_of_the_airframe_file(page_o
     content = Path(download.value.path()).read_text()
     kp = rows.nth(1).locator("td").all_inner_texts()[1]
     assert f'<define name="HOVER_KP" value="{kp}"/>' in content
-
-
-def test_a_campaign_starts_from_the_log_and_proposes_what_the_analysis_did(page_of_analysis: Dashboard) -> None:
-    dashboard, page = page_of_analysis, page_of_analysis.page
-    choose(dashboard, "takeoff.tlog", recorded("paparazzi_283_13_82.tlog"))
-    rows = page.get_by_role("region", name="Gains compared").locator("tbody tr")
-    expect(rows).to_have_count(2)
     proposed = rows.nth(1).locator("td").all_inner_texts()[1:4]
     dashboard.button("Start campaign").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("takeoff")
-    campaign_id = int(page.url.rsplit("/", 1)[1])
-    assert [trial["gains"] for trial in dashboard.trials(campaign_id)] == [{"kp": 283, "ki": 13, "kd": 82}]
-    dashboard.until(lambda: dashboard.get(f"/campaigns/{campaign_id}/proposal")["state"] == "ready")
-    gains = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["gains"]
+    assert [trial["gains"] for trial in dashboard.trials(dashboard.campaign_id)] == [{"kp": 283, "ki": 13, "kd": 82}]
+    dashboard.when_ready(dashboard.campaign_id)
+    gains = dashboard.get(f"/campaigns/{dashboard.campaign_id}/proposal")["proposal"]["gains"]
     expect(page.get_by_role("heading", name="Next: flight 2")).to_be_visible()
     assert [f"{gains[name]:g}" for name in ("kp", "ki", "kd")] == proposed
 

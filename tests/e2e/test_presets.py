@@ -7,6 +7,7 @@ from playwright.sync_api import Locator, expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard, Json
+from tests.e2e.states import States
 
 FINISHED = re.compile("^(Converged|Flight budget used)")
 NOT_IMPROVING = "The last 2 consecutive flights did not improve on the best before them by more than 5\u00a0%."
@@ -28,10 +29,10 @@ def create(dashboard: Dashboard, preset: str) -> int:
     return dashboard.when_ready(dashboard.campaign_id)
 
 
-def fly_on_green(dashboard: Dashboard, campaign_id: int, most: int) -> list[Json]:
+def fly_on_green(dashboard: Dashboard, campaign_id: int, before: int, most: int) -> list[Json]:
     """Click nothing but the green button until the campaign has ended; its trials."""
     finished = dashboard.page.get_by_role("heading", name=FINISHED)
-    for number in range(1, most + 2):
+    for number in range(before + 1, most + 2):
         green = green_button(dashboard, number)
         expect(finished.or_(green)).to_be_visible()
         if finished.is_visible():
@@ -41,22 +42,25 @@ def fly_on_green(dashboard: Dashboard, campaign_id: int, most: int) -> list[Json
 
 
 @pytest.mark.parametrize(
-    ("preset", "flights", "reason"),
+    ("preset", "before", "flights", "reason"),
     [
-        ("The paper's method: AR.Drone takeoff", 6, NOT_IMPROVING),
-        ("The paper's method: AR.Drone takeoff, simplex start", 2, NOTHING_BETTER),
-        ("The paper's method: F-16", 27, "All 27 flights of the budget have been flown."),
+        ("The paper's method: AR.Drone takeoff", 0, 6, NOT_IMPROVING),
+        ("The paper's method: AR.Drone takeoff, simplex start", 0, 2, NOTHING_BETTER),
+        ("The paper's method: F-16", 24, 27, "All 27 flights of the budget have been flown."),
     ],
 )
 def test_the_papers_method_is_flown_to_its_stop_by_the_green_button_alone(
-    open_dashboard: Opener, empty_server: Server, preset: str, flights: int, reason: str
+    open_dashboard: Opener, empty_server: Server, states: States, preset: str, before: int, flights: int, reason: str
 ) -> None:
-    """Reported: *Repeat* was preselected after flight 3, and from the simplex start the advice after flight 1 was to
-    stop."""
+    """After so many flights of what is recommended that are written. Reported: *Repeat* was preselected after flight 3,
+    and from the simplex start the advice after flight 1 was to stop."""
     dashboard = open_dashboard(empty_server.url)
     campaign_id = create(dashboard, preset)
+    for _ in range(before):
+        assert recommended(dashboard, campaign_id)["proposed"]
+        states.fly(campaign_id)
     dashboard.choose_speed("Max")
-    trials = fly_on_green(dashboard, campaign_id, flights)
+    trials = fly_on_green(dashboard, campaign_id, before, flights)
     assert [trial["state"] for trial in trials] == ["valid"] * flights
     assert trials[0]["kind"] == "start"
     assert {trial["kind"] for trial in trials[1:]} <= {"step", "shorter step"}
@@ -65,3 +69,11 @@ def test_the_papers_method_is_flown_to_its_stop_by_the_green_button_alone(
     campaign = dashboard.get(f"/campaigns/{campaign_id}")
     assert (campaign["state"], campaign["stop_reason"]) == ("finished", reason)
     expect(dashboard.page.get_by_text(reason).first).to_be_visible()
+
+
+def recommended(dashboard: Dashboard, campaign_id: int) -> Json:
+    """The choice that the page preselects."""
+    proposal = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]
+    [choice] = [each for each in proposal["choices"] if each["recommended"]]
+    found: Json = choice
+    return found

@@ -1,4 +1,5 @@
-"""Readiness on the fly screen: taken back by every loss, with what it means and the way on, and given again."""
+"""Readiness on the fly screen: taken back by every loss, with what it means and the way on, and given again. What is
+lost and held in which state is the server's rule: tests/flights/test_readiness.py."""
 
 import json
 import os
@@ -42,6 +43,7 @@ SILENT_FOR = """seconds => new Promise(done => {
         done();
     });
 })"""
+READINESS = re.compile("/readiness$")
 READY, NOT_READY = "Staged, ready to fly", "Not ready to fly"
 
 
@@ -97,82 +99,6 @@ def losses(page: Page) -> Locator:
     return page.get_by_label("Next action").get_by_role("alert")
 
 
-def test_a_link_that_is_gone_for_a_minute_is_never_under_a_green_ready_to_fly(
-    dashboard: Dashboard, drone: Drone, vehicle_id: int, trial_id: int
-) -> None:
-    """Observed defect: “Staged, ready to fly” was green and the hold button active."""
-    page = dashboard.page
-    expect(word(dashboard)).to_have_text(READY)
-    dashboard.until(partial(is_shown, page, ["done", "done", "open", "open", "open", "open"]))
-    os.kill(drone.pid, signal.SIGSTOP)
-    try:
-        expect(losses(page)).to_contain_text(
-            "No current data has been received from the vehicle for more than 2 s. Check its power"
-        )
-        expect(word(dashboard)).to_have_text(NOT_READY)
-        expect(hold_button(page)).to_be_disabled()
-        dashboard.until(partial(is_shown, page, ["done", "lost", "open", "open", "open", "open"]))
-        expect(page.get_by_label("read back")).to_have_count(0)
-        page.clock.fast_forward(60_000)
-        expect(losses(page)).to_contain_text(["No current data has been received from the vehicle for more than 2 s."])
-        expect(word(dashboard)).to_have_text(NOT_READY)
-        expect(hold_button(page)).to_be_disabled()
-    finally:
-        os.kill(drone.pid, signal.SIGCONT)
-    expect(word(dashboard)).to_have_text(READY)
-    expect(losses(page)).to_have_count(0)
-    expect(page.get_by_label("read back")).to_have_count(len(TRIED))
-    expect(hold_button(page)).to_be_enabled()
-
-
-def test_after_a_restart_of_the_drone_no_tick_stands_beside_gains_that_it_no_longer_holds(
-    dashboard: Dashboard, drone: Drone, vehicle_id: int, trial_id: int
-) -> None:
-    """Observed defect: the old read-back kept its ticks, and *Check now* was disabled."""
-    page = dashboard.page
-    drone.switch_off()
-    page.evaluate(SILENT_FOR, 0.5)
-    drone.switch_on()
-    expect(
-        page.get_by_text("The vehicle restarted. Press Stage gains so that they are written and read back again.")
-    ).to_be_visible()
-    expect(page.get_by_text("may or may not have been received")).to_have_count(0)
-    expect(page.get_by_label("read back")).to_have_count(0)
-    expect(dashboard.button("Stage gains")).to_be_enabled()
-    expect(line_of(dashboard)).to_contain_text("[283 13 82]safe")
-    assert state_of(dashboard, trial_id) == "planned"
-    dashboard.open(f"/vehicles/{vehicle_id}")
-    expect(dashboard.button("Check now")).to_be_enabled()
-
-
-def test_a_hold_that_the_pages_own_stall_broke_says_so(dashboard: Dashboard, trial_id: int) -> None:
-    page = dashboard.page
-    press(dashboard)
-    page.clock.run_for(300)
-    page.clock.fast_forward(1500)
-    expect(page.get_by_role("status").filter(has_text="Hold interrupted")).to_have_text(
-        "Hold interrupted: nothing was sent. Hold again."
-    )
-    page.mouse.up()
-    assert dashboard.get(f"/trials/{trial_id}")["flight"]["take_off_at"] is None
-
-
-def test_a_page_that_stood_still_takes_readiness_back_until_it_has_read_the_state_again(
-    dashboard: Dashboard, trial_id: int
-) -> None:
-    page = dashboard.page
-    with_hold = re.compile("/readiness$")
-    page.route(with_hold, lambda route: route.abort())
-    page.clock.pause_at(float(page.evaluate("Date.now()")) / 1000 + 30)
-    expect(losses(page).first).to_contain_text(re.compile(r"This page was frozen for (29|3\d) s"))
-    expect(word(dashboard)).to_have_text(NOT_READY)
-    expect(hold_button(page)).to_be_disabled()
-    page.clock.resume()
-    expect(losses(page).first).to_contain_text("The server is not responding.")
-    page.unroute(with_hold)
-    expect(word(dashboard)).to_have_text(READY)
-
-
 def show(page: Page, visibility: str) -> None:
     """Put the tab into the background, or bring it back."""
     page.evaluate(
@@ -206,10 +132,62 @@ def is_silent(page: Page) -> bool:
     return bool(page.evaluate("[window.questions, window.answers]") == [asked, asked])
 
 
-def test_a_tab_in_the_background_asks_nothing_and_reads_the_state_again_before_it_is_green(
-    dashboard: Dashboard, trial_id: int
+def test_readiness_is_taken_back_by_a_stall_of_the_page_the_server_or_the_vehicle_and_given_again(
+    dashboard: Dashboard, drone: Drone, vehicle_id: int, trial_id: int
 ) -> None:
-    page, readiness = dashboard.page, re.compile("/readiness$")
+    page = dashboard.page
+    expect(word(dashboard)).to_have_text(READY)
+    dashboard.until(partial(is_shown, page, ["done", "done", "open", "open", "open", "open"]))
+    a_server_that_does_not_answer(page)
+    a_hold_that_the_pages_own_stall_broke(dashboard, trial_id)
+    a_page_that_stood_still(dashboard)
+    a_tab_in_the_background(dashboard)
+    a_link_that_is_gone_for_a_minute(dashboard, drone)
+    a_restart_of_the_drone(dashboard, drone)
+    assert state_of(dashboard, trial_id) == "planned"
+    dashboard.open(f"/vehicles/{vehicle_id}")
+    expect(dashboard.button("Check now")).to_be_enabled()
+
+
+def a_server_that_does_not_answer(page: Page) -> None:
+    page.route(READINESS, lambda route: route.abort())
+    expect(losses(page)).to_contain_text(["The server is not responding."])
+    expect(hold_button(page)).to_be_disabled()
+    page.unroute(READINESS)
+    expect(hold_button(page)).to_be_enabled()
+
+
+def a_hold_that_the_pages_own_stall_broke(dashboard: Dashboard, trial_id: int) -> None:
+    page = dashboard.page
+    press(dashboard)
+    page.clock.run_for(300)
+    page.clock.fast_forward(1500)
+    expect(page.get_by_role("status").filter(has_text="Hold interrupted")).to_have_text(
+        "Hold interrupted: nothing was sent. Hold again."
+    )
+    page.mouse.up()
+    assert dashboard.get(f"/trials/{trial_id}")["flight"]["take_off_at"] is None
+    page.clock.resume()
+    expect(word(dashboard)).to_have_text(READY)
+
+
+def a_page_that_stood_still(dashboard: Dashboard) -> None:
+    """It has to read the state again first."""
+    page = dashboard.page
+    page.route(READINESS, lambda route: route.abort())
+    page.clock.pause_at(float(page.evaluate("Date.now()")) / 1000 + 30)
+    expect(losses(page).first).to_contain_text(re.compile(r"This page was frozen for (29|3\d) s"))
+    expect(word(dashboard)).to_have_text(NOT_READY)
+    expect(hold_button(page)).to_be_disabled()
+    page.clock.resume()
+    expect(losses(page).first).to_contain_text("The server is not responding.")
+    page.unroute(READINESS)
+    expect(word(dashboard)).to_have_text(READY)
+
+
+def a_tab_in_the_background(dashboard: Dashboard) -> None:
+    """It asks nothing, and reads the state again before it is green."""
+    page = dashboard.page
     page.evaluate(COUNT_QUESTIONS)
     stop_the_clock(dashboard)
     assert page.evaluate("window.questions") > 0
@@ -218,26 +196,64 @@ def test_a_tab_in_the_background_asks_nothing_and_reads_the_state_again_before_i
     expect(word(dashboard)).to_have_text(READY)
     dashboard.until(lambda: is_silent(page))
     page.clock.resume()
-    page.route(readiness, lambda route: route.abort())
+    page.route(READINESS, lambda route: route.abort())
     show(page, "visible")
     expect(losses(page).first).to_contain_text(re.compile(r"This page was frozen for \d+ s"))
     expect(word(dashboard)).to_have_text(NOT_READY)
     expect(hold_button(page)).to_be_disabled()
-    page.unroute(readiness)
+    page.unroute(READINESS)
     expect(word(dashboard)).to_have_text(READY)
     expect(hold_button(page)).to_be_enabled()
 
 
-def test_a_server_that_does_not_answer_takes_readiness_back(dashboard: Dashboard, trial_id: int) -> None:
+def a_link_that_is_gone_for_a_minute(dashboard: Dashboard, drone: Drone) -> None:
+    """Observed defect: “Staged, ready to fly” was green and the hold button active."""
     page = dashboard.page
-    page.route(re.compile("/readiness$"), lambda route: route.abort())
-    expect(losses(page)).to_contain_text(["The server is not responding."])
-    expect(hold_button(page)).to_be_disabled()
-    page.unroute(re.compile("/readiness$"))
+    os.kill(drone.pid, signal.SIGSTOP)
+    try:
+        expect(losses(page)).to_contain_text(
+            "No current data has been received from the vehicle for more than 2 s. Check its power"
+        )
+        expect(word(dashboard)).to_have_text(NOT_READY)
+        expect(hold_button(page)).to_be_disabled()
+        dashboard.until(partial(is_shown, page, ["done", "lost", "open", "open", "open", "open"]))
+        expect(page.get_by_label("read back")).to_have_count(0)
+        page.clock.fast_forward(60_000)
+        expect(losses(page)).to_contain_text(["No current data has been received from the vehicle for more than 2 s."])
+        expect(word(dashboard)).to_have_text(NOT_READY)
+        expect(hold_button(page)).to_be_disabled()
+    finally:
+        os.kill(drone.pid, signal.SIGCONT)
+    expect(word(dashboard)).to_have_text(READY)
+    expect(losses(page)).to_have_count(0)
+    expect(page.get_by_label("read back")).to_have_count(len(TRIED))
     expect(hold_button(page)).to_be_enabled()
 
 
-def test_every_loss_in_every_state_is_shown_as_the_server_says_it(dashboard: Dashboard, trial_id: int) -> None:
+def a_restart_of_the_drone(dashboard: Dashboard, drone: Drone) -> None:
+    """Observed defect: the old read-back kept its ticks, beside gains that it no longer held, and *Check now* was
+    disabled."""
+    page = dashboard.page
+    drone.switch_off()
+    page.evaluate(SILENT_FOR, 0.5)
+    drone.switch_on()
+    expect(
+        page.get_by_text("The vehicle restarted. Press Stage gains so that they are written and read back again.")
+    ).to_be_visible()
+    expect(page.get_by_text("may or may not have been received")).to_have_count(0)
+    expect(page.get_by_label("read back")).to_have_count(0)
+    expect(dashboard.button("Stage gains")).to_be_enabled()
+    expect(line_of(dashboard)).to_contain_text("[283 13 82]safe")
+
+
+SHOWN: list[tuple[str, str | None]] = [
+    *(("staged", loss) for loss in REPORTS),
+    *((state, None) for state in ("planned", "held", "staged", "unstaging", "in flight", "lost", "fallen, cause open")),
+]
+"""Each loss, and states without one; those after which the page does not ask again come last."""
+
+
+def test_states_and_losses_are_shown_as_the_server_says_them(dashboard: Dashboard, trial_id: int) -> None:
     page = dashboard.page
     shown: Readiness = readiness_of(standing(TrialState.STAGED, {}), GOOD)
 
@@ -245,18 +261,16 @@ def test_every_loss_in_every_state_is_shown_as_the_server_says_it(dashboard: Das
         body = {**asdict(shown), "is_ready": shown.is_ready}
         route.fulfill(status=200, content_type="application/json", body=json.dumps(body))
 
-    page.route(re.compile("/readiness$"), answer)
-    good, no_worker = (GOOD, VehicleState.READY), REPORTS["no worker"][:2]
-    cases = [(report, vehicle) for report, vehicle, _ in REPORTS.values()]
-    for state, flags, reached in REACHED.values():
-        is_over = state is TrialState.LOST or reached in {None, "landed", "reviewed"}
-        for report, vehicle in [good, no_worker] if is_over else [good, *cases]:
-            shown = readiness_of(standing(state, flags, vehicle), report)
-            if is_over:  # the page does not ask again
-                page.reload()
-            page.clock.run_for(1100)
-            expected = ["done" if s in shown.steps else "lost" if s in shown.lost else "open" for s in STEPS]
-            dashboard.until(partial(is_shown, page, expected))
-            expect(losses(page)).to_have_text([f"{loss.what} {loss.way_on}".replace("`", "") for loss in shown.losses])
-            expect(hold_button(page)).to_be_enabled(enabled=shown.is_ready)
-    page.unroute(re.compile("/readiness$"))
+    page.route(READINESS, answer)
+    for name, loss in SHOWN:
+        state, flags, reached = REACHED[name]
+        report, vehicle = (GOOD, VehicleState.READY) if loss is None else REPORTS[loss][:2]
+        shown = readiness_of(standing(state, flags, vehicle), report)
+        if state is TrialState.LOST or reached == "landed":  # the page does not ask again
+            page.reload()
+        page.clock.run_for(ASK_MS + 100)
+        expected = ["done" if s in shown.steps else "lost" if s in shown.lost else "open" for s in STEPS]
+        dashboard.until(partial(is_shown, page, expected))
+        expect(losses(page)).to_have_text([f"{each.what} {each.way_on}".replace("`", "") for each in shown.losses])
+        expect(hold_button(page)).to_be_enabled(enabled=shown.is_ready)
+    page.unroute(READINESS)

@@ -6,7 +6,7 @@ from typing import Final
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE
+from tests.e2e.dashboard import PHONE, TABLET
 from tests.e2e.states import States
 
 REAL: Final = {
@@ -27,6 +27,10 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     dashboard.button("Create campaign").click()
     asks = dashboard.panel("Rehearse first")
     expect(asks).to_contain_text("Not passed yet: it has not been flown on a simulation.")
+    for viewport in (PHONE, TABLET):
+        page.set_viewport_size(viewport)
+        dashboard.settled()
+        assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), viewport
     real = dashboard.when_ready(dashboard.campaign_id)
     expect(page.get_by_role("button", name=re.compile("^Stage"))).to_have_count(0)
     trial = dashboard.post(f"/campaigns/{real}/trials", {"gains": {"kp": 300, "ki": 13, "kd": 82}})
@@ -48,11 +52,3 @@ def test_a_real_campaign_is_rehearsed_first_and_then_offers_to_stage(
     page.get_by_role("link", name="Number 1").last.click()
     expect(page.get_by_role("link", name="Open fly screen")).to_be_visible()
     assert dashboard.get(f"/campaigns/{real}")["rehearsal"]["state"] == "passed"
-
-
-def test_what_asks_for_it_fits_on_a_phone(open_dashboard: Opener, empty_server: Server, states: States) -> None:
-    dashboard = open_dashboard(empty_server.url, theme="dark", viewport=PHONE)
-    dashboard.open(f"/new?vehicle={states.vehicle('Number 1', **REAL)}")
-    dashboard.button("Create campaign").click()
-    expect(dashboard.button("Rehearse on a simulation")).to_be_visible()
-    assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")

@@ -5,11 +5,10 @@ import re
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, Dashboard
+from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
 
 FIG6 = "Fig. 6: the replica of the controller"
-FIG12 = "Fig. 12: takeoffs repeated over a battery"
 
 
 def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, empty_server: Server) -> None:
@@ -38,34 +37,10 @@ def test_a_reproduction_is_run_and_read_where_it_stands(open_dashboard: Opener, 
         )
         assert drawn == [{key: trace[key] for key in ("meta", "x", "y")} for trace in told["figure"]["data"]]
     expect(dashboard.button(f"Run: {FIG6}")).to_be_visible()
-
-
-def test_a_job_is_watched_cancelled_and_retried(open_dashboard: Opener, empty_server: Server) -> None:
-    dashboard = open_dashboard(empty_server.url)
-    page = dashboard.page
+    [job] = dashboard.get("/jobs")["items"]
     dashboard.open("/jobs")
-    expect(page.get_by_text("No jobs yet.")).to_be_visible()
-    job_id = dashboard.post("/reproductions/variability/run")["id"]
-    card = page.locator("tbody").filter(has_text=f"Job {job_id}")
-    expect(card.get_by_role("link", name=FIG12)).to_be_visible()
-    expect(card.get_by_text(re.compile(r"^[1-9]\d?\s% · .*battery \d+ of 240 flown"))).to_be_visible()
-    card.get_by_role("button", name=f"Cancel job {job_id}").click()
-    expect(card.get_by_text("Cancelled", exact=True)).to_be_visible()
-    page.get_by_role("radiogroup", name="Jobs shown").get_by_text("Active").click()
-    expect(page.get_by_text("No active jobs.")).to_be_visible()
-    page.get_by_role("radiogroup", name="Jobs shown").get_by_text("All", exact=True).click()
-    card.get_by_role("button", name=f"Retry job {job_id}").click()
-    expect(card.get_by_role("progressbar")).to_be_visible()
-    card.get_by_role("button", name=f"Cancel job {job_id}").click()
-    expect(card.get_by_text("Cancelled", exact=True)).to_be_visible()
-
-
-def test_on_a_phone_the_pages_are_behind_a_menu(open_dashboard: Opener, shared_server: Server) -> None:
-    dashboard = open_dashboard(shared_server.url, viewport=PHONE)
-    dashboard.open("/")
-    dashboard.button("More pages").click()
-    dashboard.page.get_by_role("navigation", name="Pages").get_by_role("link", name="Jobs").click()
-    expect(dashboard.page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+    page.get_by_role("button", name=f"Log of job {job['id']}").click()
+    expect(page.get_by_text("reproduction stored")).to_be_visible()
 
 
 def test_long_lists_of_jobs_come_in_pages(open_dashboard: Opener, empty_server: Server, states: States) -> None:

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
-from tests.e2e.dashboard import PHONE, TABLET, Dashboard, Viewport, open_details
+from tests.e2e.dashboard import PHONE, Dashboard, open_details
 from tests.e2e.states import States
 from tests.runtime.processes import Serving
 
@@ -42,21 +42,24 @@ def test_theme_and_name_are_kept_by_this_browser(dashboard: Dashboard) -> None:
     dashboard.until(lambda: theme_of(dashboard) == "light")
 
 
-def test_settings_are_reached_from_every_page_by_the_menu(dashboard: Dashboard) -> None:
+def test_on_a_phone_settings_are_behind_a_menu_and_say_how_a_tablet_gets_in_and_what_the_server_is(
+    open_dashboard: Opener, shared_server: Server
+) -> None:
+    dashboard = open_dashboard(shared_server.url, viewport=PHONE)
     dashboard.open("/vehicles")
     dashboard.button("More pages").click()
-    dashboard.page.get_by_role("link", name="Settings").click()
+    dashboard.page.get_by_role("navigation", name="Pages").get_by_role("link", name="Settings").click()
     expect(dashboard.page.get_by_role("heading", name="Settings", level=1)).to_be_visible()
-
-
-def test_on_loopback_the_page_says_how_a_tablet_gets_in_and_what_that_opens(dashboard: Dashboard) -> None:
-    dashboard.open("/settings")
     panel = dashboard.panel("Open on a tablet")
     expect(panel).to_contain_text("gainline serve --host 0.0.0.0")
     expect(panel).to_contain_text("fly only from a browser on the computer that runs the server")
     expect(panel.locator("code", has_text="gainline unlock")).to_be_visible()
     expect(panel).not_to_contain_text("`")
     expect(panel.get_by_role("img")).to_have_count(0)
+    system, server = dashboard.get("/system"), dashboard.panel("This server")
+    for name in ("version", "database_revision", "data_dir"):
+        expect(server).to_contain_text(system[name])
+    expect(server.locator("dd", has_text="B").first).to_be_visible()
 
 
 def test_a_server_that_others_reach_shows_its_address_to_a_camera(open_dashboard: Opener, tmp_path: Path) -> None:
@@ -75,7 +78,7 @@ def test_a_server_that_others_reach_shows_its_address_to_a_camera(open_dashboard
         expect(panel).to_contain_text("anyone who can reach this computer")
 
 
-def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
+def test_a_backup_holds_what_the_dashboard_shows_and_a_refused_one_shows_the_reason_instead(
     dashboard: Dashboard, states: States, tmp_path: Path
 ) -> None:
     campaign_id = states.campaign(name="Worth keeping")
@@ -87,10 +90,6 @@ def test_a_backup_is_downloaded_and_holds_what_the_dashboard_shows(
     with closing(sqlite3.connect(tmp_path / "copy.sqlite3")) as copy:
         found = copy.execute("SELECT name FROM campaign WHERE id = ?", (campaign_id,)).fetchone()
     assert found == ("Worth keeping",)
-
-
-def test_a_refused_backup_shows_the_reason_instead_of_a_failed_download(dashboard: Dashboard) -> None:
-    dashboard.open("/settings")
     problem = {"title": "Storage error", "status": 507, "detail": "There is too little disk space for a copy.",
                "hint": "Free some disk space."}  # fmt: skip
     dashboard.page.route("**/api/system/backup", lambda route: route.fulfill(status=507, json=problem))
@@ -100,51 +99,30 @@ def test_a_refused_backup_shows_the_reason_instead_of_a_failed_download(dashboar
     expect(told).to_contain_text("Free some disk space.")
 
 
-def test_what_the_server_is_asked_about_stands_there_with_units(dashboard: Dashboard) -> None:
-    system = dashboard.get("/system")
-    dashboard.open("/settings")
-    panel = dashboard.panel("This server")
-    expect(panel).to_contain_text(system["version"])
-    expect(panel).to_contain_text(system["database_revision"])
-    expect(panel).to_contain_text(system["data_dir"])
-    expect(panel.locator("dd", has_text="B").first).to_be_visible()
-
-
-@pytest.mark.parametrize("viewport", [TABLET, PHONE], ids=["tablet", "phone"])
-def test_settings_fit_their_screen(open_dashboard: Opener, shared_server: Server, viewport: Viewport) -> None:
-    dashboard = open_dashboard(shared_server.url, viewport=viewport)
-    dashboard.open("/settings")
-    expect(dashboard.panel("Backup")).to_be_visible()
-    wide = dashboard.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-    assert wide == 0
-
-
-def test_keys_are_explained_by_a_key_and_those_of_the_page_come_first(dashboard: Dashboard) -> None:
-    dashboard.open("/")
-    dashboard.page.keyboard.press("?")
-    help_ = dashboard.page.get_by_role("dialog", name="Keyboard shortcuts")
-    expect(help_).to_be_visible()
-    expect(help_).to_be_focused()
-    expect(help_.locator("kbd").first).to_have_text("/")
-    expect(help_).to_contain_text("Abort the flight")
-    dashboard.page.keyboard.press("Escape")
-    expect(help_).to_be_hidden()
-    dashboard.button("Keyboard shortcuts").click()
-    expect(help_).to_be_visible()
-
-
-def test_slash_leads_to_the_search_and_a_question_mark_in_it_is_a_question_mark(
+def test_keys_are_explained_by_a_key_those_of_the_page_first_and_a_search_takes_it_as_text(
     dashboard: Dashboard, states: States
 ) -> None:
     states.campaign()
     dashboard.open("/")
-    search = dashboard.page.get_by_label("Search")
+    page = dashboard.page
+    help_ = page.get_by_role("dialog", name="Keyboard shortcuts")
+    page.keyboard.press("?")
+    expect(help_).to_be_visible()
+    expect(help_).to_be_focused()
+    expect(help_.locator("kbd").first).to_have_text("/")
+    expect(help_).to_contain_text("Abort the flight")
+    page.keyboard.press("Escape")
+    expect(help_).to_be_hidden()
+    dashboard.button("Keyboard shortcuts").click()
+    expect(help_).to_be_visible()
+    page.keyboard.press("Escape")
+    search = page.get_by_label("Search")
     expect(search).to_be_visible()
-    dashboard.page.keyboard.press("/")
+    page.keyboard.press("/")
     expect(search).to_be_focused()
-    dashboard.page.keyboard.type("what?")
+    page.keyboard.type("what?")
     expect(search).to_have_value("what?")
-    expect(dashboard.page.get_by_role("dialog", name="Keyboard shortcuts")).to_be_hidden()
+    expect(help_).to_be_hidden()
 
 
 def test_screen_readers_always_get_announcements_and_speech_only_when_switched_on(

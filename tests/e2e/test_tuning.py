@@ -15,7 +15,7 @@ WRAPPING = {"kp": 283, "ki": 1356, "kd": 82}
 """The paper's Table 2: ki·(sum of errors) can wrap at 32 bits."""
 
 
-def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(
+def test_the_next_flight_is_drawn_with_its_band_and_interval_and_the_fitted_parameters_are_told(
     dashboard: Dashboard, states: States
 ) -> None:
     campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
@@ -32,11 +32,6 @@ def test_the_next_flight_is_drawn_with_its_band_and_the_interval_of_its_error(
         [2, 2],
         pytest.approx([interval["lower"], interval["upper"]], abs=1e-6),
     )
-
-
-def test_fitted_parameters_are_shown_with_their_standard_errors(dashboard: Dashboard, states: States) -> None:
-    campaign_id = states.campaign(strategy="calibrated", seed=3, stop=PATIENT, flights=1)
-    dashboard.open_campaign(campaign_id)
     why = dashboard.get(f"/campaigns/{campaign_id}/proposal")["proposal"]["explanation"]
     card = dashboard.panel("Next: flight 2")
     card.get_by_text("Explanation").click()

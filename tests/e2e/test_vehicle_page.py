@@ -2,7 +2,6 @@
 has worn since it was tuned, and a simulation whose battery sags."""
 
 from collections.abc import Mapping, Sequence
-from itertools import product
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +12,7 @@ from tests.builders import csv_of
 from tests.core.tuning.flying import TAKEOFF, TWIN
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
-from tests.e2e.test_pages import THEMES, show, violations
+from tests.e2e.test_pages import LOOKS, show, violations
 
 Json = dict[str, Any]
 WORN: Final = (0.68, *TWIN[1:])
@@ -72,7 +71,7 @@ def known_calibrations(dashboard: Dashboard, vehicle_id: int) -> dict[str, tuple
     return found
 
 
-def test_the_chart_of_a_worn_vehicle_has_the_calibrations_and_the_page_says_what_changed(
+def test_the_page_of_a_worn_vehicle_draws_its_calibrations_and_tells_everybody_what_changed(
     dashboard: Dashboard, worn: int
 ) -> None:
     dashboard.open(f"/vehicles/{worn}")
@@ -85,9 +84,14 @@ def test_the_chart_of_a_worn_vehicle_has_the_calibrations_and_the_page_says_what
     said = dashboard.page.get_by_role("status").filter(has_text="Re-tune due.")
     expect(said).to_contain_text(retune["sentence"])
     expect(said).to_contain_text("hover throttle from 0.6")
+    for look in LOOKS:
+        show(dashboard, look)
+        expect(said).to_be_visible()
+        assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), look
+        assert not look.rules or violations(dashboard.page) == [], look
 
 
-def test_the_chart_of_the_batteries_has_the_voltages_of_the_flights(
+def test_the_chart_of_the_batteries_has_the_voltages_of_the_flights_also_of_one_flown_meanwhile(
     dashboard: Dashboard, states: States, sagging: int
 ) -> None:
     dashboard.open(f"/vehicles/{states.vehicle_of(sagging)}")
@@ -98,21 +102,6 @@ def test_the_chart_of_the_batteries_has_the_voltages_of_the_flights(
     assert drawn["x"] == [x for number in range(1, len(flights) + 1) for x in (number, number, None)]
     assert drawn["y"] == [voltage for one in flights for voltage in (*(one[end] for end in ends), None)]
     assert all(one["battery_v_after"] < one["battery_v_before"] for one in flights)
-
-
-def test_a_flight_elsewhere_is_drawn_while_the_page_is_open(dashboard: Dashboard, states: States, sagging: int) -> None:
-    dashboard.open(f"/vehicles/{states.vehicle_of(sagging)}")
-    expect(dashboard.plot(BATTERIES)).to_be_visible()
     flown = dashboard.get(f"/trials/{states.fly(sagging)[0]}")["number"]
     dashboard.until(lambda: flown in dashboard.traces(BATTERIES)[0]["x"])
     dashboard.until(lambda: flown in drawn_calibrations(dashboard)["hover_throttle"][0])
-
-
-def test_the_page_of_a_worn_vehicle_can_be_read_by_everybody(dashboard: Dashboard, worn: int) -> None:
-    dashboard.open(f"/vehicles/{worn}")
-    for size, theme in product(("tablet", "phone"), THEMES):
-        show(dashboard, size, theme)
-        expect(dashboard.plot(CALIBRATION)).to_have_attribute("data-drawn", "true")
-        expect(dashboard.page.get_by_text("Re-tune due.")).to_be_visible()
-        assert violations(dashboard.page) == [], (size, theme)
-        assert dashboard.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), (size, theme)

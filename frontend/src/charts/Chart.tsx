@@ -1,9 +1,10 @@
 import type { Plotly } from "plotly.js-basic-dist-min";
-import { useCallback, useEffect, useLayoutEffect, useRef, useState } from "react";
+import { useEffect, useLayoutEffect, useRef, useState } from "react";
 import type { TimeRange } from "../api/queries";
 import { liveNow } from "../live/store";
 import { afterPaint } from "../ui/throttle";
 import classes from "./Chart.module.css";
+import { createDrawings } from "./drawings";
 import {
   type Build,
   CONFIG,
@@ -69,22 +70,18 @@ export function Chart({
   const element = useRef<HTMLDivElement & PlotlyElement>(null);
   const [plotly, setPlotly] = useState<Plotly | null>(null); // once it has drawn
   const [broken, setBroken] = useState<string | null>(null);
-  const queue = useRef<Promise<unknown>>(Promise.resolve());
+  const [enqueue] = useState(() =>
+    createDrawings((error) => setBroken(error instanceof Error ? error.message : String(error))),
+  );
   const drawn = useRef<{ figure: PlotlyFigure; prediction: Props["prediction"] } | null>(null);
   const latestPrediction = useRef(prediction);
   latestPrediction.current = prediction;
-  /** One drawing after the other; one that fails is told, and does not stop those after it. */
-  const enqueue = useCallback((draw: () => Promise<void>) => {
-    queue.current = queue.current
-      .then(draw)
-      .catch((error: unknown) => setBroken(error instanceof Error ? error.message : String(error)));
-  }, []);
 
   useEffect(() => {
     const target = element.current;
     if (target === null) return;
     let wanted = true;
-    enqueue(async () => {
+    void enqueue(async () => {
       const library = await loadPlotly(build);
       if (drawn.current?.figure !== figure) await afterPaint();
       if (!wanted) return;
@@ -109,7 +106,7 @@ export function Chart({
     const target = element.current;
     if (target === null || plotly === null || prediction === undefined) return;
     let wanted = true;
-    enqueue(async () => {
+    void enqueue(async () => {
       const last = drawn.current;
       if (!wanted || last?.figure !== figure || last.prediction === prediction) return;
       drawn.current = { figure, prediction };
@@ -124,8 +121,17 @@ export function Chart({
     const target = element.current;
     if (target === null || plotly === null || liveTrial === null) return;
     if (traceWithRole(figure.data, "live") < 0) return;
-    return drawLive(plotly, target, figure.data, liveTrial);
-  }, [plotly, liveTrial, figure]);
+    let wanted = true;
+    const stop = drawLive(plotly, target, figure.data, liveTrial, (draw) =>
+      enqueue(async () => {
+        if (wanted) await draw();
+      }),
+    );
+    return () => {
+      wanted = false;
+      stop();
+    };
+  }, [plotly, liveTrial, figure, enqueue]);
 
   useEffect(() => {
     const target = element.current;

@@ -5,6 +5,7 @@ import type { TimeRange } from "../api/queries";
 import { onLive } from "../live/store";
 import type { LiveFlight } from "../live/telemetry";
 import { throttled } from "../ui/throttle";
+import type { Enqueue } from "./drawings";
 import { onPointed, pointAt } from "./pointing";
 import {
   type DrawnPrediction,
@@ -186,13 +187,19 @@ export async function drawPrediction(
 }
 
 /**
- * Extend the live traces with the telemetry of a trial; returns the unsubscribe function. While they only grow, nothing
- * else is drawn again.
+ * Extend the live traces with the telemetry of a trial, among the chart's other drawings; returns the unsubscribe
+ * function. While they only grow, nothing else is drawn again.
  */
-export function drawLive(plotly: Plotly, chart: HTMLElement, traces: readonly Trace[], trialId: number): () => void {
+export function drawLive(
+  plotly: Plotly,
+  chart: HTMLElement,
+  traces: readonly Trace[],
+  trialId: number,
+  enqueue: Enqueue,
+): () => void {
   let latest: LiveFlight | null = null;
   let isBegun = false;
-  const drawing = throttled(async () => {
+  const draw = async (): Promise<void> => {
     if (latest === null || latest.timeS.length === 0) return;
     const drawn = liveCurves(traces, latest);
     const [places, curves] = [[...drawn.keys()], [...drawn.values()]];
@@ -209,7 +216,8 @@ export function drawLive(plotly: Plotly, chart: HTMLElement, traces: readonly Tr
     };
     await plotly.update(chart, change, Number.isFinite(room[1]) ? { "yaxis.range": room } : {}, places);
     isBegun = curves.every((curve) => curve.x.length > 0);
-  }, SHORTEST_REDRAW_MS);
+  };
+  const drawing = throttled(() => enqueue(draw), SHORTEST_REDRAW_MS);
   const unfollow = onLive(trialId, (flight) => {
     latest = flight;
     drawing.ask();
