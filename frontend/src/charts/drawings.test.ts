@@ -1,5 +1,5 @@
-import { expect, test } from "vitest";
-import { createDrawings } from "./drawings";
+import { expect, test, vi } from "vitest";
+import { createDrawings, moveCurves } from "./drawings";
 
 /** As Plotly's `animate`: one that begins before the last has ended leaves the promise of that one pending for ever. */
 function animator() {
@@ -32,4 +32,19 @@ test("a drawing that fails is told and does not stop those after it", async () =
   await enqueue(async () => void drawn.push("figure"));
   expect(told).toEqual([new Error("no room")]);
   expect(drawn).toEqual(["figure"]);
+});
+
+test("curves are drawn within half a second by a browser that paints nothing", async () => {
+  vi.useFakeTimers();
+  const animate = vi.fn((_chart: unknown, frames: unknown) =>
+    Array.isArray(frames) ? Promise.resolve() : new Promise<void>(() => undefined),
+  );
+  const update = vi.fn(() => Promise.resolve());
+  const moved = moveCurves({ animate, update } as never, {} as HTMLElement, [{ x: [0, 1], y: [3, 4] }], [2]);
+  await vi.advanceTimersByTimeAsync(499);
+  expect(update).not.toHaveBeenCalled();
+  await vi.advanceTimersByTimeAsync(1);
+  await moved;
+  expect(update).toHaveBeenCalledWith({}, { x: [[0, 1]], y: [[3, 4]] }, {}, [2]);
+  vi.useRealTimers();
 });

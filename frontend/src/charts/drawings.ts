@@ -1,5 +1,8 @@
 /** The drawings of one chart. */
 
+import type { Plotly } from "plotly.js-basic-dist-min";
+import { LONGEST_PAINT_MS } from "../ui/throttle";
+
 export type Enqueue = (draw: () => Promise<void>) => Promise<void>;
 
 /**
@@ -12,4 +15,27 @@ export function createDrawings(onError: (error: unknown) => void): Enqueue {
     last = last.then(draw).catch(onError);
     return last;
   };
+}
+
+const AT_ONCE = { mode: "immediate", frame: { duration: 0, redraw: false }, transition: { duration: 0 } } as const;
+
+/**
+ * Move curves without drawing any other again. An animation ends with a paint: where the browser paints nothing for half
+ * a second, all curves are drawn instead.
+ */
+export async function moveCurves(
+  plotly: Pick<Plotly, "animate" | "update">,
+  chart: HTMLElement,
+  curves: readonly { x: unknown; y: unknown }[],
+  places: number[],
+): Promise<void> {
+  const data = curves.map(({ x, y }) => ({ x, y }));
+  const moving = plotly.animate(chart, { data, traces: places }, AT_ONCE).then(
+    () => true,
+    () => false,
+  );
+  const paint = new Promise<boolean>((done) => setTimeout(() => done(false), LONGEST_PAINT_MS));
+  if (await Promise.race([moving, paint])) return;
+  await plotly.animate(chart, [], AT_ONCE); // drops what still waits for a paint
+  await plotly.update(chart, { x: data.map(({ x }) => x), y: data.map(({ y }) => y) }, {}, places);
 }

@@ -5,7 +5,7 @@ import type { TimeRange } from "../api/queries";
 import { onLive } from "../live/store";
 import type { LiveFlight } from "../live/telemetry";
 import { throttled } from "../ui/throttle";
-import type { Enqueue } from "./drawings";
+import { type Enqueue, moveCurves } from "./drawings";
 import { onPointed, pointAt } from "./pointing";
 import {
   type DrawnPrediction,
@@ -170,8 +170,6 @@ export function followPointing(
   };
 }
 
-const AT_ONCE = { mode: "immediate", frame: { duration: 0, redraw: false }, transition: { duration: 0 } } as const;
-
 /** Draw another prediction with its band. While it only moves, no other curve is drawn again. */
 export async function drawPrediction(
   plotly: Plotly,
@@ -182,7 +180,7 @@ export async function drawPrediction(
   const drawn = predictedCurves(traces, prediction);
   const [places, curves] = [[...drawn.keys()], [...drawn.values()]];
   const onlyMoves = curves.every(({ x }, index) => x.length > 0 && chart.data?.[places[index] as number]?.x?.length);
-  if (onlyMoves) await plotly.animate(chart, { data: curves, traces: places }, AT_ONCE);
+  if (onlyMoves) await moveCurves(plotly, chart, curves, places);
   else await plotly.update(chart, { x: curves.map(({ x }) => x), y: curves.map(({ y }) => y) }, {}, places);
 }
 
@@ -206,7 +204,7 @@ export function drawLive(
     const range = (chart as PlotlyElement).layout?.yaxis?.range ?? [0, Infinity];
     const room = roomFor(range, latest.measured);
     if (isBegun && room[0] === range[0] && room[1] === range[1]) {
-      await plotly.animate(chart, { data: curves.map(({ x, y }) => ({ x, y })), traces: places }, AT_ONCE);
+      await moveCurves(plotly, chart, curves, places);
       return;
     }
     const change = {

@@ -9,7 +9,7 @@ declare module "plotly.js-basic-dist-min" {
     ): Promise<unknown>;
     animate(
       element: HTMLElement,
-      frame: { data: Record<string, unknown>[]; traces: number[] },
+      frame: { data: Record<string, unknown>[]; traces: number[] } | readonly never[],
       options: Record<string, unknown>,
     ): Promise<unknown>;
     downloadImage(figure: unknown, options: Record<string, unknown>): Promise<string>;

@@ -43,7 +43,7 @@ export function throttled(work: () => Promise<unknown>, shortestMs: number): Thr
   };
 }
 
-const LONGEST_PAINT_MS = 500;
+export const LONGEST_PAINT_MS = 500;
 
 /**
  * Resolves after the next paint, so that heavy work does not delay the display of earlier changes. A browser that paints
