@@ -318,9 +318,16 @@ def test_every_kind_of_error_has_a_story_that_provokes_it() -> None:
     assert set(map(_name, PROVOKED)) == set(map(_name, answered_kinds()))
 
 
-ON_A_PAGE_OF_THEIR_OWN: Final = {InputError, "invalid", NotFoundError, GainsError, LinkDownError, "unexpected"}
-OF_A_FILE: Final = {TooLargeError, TrajectoryError, UnconfirmedError}
-PAGES: Final = {_name(kind): {kind} for kind in ON_A_PAGE_OF_THEIR_OWN} | {
+ON_A_PAGE_OF_THEIR_OWN: Final[set[type[GainlineError] | str]] = {
+    InputError,
+    "invalid",
+    NotFoundError,
+    GainsError,
+    LinkDownError,
+    "unexpected",
+}
+OF_A_FILE: Final[set[type[GainlineError] | str]] = {TooLargeError, TrajectoryError, UnconfirmedError}
+PAGES: Final[dict[str, set[type[GainlineError] | str]]] = {_name(kind): {kind} for kind in ON_A_PAGE_OF_THEIR_OWN} | {
     "a file": OF_A_FILE,
     "a request": PROVOKED.keys() - ON_A_PAGE_OF_THEIR_OWN - OF_A_FILE,
 }

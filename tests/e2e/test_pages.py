@@ -38,9 +38,12 @@ class Look:
     """Whether axe is asked: once in each theme, on whose colours its answer depends."""
 
 
-LOOKS = (Look("desk", "light"), Look("tablet", "light", rules=False), Look("phone", "dark"))
-if ARE_KEPT:
-    LOOKS = tuple(Look(size, theme) for size, theme in product(SIZES, ("light", "dark")))
+THEMES: tuple[Theme, ...] = ("light", "dark")
+LOOKS: tuple[Look, ...] = (
+    tuple(Look(size, theme) for size, theme in product(SIZES, THEMES))
+    if ARE_KEPT
+    else (Look("desk", "light"), Look("tablet", "light", rules=False), Look("phone", "dark"))
+)
 UI_BYTES_GZIPPED = 250_000
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 
