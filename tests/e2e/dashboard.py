@@ -46,7 +46,8 @@ _SETTLED: Final = """async ([ink, within]) => {
   const frame = () => Promise.race([new Promise(requestAnimationFrame), later(1000)]);
   const all = (what, within = document) => Array.from(within.querySelectorAll(what));
   const isDrawn = plot => plot.dataset.drawn && (!ink || !plot.layout || plot.layout.font.color === ink);
-  const fits = plot => !plot._fullLayout || !plot.clientWidth || Math.abs(plot._fullLayout.width - plot.clientWidth) < 2;
+  const fits = plot =>
+    !plot._fullLayout || !plot.clientWidth || Math.abs(plot._fullLayout.width - plot.clientWidth) < 2;
   const undrawn = () => all("[role=group] > div:last-child").filter(one => !isDrawn(one) || !fits(one));
   const waiting = () => [...all("[aria-busy=true]"), ...undrawn()];
   const places = () => all("main, main section, .js-plotly-plot").map(one => {
