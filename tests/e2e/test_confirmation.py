@@ -7,6 +7,7 @@ from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
+from tests.e2e.states import States
 from tests.e2e.test_verdict import open_flight
 
 FINISHED = re.compile("^(Converged|Flight budget used)")
@@ -14,8 +15,8 @@ CANDIDATE = "Candidate: not yet confirmed by repeat flights."
 CONFIRMED = "Confirmed: better than the first gains in repeat flights."
 
 
-def fly_on(dashboard: Dashboard, campaign_id: int, *, steps: bool = False) -> None:
-    """Fly what is recommended, or with `steps` what is proposed, until the campaign is finished."""
+def fly_on(dashboard: Dashboard, campaign_id: int) -> None:
+    """Fly what is recommended until the campaign is finished."""
     page = dashboard.page
     finished = page.get_by_role("heading", name=FINISHED)
     for _ in range(12):
@@ -26,8 +27,6 @@ def fly_on(dashboard: Dashboard, campaign_id: int, *, steps: bool = False) -> No
         expect(finished.or_(fly)).to_be_visible()
         if finished.is_visible():
             return
-        if steps:
-            dashboard.choose_proposed(campaign_id)
         fly.click()
         dashboard.wait_for_flight(number)
     raise AssertionError("the campaign does not end")
@@ -35,20 +34,21 @@ def fly_on(dashboard: Dashboard, campaign_id: int, *, steps: bool = False) -> No
 
 @pytest.mark.complete
 def test_a_noisy_twin_is_flown_to_a_candidate_confirmed_reviewed_and_confirmed_again(
-    open_dashboard: Opener, empty_server: Server
+    open_dashboard: Opener, empty_server: Server, states: States
 ) -> None:
     dashboard = open_dashboard(empty_server.url)
     page = dashboard.page
-    campaign_id = dashboard.create("twin", strategy="calibrated")
+    campaign_id = states.campaign(strategy="calibrated")
+    while dashboard.get(f"/campaigns/{campaign_id}")["state"] != "finished":
+        states.fly(campaign_id)
     dashboard.open_campaign(campaign_id)
-    dashboard.choose_speed("Max")
-    fly_on(dashboard, campaign_id, steps=True)
     assert dashboard.get(f"/campaigns/{campaign_id}")["standing"] == "candidate"
     expect(page.get_by_text(CANDIDATE)).to_be_visible()
 
     flown = len(dashboard.trials(campaign_id))
     dashboard.button("Confirm with 2 flights").click()
     expect(page.get_by_role("heading", name=f"Flight {flown + 1} is planned")).to_be_visible()
+    dashboard.choose_speed("Max")
     fly_on(dashboard, campaign_id)
     expect(page.get_by_text(CONFIRMED)).to_be_visible()
     trials = dashboard.trials(campaign_id)
