@@ -58,6 +58,7 @@ def test_a_noisy_twin_is_flown_to_a_candidate_confirmed_reviewed_and_confirmed_a
     review.get_by_role("button", name="Mark invalid").click()
     review.get_by_text("Wind gust").click()
     review.get_by_role("button", name="Mark invalid").click()
+    expect(review.get_by_text("Invalid", exact=True)).to_be_visible()
     dashboard.open_campaign(campaign_id)
     expect(page.get_by_role("heading", name=f"Next: flight {len(trials) + 1}")).to_be_visible()
     fly_on(dashboard, campaign_id)
