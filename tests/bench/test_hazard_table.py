@@ -6,7 +6,6 @@ copies of packets, other components and ports, gains that were not verified), an
 are no numbers, which a profile reads alike.
 """
 
-import functools
 import math
 import random
 from collections.abc import Callable, Iterable, Mapping
@@ -36,12 +35,13 @@ from app.vehicles.mavlink.events import (
     SendGain,
 )
 from app.vehicles.mavlink.records import ending_of, has_flown
-from bench.hazards.cases import FOR_GOOD_S, TUNED, Case, PlannedFault
+from bench.hazards.cases import FOR_GOOD_S
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, judge
 from bench.hazards.hostile_table import HAZARDS
 from bench.hazards.rig import InjectedFault
 from bench.hazards.trial_states import LIFTED_M, State, TrialStates
-from tests.vehicles.mavlink.walking import GROUND_M, PLAN, STEP_S, TrialDriver
+from tests.bench.test_hostile import case
+from tests.vehicles.mavlink.walking import GROUND_M, PLAN, STEP_S, TrialDriver, once
 
 BY_HAND, HOMING = "64", "8"
 BOOT_S = 2.0
@@ -176,6 +176,10 @@ def changed(change: Callable[[Position, Effect], Measurement | None]) -> Make:
 
 def invalid(*, for_s: float = FOR_GOOD_S) -> Make:
     return changed(lambda here, effect: InvalidPosition(here.time_boot_s) if effect.lasted_s < for_s else here)
+
+
+def higher(by_m: float) -> Make:
+    return changed(lambda here, _: replace(here, altitude_m=here.altitude_m + by_m))
 
 
 def on_ground(gap_s: float) -> Make:
@@ -384,10 +388,7 @@ class Oscillating(Effect):
 EFFECTS: Mapping[str, Make] = {
     "z nan": invalid(),
     "z nan for 0.3 s": invalid(for_s=0.3),
-    **{
-        f"altitude {by_m:+g} m": changed(lambda here, _, by_m=by_m: replace(here, altitude_m=here.altitude_m + by_m))  # type: ignore[misc]
-        for by_m in (0.1, 0.2, -0.1, -0.2)
-    },
+    **{f"altitude {by_m:+g} m": higher(by_m) for by_m in (0.1, 0.2, -0.1, -0.2)},
     "replaced after 1.3 s": Replaced,
     **{f"on the ground after {gap_s:g} s": on_ground(gap_s) for gap_s in (0.0, 0.3, 0.6, 1.0)},
     "reboot once": inserted(lambda _: Position(0.2, 0.1, 0.0)),
@@ -441,7 +442,7 @@ LONG_RECORDED = {"no SYS_STATUS": 20.0}
 """Records long enough for a hazard that is noticed late, s."""
 
 
-@functools.cache
+@once
 def reached(state: State, *, has_second_source: bool = False, record_s: float = PLAN.record_s) -> Flight:
     """A flight in this state."""
     flight = Flight(plan=replace(PLAN, record_s=record_s), has_second_source=has_second_source)
@@ -452,25 +453,16 @@ def reached(state: State, *, has_second_source: bool = False, record_s: float = 
 
 def flown(name: str, state: State) -> tuple[Flight, GroundTruth]:
     record_s = LONG_RECORDED.get(name, PLAN.record_s)
-    flight = reached(state, has_second_source=name.startswith("mocap"), record_s=record_s).copied()
+    flight = reached(state, has_second_source=name.startswith("mocap"), record_s=record_s)
     begun_s, flight.hazard = flight.now_s, EFFECTS[name](flight)
     flight.hazard.begin()
     while not flight.trial.is_over and flight.now_s < begun_s + LONGEST_S:
         flight.pass_s(STEP_S)
-    hazard = PlannedFault(name, state, BEGIN[state], min(FOR_GOOD_S, HAZARDS[name].longest_s))
-    case = Case(
-        seed=1,
-        autopilot="paparazzi",
-        faults=(hazard,),
-        gains=TUNED["paparazzi"],
-        powered_s=0.0,
-        staged_s=0.0,
-        pinned=True,
-    )
+    lasts_s = HAZARDS[name].longest_s
     truth = GroundTruth(
-        case=case,
+        case=case("paparazzi", name, state, BEGIN[state], lasts_s),
         states=TrialStates(ended_s=flight.now_s),
-        injected=[InjectedFault(name, state, begun_s, begun_s + hazard.duration_s)],
+        injected=[InjectedFault(name, state, begun_s, begun_s + lasts_s)],
         sent=(),
         stops=(),
         true_states=(),
@@ -519,7 +511,7 @@ def test_a_hazard_has_no_consequence_that_its_row_does_not_permit(name: str, sta
 
 
 def test_without_a_hazard_the_vehicle_flies_lands_and_has_its_safe_gains_back() -> None:
-    flight = reached(State.LAND).copied()
+    flight = reached(State.LAND)
     while not flight.trial.is_over:
         flight.pass_s(STEP_S)
     assert (flight.state, flight.trial.failure) == ("idle", None)

@@ -7,8 +7,10 @@ if TYPE_CHECKING:
 else:
 
     def replace(state, /, **changes):
-        """As `dataclasses.replace`, without the constructor, in a thirtieth of its time: for classes without slots and
-        without `__post_init__`."""
+        """As `dataclasses.replace`, without the constructor, in a sixth of its time: for classes without slots and
+        without `__post_init__`. Raises TypeError for a field that the class lacks."""
+        if not changes.keys() <= state.__dict__.keys():
+            raise TypeError(f"{type(state).__name__} has no {', '.join(changes.keys() - state.__dict__.keys())}")
         successor = object.__new__(type(state))
         successor.__dict__.update(state.__dict__, **changes)
         return successor

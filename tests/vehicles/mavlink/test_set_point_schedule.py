@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 
 import pytest
 
@@ -23,7 +22,7 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.trial_reactions import State
 from tests.vehicles.mavlink import test_trial_machine as befall
-from tests.vehicles.mavlink.walking import PLAN, SAFE_GAINS, STEP_S, TrialDriver
+from tests.vehicles.mavlink.walking import PLAN, SAFE_GAINS, STEP_S, TrialDriver, once
 
 LATENCY_S = 0.06
 SET_POINTS = SetPoints((0.0, 6.0, 9.0, 12.0), (3.0, 2.0, 3.0, 2.0))
@@ -86,12 +85,8 @@ class Stepping(TrialDriver):
         return self
 
 
+@once
 def hovering(until_s: float = 5.0, *, unheard: bool = False) -> Stepping:
-    return _hovering(until_s, unheard).copied()
-
-
-@cache
-def _hovering(until_s: float, unheard: bool) -> Stepping:
     walk = Stepping(plan=STEPS, unheard=unheard)
     walk.lift_off()
     return walk.until_s(until_s)

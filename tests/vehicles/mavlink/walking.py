@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
-from functools import cache
-from typing import Self, TypeVar
+from functools import wraps
+from typing import ParamSpec, Self, TypeVar
 
 from app.vehicles.mavlink import observation as watching
 from app.vehicles.mavlink.boot_clock import WRAP_S
@@ -204,10 +204,19 @@ class TrialDriver:
         return self.give(GainsRestored(self.now_s, problem))
 
 
+Walk = ParamSpec("Walk")
 Driver = TypeVar("Driver", bound=TrialDriver)
 
 
-def once(make: Callable[[], Driver]) -> Callable[[], Driver]:
+def once(make: Callable[Walk, Driver]) -> Callable[Walk, Driver]:
     """A walk to some state is made once for all tests, each of which gets a copy."""
-    made = cache(make)
-    return lambda: made().copied()
+    made: dict[object, Driver] = {}
+
+    @wraps(make)
+    def copied(*args: Walk.args, **kwargs: Walk.kwargs) -> Driver:
+        where = (args, *kwargs.items())
+        if where not in made:
+            made[where] = make(*args, **kwargs)
+        return made[where].copied()
+
+    return copied
