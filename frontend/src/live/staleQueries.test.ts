@@ -120,3 +120,20 @@ test("a change after the first answer has it read again", async () => {
   await vi.waitFor(() => expect(value()).toBe(2));
   unsubscribe();
 });
+
+test("a change while an answer that nobody waits for is under way has it read once more when it is shown again", async () => {
+  const { ask, change, answer } = server();
+  const first = watched(ask);
+  await answer();
+  await vi.waitFor(() => expect(first.value()).toBe(1));
+  invalidator.invalidate();
+  first.unsubscribe();
+  change();
+  invalidator.invalidate();
+  await answer();
+  await vi.waitFor(() => expect(queries.isFetching()).toBe(0));
+  const again = watched(ask);
+  await answer();
+  await vi.waitFor(() => expect(again.value()).toBe(2));
+  again.unsubscribe();
+});

@@ -7,8 +7,9 @@ export interface Invalidator {
 }
 
 /**
- * Refetch queries after a change. The query client does not restart a first fetch that is pending, although its response
- * may be older than the change: such a query is invalidated again when the response is there.
+ * Refetch queries after a change. The query client restarts neither a first fetch that is pending nor one of a query that
+ * is not shown at the moment, although the response may be older than the change and would count as current: such a query
+ * is invalidated again when the response is there.
  */
 export function createInvalidator(queries: QueryClient): Invalidator {
   const cache = queries.getQueryCache();
@@ -20,8 +21,8 @@ export function createInvalidator(queries: QueryClient): Invalidator {
   });
   return {
     invalidate(filters = {}) {
-      for (const { state, queryHash } of cache.findAll({ ...filters, fetchStatus: "fetching" })) {
-        if (state.data === undefined) awaited.add(queryHash);
+      for (const query of cache.findAll({ ...filters, fetchStatus: "fetching" })) {
+        if (query.state.data === undefined || !query.isActive()) awaited.add(query.queryHash);
       }
       void queries.invalidateQueries(filters);
     },
