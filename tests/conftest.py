@@ -19,6 +19,7 @@ from app.db.migrate import migrate
 from app.db.session import Database
 from app.main import create_app
 from tests.unlocking import client_here
+from tests.waiting import Waits
 
 # No test measures how long something takes: the first example of one may load and compile the numerics.
 hypothesis.settings.register_profile("untimed", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
@@ -32,6 +33,14 @@ structlog.configure(
         structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback),
     ]
 )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Whatever a test waits for, its own time limit alone decides how long: --timeout, or the project's. A wait ends
+    a sixth before that, so that it can say what it waited for."""
+    chosen_s = config.getoption("timeout")
+    limit_s = float(config.getini("timeout") if chosen_s is None else chosen_s)
+    Waits.at_most_s = limit_s * 5 / 6 if limit_s else Waits.at_most_s
 
 
 def pytest_collection() -> None:

@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from app.cli.commands import app
 from app.simdrone.faults import FAULTS
 from app.simdrone.registry import AUTOPILOTS
+from tests.waiting import Waits
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "sim-drone.md").read_text()
 GAINLINE = Path(sys.executable).parent / "gainline"
@@ -25,7 +26,7 @@ def gainline(*arguments: str) -> Result:
 def test_it_speaks_until_it_is_stopped_and_then_ends_well() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
         radio.bind(("127.0.0.1", 0))
-        radio.settimeout(60.0)
+        radio.settimeout(Waits.at_most_s)
         link = f"udp:127.0.0.1:{radio.getsockname()[1]}"
         with subprocess.Popen(
             [GAINLINE, "sim-drone", "--vehicle", "twin", "--system", "42", "--link", link, "--set", "scatter=0"],
@@ -35,7 +36,7 @@ def test_it_speaks_until_it_is_stopped_and_then_ends_well() -> None:
         ) as process:
             message = mavlink.MAVLink(None).parse_buffer(radio.recv(1024))[0]
             process.send_signal(signal.SIGTERM)
-            said, complained = process.communicate(timeout=30.0)
+            said, complained = process.communicate(timeout=Waits.at_most_s)
     assert message.get_srcSystem() == 42
     assert process.returncode == 0
     assert link in said

@@ -11,7 +11,7 @@ import pytest
 from app.common.data_folder import make_private, prepare_data_dir
 from app.common.errors import StorageError
 from app.processes.locks import exclusive
-from tests.runtime.processes import PATIENCE_S, environment
+from tests.runtime.processes import environment
 
 
 def a_file(tmp_path: Path) -> Path:
@@ -44,7 +44,6 @@ def test_a_data_folder_that_cannot_be_used_is_named_with_its_option(
         env=environment(COLUMNS="1000"),
         capture_output=True,
         text=True,
-        timeout=PATIENCE_S,
         check=False,
     )
     said = " ".join(refused.stderr.split())

@@ -19,10 +19,10 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page, expect, sync_playwright
 
-from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport, Waits
+from tests.e2e.dashboard import TABLET, Dashboard, Theme, Viewport
 from tests.e2e.states import States
-from tests.runtime.processes import wait_for
 from tests.unlocking import new_link
+from tests.waiting import Waits, wait_for
 
 HERE = Path(__file__).parent
 BUILT = HERE.parents[1] / "frontend" / "dist" / "index.html"
@@ -69,15 +69,6 @@ class SharedResources:
 STARTED = SharedResources()
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Whatever a test waits for, its own time limit alone decides how long: --timeout, or the project's. A wait ends
-    a sixth before that, so that it can say what it waited for."""
-    chosen_s = config.getoption("timeout")
-    limit_s = float(config.getini("timeout") if chosen_s is None else chosen_s)
-    Waits.at_most_s = limit_s * 5 / 6 if limit_s else Waits.at_most_s
-    expect.set_options(timeout=1000 * Waits.at_most_s)
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if HERE in item.path.parents:
@@ -108,6 +99,7 @@ def chromium() -> str:
 
 @contextmanager
 def launched(chromium: str) -> Iterator[Browser]:
+    expect.set_options(timeout=1000 * Waits.at_most_s)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         yield browser
@@ -149,7 +141,7 @@ class Server:
             wait_for("the worker", self._works)  # what is asked for before is withdrawn
 
     def _works(self) -> bool:
-        return bool(httpx2.get(f"{self.url}/api/health").json()["worker"] == "running")
+        return bool(httpx2.get(f"{self.url}/api/health", timeout=Waits.at_most_s).json()["worker"] == "running")
 
     @property
     def pid(self) -> int:

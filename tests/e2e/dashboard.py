@@ -1,7 +1,6 @@
 """The dashboard as a test sees it: what is on the page, what a chart has drawn, and what the API says."""
 
 import re
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, Literal, TypeVar
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Locator, Page, ViewportSize, expect
 
 from app.figures.theme import PALETTES
+from tests.waiting import Waits, wait_for
 
 T = TypeVar("T")
 Theme = Literal["light", "dark"]
@@ -32,13 +32,6 @@ gd => gd.data.map(trace => ({
   dash: trace.line?.dash, width: trace.line?.width, bar: trace.error_y?.value, bars: trace.error_y?.array,
 }))
 """
-
-
-class Waits:
-    """How long a test waits for anything. As good as for ever, unless tests have a time limit."""
-
-    at_most_s = 86_400.0
-
 
 _SETTLED: Final = """async ([ink, within]) => {
   const until = performance.now() + within;
@@ -244,8 +237,4 @@ class Dashboard:
 
     def until(self, holds: Callable[[], T | None]) -> T:
         """Wait until that gives something true, which is returned, letting the page live meanwhile."""
-        end_s = time.monotonic() + Waits.at_most_s
-        while not (found := holds()):
-            assert time.monotonic() < end_s, f"it did not hold within {Waits.at_most_s:g} s"
-            self.page.wait_for_timeout(POLL_MS)
-        return found
+        return wait_for("this to hold", holds, lambda: self.page.wait_for_timeout(POLL_MS))

@@ -36,6 +36,7 @@ from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard, Json, open_details
 from tests.e2e.states import States
 from tests.logs.recorded import recorded
+from tests.waiting import Waits
 
 AT_START: Final = {app.common.errors.SchemaError, app.common.errors.AlreadyRunningError, app.common.errors.AddressError}
 """These end the program before it answers anybody."""
@@ -117,7 +118,9 @@ def create(dashboard: Dashboard) -> None:
 def stopped_worker(server: Server) -> Iterator[None]:
     """Neither working nor answering, and not just holding the database."""
     worker = server.worker_pid()
-    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", timeout=60.0, isolation_level=None)) as file:
+    with closing(
+        sqlite3.connect(server.data_dir / "gainline.sqlite3", timeout=Waits.at_most_s, isolation_level=None)
+    ) as file:
         file.execute("BEGIN IMMEDIATE")
         os.kill(worker, signal.SIGSTOP)
         file.execute("ROLLBACK")
@@ -288,7 +291,7 @@ def _a_page_of_another_site(dashboard: Dashboard, _server: Server, _states: Stat
 def _a_trial_that_somebody_broke_in_the_database(dashboard: Dashboard, server: Server, states: States) -> Undo:
     campaign_id = states.campaign("import")
     trial = states.plan(campaign_id, {"kp": 283, "ki": 13, "kd": 82})
-    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", timeout=60.0)) as file:
+    with closing(sqlite3.connect(server.data_dir / "gainline.sqlite3", timeout=Waits.at_most_s)) as file:
         file.execute("UPDATE trial SET gains = '[1]' WHERE id = ?", (trial,))
         file.commit()
     dashboard.open(f"/campaigns/{campaign_id}/flights/{trial}")

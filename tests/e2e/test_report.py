@@ -13,6 +13,7 @@ from tests.e2e.conftest import Opener, Server, served
 from tests.e2e.dashboard import DESK, PHONE, TABLET, Dashboard, Viewport, open_details
 from tests.e2e.states import States
 from tests.e2e.test_pages import violations
+from tests.waiting import Waits
 
 NAME = "<script>document.title = 'taken'</script> & <b>wing</b>"
 CHARTS = ("takeoffs", "errors", "gains", "landscape")
@@ -32,7 +33,7 @@ def campaign_id(states: States) -> int:
 
 @pytest.fixture(scope="module")
 def file(shared_server: Server, campaign_id: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    answer = httpx2.get(f"{shared_server.url}/api/campaigns/{campaign_id}/report.html", timeout=60.0)
+    answer = httpx2.get(f"{shared_server.url}/api/campaigns/{campaign_id}/report.html", timeout=Waits.at_most_s)
     assert answer.is_success
     saved = tmp_path_factory.mktemp("report") / "report.html"
     saved.write_bytes(answer.content)

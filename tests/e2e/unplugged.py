@@ -13,10 +13,8 @@ import tempfile
 from contextlib import closing
 from pathlib import Path
 
-from playwright.sync_api import expect
-
 from tests.e2e.conftest import launched, new_context, served, watch
-from tests.e2e.dashboard import Dashboard, Waits
+from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
 
 _SET_FLAGS, _UP_AND_RUNNING = 0x8914, 0x1 | 0x40
@@ -40,7 +38,6 @@ def is_unplugged() -> bool:
 
 def main(chromium: str) -> None:
     bring_loopback_up()
-    expect.set_options(timeout=1000 * Waits.at_most_s)
     wrong: list[str] = []
     with (
         tempfile.TemporaryDirectory() as folder,

@@ -1,8 +1,6 @@
 """An abort goes straight to the worker, whatever the database is doing."""
 
 import os
-import time
-from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
@@ -16,6 +14,7 @@ from app.db.session import Database
 from app.live.messages import WorkerHello, live_address
 from app.live.server import LiveServer
 from tests.builders import get
+from tests.waiting import eventually
 
 THREADS_OF_A_SERVER = 40
 
@@ -28,13 +27,6 @@ def long_wait_for_the_database(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def hello() -> WorkerHello:
     return WorkerHello(pid=os.getpid(), version="test", flying=[7])
-
-
-def wait_until(seen: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + 20.0
-    while not seen():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.01)
 
 
 def connections_in_use(database: Database) -> int:
@@ -57,14 +49,14 @@ def test_an_abort_passes_while_every_thread_waits_for_the_database(
         LiveServer(live_address(settings.data_dir), abort=abort, order=lambda *_: Future(), hello=hello),
         ThreadPoolExecutor(THREADS_OF_A_SERVER + 10) as people,
     ):
-        wait_until(lambda: get(client, "/api/health")["worker"] == "running")
+        eventually(lambda: get(client, "/api/health")["worker"] == "running")
         with database.write() as session:
             session.execute(text("SELECT 1"))  # from here on the write lock is ours
             waiting = [
                 people.submit(client.post, "/api/campaigns", json={"name": "Patience"})
                 for _ in range(THREADS_OF_A_SERVER + 10)
             ]
-            wait_until(lambda: connections_in_use(database) > THREADS_OF_A_SERVER)
+            eventually(lambda: connections_in_use(database) > THREADS_OF_A_SERVER)
             answer = client.post("/api/trials/7/abort", json={"reason": "too close"})
             assert (answer.status_code, answer.json()["accepted"]) == (202, True)
             assert not any(future.done() for future in waiting)

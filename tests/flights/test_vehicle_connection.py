@@ -17,8 +17,8 @@ from app.flights.process_messages import CommandForwarded, ConnectionOpened, Con
 from app.flights.vehicle_connection import VehicleConnection
 from app.live.messages import VehicleStatus
 from app.vehicles.base import Identity
+from tests.waiting import Waits
 
-PATIENCE_S = 60.0
 IDENTITY = Identity(system_id=1, autopilot="paparazzi", version="5.18")
 STATUS = VehicleStatus(
     vehicle_id=5, state="connected", at="2026-11-24T00:00:00+00:00", step="record", armed=True, altitude_m=2.9
@@ -108,12 +108,12 @@ def session(
 
 
 def told(answer: Future[str]) -> str:
-    return answer.result(PATIENCE_S)
+    return answer.result(Waits.at_most_s)
 
 
 def next_but_silence(heard: "queue.SimpleQueue[LiveMessage]") -> LiveMessage:
     """What the process says next: on a busy machine it may be shown as not answering before it comes to that."""
-    while isinstance(news := heard.get(timeout=PATIENCE_S), VehicleStatus) and news.state == "not answering":
+    while isinstance(news := heard.get(timeout=Waits.at_most_s), VehicleStatus) and news.state == "not answering":
         pass
     return news
 
@@ -124,7 +124,7 @@ def test_a_command_counts_as_executed_only_once_the_process_confirms_it(tmp_path
         assert not land.done()
         stop = one.send_command("motors off", "people below", 1.0)
         assert (told(stop), told(land)) == ("", "")
-        assert [heard.get(timeout=PATIENCE_S) for _ in range(2)] == [
+        assert [heard.get(timeout=Waits.at_most_s) for _ in range(2)] == [
             CommandForwarded(2, "motors off", "people below"),
             CommandForwarded(1, "land", "it drifts"),
         ]
@@ -146,7 +146,7 @@ def test_a_command_whose_confirmation_the_process_did_not_live_to_see_is_told_as
     with session(dies_before_it_is_confirmed, tmp_path) as (one, heard):
         for reason in ("to be sure", "people below"):
             assert told(one.send_command("motors off", reason, 1.0)) == ""
-        outcomes = [heard.get(timeout=PATIENCE_S) for _ in range(2)]
+        outcomes = [heard.get(timeout=Waits.at_most_s) for _ in range(2)]
         assert outcomes == [
             CommandForwarded(1, "motors off", "to be sure"),
             CommandForwarded(
@@ -165,7 +165,7 @@ def test_a_process_that_stands_still_is_shown_again_and_again_until_it_goes_on(
     with session(goes_on, tmp_path) as (one, heard):
         assert next_but_silence(heard) == STATUS
         for _ in range(3):
-            silent = heard.get(timeout=PATIENCE_S)
+            silent = heard.get(timeout=Waits.at_most_s)
             assert isinstance(silent, VehicleStatus)
             assert (silent.vehicle_id, silent.state, silent.step, silent.armed) == (5, "not answering", "record", True)
             assert "commands do not reach the vehicle" in silent.trouble
@@ -181,7 +181,7 @@ def test_a_process_that_has_never_told_how_its_vehicle_is_is_shown_as_not_answer
 ) -> None:
     monkeypatch.setattr(session_module, "SILENT_AFTER_S", 0.05)
     with session(says_nothing, tmp_path) as (_, heard):
-        silent = heard.get(timeout=PATIENCE_S)
+        silent = heard.get(timeout=Waits.at_most_s)
         assert isinstance(silent, VehicleStatus)
         assert (silent.vehicle_id, silent.state, silent.armed, silent.concern) == (5, "not answering", None, "")
 

@@ -36,6 +36,7 @@ from app.live.messages import (
     live_address,
 )
 from app.live.server import SLOW_CLIENT_BYTES, LiveServer
+from tests.waiting import Waits
 
 
 def telemetry(time_s: float = 1.0, rows: int = 1) -> Telemetry:
@@ -87,7 +88,7 @@ class Web:
         self.client = LiveClient(path, on_message=self.heard.append, on_link=self.links.append)
 
     async def until(self, seen: Callable[[], bool]) -> None:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(Waits.at_most_s):
             while not seen():
                 await asyncio.sleep(0.005)
 
@@ -335,7 +336,7 @@ def test_a_client_that_never_reads_loses_telemetry_but_no_phase_and_holds_up_nob
     path = tmp_path / "w.sock"
     with server(path) as worker, socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sleeper:
         sleeper.connect(str(path))
-        sleeper.settimeout(5)
+        sleeper.settimeout(Waits.at_most_s)
         reader = sleeper.makefile("rb")
         assert isinstance(decode(reader.readline()), WorkerHello)
         count = 4 * SLOW_CLIENT_BYTES // len(encode(telemetry(rows=100))) + 1
@@ -381,9 +382,9 @@ def test_the_web_process_ends_while_a_worker_owes_it_an_answer(tmp_path: Path, m
         async with await asyncio.start_unix_server(serve, str(live_address(tmp_path))):
             link = live_link(tmp_path, database)
             await link.__aenter__()
-            await asyncio.wait_for(owing.wait(), 30)
+            await asyncio.wait_for(owing.wait(), Waits.at_most_s)
             ended = asyncio.create_task(link.__aexit__(None, None, None))
-            done, _ = await asyncio.wait([ended], timeout=30)
+            done, _ = await asyncio.wait([ended], timeout=Waits.at_most_s)
             assert done, "it hangs"
 
     asyncio.run(scenario())

@@ -2,7 +2,7 @@
 
     unshare --net python day_offline.py CLONE DATA LOGS
 
-Fails with a traceback where something does not work.
+Fails with a traceback where something does not work; how long it waits for anything is up to the test that runs it.
 """
 
 import fcntl
@@ -21,7 +21,6 @@ from typing import Any
 
 CLONE, DATA, LOGS = map(Path, sys.argv[1:])
 NONE_SUCH = f"no-such-package==1.0 --hash=sha256:{0:064}\n"
-PATIENCE_S = 150.0
 SET_INTERFACE_FLAGS, UP = 0x8914, 0x1
 
 
@@ -53,7 +52,7 @@ def lines_until(process: subprocess.Popen[str], last: str) -> list[str]:
 def ask(url: str, body: object = None) -> Any:
     data = None if body is None else json.dumps(body).encode()
     request = urllib.request.Request(url, data=data, headers={"Content-Type": "application/json"})
-    with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
+    with urllib.request.urlopen(request) as answer:
         return json.load(answer)
 
 
@@ -67,20 +66,18 @@ def fly_without_a_network() -> None:
     assert "The worker is ready" in "".join(lines_until(server, "ready to compute")) + lines
     assert f"{url}/unlock?token=" in gainline("unlock", "--data-dir", DATA)
     created = ask(f"{url}/api/campaigns", {"name": "Garage", "vehicle": {"kind": "import"}, "definition": {}})
-    deadline_s = time.monotonic() + PATIENCE_S
     while ask(f"{url}/api/campaigns/{created['id']}")["state"] != "ready":
-        assert time.monotonic() < deadline_s
         time.sleep(0.05)
     log = LOGS / "paparazzi_283_13_82.tlog"
     assert "Trial 1 of campaign" in gainline("import", log, "--campaign", "Garage", "--data-dir", DATA)
     server.send_signal(signal.SIGINT)
-    assert server.wait(PATIENCE_S) == 0
+    assert server.wait() == 0
     for line in (DATA / "log" / "web.log").read_text().splitlines():
         assert json.loads(line)["event"]
     drone = start("exec", "gainline", "sim-drone")
     assert "Paparazzi" in "".join(lines_until(drone, "Paparazzi"))
     drone.terminate()
-    drone.wait(PATIENCE_S)
+    drone.wait()
     assert "The model predicts" in gainline("analyze", log)
     assert "flight" in gainline("run", "paper-ardrone-takeoff", "--max-flights", "1").lower()
 

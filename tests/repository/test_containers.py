@@ -17,9 +17,7 @@ SERVICES: dict[str, dict[str, Any]] = YAML(typ="safe").load(ROOT / "docker-compo
 
 
 def run(*command: str) -> None:
-    done = subprocess.run(
-        [PROGRAMS / command[0], *command[1:]], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
-    )
+    done = subprocess.run([PROGRAMS / command[0], *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

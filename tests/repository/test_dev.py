@@ -17,7 +17,6 @@ def dev(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
         env={**os.environ, **variables},
         capture_output=True,
         text=True,
-        timeout=60,
         check=False,
     )
 

@@ -3,8 +3,7 @@
 import os
 import signal
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from multiprocessing import active_children
@@ -20,6 +19,7 @@ from app.reproductions import service
 from app.reproductions.service import REPRODUCTION_JOB
 from app.reproductions.tasks import ReproductionJob
 from tests.builders import WORKER
+from tests.waiting import Waits, eventually
 
 LONG = "variability"
 
@@ -60,14 +60,8 @@ class Working:
         try:
             yield
         finally:
-            thread.join(60)
+            thread.join(Waits.at_most_s)
         assert not thread.is_alive()
-
-    def until(self, holds: Callable[[], bool]) -> None:
-        deadline_s = time.monotonic() + 60.0
-        while not holds():
-            assert time.monotonic() < deadline_s, "waited in vain"
-            time.sleep(0.05)
 
     def computing(self) -> list[int]:
         """The processes at it."""
@@ -100,10 +94,10 @@ def test_a_reproduction_is_computed_in_a_process_of_its_own_and_its_result_kept(
 def test_a_cancelled_reproduction_stops_within_seconds(working: Working) -> None:
     job_id = working.ask(LONG)
     with working.under_way(job_id):
-        working.until(lambda: working.advanced(job_id))
+        eventually(lambda: working.advanced(job_id))
         with working.database.write() as session:
             jobs.cancel_job(session, job_id)
-        working.until(lambda: working.computing() == [])
+        eventually(lambda: working.computing() == [])
     assert working.job(job_id).state == JobState.CANCELLED
     assert working.raised == []
 
@@ -111,7 +105,7 @@ def test_a_cancelled_reproduction_stops_within_seconds(working: Working) -> None
 def test_a_reproduction_waits_again_uncounted_when_the_worker_ends(working: Working) -> None:
     job_id = working.ask(LONG)
     with working.under_way(job_id):
-        working.until(lambda: working.advanced(job_id))
+        eventually(lambda: working.advanced(job_id))
         working.closing.set()
     waiting = working.job(job_id)
     assert (waiting.state, waiting.attempts, waiting.done_share) == (JobState.QUEUED, 0, None)
@@ -123,7 +117,7 @@ def test_a_reproduction_whose_process_is_killed_waits_again_and_fails_the_third_
     job_id = working.ask(LONG)
     for attempt in range(1, jobs.MAX_ATTEMPTS + 1):
         with working.under_way(job_id):
-            working.until(lambda: len(working.computing()) == 1)
+            eventually(lambda: len(working.computing()) == 1)
             os.kill(working.computing()[0], signal.SIGKILL)
         job = working.job(job_id)
         assert job.attempts == attempt

@@ -13,7 +13,8 @@ from typing import Any, Self
 
 from app.core.experiments.takeoff import WINDOW_S
 from tests.ports import free_port
-from tests.runtime.processes import PATIENCE_S, Serving, environment, stream, wait_for
+from tests.runtime.processes import Serving, environment, stream
+from tests.waiting import Waits, wait_for
 
 OUR_PAGE = {"Sec-Fetch-Site": "same-origin"}
 SAFE = {"kp": 283, "ki": 13, "kd": 82}
@@ -52,7 +53,7 @@ class Drone:
 
     def switch_off(self) -> None:
         self._process.send_signal(signal.SIGKILL)
-        self._process.wait(PATIENCE_S)
+        self._process.wait(Waits.at_most_s)
         assert self._process.stdout is not None
         self._process.stdout.close()
 
@@ -139,7 +140,7 @@ class Registered:
 
     def status(self, fits: Callable[[Any], bool]) -> Any:
         """The first status on a stream that fits."""
-        deadline_s, newest = time.monotonic() + PATIENCE_S, None
+        deadline_s, newest = time.monotonic() + Waits.at_most_s, None
         with stream(self.serving.url) as events:
             for name, _, data in events:
                 if name == "vehicle" and data["vehicle_id"] == self.id:

@@ -7,16 +7,15 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import httpx2
 
-T = TypeVar("T")
-PATIENCE_S = 40.0
+from tests.waiting import Waits, wait_for
+
 LIFTED_M = 0.1
 ENDED = {"valid", "aborted", "invalid", "cancelled"}
 
@@ -25,16 +24,6 @@ def environment(**more: str) -> dict[str, str]:
     """This process's, without its own settings."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("GAINLINE_")}
     return {**kept, **more}
-
-
-def wait_for(what: str, seen: Callable[[], T | None]) -> T:
-    """Whatever `seen` gives once it gives something true."""
-    deadline_s = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline_s:
-        if found := seen():
-            return found
-        time.sleep(0.02)
-    raise AssertionError(f"waited {PATIENCE_S:g} s in vain for {what}")
 
 
 def is_alive(pid: int) -> bool:
@@ -65,7 +54,7 @@ class Serving:
             self.said.append(line)
         self.url = line.rpartition(" ")[2].strip()
         self._unlocked = False
-        self.api = httpx2.Client(base_url=f"{self.url}/api", timeout=PATIENCE_S)
+        self.api = httpx2.Client(base_url=f"{self.url}/api", timeout=Waits.at_most_s)
 
     def unlock(self) -> None:
         """Open the link that was printed at the start, as a person does in the browser."""
@@ -149,7 +138,7 @@ class Serving:
         self.api.close()
         if self.process.poll() is None:
             self.process.send_signal(number)
-        code = self.process.wait(PATIENCE_S)
+        code = self.process.wait(Waits.at_most_s)
         assert self.process.stdout is not None
         self.process.stdout.close()
         self._log = self.logged()
@@ -168,7 +157,7 @@ def stream(url: str, last_event_id: str | None = None, *, since_s: float = 0.0) 
     """An open event stream."""
     headers = {} if last_event_id is None else {"Last-Event-ID": last_event_id}
     with httpx2.stream(
-        "GET", f"{url}/api/events", params={"since_s": since_s}, headers=headers, timeout=PATIENCE_S
+        "GET", f"{url}/api/events", params={"since_s": since_s}, headers=headers, timeout=Waits.at_most_s
     ) as response:
         response.raise_for_status()
         yield Stream(response)

@@ -4,7 +4,8 @@ import threading
 
 import pytest
 
-from tests.runtime.processes import PATIENCE_S, Serving, stream
+from tests.runtime.processes import Serving, stream
+from tests.waiting import Waits
 
 pytestmark = pytest.mark.real_time
 
@@ -20,10 +21,10 @@ class Watching:
         self.in_the_air = threading.Event()
         self._thread = threading.Thread(target=self._follow, args=(url,))
         self._thread.start()
-        assert self.connected.wait(PATIENCE_S)
+        assert self.connected.wait(Waits.at_most_s)
 
     def wait_for_the_end(self) -> None:
-        self._thread.join(PATIENCE_S)
+        self._thread.join(Waits.at_most_s)
         assert not self._thread.is_alive()
 
     def _follow(self, url: str) -> None:
@@ -46,7 +47,7 @@ def test_a_watched_flight_at_the_speed_of_life_is_computed_in_step_and_ends_by_i
     campaign_id = serving.campaign(kind=kind)
     watchers = [Watching(serving.url) for _ in range(WATCHERS)]
     trial_id = serving.fly(campaign_id, speed=1.0)
-    assert watchers[0].in_the_air.wait(PATIENCE_S)
+    assert watchers[0].in_the_air.wait(Waits.at_most_s)
     assert serving.post(f"/trials/{trial_id}/abort", {"reason": "enough"})["accepted"]
     assert serving.trial(trial_id, "aborted")["reason"] == "enough"
     for watcher in watchers:

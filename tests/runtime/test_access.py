@@ -13,6 +13,7 @@ import pytest
 from app.accounts.keys_and_links import Keyring
 from app.accounts.permissions import Key
 from tests.runtime.processes import Serving, environment
+from tests.waiting import Waits
 
 pytestmark = pytest.mark.real_time
 
@@ -69,7 +70,7 @@ def test_the_scripts_that_flew_a_real_vehicle_are_refused(serving: Serving, bee:
         ("POST", f"/api/vehicles/{bee}/motors-off", None),
         ("PATCH", f"/api/vehicles/{bee}", {"version": 1, "name": "Mine"}),
     ]
-    with httpx2.Client(base_url=serving.url, headers=headers) as mallory:
+    with httpx2.Client(timeout=Waits.at_most_s, base_url=serving.url, headers=headers) as mallory:
         for method, path, body in steps:
             refused = mallory.request(method, path, json=body)
             assert refused.status_code == 403, (path, refused.text)
@@ -87,7 +88,7 @@ def test_the_operator_does_the_same_in_the_unlocked_browser(serving: Serving, be
 
 
 def test_another_user_of_this_computer_only_watches(serving: Serving, bee: int) -> None:
-    with httpx2.Client(base_url=serving.url) as other:
+    with httpx2.Client(timeout=Waits.at_most_s, base_url=serving.url) as other:
         assert other.get(f"/api/vehicles/{bee}").status_code == 200
         assert other.get("/api/access").json()["may_command"] is False
         assert other.post(f"/api/vehicles/{bee}/connect").status_code == 403
@@ -111,10 +112,10 @@ def unlock(serving: Serving, *options: str) -> str:
 def test_a_second_browser_is_unlocked_by_a_link_of_the_command_line(serving: Serving) -> None:
     found = re.search(r"http://\S+/unlock\?token=\S+", unlock(serving))
     assert found is not None
-    with httpx2.Client(base_url=serving.url) as second:
+    with httpx2.Client(timeout=Waits.at_most_s, base_url=serving.url) as second:
         assert second.get(found.group()).status_code == 303
         assert second.get("/api/access").json()["may_command"]
-    with httpx2.Client(base_url=serving.url) as third:
+    with httpx2.Client(timeout=Waits.at_most_s, base_url=serving.url) as third:
         assert third.get(found.group()).status_code == 403
 
 
@@ -122,7 +123,9 @@ def test_the_token_of_a_script_is_printed_for_this_computer_alone(serving: Servi
     said = unlock(serving, "--script")
     token = said.split()[-1]
     assert "other devices" not in said
-    with httpx2.Client(base_url=f"{serving.url}/api", headers={"Authorization": f"Bearer {token}"}) as script:
+    with httpx2.Client(
+        timeout=Waits.at_most_s, base_url=f"{serving.url}/api", headers={"Authorization": f"Bearer {token}"}
+    ) as script:
         assert script.post("/vehicles/4711/motors-off").status_code == 202
 
 
@@ -141,7 +144,7 @@ def test_without_a_server_there_is_no_link(tmp_path: Path) -> None:
 
 def test_no_token_is_in_the_logs(serving: Serving) -> None:
     token = Keyring.open(serving.data_dir).new_link()
-    with httpx2.Client(base_url=serving.url) as browser:
+    with httpx2.Client(timeout=Waits.at_most_s, base_url=serving.url) as browser:
         assert browser.get(f"/unlock?token={token}").status_code == 303
         assert browser.get(f"/unlock?token={token}").status_code == 303
         assert browser.get(f"/unlock?token={token}x").status_code == 303

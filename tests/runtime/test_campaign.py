@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from tests.runtime.processes import Serving, stream, wait_for
+from tests.runtime.processes import Serving, stream
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.real_time
 

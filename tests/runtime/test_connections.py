@@ -15,6 +15,7 @@ import pytest
 
 from app.runtime.http_connections import RESERVED_FOR_ABORTS, room_for_connections
 from tests.runtime.processes import Serving, in_the_air
+from tests.waiting import Waits
 
 pytestmark = pytest.mark.real_time
 
@@ -37,7 +38,7 @@ def limited(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
 
 def connected(serving: Serving) -> socket.socket:
     host, port = serving.url.removeprefix("http://").split(":")
-    return socket.create_connection((host, int(port)), timeout=20.0)
+    return socket.create_connection((host, int(port)), timeout=Waits.at_most_s)
 
 
 def is_closed(connection: socket.socket) -> bool:
@@ -65,7 +66,7 @@ def test_an_abort_is_answered_while_idle_connections_fill_every_place(limited: S
             if not is_closed(connection):
                 connection.setblocking(True)
                 connection.sendall(first)
-        with httpx2.Client(base_url=limited.url, timeout=20.0) as operator:
+        with httpx2.Client(base_url=limited.url, timeout=Waits.at_most_s) as operator:
             answer = operator.post(f"/api/trials/{trial_id}/abort", json={"reason": "too close"})
         assert (answer.status_code, answer.json()["accepted"]) == (202, True)
         assert open_files(limited) < FILES
@@ -82,10 +83,10 @@ def test_event_streams_without_end_make_room_for_an_abort(limited: Serving) -> N
         for _ in range(FILES):
             stream = stack.enter_context(connected(limited))
             stream.sendall(request)
-        with httpx2.Client(base_url=limited.url, timeout=20.0) as operator:
+        with httpx2.Client(base_url=limited.url, timeout=Waits.at_most_s) as operator:
             answer = operator.post("/api/vehicles/4711/land")
         assert answer.status_code == 202
-        with httpx2.Client(base_url=limited.url, timeout=20.0) as somebody:
+        with httpx2.Client(base_url=limited.url, timeout=Waits.at_most_s) as somebody:
             try:
                 status = somebody.get("/api/health").status_code
             except httpx2.TransportError:
@@ -180,7 +181,9 @@ def test_headers_of_a_usual_size_are_taken_in_any_parts(serving: Serving) -> Non
 
 
 def test_a_connection_serves_one_request_after_the_other(serving: Serving) -> None:
-    with httpx2.Client(base_url=serving.url, limits=httpx2.Limits(max_connections=1)) as client:
+    with httpx2.Client(
+        base_url=serving.url, timeout=Waits.at_most_s, limits=httpx2.Limits(max_connections=1)
+    ) as client:
         for _ in range(5):
             assert client.get("/api/health").status_code == 200
             assert client.post("/api/campaigns", content=b"x" * 200_000).status_code == 415

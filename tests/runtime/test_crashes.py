@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.runtime.processes import Serving, in_the_air, is_alive, wait_for
+from tests.runtime.processes import Serving, in_the_air, is_alive
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.real_time
 

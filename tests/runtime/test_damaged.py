@@ -10,7 +10,7 @@ from typing import Final
 
 import pytest
 
-from tests.runtime.processes import PATIENCE_S, Serving, environment
+from tests.runtime.processes import Serving, environment
 
 PAGE_BYTES: Final = 4096
 
@@ -54,7 +54,6 @@ def test_every_command_reports_a_damaged_database(
         env=environment(COLUMNS="1000"),
         capture_output=True,
         text=True,
-        timeout=PATIENCE_S,
         check=False,
     )
     assert refused.returncode == 1, refused.stderr

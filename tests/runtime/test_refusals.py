@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from app.web.addresses import addresses_elsewhere, exposure, web_address
-from tests.runtime.processes import PATIENCE_S, Serving, environment, stream
+from tests.runtime.processes import Serving, environment, stream
+from tests.waiting import Waits
 
 pytestmark = pytest.mark.real_time
 
@@ -22,7 +23,6 @@ def gainline(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
         env=environment(COLUMNS="1000", **more),
         capture_output=True,
         text=True,
-        timeout=PATIENCE_S,
         check=False,
     )
     done.stderr = " ".join(done.stderr.split())
@@ -85,7 +85,7 @@ def test_a_worker_of_its_own_serves_a_server_without_one(tmp_path: Path) -> None
             assert serving.worker_pid() == worker.pid
             serving.trial(serving.fly(serving.campaign()), "valid")
             worker.send_signal(signal.SIGTERM)
-            assert worker.wait(PATIENCE_S) == 0
+            assert worker.wait(Waits.at_most_s) == 0
 
 
 @pytest.mark.complete

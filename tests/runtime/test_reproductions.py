@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from tests.runtime.processes import Serving, is_alive, wait_for
+from tests.runtime.processes import Serving, is_alive
 from tests.runtime.test_crashes import children
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.real_time
 

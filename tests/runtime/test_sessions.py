@@ -6,8 +6,9 @@ import signal
 import pytest
 
 from tests.runtime.drones import OUR_PAGE, SAFE, SPEED, TRIED, connected
-from tests.runtime.processes import Serving, stream, wait_for
+from tests.runtime.processes import Serving, stream
 from tests.runtime.test_storage import locked
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.real_time
 WINDOW_S = 12.0

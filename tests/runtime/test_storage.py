@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.runtime.processes import Serving, in_the_air, stream, wait_for
+from tests.runtime.processes import Serving, in_the_air, stream
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.real_time
 

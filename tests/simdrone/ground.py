@@ -21,6 +21,7 @@ from app.simdrone.registry import Make, get_autopilot
 from app.vehicles.base import OptionValue
 from app.vehicles.mavlink.addresses import parse
 from app.vehicles.mavlink.transports import open_transport
+from tests.waiting import Waits
 
 MODULES: Final = {
     "paparazzi": "pymavlink.dialects.v10.paparazzi",
@@ -28,8 +29,6 @@ MODULES: Final = {
     "px4": "pymavlink.dialects.v20.common",
 }
 SPEED: Final = 20.0
-SILENCE_S: Final = 120.0
-"""Of the drone's time, or the wall's: nothing that is waited for takes as long."""
 BOOTED_WITHIN_MS: Final = 1000
 HOLDS_AFTER_S: Final = 11.5
 STILL: Final[Mapping[str, OptionValue]] = {"scatter": 0.0, "start_latency_s": 0.0}
@@ -51,9 +50,16 @@ class Wire(Protocol):
         """The clock by which it is waited."""
         ...
 
+    @property
+    def patience_s(self) -> float:
+        """On that clock: nothing that is waited for takes as long."""
+        ...
+
 
 class LockstepWire:
     """Whoever waits lets the drone live."""
+
+    patience_s = 120.0
 
     def __init__(self, lockstep: Lockstep) -> None:
         self.now_s = lockstep.now_s
@@ -76,6 +82,7 @@ class UdpWire:
         self._socket.bind(("127.0.0.1", 0))
         self._socket.settimeout(1.0)
         self.now_s = time.monotonic
+        self.patience_s = Waits.at_most_s
 
     @property
     def port(self) -> int:
@@ -171,7 +178,7 @@ class Ground:
         return self.expect(answer)
 
     def _limit_s(self) -> float:
-        return self.wire.now_s() + SILENCE_S
+        return self.wire.now_s() + self.wire.patience_s
 
     def _hear(self, give_up_at_s: float) -> None:
         assert self.wire.now_s() < give_up_at_s, f"the vehicle's time stands at {self.elapsed_s:.1f} s"
@@ -238,11 +245,3 @@ def flying(autopilot: str, *, settled: bool = True, **settings: Any) -> Ground:
         rate = {"req_stream_id": 0, "req_message_rate": 4, "start_stop": 1}
         ground.send("REQUEST_DATA_STREAM", target_system=1, target_component=1, **rate)
     return ground
-
-
-def eventually(holds: Callable[[], bool], within_s: float = 20.0) -> None:
-    """Raises AssertionError when it did not come to hold in so many seconds of this computer's clock."""
-    until_s = time.monotonic() + within_s
-    while not holds():
-        assert time.monotonic() < until_s
-        time.sleep(0.05)

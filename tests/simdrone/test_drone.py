@@ -19,8 +19,9 @@ from app.simdrone.registry import AUTOPILOTS, get_autopilot
 from app.vehicles.mavlink.transports import LinkError
 from tests.clocks import ManualClock
 from tests.ports import free_port
-from tests.simdrone.ground import Ground, UdpWire, dialect_of, eventually, flying, served, switched_on
+from tests.simdrone.ground import Ground, UdpWire, dialect_of, flying, served, switched_on
 from tests.simdrone.paparazzi import Pilot
+from tests.waiting import eventually
 
 EXTREMES = {
     "float": (math.nan, math.inf, -math.inf, 3.4e38, -1.0, 0.0),

@@ -17,10 +17,10 @@ from mavsdk.plugins.telemetry.telemetry import Telemetry
 
 from app.core.clock import ScaledClock
 from tests.ports import free_port
-from tests.simdrone.ground import eventually, served
+from tests.simdrone.ground import served
+from tests.waiting import eventually
 
 SPEED = 5.0
-FOUND_WITHIN_S = 15.0
 
 
 @dataclass
@@ -46,10 +46,10 @@ def station(autopilot: str) -> Iterator[Station]:
     try:
         mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
         with served(autopilot, f"udp:127.0.0.1:{port}", clock=ScaledClock(SPEED)):
-            eventually(lambda: any(system.has_autopilot() for system in mavsdk.get_systems()), FOUND_WITHIN_S)
+            eventually(lambda: any(system.has_autopilot() for system in mavsdk.get_systems()))
             system = next(system for system in mavsdk.get_systems() if system.has_autopilot())
             info = Info(system)
-            eventually(lambda: knows(info), FOUND_WITHIN_S)
+            eventually(lambda: knows(info))
             telemetry = Telemetry(system)
             telemetry.set_rate_position(4.0)  # an ArduPilot tells nothing unasked
             yield Station(Param(system), Action(system), telemetry)

@@ -194,7 +194,7 @@ busy.join()
 @pytest.mark.complete
 def test_jsbsim_in_threads_that_end_neither_kills_the_process_nor_writes_to_the_terminal() -> None:
     """A separate process: JSBSim 1.3.3 ends it when a thread with a Python logger goes, and prints by default."""
-    done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 

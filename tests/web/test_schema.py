@@ -29,6 +29,7 @@ from app.main import create_app
 from tests.builders import create_flown_trial, create_imported_trial, create_ready_campaign, create_trial, run_jobs
 from tests.fleet.vehicles import create_campaign_on, create_connected
 from tests.unlocking import HERE
+from tests.waiting import Waits
 
 pytestmark = pytest.mark.complete
 
@@ -46,7 +47,6 @@ FEW = {
     "/api/log-analyses/campaign": 6,
 }
 """Examples of what takes a second, a process or a browser for each."""
-ANSWERED_WITHIN_S = 120.0
 NAMED = {"Host": "127.0.0.1"}
 ENDLESS = "/api/events"
 OPERATIONS = [(method, path) for path, operations in PATHS.items() if path != ENDLESS for method in operations]
@@ -134,7 +134,7 @@ def test_every_answer_is_as_described(schema: BaseSchema, method: str, path: str
                 response_schema_conformance,
             ],
             headers=NAMED,
-            timeout=ANSWERED_WITHIN_S,
+            timeout=Waits.at_most_s,
         )
         if answer.status_code >= 400:
             problem = answer.json()

@@ -22,6 +22,7 @@ from app.db.session import Database
 from app.main import create_app
 from app.web import addresses
 from tests.builders import Json, create_campaign, get, problems_of
+from tests.waiting import Waits
 
 TABLET = "http://192.0.2.7:8000"
 
@@ -140,11 +141,11 @@ def test_a_backup_during_writes_has_the_committed_rows_and_blocks_no_writer(
         with database.write() as session:
             session.connection().exec_driver_sql("UPDATE campaign SET name = 'Half way'")
             begun.set()
-            assert go_on.wait(20)
+            assert go_on.wait(Waits.at_most_s)
 
     writer = threading.Thread(target=write)
     writer.start()
-    assert begun.wait(20)
+    assert begun.wait(Waits.at_most_s)
     with closing(backup(client, tmp_path / "copy.sqlite3")) as copy:
         assert names(copy) == ["Committed"]
     go_on.set()

@@ -1,8 +1,6 @@
 """The other end of a link: a socket of the operating system and a vehicle's MAVLink identity."""
 
 import socket
-import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
@@ -10,9 +8,9 @@ from app.vehicles.mavlink.addresses import UdpAddress, UdpInAddress
 from app.vehicles.mavlink.dialects import Dialect, FieldValue, Message
 from app.vehicles.mavlink.link import Link, Received
 from tests.ports import free_port
+from tests.waiting import Waits, wait_for
 
 LOOPBACK: Final = "127.0.0.1"
-SOON_S: Final = 5.0
 """Far longer than anything on the loopback interface takes."""
 
 
@@ -70,9 +68,9 @@ class FakeVehicleEndpoint:
     def beat(self) -> None:
         self.send(heartbeat(self))
 
-    def hear(self, timeout_s: float = SOON_S) -> list[Message]:
+    def hear(self, timeout_s: float | None = None) -> list[Message]:
         """The messages of the next datagram, none after the time-out."""
-        self.socket.settimeout(timeout_s)
+        self.socket.settimeout(Waits.at_most_s if timeout_s is None else timeout_s)
         try:
             frame = self.socket.recv(4096)
         except TimeoutError:
@@ -94,19 +92,7 @@ def position(time_boot_ms: int, z: float = 0.0) -> dict[str, FieldValue]:
 
 
 def collect(link: Link, count: int) -> list[Received]:
-    """The next `count` messages of the link, or as many as come soon."""
+    """The next `count` messages of the link, or more."""
     found: list[Received] = []
-    until_s = time.monotonic() + SOON_S
-    while len(found) < count and time.monotonic() < until_s:
-        found += link.receive(0.1)
+    wait_for(f"{count} messages", lambda: len(found) >= count, lambda: found.extend(link.receive(0.1)))
     return found
-
-
-def becomes(condition: Callable[[], bool]) -> bool:
-    """Whether it comes true soon."""
-    until_s = time.monotonic() + SOON_S
-    while time.monotonic() < until_s:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return False

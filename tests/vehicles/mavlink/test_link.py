@@ -39,13 +39,12 @@ from tests.clocks import ManualClock
 from tests.vehicles.mavlink.replaying import FLOWN, recorded
 from tests.vehicles.mavlink.speaking import (
     LOOPBACK,
-    SOON_S,
     FakeVehicleEndpoint,
-    becomes,
     collect,
     heartbeat,
     position,
 )
+from tests.waiting import Waits, eventually
 
 GAIN: dict[str, FieldValue] = {
     "target_system": 31,
@@ -157,7 +156,7 @@ def link_beside(
 
 
 def wait_until_dropped(link: Link, datagrams: int) -> None:
-    assert becomes(lambda: link.health.foreign == datagrams)
+    eventually(lambda: link.health.foreign == datagrams)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2"])
@@ -234,7 +233,7 @@ def test_a_vehicle_that_returns_from_another_port_is_received_and_commanded_agai
         clock.time_s += GONE_AFTER_S + 0.1
         again.ground = paparazzi.ground
         again.send(heartbeat(again, autopilot=9))
-        assert becomes(lambda: link.health.foreign == 1)
+        eventually(lambda: link.health.foreign == 1)
         again.say("LOCAL_POSITION_NED", **position(60))
         assert [number(each.message, "time_boot_ms") for each in collect(link, 1)] == [60]
         link.send("PARAM_SET", **GAIN)
@@ -284,14 +283,14 @@ def test_strangers_at_our_own_address_do_not_keep_the_vehicle_out() -> None:
         stranger.beat()
         stranger.send(b"\xfd\xff")  # the beginning of a frame that would swallow what follows
         link.send("COMMAND_LONG", **command(400))  # to nobody yet
-        assert becomes(lambda: link.health.foreign == 2)
+        eventually(lambda: link.health.foreign == 2)
         vehicle.beat()
         assert [each.message.get_srcSystem() for each in collect(link, 1)] == [1]
         link.send("COMMAND_LONG", **command(21))
         commands = [message for message in vehicle.hear() + vehicle.hear() if message.get_type() == "COMMAND_LONG"]
         assert [number(message, "command") for message in commands] == [21]
         stranger.beat()
-        assert becomes(lambda: link.health.foreign == 3)
+        eventually(lambda: link.health.foreign == 3)
         assert link.health.unsent >= 1
 
 
@@ -375,7 +374,7 @@ def test_a_slow_reader_loses_the_oldest_packets_and_is_notified(
     monkeypatch.setattr("app.vehicles.mavlink.link.MAX_QUEUED_MESSAGES", 5)
     for step in range(8):
         paparazzi.say("LOCAL_POSITION_NED", **position(step))
-    assert becomes(lambda: link.health.received == 8)
+    eventually(lambda: link.health.received == 8)
     assert [number(each.message, "time_boot_ms") for each in link.receive(1.0)] == [3, 4, 5, 6, 7]
     assert link.health.overrun == 3
 
@@ -478,7 +477,7 @@ class Tapped:
         for _ in range(2):  # it looks at the clock after the first, and before it takes in the second
             before = self.link.health.received
             self.vehicle.say("LOCAL_POSITION_NED", **position(0))
-            assert becomes(lambda: self.link.health.received == before + 1)  # noqa: B023 - called at once
+            eventually(lambda: self.link.health.received == before + 1)  # noqa: B023 - called at once
         while heard := self.vehicle.hear(0.01):
             self.beats += [message for message in heard if message.get_type() == "HEARTBEAT"]
         return len(self.beats)
@@ -539,7 +538,7 @@ def test_a_closed_link_returns_what_it_received_and_then_reports_that_it_is_clos
 ) -> None:
     link = Link(paparazzi.address, PAPARAZZI, clock=CLOCK, target_system=31)
     paparazzi.say("LOCAL_POSITION_NED", **position(20))
-    assert becomes(lambda: link.health.received == 1)
+    eventually(lambda: link.health.received == 1)
     link.close()
     assert len(link.receive(1.0)) == 1
     for call in (lambda: link.receive(1.0), lambda: link.send("PARAM_SET", **GAIN)):
@@ -577,7 +576,7 @@ def test_a_link_whose_thread_fails_reports_it_to_all_users(
         clock.is_broken = True
         paparazzi.say("LOCAL_POSITION_NED", **position(20))
         with pytest.raises(LinkError, match=r"failed: the clock is broken\."):
-            link.receive(SOON_S)
+            link.receive(Waits.at_most_s)
         with pytest.raises(LinkError, match="failed: the clock is broken"):
             link.send("PARAM_SET", **GAIN)
     assert reported == ["the clock is broken"]
@@ -592,7 +591,7 @@ def test_a_link_over_tcp_outlives_the_connection() -> None:
         FakeVehicleEndpoint(COMMON, system=1) as vehicle,
         Link(TcpAddress(LOOPBACK, server.getsockname()[1]), COMMON, clock=CLOCK) as link,
     ):
-        server.settimeout(SOON_S)
+        server.settimeout(Waits.at_most_s)
         for _ in range(2):
             connection, _ = server.accept()
             with connection:

@@ -12,7 +12,8 @@ from app.core.clock import ScaledClock
 from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, PAPARAZZI, Dialect, FieldValue, Message, number, text
 from app.vehicles.mavlink.link import Link, LinkError
 from app.vehicles.mavlink.tlog import TlogWriter, record
-from tests.vehicles.mavlink.speaking import FakeVehicleEndpoint, becomes, collect, heartbeat, position
+from tests.vehicles.mavlink.speaking import FakeVehicleEndpoint, collect, heartbeat, position
+from tests.waiting import eventually
 
 GAIN: dict[str, FieldValue] = {
     "target_system": 31,
@@ -49,7 +50,7 @@ def test_both_directions_are_read_back_in_order_with_their_times(
                 vehicle.say("LOCAL_POSITION_NED", **position(20 * step, z=-0.5))
             assert len(collect(link, 200)) == 200
             link.send("PARAM_SET", **GAIN)
-            assert becomes(lambda: any(message.get_type() == "PARAM_SET" for message in vehicle.hear()))
+            eventually(lambda: any(message.get_type() == "PARAM_SET" for message in vehicle.hear()))
             vehicle.send(heartbeat(vehicle))
             assert len(collect(link, 1)) == 1
         assert link.log_problem is None
@@ -112,7 +113,7 @@ def test_a_log_is_continued_not_overwritten(tmp_path: Path) -> None:
 def test_a_frame_is_in_the_file_soon_though_the_log_is_open(tmp_path: Path) -> None:
     log = TlogWriter(tmp_path / "flight.tlog")
     log.write(8, b"frame")
-    assert becomes(lambda: (tmp_path / "flight.tlog").read_bytes() == record(8, b"frame"))
+    eventually(lambda: (tmp_path / "flight.tlog").read_bytes() == record(8, b"frame"))
     log.close()
 
 
@@ -147,12 +148,12 @@ def test_what_a_full_disk_did_not_take_is_stored_when_there_is_room(
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
         for step in range(100):
             log.write(8 * step, b"a frame")
-        assert becomes(lambda: log.problem == f"{path} is not complete: File too large")
+        eventually(lambda: log.problem == f"{path} is not complete: File too large")
         assert path.stat().st_size == 1000
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     log.write(800, b"a frame")
-    assert becomes(lambda: log.problem is None)
+    eventually(lambda: log.problem is None)
     log.close()
     assert path.read_bytes() == b"".join(record(8 * step, b"a frame") for step in range(101))
 
@@ -165,7 +166,7 @@ def test_a_full_disk_is_reported_and_does_not_end_the_link(monkeypatch: pytest.M
         for step in range(3):
             vehicle.say("LOCAL_POSITION_NED", **position(step))
             assert len(collect(link, 1)) == 1
-        assert becomes(lambda: link.log_problem == "/dev/full is not complete: No space left on device")
+        eventually(lambda: link.log_problem == "/dev/full is not complete: No space left on device")
 
 
 def test_a_log_that_cannot_be_opened_is_refused(tmp_path: Path) -> None:

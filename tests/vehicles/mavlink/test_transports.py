@@ -4,7 +4,6 @@ import os
 import pty
 import socket
 import threading
-import time
 import tty
 from collections.abc import Iterator
 from contextlib import closing
@@ -15,23 +14,26 @@ import pytest
 from app.vehicles.mavlink.addresses import SerialAddress, TcpAddress, UdpAddress, UdpInAddress
 from app.vehicles.mavlink.transports import BACKLOG, LinkError, Transport, open_transport
 from tests.ports import free_port
-from tests.vehicles.mavlink.speaking import LOOPBACK, SOON_S, becomes
+from tests.vehicles.mavlink.speaking import LOOPBACK
+from tests.waiting import Waits, eventually, wait_for
 
 
 def hear(transport: Transport, size: int) -> bytes:
-    """The next `size` bytes or more, or what comes soon."""
-    data = b""
-    until_s = time.monotonic() + SOON_S
-    while len(data) < size and time.monotonic() < until_s:
-        data += b"".join(piece for piece, _ in transport.read(0.1))
-    return data
+    """The next `size` bytes or more."""
+    data = bytearray()
+    wait_for(
+        f"{size} bytes",
+        lambda: len(data) >= size,
+        lambda: data.extend(b"".join(piece for piece, _ in transport.read(0.1))),
+    )
+    return bytes(data)
 
 
 @pytest.fixture
 def vehicle() -> Iterator[socket.socket]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.bind((LOOPBACK, 0))
-        vehicle.settimeout(SOON_S)
+        vehicle.settimeout(Waits.at_most_s)
         yield vehicle
 
 
@@ -46,7 +48,7 @@ def test_a_datagram_comes_with_its_sender_and_what_is_written_goes_to_the_vehicl
     ):
         stranger.sendto(b"stranger", (LOOPBACK, local))
         vehicle.sendto(b"vehicle", (LOOPBACK, local))
-        senders = [peer for _, peer in transport.read(SOON_S) + transport.read(0.1)]
+        senders = [peer for _, peer in transport.read(Waits.at_most_s) + transport.read(0.1)]
         assert senders == [(LOOPBACK, stranger.getsockname()[1]), vehicle.getsockname()]
         assert transport.write(b"command")
         assert vehicle.recvfrom(100) == (b"command", (LOOPBACK, local))
@@ -110,10 +112,10 @@ def test_a_burst_is_read_to_its_last_datagram(vehicle: socket.socket) -> None:
 
 def test_a_reader_that_waits_is_woken_by_another_thread() -> None:
     with closing(open_transport(UdpInAddress(LOOPBACK, free_port()))) as transport:
-        reader = threading.Thread(target=transport.read, args=(3600.0,))
+        reader = threading.Thread(target=transport.read, args=(2 * Waits.at_most_s,))
         reader.start()
         transport.wake()
-        reader.join(SOON_S)
+        reader.join(Waits.at_most_s)
         assert not reader.is_alive()
 
 
@@ -128,8 +130,8 @@ def test_a_broken_connection_is_silence_until_it_is_open_again() -> None:
             first.sendall(b"first")
             assert hear(transport, 5) == b"first"
             first.close()
-            assert becomes(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
-            server.settimeout(SOON_S)
+            eventually(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
+            server.settimeout(Waits.at_most_s)
             reader = threading.Thread(target=lambda: setattr(reader, "heard", hear(transport, 6)))
             reader.start()
             second, _ = server.accept()
@@ -138,7 +140,7 @@ def test_a_broken_connection_is_silence_until_it_is_open_again() -> None:
                 reader.join()
                 assert vars(reader)["heard"] == b"second"
                 assert transport.write(b"command")
-                second.settimeout(SOON_S)
+                second.settimeout(Waits.at_most_s)
                 assert second.recv(100) == b"command"
 
 
@@ -160,7 +162,7 @@ def test_writing_never_waits_for_a_peer_that_does_not_read() -> None:
                 taken += block
             assert len(taken) > BACKLOG
             arrived = bytearray()
-            peer.settimeout(SOON_S)
+            peer.settimeout(Waits.at_most_s)
             while len(arrived) < len(taken):
                 transport.read(0.0)
                 arrived += peer.recv(1 << 20)
@@ -205,9 +207,9 @@ def test_a_radio_that_is_pulled_out_and_put_back_is_heard_again(tmp_path: Path) 
         os.write(vehicle, b"before")
         assert hear(transport, 6) == b"before"
         os.close(vehicle)
-        assert becomes(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
+        eventually(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
         vehicle, _ = plugged(device)
-        assert becomes(lambda: transport.read(0.05) == [] and transport.write(b"after"))
+        eventually(lambda: transport.read(0.05) == [] and transport.write(b"after"))
         assert os.read(vehicle, 100) == b"after"
     os.close(vehicle)
 
@@ -223,7 +225,7 @@ def test_a_radio_that_stays_away_is_tried_again_and_again(tmp_path: Path, monkey
         for _ in range(5):
             assert transport.read(0.05) == []
         vehicle, _ = plugged(device)
-        assert becomes(lambda: transport.read(0.05) == [] and transport.write(b"after"))
+        eventually(lambda: transport.read(0.05) == [] and transport.write(b"after"))
         assert os.read(vehicle, 100) == b"after"
     os.close(vehicle)
 
@@ -232,7 +234,7 @@ def test_a_radio_that_was_pulled_out_can_be_closed(tmp_path: Path) -> None:
     vehicle, device = plugged(tmp_path / "ttyRadio")
     transport = open_transport(SerialAddress(str(device), 57600))
     os.close(vehicle)
-    assert becomes(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
+    eventually(lambda: transport.read(0.01) == [] and not transport.write(b"lost"))
     transport.close()
 
 

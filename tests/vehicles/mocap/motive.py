@@ -2,13 +2,13 @@
 
 import threading
 import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
 from app.simdrone.motion_capture import MocapOutput, MotionCapture, open_outlet
 from app.vehicles.mavlink.altitude_sources import AltitudeSource, SourceSample
 from app.vehicles.mocap.addresses import SourceAddress
+from tests.waiting import eventually
 
 LOOPBACK: Final = "127.0.0.1"
 
@@ -41,20 +41,14 @@ class FakeMotive:
             self._outlet.send(self.cameras.advance(time.monotonic() - begun_s, self.altitude_m))
 
 
-def comes_true(condition: Callable[[], bool], within_s: float = 10.0) -> bool:
-    until_s = time.monotonic() + within_s
-    while not (held := condition()) and time.monotonic() < until_s:
-        time.sleep(0.01)
-    return held
-
-
-def news(source: AltitudeSource, count: int = 10, within_s: float = 10.0) -> list[SourceSample]:
+def news(source: AltitudeSource, count: int = 10) -> list[SourceSample]:
     """What comes from now on, at least so many samples."""
     source.take()
     heard: list[SourceSample] = []
-    until_s = time.monotonic() + within_s
-    while len(heard) < count:
-        assert time.monotonic() < until_s, f"only {len(heard)} samples came"
-        time.sleep(0.01)
-        heard += source.take()
+
+    def enough() -> bool:
+        heard.extend(source.take())
+        return len(heard) >= count
+
+    eventually(enough)
     return heard

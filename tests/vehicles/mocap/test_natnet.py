@@ -16,7 +16,8 @@ from app.vehicles.mocap import natnet
 from app.vehicles.mocap.addresses import NatNetAddress
 from app.vehicles.mocap.natnet import NatNetSource
 from tests.ports import free_port
-from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, comes_true, news
+from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, news
+from tests.waiting import eventually
 
 CLOCK = ScaledClock()
 
@@ -43,7 +44,7 @@ def motive(unicast: NatNetAddress) -> Iterator[FakeMotive]:
 def test_the_body_s_altitude_is_heard_and_dated(address: NatNetAddress) -> None:
     with FakeMotive(address) as motive, closing(NatNetSource(address, CLOCK)) as source:
         motive.altitude_m = 1.5
-        assert comes_true(lambda: any(sample.altitude_m > 1.4 for sample in source.take()))
+        eventually(lambda: any(sample.altitude_m > 1.4 for sample in source.take()))
         begun_s = CLOCK.now_s()
         heard = news(source, 50)
         assert [sample.altitude_m for sample in heard] == pytest.approx([1.5] * len(heard), abs=0.01)
@@ -58,7 +59,7 @@ def test_the_axis_that_is_up_is_as_motive_streams_it(unicast: NatNetAddress) -> 
     z_up = replace(unicast, up="z")
     with FakeMotive(z_up) as motive, closing(NatNetSource(z_up, CLOCK)) as right:
         motive.altitude_m = 2.0
-        assert comes_true(lambda: any(sample.altitude_m > 1.9 for sample in right.take()))
+        eventually(lambda: any(sample.altitude_m > 1.9 for sample in right.take()))
         with closing(NatNetSource(unicast, CLOCK)) as wrong:
             assert max(abs(sample.altitude_m) for sample in news(wrong)) < 0.1
 
@@ -66,17 +67,17 @@ def test_the_axis_that_is_up_is_as_motive_streams_it(unicast: NatNetAddress) -> 
 def test_lost_tracking_is_told(unicast: NatNetAddress, motive: FakeMotive) -> None:
     with closing(NatNetSource(unicast, CLOCK)) as source:
         motive.cameras.blind = True
-        assert comes_true(lambda: "do not see rigid body 3" in source.trouble)
+        eventually(lambda: "do not see rigid body 3" in source.trouble)
         assert not any(sample.tracking_valid or sample.advances for sample in news(source))
         motive.cameras.blind = False
-        assert comes_true(lambda: source.trouble == "")
+        eventually(lambda: source.trouble == "")
         assert all(sample.tracking_valid for sample in news(source))
 
 
 def test_frames_that_are_sent_again_do_not_advance(unicast: NatNetAddress, motive: FakeMotive) -> None:
     with closing(NatNetSource(unicast, CLOCK)) as source:
         motive.cameras.stuck = True
-        assert comes_true(lambda: any(not sample.advances for sample in source.take()))
+        eventually(lambda: any(not sample.advances for sample in source.take()))
         assert not any(sample.advances for sample in news(source))
 
 
@@ -115,9 +116,9 @@ def test_a_system_that_was_switched_off_is_troubled_and_heard_again_when_it_is_b
     with FakeMotive(unicast, clock_s=900.0):
         source = NatNetSource(unicast, CLOCK)
     with closing(source):
-        assert comes_true(lambda: "Nothing was received for rigid body 3" in source.trouble)
+        eventually(lambda: "Nothing was received for rigid body 3" in source.trouble)
         with FakeMotive(unicast):
-            assert comes_true(lambda: source.trouble == "")
+            eventually(lambda: source.trouble == "")
             assert all(sample.advances for sample in news(source))
     assert "has stopped" in source.trouble
 

@@ -18,7 +18,8 @@ from app.vehicles.mocap.addresses import StreamAddress
 from app.vehicles.mocap.odometry import OdometrySource, StreamSource
 from app.vehicles.mocap.opening import open_source
 from tests.ports import free_port
-from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, comes_true, news
+from tests.vehicles.mocap.motive import LOOPBACK, FakeMotive, news
+from tests.waiting import eventually
 
 CLOCK = ScaledClock()
 FROM_ZERO = dict.fromkeys(("x", "y", "roll", "pitch", "yaw"), 0.0)
@@ -83,7 +84,7 @@ def test_the_first_kind_heard_is_the_one_taken_and_other_messages_are_passed_ove
 
 def test_a_link_without_odometry_is_troubled(monkeypatch: pytest.MonkeyPatch, own: OdometrySource) -> None:
     monkeypatch.setattr(odometry, "SILENT_S", 0.05)
-    assert comes_true(lambda: own.trouble.startswith("No odometry on the vehicle's own link was received for"))
+    eventually(lambda: own.trouble.startswith("No odometry on the vehicle's own link was received for"))
 
 
 def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
@@ -91,12 +92,12 @@ def test_another_stream_is_heard_in_a_thread_of_its_own() -> None:
     with FakeMotive(StreamAddress(UdpAddress(LOOPBACK, port))) as motive:
         motive.altitude_m = 1.2
         with closing(open_source(f"mavlink:udpin:{LOOPBACK}:{port}", CLOCK)) as source:
-            assert comes_true(lambda: any(sample.altitude_m > 1.1 for sample in source.take()))
+            eventually(lambda: any(sample.altitude_m > 1.1 for sample in source.take()))
             heard = news(source, 50)
             assert source.trouble == ""
             motive.cameras.blind = True
             failed = f"The odometry at mavlink:udpin:{LOOPBACK}:{port} has failed."
-            assert comes_true(lambda: source.trouble == failed)
+            eventually(lambda: source.trouble == failed)
     assert heard[-1].altitude_m == pytest.approx(1.2, abs=0.01)
     assert all(sample.advances for sample in heard)
     assert "has stopped" in source.trouble
@@ -111,7 +112,7 @@ def test_a_stranger_on_the_port_is_not_taken_for_the_motion_capture() -> None:
             with closing(StreamSource(StreamAddress(UdpInAddress(LOOPBACK, port)), CLOCK)) as source:
                 stranger.sendto(b"\xff" * 40, (LOOPBACK, port))
                 source.take()
-                assert comes_true(lambda: any(sample.advances for sample in source.take()))
+                eventually(lambda: any(sample.advances for sample in source.take()))
 
 
 def test_a_port_where_nothing_is_heard_or_that_is_taken_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

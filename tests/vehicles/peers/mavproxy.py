@@ -9,10 +9,9 @@ import threading
 import time
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import Self
 
-HEARD_WITHIN_S: Final = 30.0
-_STOPPED_WITHIN_S: Final = 10.0
+from tests.waiting import Waits
 
 
 class MavProxy:
@@ -51,12 +50,8 @@ class MavProxy:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(_STOPPED_WITHIN_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        self._process.kill()
+        self._process.wait()
         self._reader.join()
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
@@ -69,13 +64,13 @@ class MavProxy:
             self._process.stdin.write(line + "\n")
             self._process.stdin.flush()
 
-    def hears(self, pattern: str, within_s: float = HEARD_WITHIN_S) -> re.Match[str]:
+    def hears(self, pattern: str) -> re.Match[str]:
         """The next of what it says that matches, whatever comes between. Raises AssertionError with all it said."""
-        until_s = time.monotonic() + within_s
+        until_s = time.monotonic() + Waits.at_most_s
         with self._news:
             while (found := re.compile(pattern).search(self._said, self._looked_at)) is None:
                 left_s = until_s - time.monotonic()
-                assert left_s > 0.0, f"no {pattern!r} within {within_s:g} s, but:\n{self._said}"
+                assert left_s > 0.0, f"no {pattern!r} within {Waits.at_most_s:g} s, but:\n{self._said}"
                 self._news.wait(left_s)
             self._looked_at = found.end()
         return found

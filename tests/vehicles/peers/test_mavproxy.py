@@ -9,14 +9,14 @@ import pytest
 from app.core.clock import ScaledClock
 from app.simdrone.drone import Drone
 from tests.ports import free_port
-from tests.simdrone.ground import eventually, served
+from tests.simdrone.ground import served
 from tests.simdrone.paparazzi import CLIMB, HOLDING_POINT, LAND_HERE, START_ENGINE, SYSTEM, TAKEOFF
 from tests.vehicles.peers.mavproxy import MavProxy
+from tests.waiting import eventually
 
 pytestmark = pytest.mark.real_time
 
 SPEED = 5.0
-PATIENCE_S = 60.0
 
 
 @contextmanager
@@ -37,14 +37,14 @@ def test_mavproxy_tunes_and_flies_a_simulated_ardupilot(tmp_path: Path) -> None:
     with typing_to("ardupilot", tmp_path, dialect="ardupilotmega", mavlink=2, modules=modules) as (mavproxy, drone):
         mavproxy.hears(r"Received \d+ parameters")
         mavproxy.type("param set PSC_VELZ_P 4.5")
-        eventually(lambda: fetched(mavproxy, "PSC_VELZ_P") == 4.5, PATIENCE_S)
+        eventually(lambda: fetched(mavproxy, "PSC_VELZ_P") == 4.5)
         mavproxy.type("mode GUIDED")
         mavproxy.hears("Mode GUIDED")
         mavproxy.type("arm throttle")
         mavproxy.hears(r"\bARMED")
         mavproxy.type("takeoff 3")
         mavproxy.hears("NAV_TAKEOFF: ACCEPTED")
-        eventually(lambda: drone.body.altitude_m == pytest.approx(3.0, abs=0.1), PATIENCE_S)
+        eventually(lambda: drone.body.altitude_m == pytest.approx(3.0, abs=0.1))
         mavproxy.type("mode LAND")
         mavproxy.hears("DISARMED")
         assert drone.body.stands
@@ -75,15 +75,15 @@ def test_mavproxy_tunes_and_flies_a_simulated_paparazzi(tmp_path: Path) -> None:
         for name, value in ((b"gui_v_kp", 1624.7), (b"gui_v_ki", 1356), (b"gui_v_kd", 195)):
             mavproxy.type(message("PARAM_SET", name, value, 9))
         mavproxy.type(message("PARAM_REQUEST_READ", b"gui_v_kp", -1))
-        eventually(lambda: read_back(mavproxy, "gui_v_kp") == 1624.0, PATIENCE_S)
+        eventually(lambda: read_back(mavproxy, "gui_v_kp") == 1624.0)
         mavproxy.type(message("MISSION_ITEM", CLIMB, 4, 16, 0, 0, 0, 0, 0, 0, 0, 0, 3.0))
         mavproxy.hears(r"MISSION_ACK \{[^}]*type : 0")
         mavproxy.type(*block(HOLDING_POINT), *block(START_ENGINE))
         mavproxy.hears(r"\bARMED")
         mavproxy.type(*block(TAKEOFF))
-        eventually(lambda: drone.body.altitude_m > 2.8, PATIENCE_S)
+        eventually(lambda: drone.body.altitude_m > 2.8)
         mavproxy.type(*block(LAND_HERE))
-        eventually(lambda: drone.body.stands, PATIENCE_S)
+        eventually(lambda: drone.body.stands)
         mavproxy.type(message("PARAM_SET", b"kil_thr", 1, 9))
         mavproxy.hears("DISARMED")
 
