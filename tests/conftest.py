@@ -58,6 +58,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.get_closest_marker("real_time") is None)
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A test that waits for the clock on the wall says why. Not refused when it is collected: where several processes
+    collect, no test would be run and no reason shown."""
+    if any(not mark.args for mark in item.iter_markers("real_time")):
+        pytest.fail('It must say why it waits: @pytest.mark.real_time("…")', pytrace=False)
+
+
 @pytest.fixture(scope="session")
 def migrated_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An empty database at the newest revision, built by the migrations; for copying only."""

@@ -88,7 +88,7 @@ def data_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "data"
 
 
-@pytest.mark.real_time
+@pytest.mark.real_time("a drone flies in a process of its own, over real UDP")
 @pytest.mark.complete
 def test_a_set_is_flown_by_hand_between_processes_in_real_time(tmp_path: Path) -> None:
     out = tmp_path / "campaign.json"

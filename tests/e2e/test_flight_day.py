@@ -29,7 +29,7 @@ from tests.e2e.states import States
 from tests.e2e.test_pages import ROOT
 from tests.runtime.drones import Drone
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("a drone flies in a process of its own, over real UDP")
 
 PICTURES: Final = ROOT / "docs" / "images" / "day"
 ARE_TAKEN: Final = bool(os.environ.get("GAINLINE_README_IMAGE"))
@@ -142,7 +142,8 @@ def land(dashboard: Dashboard, trial: Json) -> None:
 
 @contextmanager
 def slow_answers(page: Page) -> Iterator[None]:
-    """What is read of a campaign comes late, its list of flights last."""
+    """What is read of a campaign comes late, its list of flights last: so late that what is shown meanwhile is
+    seen."""
 
     def late(route: Route) -> None:
         time.sleep(0.3)

@@ -208,6 +208,7 @@ def test_a_process_that_is_killed_ends_its_flight_with_an_error(tmp_path: Path) 
 
 
 def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_path: Path) -> None:
+    """That nothing comes is seen by waiting: for a second, in which a flight with a free vehicle is over."""
     flight_process = start(tmp_path)
     heard: list[FlightMessage] = []
     with exclusive(vehicle_lock(tmp_path, "twin")):

@@ -7,7 +7,7 @@ import pytest
 from tests.runtime.processes import Serving, stream
 from tests.waiting import Waits
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("flights keep pace with the clock while they are watched")
 
 WATCHERS = 5
 

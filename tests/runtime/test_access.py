@@ -15,7 +15,7 @@ from app.accounts.permissions import Key
 from tests.runtime.processes import Serving, environment
 from tests.waiting import Waits
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("a real server is asked over real connections")
 
 REAL = {
     "name": "Bee",

@@ -7,7 +7,7 @@ import pytest
 from tests.runtime.processes import Serving, stream
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("a server and its worker fly in processes of their own")
 
 
 def changes(url: str, last_event_id: str, until: str) -> list[tuple[str, str | None, Any]]:

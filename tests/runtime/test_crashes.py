@@ -13,7 +13,7 @@ import pytest
 from tests.runtime.processes import Serving, in_the_air, is_alive
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("processes are killed, noticed and replaced")
 
 
 def started_by(pid: int) -> dict[int, bytes]:
@@ -196,6 +196,7 @@ def test_a_proposal_whose_worker_is_killed_is_computed_again_and_is_the_same(ser
 
 @pytest.mark.complete
 def test_a_worker_killed_at_random_moments_never_leaves_a_false_state(serving: Serving) -> None:
+    """From 0 to 0.18 s after the flight was asked for: whatever is under way then, which nothing tells."""
     campaign_id = serving.campaign(max_flights=200)
     for number in range(4):
         wait_for("the vehicle", lambda: serving.get(f"/campaigns/{campaign_id}")["vehicle"]["state"] == "ready")

@@ -13,7 +13,7 @@ from app.web.addresses import addresses_elsewhere, exposure, web_address
 from tests.runtime.processes import Serving, environment, stream
 from tests.waiting import Waits
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("servers and workers start and stop")
 
 
 def gainline(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:

@@ -10,7 +10,7 @@ from tests.runtime.processes import Serving, is_alive
 from tests.runtime.test_crashes import children
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("a worker and its processes compute, are killed and replaced")
 
 LONG = "variability"
 

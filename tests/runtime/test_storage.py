@@ -13,7 +13,7 @@ import pytest
 from tests.runtime.processes import Serving, in_the_air, stream
 from tests.waiting import wait_for
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("a server and its worker try again after times of their own")
 
 SIZE_MB = 32
 LESS_THAN_A_RECORD_MB = 3

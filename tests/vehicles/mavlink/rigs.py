@@ -44,8 +44,10 @@ SAFE: Final[Mapping[str, Mapping[str, float]]] = {
     "px4": {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_Z_VEL_I_ACC": 2.0, "MPC_Z_VEL_D_ACC": 0.0},
 }
 _TICKS_AT_ONCE: Final = 8
-_PATIENCE_S: Final = 0.5
-"""On the wall: for a thread that has nothing to hear, or a machine that is very busy."""
+_STANDS_AT_MOST_S: Final = 0.5
+"""On the wall: how long the drone's time stands for threads of the ground side that have not looked at the clock since
+its last messages. Then it goes on without them, for one that has nothing to hear does not look. Its own time cannot
+bound this, for it stands meanwhile; no test fails by it."""
 _SPEED: Final = 8.0
 _BYTEWISE: Final = 6
 _FAILSAFES: Final[Mapping[str, Sequence[tuple[str, int, int]]]] = {
@@ -268,7 +270,7 @@ class UdpRig(_Heard):
             self.problem = error
 
     def _wait_for_lookers(self) -> None:
-        until_s = time.monotonic() + _PATIENCE_S
+        until_s = time.monotonic() + _STANDS_AT_MOST_S
         while time.monotonic() < until_s and not all(
             looked or not thread.is_alive() for thread, looked in tuple(self._lookers.items())
         ):

@@ -17,7 +17,7 @@ from tests.vehicles.flying import never, unwatched
 from tests.vehicles.peers.mavsdk_vehicle import FLOATS, INTEGERS, MAKE, MavsdkVehicle
 from tests.vehicles.peers.mavsdk_vehicle import GAINS as SAFE
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time("MAVSDK's vehicle knows no other clock")
 
 TUNED = {"MPC_Z_P": 1.25, "MPC_Z_VEL_P_ACC": 6.1, "MPC_Z_VEL_D_ACC": 0.05, "MPC_Z_VEL_I_ACC": 1.7}
 RECORD_S = 6.0
