@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from multiprocessing import Pipe, get_context
@@ -29,6 +28,7 @@ from app.vehicles.mavlink.profiles import PROFILES
 from tests.ports import free_port
 from tests.vehicles.mavlink.rigs import LockstepRig
 from tests.vehicles.mavlink.speaking import LOOPBACK
+from tests.waiting import wait_for
 
 GAINLINE = Path(sys.executable).parent / "gainline"
 SPEED: Final = 2
@@ -69,9 +69,9 @@ def drone(autopilot: str, *options: str) -> Iterator[str]:
 def held_by(address: str, profile: str, names: Mapping[str, float]) -> dict[str, float]:
     """What the vehicle says it holds, asked as any ground station asks."""
     found: dict[str, float] = {}
-    until_s = time.monotonic() + 20.0
     with Link(parse(address), PROFILES[profile].dialect, clock=ScaledClock(1.0)) as link:
-        while len(found) < len(names) and time.monotonic() < until_s:
+
+        def ask() -> None:
             for name in names.keys() - found.keys():
                 whom = {"target_system": 1, "target_component": 1}
                 link.send("PARAM_REQUEST_READ", **whom, param_id=name, param_index=-1)
@@ -79,6 +79,8 @@ def held_by(address: str, profile: str, names: Mapping[str, float]) -> dict[str,
                 message = received.message
                 if message.get_type() == "PARAM_VALUE" and text(message, "param_id") in names:
                     found[text(message, "param_id")] = number(message, "param_value")
+
+        wait_for("all that it holds", lambda: len(found) == len(names), ask)
     return found
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from app.db.outbox import DatabaseWatch
 from app.live.hub import WAITING_CHANGES, WAITING_TELEMETRY, Change, Hub, LinkState, Live, LiveState
 from app.live.messages import FlightPhase, Telemetry, VehicleStatus
+from tests.waiting import Waits
 
 
 def change(number: int) -> Change:
@@ -131,7 +132,7 @@ def test_a_stream_too_far_behind_is_ended_so_that_it_resumes_from_the_database()
 def test_a_closed_hub_ends_open_and_new_streams() -> None:
     async def scenario() -> None:
         hub = Hub()
-        async with asyncio.timeout(1):
+        async with asyncio.timeout(Waits.at_most_s):
             with hub.subscribe() as stream:
                 hub.close()
                 assert [item async for item in stream] == []

@@ -82,6 +82,7 @@ def blocks_told(rig: LockstepRig) -> list[int]:
 
 
 def attend_until(vehicle: MavlinkVehicle, condition: Callable[[], bool], within_s: float = 30.0) -> None:
+    """In seconds of the rig's own time."""
     for _ in range(round(within_s / 0.2)):
         if condition():
             return
