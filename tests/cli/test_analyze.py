@@ -9,11 +9,9 @@ from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
 from tests.core.analysis.flights import GUSTY, QUIET, simulated_flight
-from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import recorded
 from tests.logs.written import NEWER_PARAMETERS, PARAMETERS, ardupilot_log
-from tests.logs.written_px4 import px4_log
 
 
 def analyze(*arguments: str | Path) -> Result:
@@ -74,21 +72,6 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
     assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3], values[0][4]])
 
 
-@pytest.mark.complete
-def test_the_log_of_px4_gives_a_file_for_its_ground_station(tmp_path: Path) -> None:
-    log, parameters = tmp_path / "flight.ulg", tmp_path / "gains.params"
-    log.write_bytes(px4_log(simulated_px4()))
-    result = analyze(log, "--params", parameters)
-    assert result.exit_code == 0, result.output
-    assert "hover throttle 0.4" in result.output
-    assert "PX4's default gains" in result.output
-    assert "# MPC_Z_VEL_P_ACC was 4\n" in parameters.read_text()
-    rows = [line.split("\t") for line in lines_of(parameters)]
-    gains = ["MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC"]
-    assert [row[2] for row in rows] == [*gains, "MPC_THR_HOVER"]
-    assert {len(row) for row in rows} == {5}
-
-
 def test_the_document_alone_can_be_printed(takeoff: Path) -> None:
     result = analyze(takeoff, "--json", "-")
     assert json.loads(result.stdout)["file_name"] == "takeoff.tlog"
@@ -107,19 +90,6 @@ def test_gains_may_replace_gains_but_nothing_else(steps: Path, tmp_path: Path) -
     assert refused.exit_code == 2
     assert "was not written by this command" in refused.output
     assert steps.read_bytes() == before
-
-
-@pytest.mark.complete
-def test_a_wrong_hover_throttle_is_told(tmp_path: Path) -> None:
-    """The vehicle hovers at 0.40 of its throttle, and was told 0.30."""
-    path = tmp_path / "hover.bin"
-    flight = simulated_flight(replace(QUIET, assumed_hover_throttle=0.3))
-    path.write_bytes(ardupilot_log(flight, parameters={**PARAMETERS, "MOT_THST_HOVER": 0.3}))
-    result = analyze(path)
-    assert result.exit_code == 0, result.output
-    said = " ".join(result.output.split())
-    assert "hover throttle 0.400, but MOT_THST_HOVER was 0.300" in said
-    assert "Set MOT_THST_HOVER to 0.4." in said
 
 
 @pytest.mark.complete
@@ -143,21 +113,6 @@ def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> No
     assert refused.exit_code == 1
     assert "No parameter file was written" in refused.output
     assert not parameters.exists()
-
-
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("arducopter_takeoff.bin", "holds altitude for 4.8 s only"),
-        ("px4_takeoff.ulg", "has no 4 s with an altitude to follow between takeoff and landing"),
-    ],
-)
-def test_the_other_recorded_logs_are_refused_with_the_reason(name: str, reason: str, tmp_path: Path) -> None:
-    path = tmp_path / name
-    path.write_bytes(recorded(name))
-    result = analyze(path)
-    assert result.exit_code == 1
-    assert reason in result.output
 
 
 def test_takeoffs_under_paparazzi_give_a_section_of_the_airframe_file(takeoff: Path, tmp_path: Path) -> None:

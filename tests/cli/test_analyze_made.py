@@ -1,4 +1,6 @@
-"""`gainline analyze` on logs made of simulated flights: each is answered, or refused for what it lacks."""
+"""`gainline analyze` on logs made of simulated flights: each is answered, or refused for what it lacks.
+
+What a reader or the analysis itself refuses: tests/logs and tests/core/analysis."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -7,25 +9,19 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from app.cli.commands import app
-from app.core.analysis.flight import LoggedFlight
-from app.core.records.trajectory import Samples
 from tests.core.analysis.flights import QUIET, simulated_flight
 from tests.core.analysis.px4_flights import simulated_px4
 from tests.logs.recorded import OnBoardLog
-from tests.logs.written import STABILIZE, ardupilot_log
-from tests.logs.written_px4 import POSITION, px4_log
+from tests.logs.written import ardupilot_log
+from tests.logs.written_px4 import px4_log
 from tests.logs.written_tlog import (
-    ATTITUDE,
-    CONTROLLER,
     HOLD,
     LOITER,
     PX4_RECORDING,
-    TARGET,
     Recording,
 )
 
@@ -34,24 +30,6 @@ px4 = cache(simulated_px4)
 TLOG: Final = Recording()
 FIXED_WING: Final = 1
 NEVER_ASKED: Final = "is not in the log, nor PSC_D_POS_P of release 4.7: read the vehicle's parameters"
-
-
-def differing(flight: LoggedFlight, **signals: Samples) -> LoggedFlight:
-    """The flight with other values of its signals."""
-    (segment,) = flight.segments
-    return replace(flight, segments=[replace(segment, **signals)])
-
-
-def hovering(flight: LoggedFlight) -> LoggedFlight:
-    """The reference stays where it is."""
-    still = np.zeros_like(flight.segments[0].z_m)
-    return differing(flight, z_m=5.0 + still, z_d_m=5.0 + still, v_d_m_s=still, a_d_m_s2=still, v_t_m_s=still)
-
-
-def saturated(flight: LoggedFlight) -> LoggedFlight:
-    """Every fifth row has full throttle."""
-    throttle = flight.segments[0].throttle
-    return differing(flight, throttle=np.where(np.arange(len(throttle)) % 5 == 0, 1.0, throttle))
 
 
 def cut(content: bytes, share: float = 0.6) -> bytes:
@@ -74,46 +52,15 @@ class RefusedLog:
 
 
 REFUSED: Final = (
-    RefusedLog("empty.bin", lambda: b"", "file: is empty"),
     RefusedLog("packed.bin", lambda: b"\x1f\x8b\x08", "file: is compressed (gzip): unpack it first"),
     RefusedLog("definitions.bin", lambda: cut(ardupilot_log(copter()), 0.01), "file: has no data: copy the whole log"),
     RefusedLog("plane.bin", of_a_plane, "MSG: is of ArduPlane, not of ArduCopter"),
-    RefusedLog("hover.bin", lambda: ardupilot_log(hovering(copter())), "file: has no altitude changes"),
-    RefusedLog(
-        "saturated.bin", lambda: ardupilot_log(saturated(copter())), "file: has the throttle at a limit in 20% of"
-    ),
-    RefusedLog(
-        "short.bin", lambda: ardupilot_log(copter(), rows=slice(45)), "file: holds altitude for 4.4 s only; 6 s"
-    ),
-    RefusedLog("short.bin", lambda: cut(ardupilot_log(copter()), 0.3), "s only; 6 s are needed"),
-    RefusedLog(
-        "manual.bin",
-        lambda: ardupilot_log(copter(), modes=((0.0, STABILIZE),)),
-        "MODE: has no mode that holds altitude in flight",
-    ),
-    RefusedLog("unset.bin", lambda: ardupilot_log(copter(), parameters={}), "PSC_POSZ_P: is missing"),
-    RefusedLog(
-        "sideways.bin",
-        lambda: ardupilot_log(hovering(copter()), attitude=[(0.1 * row, 0.0, 40.0) for row in range(400)]),
-        "ATT: leans by more than 30° throughout the flight",
-    ),
     RefusedLog("header.ulg", lambda: px4_log(px4())[:16], "file: has no data: copy the whole log"),
     RefusedLog(
         "plane.ulg",
         lambda: px4_log(px4(), without=("takeoff_status",), kind=2),
         "vehicle_status.vehicle_type: is never that of a copter",
     ),
-    RefusedLog("hover.ulg", lambda: px4_log(hovering(px4())), "file: has no altitude changes"),
-    RefusedLog(
-        "saturated.ulg", lambda: px4_log(saturated(px4())), "file: has the throttle at a limit in 20% of its rows"
-    ),
-    RefusedLog(
-        "manual.ulg",
-        lambda: px4_log(px4(), has_altitude=False, modes=((0.0, POSITION),)),
-        "setpoint.z: has no altitude to follow in flight, as in manual modes",
-    ),
-    RefusedLog("unset.ulg", lambda: px4_log(px4(), parameters={}), "MPC_Z_P: is missing"),
-    RefusedLog("cut.ulg", lambda: cut(px4_log(px4()), 0.2), "the file ends in the middle of a message"),
     RefusedLog(
         "plane.tlog", lambda: replace(TLOG, kind=FIXED_WING).content, "file: is the log of a fixed-wing aircraft"
     ),
@@ -122,13 +69,6 @@ REFUSED: Final = (
         lambda: replace(TLOG, set_points=((0.0, 5.0),)).content,
         "POSITION_TARGET_LOCAL_NED: has no altitude step in GUIDED in flight",
     ),
-    RefusedLog(
-        "hover.tlog",
-        lambda: replace(PX4_RECORDING, set_points=((0.0, 5.0),)).content,
-        "file: has no altitude changes: the reference moves by 0.00 m",
-    ),
-    RefusedLog("saturated.tlog", lambda: replace(TLOG, full_from=0.4).content, "file: has the throttle at a limit"),
-    RefusedLog("short.tlog", lambda: replace(TLOG, lasts_s=8.5).content, "file: holds altitude for 5.5 s only; 6 s"),
     RefusedLog(
         "loiter.tlog",
         lambda: replace(TLOG, mode=LOITER).content,
@@ -143,8 +83,6 @@ REFUSED: Final = (
         lambda: replace(TLOG, every=12).content,
         "NAV_CONTROLLER_OUTPUT: arrives 4.2 times a second; 17 times are needed",
     ),
-    RefusedLog("silent.tlog", lambda: replace(TLOG, without=(ATTITUDE,)).content, "ATTITUDE_TARGET: is missing"),
-    RefusedLog("silent.tlog", lambda: replace(TLOG, without=(CONTROLLER, TARGET)).content, "LOCAL_NED: is missing"),
     RefusedLog(
         "sideways.tlog",
         lambda: replace(TLOG, lean_rad=0.7).content,

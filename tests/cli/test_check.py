@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
-from tests.logs.paparazzi_flights import Flight, data_of, write
+from tests.logs.paparazzi_flights import Flight, write
 from tests.logs.recorded import recorded
 
 DEFAULT = {"kp": 283, "ki": 13, "kd": 82}
@@ -57,16 +57,6 @@ def test_every_row_of_a_recorded_log_follows_with_the_gains_of_its_time(tmp_path
     assert [each["gains"] for each in checked["flown"]] == [DEFAULT, {"kp": 3981, "ki": 1073, "kd": 409}]
     assert checked["flown"][1]["after_s"] == pytest.approx(94.943)
     assert "kp 283, ki 13, kd 82; after 94.9 s kp 3981, ki 1073, kd 409 (of the log)" in result.stderr
-
-
-def test_a_calm_flight_without_gains_asks_for_them(tmp_path: Path) -> None:
-    lines = data_of(Flight(DEFAULT)).splitlines()
-    calm = tmp_path / "calm.data"
-    calm.write_text("\n".join(line for line in lines if float(line.split()[0]) > 40.0))
-    result = check(calm)
-    assert result.exit_code == 1
-    assert "--gains KP,KI,KD" in result.stderr
-    assert check(calm, "--gains", "283,13,82").exit_code == 0
 
 
 def test_logs_of_other_autopilots_are_sent_to_the_command_that_reads_them(tmp_path: Path) -> None:

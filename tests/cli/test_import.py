@@ -12,7 +12,7 @@ from app.common.settings import Settings
 from app.db.session import Database
 from tests.builders import Json, create_ready_campaign, create_trial, get
 from tests.logs.paparazzi_flights import Flight, write
-from tests.logs.recorded import LOGS, recorded
+from tests.logs.recorded import LOGS
 
 TUNED_LOG, LOG = LOGS / "paparazzi_1624_1356_195.tlog", LOGS / "paparazzi_283_13_82.tlog"
 
@@ -153,47 +153,3 @@ def test_without_a_database_the_command_to_make_one_is_told(tmp_path: Path) -> N
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 1
     assert "gainline serve" in result.stderr
-
-
-def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
-    settings: Settings, campaign: Json, tmp_path: Path
-) -> None:
-    log = tmp_path / "flight.bin"
-    log.write_bytes(recorded("arducopter_takeoff.bin"))
-    result = run(settings, log, "--campaign", "Garage", "--yes")
-    assert result.exit_code == 1
-    assert "The log has the gains PSC_POSZ_P" in result.stderr
-    assert "this campaign tunes kp, ki, kd" in result.stderr
-
-
-COPTERS = [
-    ("takeoff-ardupilot", "arducopter_takeoff.bin", {"PSC_POSZ_P": 1.0, "PSC_VELZ_P": 5.0, "PSC_ACCZ_P": 0.5}),
-    ("takeoff-px4", "px4_takeoff.ulg", {"MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.2, "MPC_Z_VEL_I_ACC": 2.0}),
-]
-
-
-@pytest.mark.parametrize(("experiment", "log", "gains"), COPTERS, ids=[log for _, log, _ in COPTERS])
-def test_a_copters_log_imports_into_its_own_experiment_with_the_gains_that_it_flew(
-    experiment: str,
-    log: str,
-    gains: dict[str, float],
-    client: TestClient,
-    database: Database,
-    settings: Settings,
-    tmp_path: Path,
-) -> None:
-    definition = {
-        "experiment": experiment,
-        "strategy": "manual",
-        "start": {"kind": "default"},
-        "step_fraction": 0.25,
-        "stop": {"kind": "budget", "max_flights": 3},
-    }
-    create_ready_campaign(client, database, vehicle="import", name="Copter", definition=definition)
-    file = tmp_path / log
-    file.write_bytes(recorded(log))
-    result = run(settings, file, "--campaign", "Copter", "--yes", "--json", "-")
-    assert result.exit_code == 0, result.stderr
-    stored = json.loads(result.stdout)
-    assert {name: stored["gains"][name] for name in gains} == pytest.approx(gains)
-    assert stored["read_back"] == stored["gains"]
