@@ -147,10 +147,19 @@ def create_trial(client: httpx2.Client, campaign_id: int, **fields: object) -> J
     return trial
 
 
+def fly_trial(
+    client: httpx2.Client, database: Database, campaign_id: int, record: FlightRecord, **fields: object
+) -> Json:
+    """A trial as `create_trial` makes it, landed with this record."""
+    trial = create_trial(client, campaign_id, fly={"speed": None}, **fields)
+    land(database, lift_off(database), record)
+    landed: Json = get(client, f"/api/trials/{trial['id']}")
+    return landed
+
+
 def create_flown_trial(client: httpx2.Client, database: Database, campaign_id: int, settling_s: float = 1.0) -> Json:
     """A trial of the proposal that landed with a known error, and the next proposal computed."""
-    trial = create_trial(client, campaign_id, fly={"speed": None})
-    land(database, lift_off(database), create_record(settling_s))
+    trial = fly_trial(client, database, campaign_id, create_record(settling_s))
     run_jobs(database)
     flown: Json = get(client, f"/api/trials/{trial['id']}")
     return flown

@@ -19,6 +19,7 @@ from tests.builders import (
     create_ready_campaign,
     create_record,
     create_trial,
+    fly_trial,
     get,
     land,
     lift_off,
@@ -318,8 +319,9 @@ def test_why_a_flight_was_broken_off_goes_along_and_bundles_from_before_it_was_r
     client: TestClient, database: Database, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
     there, _ = elsewhere
-    trial = create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), create_record(ending="aborted", reason="enough", on_request=True))
+    trial = fly_trial(
+        client, database, campaign["id"], create_record(ending="aborted", reason="enough", on_request=True)
+    )
     run_jobs(database)
     bundle = download_bundle(client, campaign["id"])
 

@@ -11,7 +11,6 @@ from tests.builders import (
     climb_error,
     create_campaign,
     create_flown_trial,
-    create_imported_trial,
     create_ready_campaign,
     create_trial,
     get,
@@ -185,19 +184,6 @@ def test_a_campaign_with_flights_is_never_deleted(client: TestClient, database: 
     assert client.delete(f"/api/campaigns/{campaign['id']}?version=1").status_code == 409
 
 
-def test_the_budget_ends_a_campaign_and_nothing_more_is_flown(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database, definition=BUDGET)
-    first = create_flown_trial(client, database, campaign["id"], 2.0)
-    create_flown_trial(client, database, campaign["id"], 1.0)
-    path = f"/api/campaigns/{campaign['id']}"
-    done = get(client, path)
-    assert (done["state"], done["outcome"]) == ("finished", "budget")
-    assert done["stop_reason"] == "All 2 flights of the budget have been flown."
-    assert get(client, f"{path}/proposal")["proposal"]["recommended"] == "stop"
-    assert client.post(f"{path}/trials", json={"gains": first["gains"]}).status_code == 409
-    assert done["actions"] == ["rename", "reopen", "archive", "clone", "judge"]
-
-
 def test_a_campaign_can_be_stopped_archived_and_continued_as_a_clone(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=BUDGET)
     path = f"/api/campaigns/{campaign['id']}"
@@ -254,22 +240,9 @@ def test_reclassing_a_flight_recomputes_what_came_after(client: TestClient, data
     )
 
 
-def test_ask_and_tell_by_script(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database, vehicle="import")
-    path = f"/api/campaigns/{campaign['id']}"
-    assert campaign["next_action"] == "Upload the record of the first flight"
-    told = create_imported_trial(client, campaign["id"])
-    assert (told["state"], told["kind"]) == ("valid", "start")
-    assert told["error"] == pytest.approx(climb_error(1.0), rel=1e-4)
-    frozen = get(client, path)
-    assert (frozen["state"], frozen["trials"]["valid"]) == ("deciding", 1)
-    assert frozen["definition_digest"]
-    run_jobs(database)
-    assert get(client, f"{path}/proposal")["state"] == "ready"
-
-
 def test_an_imported_campaign_cannot_be_flown_from_here(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import")
+    assert campaign["next_action"] == "Upload the record of the first flight"
     trial = create_trial(client, campaign["id"])
     assert trial["actions"] == ["cancel", "upload", "note"]
     answer = client.post(f"/api/trials/{trial['id']}/fly")

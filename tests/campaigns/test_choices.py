@@ -15,9 +15,8 @@ from tests.builders import (
     create_ready_campaign,
     create_record,
     create_trial,
+    fly_trial,
     get,
-    land,
-    lift_off,
     run_jobs,
 )
 
@@ -37,16 +36,23 @@ def consider(client: TestClient, campaign_id: int, what: str, gains: object) -> 
 
 
 def fly_gains(client: TestClient, database: Database, campaign_id: int, gains: Json, settling_s: float) -> None:
-    create_trial(client, campaign_id, gains=gains, fly={"speed": None})
-    land(database, lift_off(database), create_record(settling_s))
+    fly_trial(client, database, campaign_id, create_record(settling_s), gains=gains)
     run_jobs(database)
 
 
-def test_before_the_first_flight_the_only_choice_is_the_baseline(client: TestClient, database: Database) -> None:
+def test_before_the_first_flight_the_only_choice_is_the_baseline_and_no_variant_is_taken(
+    client: TestClient, database: Database
+) -> None:
     campaign_id = create_ready_campaign(client, database)["id"]
     assert proposal_of(client, campaign_id)["choices"] == [
         {"kind": "baseline", "gains": FIRST, "proposed": True, "recommended": True}
     ]
+    for variant in ("repeat", "baseline", "smaller step"):
+        refused = client.post(f"/api/campaigns/{campaign_id}/trials", json={"variant": variant})
+        assert (refused.status_code, "needs a valid flight inside the bounds" in refused.json()["detail"]) == (
+            409,
+            True,
+        )
 
 
 def test_after_two_flights_there_are_a_step_half_of_it_the_best_again_and_the_first_again(
@@ -64,6 +70,9 @@ def test_after_two_flights_there_are_a_step_half_of_it_the_best_again_and_the_fi
     assert [choice["kind"] for choice in proposal["choices"] if choice["proposed"]] == ["step"]
     [recommended] = [choice for choice in proposal["choices"] if choice["recommended"]]
     assert recommended["gains"] == proposal["advice"]["gains"]
+    for variant, kind in (("smaller step", "shorter step"), ("baseline", "baseline"), ("repeat", "repeat")):
+        planned = create_trial(client, campaign_id, variant=variant)
+        assert (planned["kind"], planned["gains"], planned["gate"]["passed"]) == (kind, chosen[variant], True)
 
 
 def test_after_one_flight_its_gains_are_offered_once(client: TestClient, database: Database) -> None:

@@ -107,17 +107,11 @@ def test_throttle_reported_once_a_second_is_not_drawn_as_zero_after_the_command(
     assert not [x for x in drawn["x"] if 0.0 < x < 1.28]
 
 
-def test_a_campaign_without_flights_shows_what_is_missing(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database)
-    card = get(client, f"/api/campaigns/{campaign['id']}/figures/errors")
-    assert (card["state"], card["figure"]) == ("waiting", None)
-    assert "first valid flight" in card["reason"]
-
-
 @pytest.mark.parametrize(
     ("path", "status"),
     [
         ("/api/campaigns/999/figures/takeoffs", 404),
+        ("/api/campaigns/999/figures/landscape", 404),
         ("/api/trials/999/figure", 404),
         ("/api/campaigns/1/figures/pie", 422),
         ("/api/campaigns/1/figures/takeoffs?theme=pink", 422),

@@ -12,7 +12,7 @@ from app.db.session import Database
 from app.jobs import service as jobs
 from app.jobs.runner import JobRunner
 from app.processes.pool import ComputePool
-from tests.builders import WORKER, create_flown_campaign, create_flown_trial, get
+from tests.builders import WORKER, create_campaign, create_flown_campaign, create_flown_trial, get
 
 Json = dict[str, Any]
 
@@ -45,6 +45,16 @@ def run_landscapes(database: Database) -> int:
         with database.write() as session:
             jobs.finish_job(session, job_id, worker=WORKER, result=landscapes.as_json(landscape, order))
         count += 1
+
+
+def carry_out_as_the_worker(database: Database) -> None:
+    """The job that waits, with the worker's own runner."""
+    with ComputePool(1, prepare=int) as pool:
+        job = LandscapeJob(database, pool, worker=WORKER, lease_s=9.0)
+        runner = JobRunner(database, landscapes.LANDSCAPE_JOB, job, room=1, worker=WORKER, lease_s=30.0)
+        claimed = runner.claim()
+        assert claimed is not None
+        runner.carry_out(claimed)
 
 
 def card_of(client: TestClient, campaign_id: int, query: str = "") -> Json:
@@ -115,12 +125,7 @@ def test_the_share_that_is_done_is_that_of_the_gain_sets_evaluated(
     told: list[tuple[float, str]] = []
     monkeypatch.setattr(tasks, "PROGRESS_EVERY_S", 0.0)
     monkeypatch.setattr(LandscapeJob, "_report", lambda _self, _job, share, doing: told.append((share, doing)))
-    with ComputePool(1, prepare=int) as pool:
-        runner = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER, lease_s=9.0),
-                    room=1, worker=WORKER, lease_s=30.0)  # fmt: skip
-        claimed = runner.claim()
-        assert claimed is not None
-        runner.carry_out(claimed)
+    carry_out_as_the_worker(database)
     assert len(told) > 2
     for share, doing in told:
         done, _, points, *_ = doing.split()
@@ -143,12 +148,7 @@ def test_one_that_the_flights_overtake_is_withdrawn_and_asked_for_anew_once_its_
 ) -> None:
     card_of(client, campaign_id)
     classify(client, campaign_id, "invalid")
-    with ComputePool(1, prepare=int) as pool:
-        runner = JobRunner(database, landscapes.LANDSCAPE_JOB, LandscapeJob(database, pool, worker=WORKER, lease_s=9.0),
-                    room=1, worker=WORKER, lease_s=30.0)  # fmt: skip
-        claimed = runner.claim()
-        assert claimed is not None
-        runner.carry_out(claimed)
+    carry_out_as_the_worker(database)
     (withdrawn,) = landscape_jobs(client)
     assert withdrawn["state"] == "cancelled"
     assert "flights have changed" in withdrawn["problem"]["title"]
@@ -185,27 +185,9 @@ def test_stacked_slices_stand_one_below_the_other(client: TestClient, database: 
 
 
 def test_without_a_model_the_card_says_so_and_nothing_is_computed(client: TestClient, database: Database) -> None:
-    vehicle = client.post(
-        "/api/vehicles",
-        json={
-            "name": "Moth",
-            "kind": "mavlink",
-            "options": {"autopilot": "px4", "address": "udpin:127.0.0.1:14997", "simulated": True},
-        },
-    ).json()
-    campaign = client.post(
-        "/api/campaigns",
-        json={
-            "name": "By hand",
-            "vehicle": {"kind": "mavlink", "id": vehicle["id"]},
-            "definition": {"experiment": "takeoff-px4", "strategy": "manual"},
-        },
-    ).json()
+    definition = {"experiment": "takeoff-px4", "strategy": "manual"}
+    campaign = create_campaign(client, vehicle="import", definition=definition)
     card = card_of(client, campaign["id"])
     assert card["state"] == "waiting"
     assert "no model" in card["reason"]
     assert waiting_jobs(client) == []
-
-
-def test_an_unknown_campaign_is_refused(client: TestClient) -> None:
-    assert client.get("/api/campaigns/999/figures/landscape").status_code == 404

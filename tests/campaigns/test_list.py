@@ -9,10 +9,8 @@ from tests.builders import (
     create_flown_trial,
     create_ready_campaign,
     create_record,
-    create_trial,
+    fly_trial,
     get,
-    land,
-    lift_off,
     problems_of,
     run_jobs,
 )
@@ -68,8 +66,9 @@ def test_a_card_shows_what_matters(client: TestClient, database: Database) -> No
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 20}})
     others, best = {"kp": 283, "ki": 13, "kd": 82}, {"kp": 290, "ki": 20, "kd": 82}
     for settling_s in (2.0, 0.5, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6):
-        create_trial(client, campaign["id"], fly={"speed": None}, gains=best if settling_s == 0.5 else others)
-        land(database, lift_off(database), create_record(settling_s))
+        fly_trial(
+            client, database, campaign["id"], create_record(settling_s), gains=best if settling_s == 0.5 else others
+        )
     run_jobs(database)
     (card,) = get(client, "/api/campaigns")["items"]
     assert (card["flights"], card["best"]["trial_number"], card["next_action"]) == (9, 2, "Fly the next flight")
@@ -103,8 +102,7 @@ def test_a_query_that_makes_no_sense_is_refused_by_field(client: TestClient, que
 def test_a_card_compares_the_means_of_the_best_gains_and_of_the_first(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 20}})
     for settling_s, ki in ((1.5, 13), (1.3, 13), (1.0, 20)):
-        create_trial(client, campaign["id"], fly={"speed": None}, gains={"kp": 283, "ki": ki, "kd": 82})
-        land(database, lift_off(database), create_record(settling_s))
+        fly_trial(client, database, campaign["id"], create_record(settling_s), gains={"kp": 283, "ki": ki, "kd": 82})
     groups = get(client, f"/api/campaigns/{campaign['id']}/statistics")["groups"]
     (card,) = get(client, "/api/campaigns")["items"]
     assert (card["first_error"], card["best"]["mean"]) == (groups[0]["mean"], groups[1]["mean"])

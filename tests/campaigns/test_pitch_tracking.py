@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from app.db.session import Database
 from app.vehicles.registry import open_vehicle
-from tests.builders import create_ready_campaign, create_trial, get, land, lift_off, problems_of, run_jobs
+from tests.builders import create_ready_campaign, create_trial, get, land, lift_off, run_jobs
 from tests.vehicles.flying import HAND, fly
 
 DEFINITION = {
@@ -16,13 +16,6 @@ DEFINITION = {
     "strategy": "identified",
     "start": {"kind": "simplex"},
 }
-
-
-def test_a_vehicle_of_another_experiment_is_refused_naming_both_fields(client: TestClient) -> None:
-    wanted = {"name": "Test", "vehicle": {"kind": "twin"}, "definition": DEFINITION}
-    answer = client.post("/api/campaigns", json=wanted)
-    assert answer.status_code == 422
-    assert set(problems_of(answer)) == {"definition.experiment", "vehicle.kind"}
 
 
 @pytest.mark.complete

@@ -9,10 +9,8 @@ from tests.builders import (
     create_flown_trial,
     create_ready_campaign,
     create_record,
-    create_trial,
+    fly_trial,
     get,
-    land,
-    lift_off,
     problems_of,
 )
 from tests.fleet.vehicles import DEFAULT_GAINS, control_header, create_campaign_on, create_connected, seen
@@ -54,8 +52,7 @@ def test_gains_that_are_not_shown_to_be_better_stay_what_they_are(client: TestCl
     patient = {"stop": {"kind": "budget", "max_flights": 4}}
     campaign = create_campaign_on(client, database, vehicle, definition=patient)
     create_flown_trial(client, database, campaign["id"], 1.0)
-    create_trial(client, campaign["id"], gains={"kp": 250, "ki": 13, "kd": 90}, fly={"speed": None})
-    land(database, lift_off(database), create_record(0.99))
+    fly_trial(client, database, campaign["id"], create_record(0.99), gains={"kp": 250, "ki": 13, "kd": 90})
     refused = promote(client, campaign)
     assert refused["status"] == 409
     assert "with the first gains is unresolved" in refused["detail"]

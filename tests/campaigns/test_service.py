@@ -23,6 +23,7 @@ from tests.builders import (
     create_ready_campaign,
     create_record,
     create_trial,
+    fly_trial,
     get,
     land,
     lift_off,
@@ -103,7 +104,7 @@ def test_a_vehicles_own_safe_gains_stand_in_the_definition_that_proposals_and_ga
     assert get(client, path)["definition"] == campaign["definition"]
 
 
-def test_marking_a_flight_invalid_reopens_a_campaign_and_marking_it_valid_ends_it_again(
+def test_the_budget_ends_a_campaign_marking_a_flight_invalid_reopens_it_and_marking_it_valid_ends_it_again(
     client: TestClient, database: Database
 ) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 2}})
@@ -112,6 +113,10 @@ def test_marking_a_flight_invalid_reopens_a_campaign_and_marking_it_valid_ends_i
     last = create_flown_trial(client, database, campaign["id"], 1.0)
     done = get(client, path)
     assert (done["state"], done["outcome"]) == ("finished", "budget")
+    assert done["stop_reason"] == "All 2 flights of the budget have been flown."
+    assert done["actions"] == ["rename", "reopen", "archive", "clone", "judge"]
+    assert get(client, f"{path}/proposal")["proposal"]["recommended"] == "stop"
+    assert client.post(f"{path}/trials", json={"gains": last["gains"]}).status_code == 409
     assert classify(client, last["id"], "invalid") == 200
     run_jobs(database)
     after = get(client, path)
@@ -131,7 +136,6 @@ def test_a_finished_campaign_is_reopened_for_more_flights_and_ends_after_them(
     path = f"/api/campaigns/{campaign['id']}"
     create_flown_trial(client, database, campaign["id"], 2.0)
     create_flown_trial(client, database, campaign["id"], 1.0)
-    assert get(client, path)["actions"] == ["rename", "reopen", "archive", "clone", "judge"]
     reopened = client.post(f"{path}/reopen", json={"flights": 2}).json()
     assert (reopened["state"], reopened["outcome"], reopened["stop_reason"]) == ("deciding", None, "")
     run_jobs(database)
@@ -194,28 +198,23 @@ def test_a_campaign_that_is_not_finished_is_not_reopened(client: TestClient, dat
     assert answer.json()["hint"].startswith("This is possible only while it is finished.")
 
 
-def test_what_an_operator_stopped_stays_stopped_by_the_operator(client: TestClient, database: Database) -> None:
+def test_what_an_operator_stopped_stays_stopped_and_says_why_it_has_no_proposal(
+    client: TestClient, database: Database
+) -> None:
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     path = f"/api/campaigns/{campaign['id']}"
     flown = create_flown_trial(client, database, campaign["id"])
     client.post(f"{path}/finish", json={"reason": "rain"})
     assert classify(client, flown["id"], "invalid") == 200
-    run_jobs(database)
-    after = get(client, path)
-    assert (after["outcome"], after["stop_reason"]) == ("stopped", "rain")
-
-
-def test_a_finished_campaign_without_a_proposal_gives_the_reason(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database, definition=PATIENT)
-    path = f"/api/campaigns/{campaign['id']}"
-    flown = create_flown_trial(client, database, campaign["id"])
-    client.post(f"{path}/finish", json={"reason": "rain"})
-    classify(client, flown["id"], "invalid")
     (job,) = get(client, "/api/jobs?state=queued")["items"]
     client.post(f"/api/jobs/{job['id']}/cancel")
     problem = get(client, f"{path}/proposal")["problem"]
     assert problem["detail"] == "Its computation was cancelled."
     assert "reopen" in problem["hint"].lower()
+    assert client.post(f"/api/jobs/{job['id']}/retry").status_code == 200
+    run_jobs(database)
+    after = get(client, path)
+    assert (after["outcome"], after["stop_reason"]) == ("stopped", "rain")
 
 
 def test_gains_of_ones_own_are_judged_without_searching_the_model_again(
@@ -257,8 +256,7 @@ def test_a_low_battery_ends_a_campaign_whatever_its_last_flight_is_worth(
     )
     path = f"/api/campaigns/{campaign['id']}"
     trial = create_trial(client, campaign["id"], gains={"kp": 300, "ki": 13, "kd": 82})
-    create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), sagged(10.8))
+    fly_trial(client, database, campaign["id"], sagged(10.8))
     run_jobs(database)
     before = get(client, f"{path}/proposal")["proposal"]
     assert before["stop_verdict"]["stop"] is False
@@ -300,7 +298,6 @@ def test_without_a_battery_limit_an_invalid_flight_leaves_the_proposal_as_it_is(
     campaign = create_ready_campaign(client, database, definition=PATIENT)
     path = f"/api/campaigns/{campaign['id']}/proposal"
     before = get(client, path)["proposal"]
-    create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), sagged(10.4, until_s=10.0))
+    fly_trial(client, database, campaign["id"], sagged(10.4, until_s=10.0))
     run_jobs(database)
     assert get(client, path)["proposal"]["history_digest"] == before["history_digest"]

@@ -20,6 +20,7 @@ from tests.builders import (
     create_ready_campaign,
     create_record,
     create_trial,
+    fly_trial,
     get,
     land,
     lift_off,
@@ -42,9 +43,7 @@ def create(client: TestClient, database: Database, name: str = "Test", **fields:
 def fly(
     client: TestClient, database: Database, campaign_id: int, settling_s: float, gains: Json = FIRST, **record: Any
 ) -> int:
-    trial = create_trial(client, campaign_id, fly={"speed": None}, gains=gains)
-    land(database, lift_off(database), create_record(settling_s, **record))
-    return int(trial["id"])
+    return int(fly_trial(client, database, campaign_id, create_record(settling_s, **record), gains=gains)["id"])
 
 
 def address(trial_ids: Sequence[int], what: str = "") -> str:

@@ -60,6 +60,11 @@ def ask(client: TestClient, vehicle: Json, act: str) -> int:
     return client.post(f"/api/vehicles/{vehicle['id']}/{act}", json=body).status_code
 
 
+def lose_link(database: Database, vehicle: Json) -> None:
+    with database.write() as session:
+        commands.record_disconnected(session, vehicle["id"])
+
+
 def newest(client: TestClient, vehicle: Json) -> Json:
     act: Json = get(client, f"/api/vehicles/{vehicle['id']}/acts")["items"][0]
     return act
@@ -192,6 +197,18 @@ def test_a_check_keeps_every_item_it_found(client: TestClient, database: Databas
     assert newest(client, vehicle)["result"] == {"passed": False}
 
 
+def manager_of(database: Database, settings: Settings, *, links: bool = True) -> VehicleConnectionManager:
+    return VehicleConnectionManager(
+        database,
+        settings.data_dir,
+        AbortRegistry(),
+        lambda _shown: None,
+        worker=WORKER,
+        closing=threading.Event(),
+        links=links,
+    )
+
+
 FAILED = CheckItem(name="failsafe", title="FS_GCS_ENABLE", passed=False, found="off", needed="on")
 
 
@@ -210,9 +227,7 @@ def test_a_check_says_nothing_of_a_vehicle_that_has_restarted_since(
     settings: Settings, client: TestClient, database: Database
 ) -> None:
     vehicle = create_connected(client, database)
-    manager = VehicleConnectionManager(
-        database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
-    )
+    manager = manager_of(database, settings)
 
     def checks_after(restarts: list[int]) -> object:
         slot = VehicleSlot()
@@ -235,9 +250,7 @@ def test_the_newest_concern_of_a_vehicle_is_the_one_that_is_kept(
     settings: Settings, client: TestClient, database: Database
 ) -> None:
     vehicle = connect(client, database, register(client), concern="it was met armed")
-    manager = VehicleConnectionManager(
-        database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
-    )
+    manager = manager_of(database, settings)
     status = VehicleStatus(vehicle_id=vehicle["id"], state="connected", at=status_time(), step="")
     slot = VehicleSlot(concern="it was met armed")
     for concern in ("it was met armed", "its motors did not stop"):
@@ -275,8 +288,7 @@ def test_a_quarantine_outlives_the_link(client: TestClient, database: Database) 
         commands.quarantine_vehicle(session, vehicle["id"], "its gains are not verified")
     ask(client, vehicle, "disconnect")
     finish_act(database)
-    with database.write() as session:
-        commands.record_disconnected(session, vehicle["id"])
+    lose_link(database, vehicle)
     assert seen(client, vehicle)["state"] == "disconnected"
     again = connect(client, database, vehicle)
     assert (again["state"], again["concern"]) == ("quarantined", "its gains are not verified")
@@ -286,17 +298,12 @@ def test_a_released_simulation_is_ready_at_once_and_its_acts_say_who_looked(
     client: TestClient, database: Database
 ) -> None:
     vehicle = create_campaign(client)["vehicle"]
+    path, said = f"/api/vehicles/{vehicle['id']}/release", {"statement": "Ada: it is fine"}
+    assert "only while it is quarantined" in client.post(path, json=said).json()["hint"]
     put_into(VehicleState.QUARANTINED, database, vehicle)
-    released = client.post(f"/api/vehicles/{vehicle['id']}/release", json={"statement": "Ada: it is fine"}).json()
+    released = client.post(path, json=said).json()
     assert (released["state"], released["concern"]) == ("ready", "")
     assert newest(client, vehicle)["reason"] == "Ada: it is fine"
-
-
-def test_a_shared_simulation_takes_no_acts(client: TestClient) -> None:
-    vehicle = create_campaign(client)["vehicle"]
-    refused = client.post(f"/api/vehicles/{vehicle['id']}/connect")
-    assert refused.status_code == 409
-    assert "is shared by all campaigns" in refused.json()["detail"]
 
 
 def test_a_restarted_worker_connects_again_what_was_wanted_and_does_nothing_else(
@@ -331,8 +338,7 @@ def test_a_vehicle_found_with_gains_of_its_own_is_met_for_the_first_time_until_a
         assert client.get(f"/api/vehicles/{vehicle['id']}/ledger").json()["items"] == []
         assert ask(client, vehicle, "check") == 202
         assert finish_act(database).vehicle.identity is None, "whoever connects it compares, and writes nothing"
-        with database.write() as session:
-            commands.record_disconnected(session, vehicle["id"])
+        lose_link(database, vehicle)
     connect(client, database, vehicle)
     assert ask(client, vehicle, "check") == 202
     assert finish_act(database).vehicle.identity is not None
@@ -344,8 +350,7 @@ def test_a_pinned_vehicle_is_looked_for_after_a_connect_that_failed_until_somebo
     known, new = create_connected(client, database, "A"), register(client, "B")
     ask(client, known, "disconnect")
     finish_act(database)
-    with database.write() as session:
-        commands.record_disconnected(session, known["id"])
+    lose_link(database, known)
     assert "disconnect" not in seen(client, known)["actions"]
     for vehicle in (known, new):
         ask(client, vehicle, "connect")
@@ -400,8 +405,7 @@ def test_a_vehicle_may_be_in_the_air_after_a_flight_until_its_gains_are_read_or_
         session.get_one(TrialRow, trial["id"]).flown_at = utc_now()
     assert may_fly()
     connect(client, database, vehicle)
-    with database.write() as session:
-        commands.record_disconnected(session, vehicle["id"])
+    lose_link(database, vehicle)
     assert not may_fly(), "it was on the ground, with its safe gains"
 
 
@@ -409,8 +413,7 @@ def test_the_ledger_names_no_gains_for_a_pinned_vehicle_that_was_armed_or_absent
     client: TestClient, database: Database
 ) -> None:
     vehicle = create_connected(client, database)
-    with database.write() as session:
-        commands.record_disconnected(session, vehicle["id"])
+    lose_link(database, vehicle)
     ask(client, vehicle, "connect")
     finish_act(database, problem="nobody answers")
     with database.write() as session:
@@ -445,11 +448,8 @@ def test_the_link_to_a_vehicle_that_is_found_when_nobody_wants_it_any_more_is_cl
             events.append("closed")
 
     monkeypatch.setattr("app.flights.connection_manager.VehicleConnection", Found)
-    with database.write() as session:
-        commands.record_disconnected(session, vehicle["id"])
-    manager = VehicleConnectionManager(
-        database, settings.data_dir, AbortRegistry(), lambda _shown: None, worker=WORKER, closing=threading.Event()
-    )
+    lose_link(database, vehicle)
+    manager = manager_of(database, settings)
     manager.maintain()
     manager._reconnect_executor.shutdown()
     assert events == ["found", "closed"]
@@ -472,17 +472,6 @@ def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: 
             "It was not started: no worker was running when it was requested. Request it again if it is still needed.",
         ),
     ]
-
-
-def test_a_connection_that_a_person_asked_for_and_that_failed_is_not_tried_again_by_itself(
-    client: TestClient, database: Database
-) -> None:
-    vehicle = register(client)
-    ask(client, vehicle, "connect")
-    finish_act(database, problem="nobody answered within 5 s")
-    assert newest(client, vehicle)["problem"] == "nobody answered within 5 s"
-    with database.write() as session:
-        assert commands.request_reconnections(session) == []
 
 
 def test_a_vehicle_with_a_link_is_asked_nothing_but_to_be_let_go_over_a_server_that_others_reach(
@@ -514,15 +503,7 @@ def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
 ) -> None:
     vehicles = [create_connected(client, database, name, real=name == "Real") for name in ("Simulated", "Real")]
     before = [newest(client, vehicle)["id"] for vehicle in vehicles]
-    manager = VehicleConnectionManager(
-        database,
-        settings.data_dir,
-        AbortRegistry(),
-        lambda _shown: None,
-        worker=WORKER,
-        closing=threading.Event(),
-        links=links,
-    )
+    manager = manager_of(database, settings, links=links)
     manager.recover()
     manager.maintain()
     manager.close()
@@ -530,43 +511,29 @@ def test_a_worker_beside_a_server_that_others_reach_connects_no_vehicle_again(
     assert [now != known for now, known in zip(after, before, strict=True)] == [links, links]
 
 
-def test_the_version_is_pinned_when_it_is_told_and_not_changed_by_itself(
-    client: TestClient, database: Database
+@pytest.mark.parametrize(("field", "told"), [("version", ("", "5.18", "", "5.20")), ("uid", ("", "0a", "", "0b"))])
+def test_version_and_hardware_id_are_pinned_when_they_are_told_and_changed_by_a_release_alone(
+    client: TestClient, database: Database, field: str, told: tuple[str, ...]
 ) -> None:
     """Paparazzi sends its version every few seconds, often only after the connection."""
     vehicle = register(client)
+    known = Identity(system_id=1, autopilot="px4", version="1.16.0")
 
-    def connected_as(version: str, concern: str = "") -> str:
+    def pinned() -> str:
+        return str(seen(client, vehicle)["identity"][field])
+
+    def connected_as(value: str) -> str:
         with database.write() as session:
-            identity = Identity(system_id=1, autopilot="paparazzi", version=version)
-            commands.record_connected(session, vehicle["id"], identity, concern=concern)
-            commands.record_disconnected(session, vehicle["id"])
-        return str(seen(client, vehicle)["identity"]["version"])
+            commands.record_connected(session, vehicle["id"], replace(known, **{field: value}))
+        lose_link(database, vehicle)
+        return pinned()
 
-    assert [connected_as(version) for version in ("", "5.18", "", "5.20")] == ["", "5.18", "5.18", "5.18"]
-
-
-def test_the_hardware_id_is_pinned_when_it_is_told_and_changed_by_a_release_alone(
-    client: TestClient, database: Database
-) -> None:
-    vehicle = register(client)
-
-    def connected_as(uid: str) -> str:
+    assert [connected_as(value) for value in told] == ["", told[1], told[1], told[1]]
+    for value in (told[3], ""):  # it tells none any more, and is accepted as it is
+        put_into(VehicleState.QUARANTINED, database, vehicle)
         with database.write() as session:
-            identity = Identity(system_id=1, autopilot="px4", version="1.16.0", uid=uid)
-            commands.record_connected(session, vehicle["id"], identity)
-            commands.record_disconnected(session, vehicle["id"])
-        return str(seen(client, vehicle)["identity"]["uid"])
-
-    assert [connected_as(uid) for uid in ("", "0a", "", "0b")] == ["", "0a", "0a", "0a"]
-    with database.write() as session:
-        accepted = Identity(system_id=1, autopilot="px4", version="1.16.0", uid="0b")
-        commands.record_released(session, vehicle["id"], identity=accepted)
-    assert seen(client, vehicle)["identity"]["uid"] == "0b"
-    put_into(VehicleState.QUARANTINED, database, vehicle)
-    with database.write() as session:
-        commands.record_released(session, vehicle["id"], identity=replace(accepted, uid=""))
-    assert seen(client, vehicle)["identity"]["uid"] == "", "it tells none any more, and is accepted as it is"
+            commands.record_released(session, vehicle["id"], identity=replace(known, **{field: value}))
+        assert pinned() == value
 
 
 def test_an_identity_that_was_pinned_before_hardware_ids_were_looked_at_is_read(

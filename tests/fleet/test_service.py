@@ -6,7 +6,7 @@ from fastapi.testclient import TestClient
 from app.core.errors import InputError
 from app.db.session import Database
 from app.fleet.service import registered_for
-from tests.builders import create_campaign, create_flown_trial, create_ready_campaign, get
+from tests.builders import create_campaign, get
 from tests.fleet.vehicles import register
 
 DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
@@ -36,19 +36,6 @@ def test_the_options_of_a_vehicle_belong_to_the_campaign(client: TestClient) -> 
     assert calm["vehicle"]["options"]["scatter"] == 0.0
     assert windy["vehicle"]["options"]["scatter"] == 2.0
     assert set(calm["vehicle"]["options"]) == set(windy["vehicle"]["options"])
-
-
-def test_the_ledger_lists_what_was_asked_and_what_was_read_back(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 3}})
-    flown = [create_flown_trial(client, database, campaign["id"], settling_s) for settling_s in (3.0, 2.0, 1.0)]
-    path = f"/api/vehicles/{campaign['vehicle']['id']}/ledger"
-    first = get(client, f"{path}?limit=2")
-    rest = get(client, f"{path}?limit=2&cursor={first['next_cursor']}")
-    lines = first["items"] + rest["items"]
-    assert (first["total"], rest["next_cursor"]) == (3, None)
-    assert [line["trial_id"] for line in lines] == [trial["id"] for trial in flown[::-1]]
-    assert [line["asked"] for line in lines] == [trial["gains"] for trial in flown[::-1]]
-    assert all(line["asked"] == line["read_back"] and line["outcome"] == "landed" for line in lines)
 
 
 def test_an_experiment_is_flown_by_the_named_vehicle_or_the_last_registered_one(

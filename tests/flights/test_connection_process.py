@@ -146,12 +146,21 @@ def flight_of(rig: AnsweringRig, folder: Path) -> FlightRequest:
     )
 
 
+@pytest.fixture
+def line() -> RecordingPipe:
+    return RecordingPipe()
+
+
+@pytest.fixture
+def process(rig: AnsweringRig, line: RecordingPipe, tmp_path: Path) -> VehicleProcess:
+    """Connected, with the vehicle on the ground."""
+    return started(rig, line, tmp_path)
+
+
 @pytest.mark.parametrize("takes_its_safe_gains", [True, False])
 def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains_can_be_verified(
-    rig: AnsweringRig, tmp_path: Path, takes_its_safe_gains: bool
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path, takes_its_safe_gains: bool
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
 
     def refuse() -> None:
         rig.drone.autopilot.refuses_arming = True
@@ -169,10 +178,10 @@ def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains
     )
 
 
-def test_a_take_off_that_comes_too_late_does_not_take_place(rig: AnsweringRig, tmp_path: Path) -> None:
+def test_a_take_off_that_comes_too_late_does_not_take_place(
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path
+) -> None:
     """Observed defect: the process was suspended for 20 s, and the vehicle took off unexpectedly afterwards."""
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     line.workers_end.send(TakeOffCommand(by_s=time.monotonic() - 0.001))
     process._fly(flight_of(rig, tmp_path))
     staged, restored, failure, _ = (said for said in line.said if not isinstance(said, ConnectionOpened))
@@ -186,12 +195,10 @@ def test_a_take_off_that_comes_too_late_does_not_take_place(rig: AnsweringRig, t
 
 
 def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
-    rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the last check, after its takeoff command came in time."""
     stood_still_s = 0.0
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     clock = SimpleNamespace(monotonic=lambda: time.monotonic() + stood_still_s)
     monkeypatch.setattr(vehicle_process_module, "time", clock)
 
@@ -212,9 +219,9 @@ def test_a_process_that_stands_still_before_it_arms_does_not_take_off(
     assert (rig.drone.autopilot.armed, rig.drone.body.stands) == (False, True)
 
 
-def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: AnsweringRig, tmp_path: Path) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
+def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess
+) -> None:
     assert line.said == [ConnectionOpened(identity=process._vehicle.identity, concern="", held=dict(SAFE))]
     answered = process._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=TUNED))
     assert (answered.problem, answered.concern, answered.held) == ("", "", dict(TUNED))
@@ -223,8 +230,9 @@ def test_safe_gains_that_a_person_changes_in_the_first_session_are_written(rig: 
     assert (answered.problem, answered.concern, answered.held) == ("", "Somebody else armed it.", dict(SAFE))
 
 
-def test_changed_safe_gains_that_a_vehicle_does_not_take_leave_it_observed(rig: AnsweringRig, tmp_path: Path) -> None:
-    process = started(rig, RecordingPipe(), tmp_path)
+def test_changed_safe_gains_that_a_vehicle_does_not_take_leave_it_observed(
+    rig: AnsweringRig, process: VehicleProcess
+) -> None:
     rig.drone.autopilot.ignores_parameters = True
     answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
     assert "Its safe gains could not be verified" in answered.concern
@@ -282,10 +290,8 @@ def stops_told_s(rig: AnsweringRig) -> list[float]:
     ],
 )
 def test_a_command_is_executed_at_once_and_ends_the_act_in_progress(
-    rig: AnsweringRig, tmp_path: Path, kind: ActKind, while_it_hears: str
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, kind: ActKind, while_it_hears: str
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     ordered_s, told = order_when(rig, line, while_it_hears, MOTORS_OFF), len(stops_told_s(rig))
     answered = process._act(VehicleRequest(kind=kind, safe_gains=SAFE))
     assert "interrupted: motors off was commanded (people below)" in answered.problem
@@ -295,10 +301,8 @@ def test_a_command_is_executed_at_once_and_ends_the_act_in_progress(
 
 @pytest.mark.parametrize("ordered", [MOTORS_OFF, LAND], ids=["motors off", "land"])
 def test_an_order_is_carried_out_at_once_while_changed_safe_gains_are_written(
-    rig: AnsweringRig, tmp_path: Path, ordered: VehicleCommand
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, ordered: VehicleCommand
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     ordered_s = order_when(rig, line, "PARAM_SET", ordered)
     told = len(rig.heard)
     answered = process._act(VehicleRequest(kind=ActKind.CHECK, safe_gains=TUNED))
@@ -310,10 +314,8 @@ def test_an_order_is_carried_out_at_once_while_changed_safe_gains_are_written(
 
 
 def test_an_order_that_comes_too_late_is_not_passed_on_and_interrupts_nothing(
-    rig: AnsweringRig, tmp_path: Path
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     order_when(rig, line, "PARAM_SET", replace(MOTORS_OFF, by_s=time.monotonic() - 0.001))
     told = len(stops_told_s(rig))
     assert process._act(VehicleRequest(kind=ActKind.RESTORE, safe_gains=SAFE)).problem == ""
@@ -324,12 +326,10 @@ def test_an_order_that_comes_too_late_is_not_passed_on_and_interrupts_nothing(
 
 
 def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_with_its_safe_gains(
-    rig: AnsweringRig, tmp_path: Path
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path
 ) -> None:
     """Land, and motors off at once after it, which comes while the safe gains are given back; what waits before them in
     the pipe is kept."""
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     line.workers_end.send(CancelFlight(9, "of another flight"))
     line.on_staged = lambda: line.workers_end.send(CancelTakeOff())
     order_when(rig, line, "PARAM_SET", LAND, MOTORS_OFF, nth=2)
@@ -348,10 +348,8 @@ def test_orders_while_the_gains_of_a_flight_are_written_end_it_on_the_ground_wit
 
 
 def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_ground(
-    rig: AnsweringRig, tmp_path: Path
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_REQUEST_READ", LAND)
     process._fly(flight_of(rig, tmp_path))
@@ -363,10 +361,8 @@ def test_an_order_between_the_take_off_and_arming_keeps_the_vehicle_on_the_groun
 
 @pytest.mark.complete
 def test_motors_off_while_the_safe_gains_are_written_after_a_flight_is_carried_out_and_they_are_verified(
-    rig: AnsweringRig, tmp_path: Path
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     line.workers_end.send(TakeOffCommand(by_s=math.inf))
     line.on_staged = partial(order_when, rig, line, "PARAM_SET", MOTORS_OFF, nth=2)
     process._fly(flight_of(rig, tmp_path))
@@ -390,11 +386,15 @@ def stop_outcomes(process: VehicleProcess, line: RecordingPipe) -> list[str]:
 @pytest.mark.parametrize("is_confirmed", [True, False])
 @pytest.mark.parametrize("in_flight", [True, False])
 def test_motors_off_is_done_only_once_the_vehicle_has_confirmed_it(
-    rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_confirmed: bool, in_flight: bool
+    rig: AnsweringRig,
+    line: RecordingPipe,
+    process: VehicleProcess,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    is_confirmed: bool,
+    in_flight: bool,
 ) -> None:
     """Seen: it was recorded as done though the vehicle had never confirmed it, and the vehicle was ready."""
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
 
     def fall_silent(message: Message) -> None:
         rig.muted = rig.muted or (message.get_type() == "COMMAND_LONG" and not is_confirmed)
@@ -435,9 +435,9 @@ def left_alone(process: VehicleProcess, line: RecordingPipe, rig: AnsweringRig, 
     return rig.now_s() - begun_s
 
 
-def test_land_is_repeated_after_the_worker_died_until_the_vehicle_responds(rig: AnsweringRig, tmp_path: Path) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
+def test_land_is_repeated_after_the_worker_died_until_the_vehicle_responds(
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess
+) -> None:
     in_the_air(rig, process)
     rig.deaf_until_s = rig.now_s() + 5.0
     assert 5.0 < left_alone(process, line, rig, LAND) < 60.0
@@ -447,10 +447,8 @@ def test_land_is_repeated_after_the_worker_died_until_the_vehicle_responds(rig: 
 @pytest.mark.complete
 @pytest.mark.parametrize("silenced", [{"deaf_until_s": math.inf}, {"muted": True}], ids=["never obeys", "falls silent"])
 def test_a_vehicle_in_the_air_that_does_not_respond_gets_the_command_for_a_minute(
-    rig: AnsweringRig, tmp_path: Path, silenced: dict[str, float | bool]
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, silenced: dict[str, float | bool]
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     in_the_air(rig, process)
     for name, value in silenced.items():
         setattr(rig, name, value)
@@ -459,11 +457,9 @@ def test_a_vehicle_in_the_air_that_does_not_respond_gets_the_command_for_a_minut
 
 @pytest.mark.complete
 def test_a_vehicle_that_got_land_unheard_for_a_minute_keeps_no_process_waiting(
-    rig: AnsweringRig, tmp_path: Path
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess
 ) -> None:
     """Seen: two drones were gone, and the server took a minute to stop."""
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     in_the_air(rig, process)
     process._vehicle.land("the link was lost")
     rig.muted = True
@@ -473,11 +469,9 @@ def test_a_vehicle_that_got_land_unheard_for_a_minute_keeps_no_process_waiting(
 
 @pytest.mark.complete
 def test_one_heartbeat_that_reports_it_disarmed_does_not_end_land_after_the_worker_died(
-    rig: AnsweringRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seen: the process exited after 2.2 s, and the drone hovered on at 2.7 m."""
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     in_the_air(rig, process)
     rig.deaf_until_s = math.inf
     forger = MessageForger("paparazzi", PAPARAZZI, rig.drone, random.Random(1))
@@ -494,8 +488,6 @@ def test_one_heartbeat_that_reports_it_disarmed_does_not_end_land_after_the_work
 
 @pytest.mark.parametrize("ordered", [(), (LAND,), (MOTORS_OFF,)], ids=["nothing", "land", "motors off"])
 def test_a_vehicle_on_the_ground_keeps_no_process_waiting(
-    rig: AnsweringRig, tmp_path: Path, ordered: tuple[VehicleCommand, ...]
+    rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, ordered: tuple[VehicleCommand, ...]
 ) -> None:
-    line = RecordingPipe()
-    process = started(rig, line, tmp_path)
     assert left_alone(process, line, rig, *ordered) < 0.1

@@ -17,7 +17,7 @@ from app.flights.flight_process import FlightProcess, FlightProcessPool
 from app.flights.process_messages import FlightFailure, FlightLanded, FlightMessage, FlightRequest, GainsStaged
 from app.live.messages import MAX_LINE_BYTES, FlightPhase, Telemetry, encode
 from app.processes.locks import exclusive
-from app.vehicles.base import FlightOptions, Sample, VehicleError
+from app.vehicles.base import FlightOptions, FlightRecord, Sample, VehicleError
 from app.vehicles.registry import open_vehicle
 from tests.clocks import ManualClock
 
@@ -64,35 +64,30 @@ def fly(
     return heard
 
 
-def only(heard: list[FlightMessage], kind: type[FlightMessage]) -> list[FlightMessage]:
-    return [said for said in heard if isinstance(said, kind)]
+def landed_of(heard: list[FlightMessage]) -> FlightRecord:
+    """What the only flight left behind."""
+    (landed,) = (said for said in heard if isinstance(said, FlightLanded))
+    return landed.record
 
 
-def test_a_flight_in_the_process_is_the_flight_in_this_one(flight_process: FlightProcess, tmp_path: Path) -> None:
+def test_a_flight_in_the_process_is_the_flight_in_this_one_and_its_telemetry_covers_it(
+    flight_process: FlightProcess,
+) -> None:
     heard = fly(flight_process, flight_of())
     with open_vehicle("twin", {}, safe_gains=GAINS) as vehicle:
         vehicle.stage(GAINS)
         here = vehicle.fly(FlightOptions(seed=3), on_sample=lambda _: None, should_stop=lambda: None)
-    (landed,) = only(heard, FlightLanded)
-    assert isinstance(landed, FlightLanded)
+    record = landed_of(heard)
     assert heard[0] == GainsStaged(GAINS)
-    assert landed.record.ending == "completed"
-    np.testing.assert_array_equal(landed.record.trajectory["altitude_m"], here.trajectory["altitude_m"])
+    assert record.ending == "completed"
+    np.testing.assert_array_equal(record.trajectory["altitude_m"], here.trajectory["altitude_m"])
     assert [said.phase for said in heard if isinstance(said, FlightPhase)] == ["flying", "landed"]
-
-
-def test_telemetry_covers_the_flight_and_its_error_so_far_ends_at_the_error(
-    flight_process: FlightProcess, tmp_path: Path
-) -> None:
-    heard = fly(flight_process, flight_of())
-    rows = [row for said in heard if isinstance(said, Telemetry) for row in said.samples]
+    telemetry = [said for said in heard if isinstance(said, Telemetry)]
+    rows = [row for said in telemetry for row in said.samples]
     assert [round(row[0] * 50) for row in rows] == list(range(len(rows)))
     assert rows[-1][0] == pytest.approx(33.0, abs=0.03)
-    last = [said for said in heard if isinstance(said, Telemetry)][-1]
-    (landed,) = only(heard, FlightLanded)
-    assert isinstance(landed, FlightLanded)
     # 50 Hz telemetry against the 512 Hz record
-    assert last.error_so_far == pytest.approx(get_experiment("takeoff").error(landed.record.trajectory), abs=2e-4)
+    assert telemetry[-1].error_so_far == pytest.approx(get_experiment("takeoff").error(record.trajectory), abs=2e-4)
 
 
 def test_a_flight_computed_at_once_is_sent_in_messages_that_the_live_link_takes() -> None:
@@ -125,32 +120,25 @@ def test_a_reference_that_is_reported_later_begins_a_message_and_is_scored_from_
     assert heard[-1].error_so_far == pytest.approx((3.0 * 0.2 + 0.25) / 4.0)
 
 
-def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(
-    flight_process: FlightProcess, tmp_path: Path
-) -> None:
+def test_an_abort_lands_the_vehicle_and_an_old_one_does_not_end_the_next_flight(flight_process: FlightProcess) -> None:
     def abort(said: FlightMessage) -> None:
         if isinstance(said, Telemetry):
             flight_process.cancel_flight(1, "too high")
 
-    (landed,) = only(fly(flight_process, flight_of(speed=1.0), abort), FlightLanded)
-    assert isinstance(landed, FlightLanded)
-    assert (landed.record.ending, landed.record.reason) == ("aborted", "too high")
-    assert landed.record.trajectory["altitude_m"][-1] < 0.1
-    (landed,) = only(fly(flight_process, flight_of(trial_id=2)), FlightLanded)
-    assert isinstance(landed, FlightLanded)
-    assert landed.record.ending == "completed"
+    aborted = landed_of(fly(flight_process, flight_of(speed=1.0), abort))
+    assert (aborted.ending, aborted.reason) == ("aborted", "too high")
+    assert aborted.trajectory["altitude_m"][-1] < 0.1
+    assert landed_of(fly(flight_process, flight_of(trial_id=2))).ending == "completed"
 
 
-def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(
-    flight_process: FlightProcess, tmp_path: Path
-) -> None:
+def test_what_the_vehicle_refuses_is_trouble_and_the_process_stays_usable(flight_process: FlightProcess) -> None:
     (trouble,) = fly(flight_process, flight_of(kind="import"))
     assert isinstance(trouble, FlightFailure)
     assert not trouble.unsafe
-    assert len(only(fly(flight_process, flight_of()), FlightLanded)) == 1
+    assert landed_of(fly(flight_process, flight_of())).ending == "completed"
 
 
-def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess, tmp_path: Path) -> None:
+def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess) -> None:
     heard = []
     for said in flight_process.fly(flight_of()):
         heard.append(said)
@@ -158,39 +146,34 @@ def test_a_declined_flight_leaves_no_record(flight_process: FlightProcess, tmp_p
     assert heard == [GainsStaged(GAINS)]
 
 
-def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(
-    flight_process: FlightProcess, tmp_path: Path
-) -> None:
+def test_an_abort_that_overtakes_the_take_off_ends_the_flight_on_the_ground(flight_process: FlightProcess) -> None:
     heard = []
     for said in flight_process.fly(flight_of(speed=1.0)):
         heard.append(said)
         if isinstance(said, GainsStaged):
             flight_process.cancel_flight(1, "not today")
             flight_process.take_off()
-    (landed,) = only(heard, FlightLanded)
-    assert isinstance(landed, FlightLanded)
-    assert (landed.record.ending, landed.record.reason) == ("aborted", "not today")
-    assert landed.record.trajectory["altitude_m"].max() < 0.05
+    aborted = landed_of(heard)
+    assert (aborted.ending, aborted.reason) == ("aborted", "not today")
+    assert aborted.trajectory["altitude_m"].max() < 0.05
 
 
 def test_two_simulations_in_the_air_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
     alone, together = start(tmp_path / "alone"), [start(tmp_path / "one"), start(tmp_path / "other")]
-    records: dict[int, FlightLanded] = {}
+    records: dict[int, FlightRecord] = {}
 
     def one(number: int) -> None:
-        (landed,) = only(fly(together[number], flight_of(kind="jsbsim")), FlightLanded)
-        assert isinstance(landed, FlightLanded)
-        records[number] = landed
+        records[number] = landed_of(fly(together[number], flight_of(kind="jsbsim")))
 
     threads = [threading.Thread(target=one, args=(number,)) for number in range(2)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    (expected,) = only(fly(alone, flight_of(kind="jsbsim")), FlightLanded)
-    assert isinstance(expected, FlightLanded)
-    for landed in records.values():
-        np.testing.assert_array_equal(landed.record.trajectory["altitude_m"], expected.record.trajectory["altitude_m"])
+    expected = landed_of(fly(alone, flight_of(kind="jsbsim")))
+    assert len(records) == 2
+    for record in records.values():
+        np.testing.assert_array_equal(record.trajectory["altitude_m"], expected.trajectory["altitude_m"])
     for each in (alone, *together):
         each.close()
 
@@ -217,5 +200,5 @@ def test_a_vehicle_in_another_process_hands_is_flown_only_once_it_is_free(tmp_pa
         thread.join(1.0)
         assert heard == []
     thread.join()
-    assert len(only(heard, FlightLanded)) == 1
+    assert landed_of(heard).ending == "completed"
     flight_process.close()

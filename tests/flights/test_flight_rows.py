@@ -10,7 +10,6 @@ from app.core.definition import flight_seed
 from app.db.session import Database
 from app.flights import flight_rows
 from app.flights.flight_rows import FlightOutcome
-from app.flights.process_messages import FlightRequest
 from app.vehicles.base import FlightRecord
 from tests.builders import (
     claim,
@@ -20,13 +19,14 @@ from tests.builders import (
     create_ready_campaign,
     create_record,
     create_trial,
+    fly_trial,
     get,
     land,
     lift_off,
     run_jobs,
     stage,
 )
-from tests.campaigns.trials.states import csv_with_a_gap, make_vehicle_real
+from tests.campaigns.trials.states import make_vehicle_real
 
 DEFAULT_GAINS = {"kp": 283, "ki": 13, "kd": 82}
 
@@ -47,9 +47,7 @@ def test_a_landed_flight_is_scored_as_it_is_stored_and_classed_by_the_program(
     client: TestClient, database: Database
 ) -> None:
     campaign = create_ready_campaign(client, database)
-    create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), create_record(1.0))
-    trial = get(client, "/api/trials/1")
+    trial = fly_trial(client, database, campaign["id"], create_record(1.0))
     assert (trial["state"], trial["read_back"]) == ("valid", DEFAULT_GAINS)
     # 50 Hz trapezoids of an exponential: (dt/τ)²/12 = 3e-5 of the value; single precision adds less.
     assert trial["error"] == pytest.approx(climb_error(1.0), rel=1e-4)
@@ -63,33 +61,17 @@ def test_a_landed_flight_is_scored_as_it_is_stored_and_classed_by_the_program(
 def test_the_definition_is_frozen_with_its_digest_at_lift_off(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     create_trial(client, campaign["id"], fly={"speed": None})
-    stage(database)
+    task = stage(database)
     assert get(client, f"/api/campaigns/{campaign['id']}")["definition_digest"] is None
     with database.write() as session:
-        flight_rows.record_lift_off(session, 1)
+        flight_rows.record_lift_off(session, task.flight_id)
     flying = get(client, f"/api/campaigns/{campaign['id']}")
     assert flying["state"] == "flying"
     assert len(flying["definition_digest"]) == 64
     assert flying["flying"] == {"trial_id": 1, "trial_number": 1}
-    land(database, claim_task(database), create_record())
+    land(database, task, create_record())
     answer = client.patch(f"/api/campaigns/{campaign['id']}", json={"version": 1, "definition": {"seed": 2}})
     assert answer.status_code == 409
-
-
-def claim_task(database: Database) -> FlightRequest:
-    """The request of the only flight, which runs."""
-    return FlightRequest(
-        flight_id=1,
-        trial_id=1,
-        campaign_id=1,
-        experiment="takeoff",
-        vehicle_id=1,
-        vehicle_kind="twin",
-        vehicle_options={},
-        safe_gains={},
-        gains={},
-        seed=0,
-    )
 
 
 def test_a_vehicle_that_took_other_gains_does_not_fly(client: TestClient, database: Database) -> None:
@@ -114,9 +96,9 @@ def test_an_aborted_flight_keeps_its_record_and_is_history_without_an_error(
     client: TestClient, database: Database
 ) -> None:
     campaign = create_ready_campaign(client, database)
-    trial = create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), create_record(ending="aborted", reason="too close to the wall", until_s=4.0))
-    after = get(client, f"/api/trials/{trial['id']}")
+    after = fly_trial(
+        client, database, campaign["id"], create_record(ending="aborted", reason="too close to the wall", until_s=4.0)
+    )
     assert (after["state"], after["error"], after["reason"]) == ("aborted", None, "too close to the wall")
     assert after["record"]["duration_s"] == pytest.approx(4.0)
     assert run_jobs(database) == 1
@@ -180,17 +162,6 @@ def test_a_worker_that_died_leaves_a_lost_flight_that_is_not_flown_again(
     assert "fly" not in after["actions"]
     assert get(client, f"/api/campaigns/{campaign['id']}")["state"] == "deciding"
     assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
-
-
-def test_a_worker_that_died_before_lift_off_leaves_a_planned_trial(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database)
-    trial = create_trial(client, campaign["id"], fly={"speed": None})
-    stage(database)
-    with database.write() as session:
-        assert flight_rows.lose_running_flights(session) == []
-    after = get(client, f"/api/trials/{trial['id']}")
-    assert (after["state"], after["flight"]["state"]) == ("planned", "failed")
-    assert client.post(f"/api/trials/{trial['id']}/fly").status_code == 202
 
 
 def test_the_record_of_a_lost_flight_can_be_recovered_once(client: TestClient, database: Database) -> None:
@@ -314,20 +285,3 @@ def test_a_trial_cancelled_while_it_is_staged_does_not_lift_off(client: TestClie
         flight_rows.record_outcome(session, task.flight_id, FlightOutcome(problem="cancelled"))
     assert get(client, f"/api/trials/{trial['id']}")["state"] == "cancelled"
     assert get(client, f"/api/vehicles/{campaign['vehicle']['id']}")["state"] == "ready"
-
-
-def test_a_gap_makes_a_flight_invalid_until_a_person_classifies_it(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database, vehicle="import")
-    trial = create_trial(client, campaign["id"])
-    uploaded = client.post(
-        f"/api/trials/{trial['id']}/trajectory", content=csv_with_a_gap(), headers={"Content-Type": "text/csv"}
-    ).json()
-    assert (uploaded["state"], uploaded["error"]) == ("invalid", None)
-    assert "gap of 1.02 s after 4.980 s" in uploaded["reason"]
-    counted = client.post(
-        f"/api/trials/{trial['id']}/classify",
-        json={"version": uploaded["version"], "outcome": "valid", "reason": "the video shows nothing odd"},
-    ).json()
-    assert counted["state"] == "valid"
-    # The trapezoid over the gap lies above the convex curve: at most gap³/12 · |f''| / window more.
-    assert counted["error"] == pytest.approx(climb_error(1.0), rel=1e-2)

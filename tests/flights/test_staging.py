@@ -33,7 +33,6 @@ from tests.builders import (
     create_record,
     create_trial,
     get,
-    run_jobs,
 )
 from tests.builders import stage as stage_claimed
 from tests.fleet.vehicles import (
@@ -385,46 +384,23 @@ def test_the_ledger_lists_every_gain_set_that_was_given(
     assert seen(client, real)["held"] == better
 
 
-def test_safe_gains_that_were_not_read_back_after_a_flight_stand_in_the_ledger(
-    client: TestClient, database: Database, real: Json, staged: Json
+@pytest.mark.parametrize(
+    ("restored", "outcome"),
+    [(None, "not confirmed"), ({"kp": 283, "ki": 0, "kd": 82}, "failed")],
+    ids=["not read", "read otherwise"],
+)
+def test_safe_gains_that_did_not_come_back_after_a_flight_stand_in_the_ledger_as_they_were_read(
+    client: TestClient, database: Database, real: Json, staged: Json, restored: Json | None, outcome: str
 ) -> None:
     """Observed defect: the ledger ended with the gains of the flight, and nothing said that the safe ones failed."""
+    ended = FlightOutcome(problem="refused", restored=restored, concern="Its safe gains could not be verified.")
     with database.write() as session:
-        outcome = FlightOutcome(problem="refused", concern="Its safe gains could not be verified.")
-        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
+        flight_rows.record_outcome(session, staged["flight"]["id"], ended)
     line = get(client, f"/api/vehicles/{real['id']}/ledger")["items"][0]
     assert (line["purpose"], line["asked"]) == ("restore after flight", DEFAULT_GAINS)
-    assert (line["read_back"], line["outcome"]) == (None, "not confirmed")
+    assert (line["read_back"], line["outcome"]) == (restored, outcome)
     assert line["asked_at"] is not None
-
-
-def test_safe_gains_that_did_not_come_back_stand_in_the_ledger_as_they_were_read(
-    client: TestClient, database: Database, real: Json, staged: Json
-) -> None:
-    wrong = {"kp": 283, "ki": 0, "kd": 82}
-    with database.write() as session:
-        outcome = FlightOutcome(problem="refused", restored=wrong, concern="ki was read back as 0")
-        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
-    line = get(client, f"/api/vehicles/{real['id']}/ledger")["items"][0]
-    assert (line["asked"], line["read_back"], line["outcome"]) == (DEFAULT_GAINS, wrong, "failed")
     assert seen(client, real)["state"] == "quarantined"
-
-
-def test_the_definition_keeps_the_safe_gains_of_its_first_flight(
-    client: TestClient, database: Database, real: Json, planned: Json
-) -> None:
-    flown = fly(client, database, real, planned, create_record())
-    said = {"version": flown["version"], "outcome": "valid", "reason": "clean"}
-    assert client.post(f"/api/trials/{flown['id']}/classify", json=said).status_code == 200
-    run_jobs(database)
-    path = f"/api/campaigns/{planned['campaign_id']}/proposal"
-    before = get(client, path)
-    change = {"version": real["version"], "safe_gains": {"kp": 250, "ki": 13, "kd": 82}, "statement": "Ada"}
-    header = control_header(client, real)
-    assert client.patch(f"/api/vehicles/{real['id']}", json=change, headers=header).status_code == 200
-    after = get(client, path)
-    assert (before["state"], after["state"]) == ("ready", "ready")
-    assert after["proposal"]["stale"] is False
 
 
 def test_the_telemetry_log_of_a_flight_is_handed_out(
@@ -548,55 +524,44 @@ def test_a_flight_that_ended_because_gainline_was_stopped_says_so_and_asks_for_n
     assert (flown["state"], flown["reason"], flown["abort_cause"]) == ("aborted", reason, cause)
 
 
-def test_a_staged_flight_whose_gainline_was_stopped_says_what_became_of_the_vehicle(
-    client: TestClient, database: Database, staged: Json
-) -> None:
-    outcome = FlightOutcome(withdrawn=True, problem="Gainline was stopped", restored=DEFAULT_GAINS)
-    with database.write() as session:
-        flight_rows.record_outcome(session, staged["flight"]["id"], outcome)
-    after = trial(client, staged)
-    assert after["state"] == "planned"
-    assert after["flight"]["problem"].startswith("Gainline was stopped. It restored the safe gains before the takeoff.")
+SILENT = "No current data has been received from the vehicle for more than 2 s."
+LOW = "The battery voltage is below the vehicle's minimum."
 
 
+@pytest.mark.parametrize(
+    ("unready", "over_minimum_v", "told", "steps", "lost"),
+    [
+        ("link silent", 0.0, SILENT, ["control"], ["staged"]),
+        ("", -0.1, LOW, ["control", "staged"], []),
+    ],
+    ids=["link silent", "battery low"],
+)
 def test_a_staged_vehicle_that_is_no_longer_ready_does_not_take_off_until_it_is_again(
-    client: TestClient, database: Database, real: Json, staged: Json
+    client: TestClient,
+    database: Database,
+    real: Json,
+    staged: Json,
+    unready: UnreadyReason,
+    over_minimum_v: float,
+    told: str,
+    steps: list[str],
+    lost: list[str],
 ) -> None:
-    """The rules themselves: test_readiness.py."""
+    """The rules themselves: test_readiness.py. With a low battery it stays staged."""
     operator = control_header(client, real) | OUR_PAGE
-    path = f"/api/trials/{staged['id']}"
-    report(client, staged, "link silent")
+    path, minimum_v = f"/api/trials/{staged['id']}", real["options"]["min_battery_v"]
+    report(client, staged, unready, battery_v=minimum_v + over_minimum_v)
     refused = client.post(f"{path}/take-off", headers=operator)
-    silent = "No current data has been received from the vehicle for more than 2 s."
-    assert (refused.status_code, silent in refused.json()["detail"]) == (409, True), refused.text
+    assert (refused.status_code, told in refused.json()["detail"]) == (409, True), refused.text
     readiness = client.get(f"{path}/readiness", headers=operator).json()
-    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (["control"], ["staged"], False)
-    assert [loss["kind"] for loss in readiness["losses"]] == ["link silent"]
+    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (steps, lost, False)
+    assert [loss["what"] for loss in readiness["losses"]] == [told]
     assert is_wanted(database, staged) == (False, None)
-    report(client, staged)
+    report(client, staged, battery_v=minimum_v)
     readiness = client.get(f"{path}/readiness", headers=operator).json()
     assert (readiness["steps"], readiness["losses"], readiness["is_ready"]) == (["control", "staged"], [], True)
     assert client.post(f"{path}/take-off", headers=operator).status_code == 202
     assert client.get(f"{path}/readiness", headers=operator).json()["steps"] == ["control", "staged", "held"]
-
-
-def test_a_staged_vehicle_below_its_minimum_voltage_does_not_take_off_but_stays_staged(
-    client: TestClient, database: Database, real: Json, staged: Json
-) -> None:
-    operator = control_header(client, real) | OUR_PAGE
-    path = f"/api/trials/{staged['id']}"
-    report(client, staged, battery_v=real["options"]["min_battery_v"] - 0.1)
-    refused = client.post(f"{path}/take-off", headers=operator)
-    assert (refused.status_code, refused.json()["detail"], refused.json()["hint"]) == (
-        409,
-        "The battery voltage is below the vehicle's minimum.",
-        "Insert a charged battery, then stage the flight again.",
-    )
-    readiness = client.get(f"{path}/readiness", headers=operator).json()
-    assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (["control", "staged"], [], False)
-    assert is_wanted(database, staged) == (False, None)
-    report(client, staged, battery_v=real["options"]["min_battery_v"])
-    assert client.post(f"{path}/take-off", headers=operator).status_code == 202
 
 
 def test_who_watches_while_another_operator_is_in_control_sees_the_flight_as_staged(

@@ -8,10 +8,8 @@ from tests.builders import (
     Json,
     create_ready_campaign,
     create_record,
-    create_trial,
+    fly_trial,
     get,
-    land,
-    lift_off,
     made_once,
     run_jobs,
 )
@@ -29,8 +27,7 @@ def make_campaign(client: TestClient, database: Database) -> Json:
     """Three flights on the twin with known errors, the second one ruled out."""
     ready = create_ready_campaign(client, database, name=NAME, definition={"stop": {"kind": "budget"}})
     for kd, settling_s in ((82, 1.5), (90, 1.2), (98, 0.9)):
-        create_trial(client, ready["id"], gains={"kp": 283, "ki": 13, "kd": kd}, fly={"speed": None})
-        land(database, lift_off(database), create_record(settling_s))
+        fly_trial(client, database, ready["id"], create_record(settling_s), gains={"kp": 283, "ki": 13, "kd": kd})
     second = get(client, f"/api/campaigns/{ready['id']}/trials")["items"][1]
     said = {"version": second["version"], "outcome": "invalid", "reason": REASON}
     assert client.post(f"/api/trials/{second['id']}/classify", json=said).status_code == 200

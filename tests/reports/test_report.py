@@ -21,7 +21,14 @@ from app.campaigns.service import get_row
 from app.core.formatting import measured
 from app.db.session import Database
 from app.reports import pdf, router, sections
-from tests.builders import Json, create_ready_campaign, create_record, create_trial, get, land, lift_off, run_jobs
+from tests.builders import (
+    Json,
+    create_ready_campaign,
+    create_record,
+    fly_trial,
+    get,
+    run_jobs,
+)
 from tests.campaigns.test_landscapes import card_of, run_landscapes
 from tests.campaigns.trials.test_photos import JPEG, add, png
 from tests.fleet.vehicles import create_campaign_on, create_connected
@@ -187,8 +194,7 @@ def drawn(client: TestClient, campaign: Json) -> Json:
 @pytest.mark.complete
 def test_a_flight_that_does_not_settle_is_said_not_to(client: TestClient, database: Database, campaign: Json) -> None:
     assert "not settled" not in read(client, campaign).cells
-    create_trial(client, campaign["id"], gains={"kp": 283, "ki": 13, "kd": 106}, fly={"speed": None})
-    land(database, lift_off(database), create_record(30.0))
+    fly_trial(client, database, campaign["id"], create_record(30.0), gains={"kp": 283, "ki": 13, "kd": 106})
     run_jobs(database)
     assert read(client, campaign).cells.count("not settled") == 1
 

@@ -40,17 +40,13 @@ def test_a_campaign_flies_to_its_stop_and_gets_better(serving: Serving) -> None:
 
 
 def require_telemetry(heard: list[tuple[str, str | None, Any]], trial: Any) -> None:
-    """It came while the trial flew, with the error so far."""
+    """It came while the trial flew; what is in it: tests/flights/test_flight_process.py."""
     telemetry = [data for name, _, data in heard if name == "telemetry"]
     assert {identity for name, identity, _ in heard if name == "telemetry"} == {None}
     phases = [data["phase"] for name, _, data in heard if name == "phase"]
     assert phases == ["staging", "flying", "landed", "ended"]
     assert {data["trial_id"] for data in telemetry} == {trial["id"]}
-    times = [row[0] for data in telemetry for row in data["samples"]]
-    assert times == sorted(times)
-    assert times[-1] > 32.6
-    # 50 Hz telemetry against the 512 Hz record
-    assert telemetry[-1]["error_so_far"] == pytest.approx(trial["error"], abs=2e-4)
+    assert telemetry[-1]["time_s"] > 32.6
 
 
 def test_two_streams_see_the_same_and_a_later_one_resumes_where_another_left(serving: Serving) -> None:

@@ -23,6 +23,10 @@ def damaged(migrated_file: Path, data_dir: Path, table: str) -> None:
     with closing(sqlite3.connect(file)) as connection:
         (page,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = ?", (table,)).fetchone()
         assert connection.execute("PRAGMA page_size").fetchone() == (PAGE_BYTES,)
+    overwrite(file, page)
+
+
+def overwrite(file: Path, page: int) -> None:
     with file.open("r+b") as raw:
         raw.seek((page - 1) * PAGE_BYTES)
         raw.write(b"\xee" * PAGE_BYTES)
@@ -71,9 +75,7 @@ def test_the_running_server_says_so_too(tmp_path: Path) -> None:
         with closing(sqlite3.connect(file)) as connection:
             (page,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = 'campaign'").fetchone()
             connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        with file.open("r+b") as raw:
-            raw.seek((page - 1) * PAGE_BYTES)
-            raw.write(b"\xee" * PAGE_BYTES)
+        overwrite(file, page)
         with closing(sqlite3.connect(file)) as connection:  # a change, so that pages that are known are read again
             connection.execute("PRAGMA user_version = 1")
         answer = serving.api.get("/campaigns")

@@ -141,7 +141,7 @@ def test_a_key_is_worth_nothing_through_a_proxy_or_under_another_name(
     assert get(client, "/api/vehicles")["total"] == 1
 
 
-def acts_on(vehicle: Json) -> list[tuple[str, str, Json]]:
+def acts_on(vehicle: Json) -> list[tuple[str, str, Json | None]]:
     """Every way to command a vehicle, by method, path and body."""
     path = f"/api/vehicles/{vehicle['id']}"
     return [
@@ -149,6 +149,7 @@ def acts_on(vehicle: Json) -> list[tuple[str, str, Json]]:
         *(("POST", f"{path}/{act}", {}) for act in ("check", "restore", "parameters", "disconnect", "motors-off")),
         ("POST", f"{path}/release", {"statement": "I looked"}),
         ("PATCH", path, {"version": vehicle["version"], "name": "Mine"}),
+        ("DELETE", f"{path}?version={vehicle['version']}", None),
     ]
 
 
@@ -284,13 +285,19 @@ def test_a_server_that_others_reach_has_no_links_whoever_asks(
     assert get(exposed, "/api/access")["may_link"] is False
 
 
-@pytest.mark.parametrize("headers", [{"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"}])
+@pytest.mark.parametrize(
+    "headers",
+    [{"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"}, {"Origin": "http://evil.example"},
+     {"Host": "evil.example"}],
+)  # fmt: skip
 def test_a_page_of_another_site_starts_no_work(client: TestClient, database: Database, headers: dict[str, str]) -> None:
     """Not even by pictures and links, which are read without asking."""
     campaign = create_ready_campaign(client, database)
     jobs = get(client, "/api/jobs")["total"]
-    for path in ("figures/landscape", "figures/takeoffs", "report.html", "report.pdf", "bundle", "statistics"):
-        assert client.get(f"/api/campaigns/{campaign['id']}/{path}", headers=headers).status_code == 403
+    parts = ("figures/landscape", "figures/takeoffs", "report.html", "report.pdf", "bundle", "statistics")
+    for path in ("system/backup", *(f"campaigns/{campaign['id']}/{part}" for part in parts)):
+        answer = client.get(f"/api/{path}", headers=headers)
+        assert (answer.status_code, answer.headers["content-type"]) == (403, "application/problem+json"), path
     assert get(client, "/api/jobs")["total"] == jobs
 
 

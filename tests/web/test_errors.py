@@ -186,14 +186,6 @@ def test_the_gate_says_how_far_the_gains_may_go(client: TestClient, database: Da
     )
 
 
-@pytest.mark.parametrize("body", [{}, {"proposal_id": 1, "gains": {"kp": 283, "ki": 13, "kd": 82}}])
-def test_a_trial_flies_a_proposal_or_gains_and_not_both(client: TestClient, database: Database, body: object) -> None:
-    campaign = create_ready_campaign(client, database)
-    answer = client.post(f"{CAMPAIGN}/{campaign['id']}/trials", json=body)
-    assert answer.status_code == 422
-    assert "proposal_id" in problems_of(answer)
-
-
 def test_another_campaigns_proposal_is_not_found(client: TestClient, database: Database) -> None:
     first, second = (create_ready_campaign(client, database)["id"] for _ in range(2))
     theirs = get(client, f"{CAMPAIGN}/{first}/proposal")["proposal"]["id"]
@@ -252,10 +244,3 @@ def test_every_error_is_drawn_in_the_trees_docstring() -> None:
     assert errors.__doc__ is not None
     assert {name for name in kinds if name not in errors.__doc__} == set()
     assert kinds <= set(errors.__all__)
-
-
-def test_a_vehicle_that_is_not_quarantined_cannot_be_released(client: TestClient, database: Database) -> None:
-    create_ready_campaign(client, database)
-    answer = client.post("/api/vehicles/1/release", json={"statement": "looks well"})
-    assert answer.status_code == 409
-    assert "only while it is quarantined" in answer.json()["hint"]

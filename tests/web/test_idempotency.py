@@ -12,7 +12,6 @@ from app.db.session import Database
 from app.db.types import utc_now
 from tests.builders import (
     create_campaign,
-    create_csv,
     create_ready_campaign,
     create_record,
     create_trial,
@@ -68,23 +67,6 @@ def test_an_answer_is_given_again_as_it_was_though_the_world_has_moved_on(
     land(database, lift_off(database), create_record())
     assert client.post(path, json=ask, headers=KEY).json() == first.json()
     assert get(client, path)["total"] == 1
-
-
-def test_a_record_sent_twice_with_its_key_is_stored_once(client: TestClient, database: Database) -> None:
-    campaign = create_ready_campaign(client, database, vehicle="import")
-    trial = create_trial(client, campaign["id"])
-    answers = [
-        client.post(
-            f"/api/trials/{trial['id']}/trajectory", content=create_csv(), headers={**KEY, "Content-Type": "text/csv"}
-        )
-        for _ in range(2)
-    ]
-    assert [answer.status_code for answer in answers] == [201, 201]
-    assert answers[0].json() == answers[1].json()
-    other = client.post(
-        f"/api/trials/{trial['id']}/trajectory", content=create_csv(2.0), headers={**KEY, "Content-Type": "text/csv"}
-    )
-    assert other.status_code == 422
 
 
 @pytest.mark.parametrize("key", ["", "x" * 201])

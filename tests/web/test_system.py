@@ -165,20 +165,6 @@ def test_a_backup_comes_as_a_file_with_its_size_and_the_date(client: TestClient)
         assert names(copy) == []
 
 
-@pytest.mark.parametrize(
-    "headers",
-    [{"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"}, {"Origin": "http://evil.example"},
-     {"Host": "evil.example"}],
-)  # fmt: skip
-@pytest.mark.parametrize("path", ["system/backup", "campaigns/1/report.pdf", "campaigns/1/bundle"])
-def test_no_page_of_another_site_sets_a_backup_a_print_or_a_bundle_going(
-    client: TestClient, path: str, headers: dict[str, str]
-) -> None:
-    answer = client.get(f"/api/{path}", headers=headers)
-    assert answer.status_code == 403
-    assert answer.headers["content-type"] == "application/problem+json"
-
-
 def test_a_backup_never_takes_the_room_that_flights_need(
     client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

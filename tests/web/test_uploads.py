@@ -107,15 +107,6 @@ def test_more_rows_than_allowed_are_refused_even_when_they_are_short(client: Tes
     assert "200 000" in answer.text or "200000" in answer.text
 
 
-def test_a_stated_length_beyond_the_limit_is_refused_before_anything_arrives(client: TestClient, trial: Json) -> None:
-    answer = client.post(
-        f"/api/trials/{trial['id']}/trajectory",
-        content=b"x",
-        headers={"Content-Type": "text/csv", "Content-Length": str(10**10)},
-    )
-    assert answer.status_code == 413
-
-
 SMALL: Final = 2**16
 """Limit of every upload in the tests below, and a part of what is sent beyond it."""
 
@@ -157,11 +148,6 @@ def test_every_route_for_files_refuses_what_is_too_large_whatever_its_length_say
             assert "Send at most" in answer.json()["hint"]
 
 
-def test_a_record_may_come_as_a_form(client: TestClient, trial: Json) -> None:
-    answer = client.post(f"/api/trials/{trial['id']}/trajectory", files={"file": ("flight.csv", create_csv())})
-    assert (answer.status_code, answer.json()["state"]) == (201, "valid")
-
-
 @pytest.mark.parametrize(
     ("arguments", "status"),
     [
@@ -178,12 +164,6 @@ def test_something_else_than_a_record_is_refused(client: TestClient, trial: Json
     answer = client.post(f"/api/trials/{trial['id']}/trajectory", **arguments)
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
-
-
-def test_a_trial_takes_one_record(client: TestClient, trial: Json) -> None:
-    assert send(client, trial["id"], create_csv()).status_code == 201
-    again = send(client, trial["id"], create_csv(2.0))
-    assert again.status_code == 409
 
 
 def test_an_export_can_be_imported_and_gives_the_same_record_and_error(client: TestClient, database: Database) -> None:

@@ -11,7 +11,6 @@ from tests.builders import (
     create_ready_campaign,
     create_record,
     create_trial,
-    csv_of,
     land,
     lift_off,
     made_once,
@@ -23,12 +22,6 @@ def make_vehicle_real(database: Database, kind: str = "twin") -> None:
     """From now on this kind counts as a real aircraft."""
     with database.write() as session:
         session.query(VehicleRow).filter(VehicleRow.kind == kind).one().is_real = True
-
-
-def csv_with_a_gap(gap_s: float = 1.0) -> bytes:
-    climb = create_record().trajectory
-    kept = (climb.time_s < 5.0) | (climb.time_s >= 5.0 + gap_s)
-    return csv_of({"time_s": climb.time_s[kept], "altitude_m": climb["altitude_m"][kept]})
 
 
 def create_trial_in(state: TrialState, client: TestClient, database: Database) -> Json:

@@ -208,14 +208,6 @@ def test_no_log_is_taken_for_a_trial_that_gainline_flies_itself(
     assert (after["state"], after["record"], after["read_back"]) == ("planned", None, None)
 
 
-def test_pitch_tracking_has_no_campaign_for_records_of_flights_made_elsewhere(client: TestClient) -> None:
-    definition = {"experiment": "pitch-tracking", "strategy": "manual"}
-    wanted = {"name": "Test", "vehicle": {"kind": "import"}, "definition": definition}
-    answer = client.post("/api/campaigns", json=wanted)
-    assert answer.status_code == 422
-    assert set(problems_of(answer)) == {"definition.experiment", "vehicle.kind"}
-
-
 def test_the_content_of_a_log_counts_and_not_its_file_extension(client: TestClient, trial: Json) -> None:
     empty = client.post(path_of(trial), files={"file": ("flight.ulg", b"")})
     assert (empty.status_code, set(problems_of(empty))) == (422, {"file"})
@@ -265,13 +257,14 @@ def test_of_a_log_with_two_takeoffs_the_one_that_is_asked_for_is_stored(client: 
     assert flown["error"] == pytest.approx(0.3297, abs=0.00005)
 
 
-def test_the_same_key_with_another_question_is_another_request(client: TestClient, trial: Json) -> None:
+def test_the_same_key_with_another_question_or_another_log_is_another_request(client: TestClient, trial: Json) -> None:
     headers = {**ANY, "Idempotency-Key": "one"}
     content = recorded(f"{DEFAULT}.tlog")
     first = client.post(path_of(trial), content=content, headers=headers)
     assert client.post(path_of(trial), content=content, headers=headers).json() == first.json()
-    other = client.post(f"{path_of(trial)}?takeoff=1", content=content, headers=headers)
-    assert (other.status_code, other.json()["title"]) == (422, "Key reused")
+    for query, sent in (("?takeoff=1", content), ("", recorded(f"{TUNED}.tlog"))):
+        other = client.post(f"{path_of(trial)}{query}", content=sent, headers=headers)
+        assert (other.status_code, other.json()["title"]) == (422, "Key reused")
 
 
 def test_a_paparazzi_log_comes_with_its_companion_in_a_form(client: TestClient, trial: Json) -> None:

@@ -71,22 +71,6 @@ def fly(client: TestClient, campaign_id: int, gains: Json) -> Json:
 
 
 @pytest.mark.complete
-def test_a_flight_with_custom_gains_grows_over_its_own_prediction(
-    client: TestClient, database: Database, campaign: Json
-) -> None:
-    shown = prediction(client, campaign["id"], OWN)
-    trial = fly(client, campaign["id"], OWN)
-    for query in ("", f"?predicted={trial['number']}"):
-        found = drawn(client, campaign["id"], query)
-        assert set(found) == {"prediction", "band lower", "band upper", "predicted deviation"}
-        assert found["prediction"][0] == trial["number"]
-        assert max(found["prediction"][1]) == pytest.approx(max(shown["curve"]["values"]), abs=1e-3)
-        assert found["band upper"][1][-1] == pytest.approx(shown["upper"]["values"][-1], abs=1e-3)
-    land(database, lift_off(database), create_record(0.9))
-    run_jobs(database)
-
-
-@pytest.mark.complete
 def test_the_chart_of_a_reviewed_flight_has_its_own_prediction_and_never_the_next_ones(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
@@ -142,6 +126,7 @@ def test_a_flight_keeps_the_curve_and_the_band_with_which_it_was_planned(
     query = f"?predicted={trial['number']}"
     planned = drawn(client, campaign["id"], query)
     assert set(planned) == {"prediction", "band lower", "band upper", "predicted deviation"}
+    assert planned["prediction"][0] == trial["number"]
     assert drawn(client, campaign["id"]) == planned
     task = lift_off(database)
     assert drawn(client, campaign["id"]) == planned

@@ -15,6 +15,7 @@ from tests.builders import (
     create_ready_campaign,
     create_record,
     create_trial,
+    fly_trial,
     get,
     land,
     lift_off,
@@ -40,13 +41,12 @@ def test_only_a_completed_flight_has_a_steady_state_until_a_person_counts_it(
 ) -> None:
     """A record can go on through the landing of a flight that the program ended."""
     campaign = create_ready_campaign(client, database, definition=PATIENT)
-    trial = create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), create_record(ending="invalid", reason="The battery voltage is low."))
+    record = create_record(ending="invalid", reason="The battery voltage is low.")
+    ended = fly_trial(client, database, campaign["id"], record)
     measured = ("settling_time_s", "overshoot_m", "steady_state_error_m")
-    ended = get(client, f"/api/trials/{trial['id']}")
     assert [ended[name] for name in measured] == [None] * 3
-    assert classify(client, trial["id"], "valid") == 200
-    counted = get(client, f"/api/trials/{trial['id']}")
+    assert classify(client, ended["id"], "valid") == 200
+    counted = get(client, f"/api/trials/{ended['id']}")
     assert None not in [counted[name] for name in measured]
 
 
@@ -102,17 +102,16 @@ def test_only_a_record_that_covers_the_window_may_be_marked_valid(
     client: TestClient, database: Database, until_s: float, may_be_valid: bool
 ) -> None:
     campaign = create_ready_campaign(client, database, definition=PATIENT)
-    trial = create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), create_record(ending="invalid", reason="low battery", until_s=until_s))
-    ended = get(client, f"/api/trials/{trial['id']}")
+    ended = fly_trial(
+        client, database, campaign["id"], create_record(ending="invalid", reason="low battery", until_s=until_s)
+    )
     assert (ended["state"], ended["may_be_valid"]) == ("invalid", may_be_valid)
-    assert classify(client, trial["id"], "valid") == (200 if may_be_valid else 422)
+    assert classify(client, ended["id"], "valid") == (200 if may_be_valid else 422)
 
 
 def test_a_flight_that_was_broken_off_never_counts_as_complete(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=PATIENT)
-    trial = create_trial(client, campaign["id"], fly={"speed": None})
-    land(database, lift_off(database), create_record(ending="aborted", reason="gust"))
+    trial = fly_trial(client, database, campaign["id"], create_record(ending="aborted", reason="gust"))
     assert classify(client, trial["id"], "invalid") == 200
     version = get(client, f"/api/trials/{trial['id']}")["version"]
     answer = client.post(
