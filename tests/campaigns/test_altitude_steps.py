@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from numpy.typing import NDArray
 
 from app.core.clock import REAL_TIME
 from app.db.session import Database
@@ -71,8 +72,7 @@ def test_two_flights_are_flown_to_the_schedule_scored_against_the_reference_pred
     first = fly(client, database, campaign["id"])
     second = fly(client, database, campaign["id"])
     assert [first["state"], second["state"]] == ["valid", "valid"]
-    text = client.get(f"/api/trials/{second['id']}/trajectory.csv").text
-    rows = np.genfromtxt(io.StringIO(text), delimiter=",", names=True)
+    rows = rows_of(client, second)
     changes = np.flatnonzero(np.diff(rows["set_point_m"])) + 1
     assert rows["time_s"][changes].tolist() == [10.0, 13.0]
     assert rows["set_point_m"][[0, 5120, 6656, -1]].tolist() == [3.0, 2.0, 3.0, 3.0]
@@ -115,10 +115,15 @@ def test_its_error_landscape_is_computed_and_drawn(client: TestClient, database:
     assert get(client, path)["state"] == "ready"
 
 
+def rows_of(client: TestClient, trial: Json) -> NDArray[np.void]:
+    """The trial's exported record, its columns by name."""
+    text = client.get(f"/api/trials/{trial['id']}/trajectory.csv").text
+    return np.genfromtxt(io.StringIO(text), delimiter=",", names=True)
+
+
 def distance_of(client: TestClient, trial: Json) -> float:
     """The largest distance from the reference after the first step."""
-    text = client.get(f"/api/trials/{trial['id']}/trajectory.csv").text
-    rows = np.genfromtxt(io.StringIO(text), delimiter=",", names=True)
+    rows = rows_of(client, trial)
     after = (rows["time_s"] > 10.0) & (rows["time_s"] <= 16.0)
     return float(np.abs(rows["altitude_m"] - rows["reference_m"])[after].max())
 

@@ -517,14 +517,17 @@ def test_version_and_hardware_id_are_pinned_when_they_are_told_and_changed_by_a_
 ) -> None:
     """Paparazzi sends its version every few seconds, often only after the connection."""
     vehicle = register(client)
-    known = Identity(system_id=1, autopilot="px4", version="1.16.0")
+    known = {"version": "1.16.0"}
+
+    def identity(value: str) -> Identity:
+        return Identity(system_id=1, autopilot="px4", **{**known, field: value})
 
     def pinned() -> str:
         return str(seen(client, vehicle)["identity"][field])
 
     def connected_as(value: str) -> str:
         with database.write() as session:
-            commands.record_connected(session, vehicle["id"], replace(known, **{field: value}))
+            commands.record_connected(session, vehicle["id"], identity(value))
         lose_link(database, vehicle)
         return pinned()
 
@@ -532,7 +535,7 @@ def test_version_and_hardware_id_are_pinned_when_they_are_told_and_changed_by_a_
     for value in (told[3], ""):  # it tells none any more, and is accepted as it is
         put_into(VehicleState.QUARANTINED, database, vehicle)
         with database.write() as session:
-            commands.record_released(session, vehicle["id"], identity=replace(known, **{field: value}))
+            commands.record_released(session, vehicle["id"], identity=identity(value))
         assert pinned() == value
 
 

@@ -552,10 +552,10 @@ def test_a_staged_vehicle_that_is_no_longer_ready_does_not_take_off_until_it_is_
     path, minimum_v = f"/api/trials/{staged['id']}", real["options"]["min_battery_v"]
     report(client, staged, unready, battery_v=minimum_v + over_minimum_v)
     refused = client.post(f"{path}/take-off", headers=operator)
-    assert (refused.status_code, told in refused.json()["detail"]) == (409, True), refused.text
+    assert (refused.status_code, refused.json()["detail"]) == (409, told), refused.text
     readiness = client.get(f"{path}/readiness", headers=operator).json()
     assert (readiness["steps"], readiness["lost"], readiness["is_ready"]) == (steps, lost, False)
-    assert [loss["what"] for loss in readiness["losses"]] == [told]
+    assert [(loss["what"], loss["way_on"]) for loss in readiness["losses"]] == [(told, refused.json()["hint"])]
     assert is_wanted(database, staged) == (False, None)
     report(client, staged, battery_v=minimum_v)
     readiness = client.get(f"{path}/readiness", headers=operator).json()
