@@ -9,7 +9,7 @@ from app.common.settings import Settings
 from app.live.messages import VehicleLinkState, VehicleStatus, WorkerHello, live_address
 from app.live.server import LiveServer
 from tests.builders import get
-from tests.flights.test_abort import wait_until
+from tests.waiting import eventually
 
 
 def status(vehicle_id: int, state: VehicleLinkState, trouble: str = "") -> VehicleStatus:
@@ -27,13 +27,13 @@ def test_a_vehicle_whose_process_stands_still_is_named_until_it_goes_on(client: 
         order=lambda *_: Future(),
         hello=lambda: WorkerHello(pid=os.getpid(), version="test", flying=[]),
     ) as worker:
-        wait_until(lambda: get(client, "/api/health")["worker"] == "running")
+        eventually(lambda: get(client, "/api/health")["worker"] == "running")
         worker.publish(status(4, "gone", "The telemetry log cannot be written."))
         worker.publish(status(5, "not answering", "Orders do not reach it."))
-        wait_until(lambda: named() == [{"vehicle_id": 5, "trouble": "Orders do not reach it."}])
+        eventually(lambda: named() == [{"vehicle_id": 5, "trouble": "Orders do not reach it."}])
         worker.publish(status(5, "connected"))
-        wait_until(lambda: named() == [])
+        eventually(lambda: named() == [])
         worker.publish(status(5, "not answering", "Orders do not reach it."))
-        wait_until(lambda: named() != [])
-    wait_until(lambda: named() == [])
+        eventually(lambda: named() != [])
+    eventually(lambda: named() == [])
     assert get(client, "/api/health")["worker"] == "absent"
