@@ -9,7 +9,7 @@ import pytest
 
 from app.core.records.trajectory import Trajectory
 from app.simdrone.faults import FAULTS
-from bench.hazards.cases import TUNED, Case, PlannedFault
+from bench.hazards.cases import ABORT, TUNED, Case, PlannedFault
 from bench.hazards.hostile_checks import GroundTruth, ReportedOutcome, TrueState, find_violations
 from bench.hazards.hostile_table import HAZARDS
 from bench.hazards.hostile_trial import POWERED_S, cases, run_trial
@@ -51,7 +51,10 @@ SEEN_ALIKE = [
     ("paparazzi", "x inf for 0.3 s", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "flies home", State.RECORD, "invalid", "F10b", "quarantined"),
     ("ardupilot", "foreign kill", State.LAND, "invalid", "F10b", "quarantined"),
+    ("px4", "foreign kill", State.RECORD, "invalid", "F10b", "quarantined"),
     ("ardupilot", "process killed", State.RECORD, "lost", "", "quarantined"),
+    ("px4", "process killed", State.RECORD, "lost", "", "quarantined"),
+    ("ardupilot", "companion as autopilot", State.CONNECT, "completed", "", "safe"),
     ("paparazzi", "30 % are lost", State.PREFLIGHT, "refused", "", "safe"),
     ("paparazzi", "twin 0.4 s older", State.LAND, "invalid", "F12", "quarantined"),
     ("ardupilot", "twin 3600 s older", State.RECORD, "invalid", "F12", "quarantined"),
@@ -101,6 +104,23 @@ def test_what_once_stopped_motors_in_the_air_does_not_any_more(
 ) -> None:
     """Seen: told to stop at 0.7 to 2.3 m, several of them then reported safe."""
     assert run_trial(case(autopilot, what, state, delay_s=delay_s)).wrong == ()
+
+
+@pytest.mark.complete
+@pytest.mark.parametrize(
+    ("what", "state", "delay_s", "abort_s", "outcome"),
+    [
+        ("on the ground after 0 s", State.SET_GAINS, 0.46, 0.51, "refused"),
+        ("on the ground after 0.3 s", State.TAKEOFF, 0.42, 0.50, "aborted"),
+    ],
+)
+def test_a_drone_whose_position_stays_on_the_ground_is_not_flown_or_has_flown(
+    what: str, state: State, delay_s: float, abort_s: float, outcome: str
+) -> None:
+    """Seen: it rose to 0.1 to 0.4 m, was aborted, landed as its flight plan reported, and had not flown."""
+    lies = case("paparazzi", what, state, delay_s)
+    abort = PlannedFault(ABORT, State.TAKEOFF, abort_s)
+    assert run_trial(replace(lies, faults=(*lies.faults, abort))).outcome == outcome
 
 
 @pytest.mark.parametrize(

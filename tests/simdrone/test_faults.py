@@ -11,7 +11,7 @@ from app.simdrone.drone import Drone
 from app.simdrone.faults import FAULTS, PlannedFault, parse_fault
 from tests.simdrone import copters
 from tests.simdrone.ground import Ground, Heard, LockstepWire, flying
-from tests.simdrone.paparazzi import GROUND_M, LAND_HERE, PLAN_M, START_ENGINE, Pilot, from_vehicle
+from tests.simdrone.paparazzi import GROUND_M, LAND_HERE, PLAN_M, Pilot, from_vehicle
 
 
 def positions(messages: list[Heard]) -> list[Heard]:
@@ -67,14 +67,6 @@ def test_an_unconfirmed_parameter_is_neither_answered_nor_held() -> None:
     assert held.param_value == 283.0
 
 
-def test_paparazzi_refuses_to_arm_without_a_word() -> None:
-    ground = flying("paparazzi", faults=["arm-refused@connect"])
-    pilot = Pilot(ground)
-    pilot.block(START_ENGINE)
-    assert not pilot.is_armed()
-    assert pilot.command(400, 1.0) == 4
-
-
 @pytest.mark.parametrize(("autopilot", "result"), [("ardupilot", 4), ("px4", 1)])
 def test_the_others_refuse_to_arm_and_say_why(autopilot: str, result: int) -> None:
     ground = flying(autopilot, faults=["arm-refused@connect"])
@@ -83,25 +75,6 @@ def test_the_others_refuse_to_arm_and_say_why(autopilot: str, result: int) -> No
     assert pilot.command(copters.ARM, 1.0) == result
     assert pilot.command(copters.ARM, 1.0, copters.FORCE) == result
     assert len(pilot.words()) == 2
-
-
-def test_without_lift_off_it_stands_though_it_is_armed_and_told_to_climb() -> None:
-    ground = flying("paparazzi", faults=["no-lift-off@connect"])
-    pilot = Pilot(ground)
-    pilot.take_off()
-    assert max(-each.z for each in positions(ground.listen(5.0))) < 0.11
-    assert pilot.is_armed()
-
-
-def test_a_lost_link_is_silent_both_ways_while_the_drone_flies_on() -> None:
-    ground = flying("paparazzi", faults=["link-lost:8@4"])
-    pilot = Pilot(ground)
-    pilot.take_off()
-    heard = positions(ground.listen(25.0))
-    gaps_ms = [b.time_boot_ms - a.time_boot_ms for a, b in pairwise(heard)]
-    assert max(gaps_ms) == pytest.approx(8000, abs=50)
-    assert sorted(gaps_ms)[-2] <= 20
-    assert -heard[-1].z > 2.8
 
 
 def test_during_a_lost_link_commands_do_not_arrive() -> None:
@@ -268,17 +241,6 @@ def test_in_a_fall_paparazzis_estimated_altitude_steps_as_in_the_recorded_one() 
     assert (-heard[-1].z, heard[-1].vz) == pytest.approx((GROUND_M, 0.0), abs=0.01)
 
 
-@pytest.mark.parametrize(
-    "autopilot", ["paparazzi", *(pytest.param(each, marks=pytest.mark.complete) for each in ("ardupilot", "px4"))]
-)
-def test_another_station_stops_the_motors_in_the_air(autopilot: str) -> None:
-    ground = hovering(autopilot)
-    drone_of(ground).inject_fault("foreign-kill")
-    assert not ground.expect("HEARTBEAT", within_s=4.0).base_mode & 128
-    ground.listen(1.5)
-    assert drone_of(ground).body.altitude_m == pytest.approx(0.0, abs=0.01)
-
-
 @pytest.mark.parametrize(("fault", "drift_m_s"), [("drifting-altitude", 0.5), ("creeping-altitude", 0.1)])
 def test_a_drift_of_the_altitude_is_in_the_telemetry_alone(fault: str, drift_m_s: float) -> None:
     ground = hovering("paparazzi")
@@ -350,13 +312,3 @@ def test_on_the_ground_after_arming_the_altitude_drifts_as_recorded_and_comes_ba
     assert [-each(heard, key=lambda at: at.vz).vz for each in (min, max)] == pytest.approx([0.125, -0.125], abs=0.001)
     assert -heard[-1].z == pytest.approx(before_m, abs=0.01)
     assert {each.landed_state for each in ground.heard if each.get_type() == "EXTENDED_SYS_STATE"} <= {1}
-
-
-def test_the_registry_holds_what_was_promised() -> None:
-    promised = (
-        "no-heartbeat param-unconfirmed arm-refused no-lift-off link-lost deaf ack-lost silent-witness taken-over "
-        "foreign-kill flies-home frozen-position jumping-position stuck-altitude drifting-altitude creeping-altitude "
-        "lean-oscillation low-battery reboot duplicated-packets reordered-packets wrong-system carried-away mocap-lost "
-        "mocap-frozen mocap-drift ground-drift"
-    )
-    assert list(FAULTS) == promised.split()

@@ -1,6 +1,5 @@
 """Whole trials of altitude steps against the simulated autopilots, in lockstep."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,12 +16,11 @@ from app.vehicles.registry import open_vehicle
 from tests.core.tuning.flying import compiled_only
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
-from tests.vehicles.mavlink.rigs import LockstepRig, UdpRig, copter_of
+from tests.vehicles.mavlink.rigs import LockstepRig, copter_of
 
 STEPS = AltitudeSteps().configured({"steps": 2, "step_window_s": 3.0})
 """At 10 s from 3 m to 2 m, at 13 s back; scored until 16 s."""
 ORDER = FlightOptions(seed=1, window_s=STEPS.window_s, set_points=STEPS.set_points)
-SPEED = 40.0
 TOLERANCE_M = 0.001
 """The steps are up to 10 ms early or late, and the link sends positions 51 times a second, rounded to 1/256 m."""
 
@@ -102,31 +100,6 @@ def test_an_abort_while_a_set_point_is_under_way_lands_on_the_safe_gains_and_doe
         record = fly(rig, watcher=Watcher(abort_at_s=10.3))
         assert waypoints(rig) == [3.0, 2.0]
     assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
-
-
-@compiled_only
-@pytest.mark.parametrize(
-    ("fault", "abort_at_s", "ending", "reason", "sent"),
-    [
-        ("ack-lost:0.4@9.9", 12.0, "aborted", "the operator pressed Abort", [3.0, 2.0, 2.0]),
-        ("link-lost:3@10.5", math.inf, "invalid", "The link was lost in flight.", [3.0, 2.0]),
-    ],
-)
-@pytest.mark.complete
-def test_over_real_sockets_it_ends_as_well(
-    fault: str, abort_at_s: float, ending: str, reason: str, sent: list[float]
-) -> None:
-    watcher = Watcher(abort_at_s=abort_at_s)
-    with UdpRig(faults=[fault], speed=SPEED) as rig:
-        vehicle = rig.vehicle()
-        vehicle.stage(TUNED)
-        record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
-        assert vehicle.read_gains() == SAFE
-        assert [number(message, "z") for message in rig.told("MISSION_ITEM")] == sent
-        assert rig.drone.body.stands
-        vehicle.close()
-    assert record.ending == ending
-    assert reason in record.reason
 
 
 @compiled_only

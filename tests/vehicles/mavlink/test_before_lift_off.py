@@ -1,6 +1,5 @@
 """A trial that ends before the lift-off: nothing was flown if the vehicle has certainly never left the ground."""
 
-import random
 from collections.abc import Callable
 
 import pytest
@@ -17,10 +16,6 @@ from app.vehicles.mavlink.events import (
 from app.vehicles.mavlink.failures import Failure
 from app.vehicles.mavlink.records import contact_of, has_flown
 from app.vehicles.mavlink.trial_reactions import State
-from bench.hazards.cases import ABORT, Case, PlannedFault, tuned_gains
-from bench.hazards.hostile_trial import run_trial
-from bench.hazards.trial_states import RESTING_M
-from bench.hazards.trial_states import State as BenchState
 from tests.vehicles.flying import TUNED, unwatched
 from tests.vehicles.mavlink.rigs import SAFE as OWN_SAFE
 from tests.vehicles.mavlink.rigs import LockstepRig
@@ -141,18 +136,12 @@ MAY_HAVE_FLOWN: list[Walk] = [
 
 
 @pytest.mark.parametrize("happens", MAY_HAVE_FLOWN, ids=lambda each: each.__name__)
-def test_a_vehicle_that_may_have_left_the_ground_has_flown(happens: Walk) -> None:
+@pytest.mark.parametrize("then_refused", [True, False], ids=["before its refusal", "after it"])
+def test_a_vehicle_that_may_have_left_the_ground_has_flown(happens: Walk, then_refused: bool) -> None:
     """Although it refused to take off."""
-    walk = taking_off()
+    walk = taking_off() if then_refused else refused(taking_off())
     happens(walk)
-    assert has_flown(over(refused(walk)).trial)
-
-
-@pytest.mark.parametrize("happens", MAY_HAVE_FLOWN, ids=lambda each: each.__name__)
-def test_a_vehicle_that_may_have_left_the_ground_after_its_refusal_has_flown(happens: Walk) -> None:
-    walk = refused(taking_off())
-    happens(walk)
-    assert has_flown(over(walk).trial)
+    assert has_flown(over(refused(walk) if then_refused else walk).trial)
 
 
 @pytest.mark.parametrize("ends", [aborted, stopped_by_hand], ids=["abort", "motors off"])
@@ -237,62 +226,3 @@ def stopped(autopilot: str, at_s: float, *, motors_off: bool) -> tuple[FlightRec
         assert concern or vehicle.read_gains() == OWN_SAFE[autopilot]
         vehicle.close()
     return record, rose_m, concern
-
-
-@pytest.mark.complete
-@pytest.mark.parametrize("motors_off", [False, True])
-@pytest.mark.parametrize("autopilot", OWN_SAFE)
-def test_whenever_it_is_stopped_a_drone_that_truly_rose_has_flown_and_one_that_was_not_commanded_has_not(
-    autopilot: str, motors_off: bool
-) -> None:
-    for tenths in (0, *range(14, 27, 4)):
-        record, rose_m, _ = stopped(autopilot, tenths / 10, motors_off=motors_off)
-        assert record.ending == "aborted"
-        assert record.has_flown or rose_m <= RESTING_M, tenths
-        was_commanded = len(record.trajectory.time_s) > 1
-        assert record.has_flown == was_commanded, tenths
-
-
-@pytest.mark.parametrize(
-    ("at_s", "flown"),
-    [(0.0, False), (1.0, False), (1.7, False), pytest.param(2.6, True, marks=pytest.mark.complete)],
-)
-def test_an_abort_before_the_lift_off_of_a_drone_is_no_flight(at_s: float, flown: bool) -> None:
-    record, rose_m, concern = stopped("paparazzi", at_s, motors_off=False)
-    assert (record.has_flown, rose_m > 0.0, concern) == (flown, flown, "")
-    assert (record.ending, record.reason) == ("aborted", "tea")
-
-
-@pytest.mark.complete
-@pytest.mark.parametrize(
-    ("seed", "hazard", "state", "outcome"),
-    [
-        (504, "on the ground after 0 s", BenchState.SET_GAINS, "refused"),
-        (534, "on the ground after 0.3 s", BenchState.TAKEOFF, "aborted"),
-    ],
-)
-def test_a_drone_whose_position_stays_on_the_ground_is_not_flown_or_has_flown(
-    seed: int, hazard: str, state: BenchState, outcome: str
-) -> None:
-    """Seen: it rose to 0.1 to 0.4 m, was aborted, landed as its flight plan reported, and had not flown."""
-    chance = random.Random(seed)
-    lies = PlannedFault(hazard, state, chance.uniform(0.0, 1.0))
-    abort = PlannedFault(ABORT, BenchState.TAKEOFF, chance.uniform(0.0, 0.9))
-    ended = run_trial(
-        Case(
-            seed=seed,
-            autopilot="paparazzi",
-            faults=(lies, abort),
-            gains=tuned_gains(chance, "paparazzi"),
-            powered_s=5.0,
-            staged_s=0.0,
-            pinned=True,
-        )
-    )
-    assert ended.outcome == outcome
-
-
-def test_the_record_of_a_drone_whose_motors_were_stopped_in_the_air_states_no_landing() -> None:
-    record, rose_m, concern = stopped("paparazzi", 4.0, motors_off=True)
-    assert (rose_m > 1.0, bool(concern), record.has_flown) == (True, True, True)
-    assert record.settings["landed"] is False

@@ -1,7 +1,6 @@
 """A vehicle whose link stays open between flights, against the simulated drone."""
 
 import math
-import re
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -11,7 +10,7 @@ import pytest
 from pymavlink import mavutil
 
 from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, StopRequest, VehicleError
-from app.vehicles.mavlink.dialects import FieldValue, number, text
+from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched
@@ -54,27 +53,6 @@ def enter_block(rig: LockstepRig, *blocks: int) -> None:
             link.send("MISSION_ACK", target_system=31, target_component=0, type=0)
             link.send("SCRIPT_ITEM", target_system=31, target_component=0, seq=block, name="")
             rig.wait_s(0.3)
-
-
-class PosingRig(LockstepRig):
-    """A companion computer with the vehicle's system id poses as its autopilot, and is heard first."""
-
-    def __init__(self, autopilot: str) -> None:
-        super().__init__(autopilot)
-        self.companion = PROFILES[autopilot].dialect.codec(system=1, component=191)
-
-    def arriving(self, frames: list[bytes]) -> list[bytes]:
-        fields: dict[str, FieldValue] = {"type": 2, "autopilot": PROFILES[self.autopilot].autopilot}
-        rest = dict.fromkeys(("base_mode", "custom_mode", "system_status", "mavlink_version"), 0)
-        beat = self.companion.pack(PROFILES[self.autopilot].dialect.message("HEARTBEAT", fields | rest))
-        return [beat, *frames] if frames else []
-
-
-def test_the_autopilot_is_connected_though_a_companion_poses_as_it_and_is_heard_first() -> None:
-    """Seen: a vehicle that “did not reply”, because the companion was asked."""
-    with PosingRig("ardupilot") as rig, connected(rig) as vehicle:
-        assert vehicle._radio.target.component == 1
-        assert vehicle.concern == ""
 
 
 def blocks_told(rig: LockstepRig) -> list[int]:
@@ -395,17 +373,6 @@ def test_gains_that_changed_after_they_were_staged_are_not_flown() -> None:
         assert vehicle.restore() == SAFE
 
 
-def test_gains_that_were_staged_before_a_restart_are_not_flown() -> None:
-    with LockstepRig() as rig, connected(rig) as vehicle:
-        vehicle.stage(TUNED)
-        rig.drone.reboot()
-        vehicle.attend(4.0)
-        assert vehicle.condition().held == {}
-        with pytest.raises(VehicleError, match="the vehicle has restarted since"):
-            vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
-        assert vehicle.restore() == SAFE
-
-
 @pytest.mark.complete
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4", "paparazzi"])
 def test_a_restart_between_flights_is_noticed_before_the_next_which_then_flies(autopilot: str) -> None:
@@ -563,37 +530,6 @@ def test_a_vehicle_that_somebody_else_arms_is_only_observed_from_then_on() -> No
         assert vehicle.concern
 
 
-def test_motors_off_in_the_air_stops_them_at_once_and_the_record_is_aborted() -> None:
-    told: list[float] = []
-
-    def slide() -> StopRequest | None:
-        if rig.drone.body.altitude_m > 2.0 and not told:
-            told.append(rig.now_s())
-            return StopRequest("people below", motors_off=True)
-        return None
-
-    with LockstepRig("ardupilot") as rig:
-        rig.switch_on_failsafes()
-        with connected(rig) as vehicle:
-            vehicle.attend(2.0)
-            vehicle.stage(OWN_SAFE["ardupilot"])
-            record = vehicle.fly(ORDER, on_sample=unwatched, should_stop=slide)
-            assert record.ending == "aborted"
-            stopped = "Motors off was requested: people below. The vehicle confirmed that its motors have stopped."
-            assert re.fullmatch(
-                f"{stopped} The vehicle was 2.[0-9] m above the ground: inspect it before it flies again.",
-                record.reason,
-            )
-            forced = [
-                at_s for at_s, it in rig.heard if it.get_type() == "COMMAND_LONG" and number(it, "param2") == 21196
-            ]
-            assert forced[0] - told[0] < 0.3
-            assert vehicle.concern == record.reason
-            vehicle.release()
-            assert (vehicle.concern, vehicle.read_gains()) == ("", OWN_SAFE["ardupilot"])
-            assert "PSC_POSZ_P" in {text(message, "param_id") for message in rig.told("PARAM_SET")}
-
-
 def test_what_was_ordered_is_repeated_also_while_something_else_takes_its_time() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         enter_block(rig, START_ENGINE, TAKE_OFF)
@@ -638,22 +574,6 @@ def test_motors_off_is_heard_also_after_the_program_failed_while_the_vehicle_lan
             )
             vehicle.release()
             assert (vehicle.concern, vehicle.read_gains()) == ("", OWN_SAFE["ardupilot"])
-
-
-def test_a_flight_plan_that_lands_by_its_own_exception_is_landed_with() -> None:
-    left: list[int] = []
-
-    def leave(sample: Sample) -> None:
-        if sample.time_s > 5.0 and not left:
-            left.append(1)
-            rig.drone.autopilot._enter(LAND_HERE)  # type: ignore[attr-defined]  # as its exceptions do
-
-    with LockstepRig() as rig, connected(rig) as vehicle:
-        vehicle.stage(TUNED)
-        record = vehicle.fly(ORDER, on_sample=leave, should_stop=never)
-        assert (record.ending, vehicle.concern, vehicle.read_gains()) == ("invalid", "", SAFE)
-        assert "The vehicle began to land by itself. Its flight plan entered the block “land" in record.reason
-        assert rig.drone.body.stands
 
 
 def test_a_log_that_cannot_be_written_is_reported_and_the_previous_one_continues(tmp_path: Path) -> None:

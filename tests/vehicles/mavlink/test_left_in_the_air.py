@@ -74,20 +74,6 @@ def stops_told(rig: LockstepRig) -> list[object]:
     return [message for message in rig.told("COMMAND_LONG") if message.command == 400]  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("autopilot", ["ardupilot", "paparazzi", pytest.param("px4", marks=pytest.mark.complete)])
-def test_a_vehicle_left_in_the_air_by_its_process_is_landed_by_the_next_which_stops_no_motor(autopilot: str) -> None:
-    """Seen: it hovered on for good, and the next process's heartbeats kept its own failsafe from acting."""
-    with left_in_the_air(autopilot) as rig:
-        begun_s = rig.now_s()
-        with found(rig) as vehicle:
-            vehicle.attend(15.0 - (rig.now_s() - begun_s))
-            assert lands_told(rig) >= 1
-            assert "The process that flew it ended in flight. Land is repeated" in vehicle.concern
-            vehicle.attend(15.0)
-            assert rig.drone.body.stands
-            assert (stops_told(rig), rig.writes) == ([], [])
-
-
 @pytest.mark.parametrize("autopilot", LESS_OFTEN)
 def test_a_vehicle_that_somebody_else_has_in_the_air_is_only_observed(autopilot: str) -> None:
     with left_in_the_air(autopilot) as rig, found(rig, was_flying=False) as vehicle:

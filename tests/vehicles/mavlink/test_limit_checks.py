@@ -138,7 +138,7 @@ def test_a_clock_that_stands_still_among_packets_is_frozen() -> None:
     assert limit_checks.find_frozen(repeated(watch_of(3.0), until_s=10.24), LIMITS, 10.3) is None
     frozen = limit_checks.find_frozen(repeated(watch_of(3.0), until_s=10.28), LIMITS, 10.3)
     assert frozen is not None
-    assert frozen.failure is Failure.FROZEN
+    assert (frozen.failure, frozen.why) == (Failure.FROZEN, "Its clock stood still for more than 0.25 s.")
 
 
 def test_what_a_stall_delayed_may_come_in_any_order() -> None:

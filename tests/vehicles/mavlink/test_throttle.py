@@ -171,29 +171,6 @@ class ThrottleEnds(Hostile):
         return [] if self.ended else [letter]
 
 
-class ForeignThrottle(Hostile):
-    """Another system on the same link reports full throttle."""
-
-    name = "foreign-throttle"
-
-    def changed(self, letter: OutgoingMessage) -> list[OutgoingMessage]:
-        return [letter, replace(with_throttle(letter, 100), system=77)]
-
-
-class LateThrottle(Hostile):
-    """Every report arrives after the next one."""
-
-    name = "late-throttle"
-
-    def begin(self, drone: FaultTarget) -> None:
-        super().begin(drone)
-        self.waiting: list[OutgoingMessage] = []
-
-    def changed(self, letter: OutgoingMessage) -> list[OutgoingMessage]:
-        self.waiting.append(letter)
-        return [self.waiting.pop(1), self.waiting.pop(0)] if len(self.waiting) == 2 else []
-
-
 class WildThrottle(Hostile):
     """Full and none in turns."""
 
@@ -229,15 +206,6 @@ def test_a_report_that_is_too_old_is_not_shown_and_not_recorded() -> None:
     assert max(has) == pytest.approx(left_s + 4.0, abs=0.2)
     assert min(has_not) > max(has)
     assert "throttle" not in record.trajectory.channels
-
-
-@pytest.mark.parametrize("fault", [ForeignThrottle, LateThrottle])
-@pytest.mark.complete
-def test_another_vehicle_s_throttle_and_late_reports_are_never_taken_for_saturation(fault: type[Fault]) -> None:
-    record, live, _ = flown("px4", fault)
-    usual, _, _ = flown("px4")
-    assert 0.5 < record.trajectory["throttle"].max() <= usual.trajectory["throttle"].max() < 1.0
-    assert len(live) > 500
 
 
 @pytest.mark.complete

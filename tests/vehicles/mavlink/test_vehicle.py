@@ -78,60 +78,6 @@ def test_a_window_that_the_flight_plan_would_cut_short_is_refused_on_the_ground(
         assert rig.drone.body.stands
 
 
-FAULTS = [
-    ("link-lost:3@3", "invalid", "The link was lost in flight"),
-    ("no-lift-off@0", "aborted", "It was still on the ground 1.5 s after the command"),
-]
-FURTHER_FAULTS = [
-    ("frozen-position:2@3", "invalid", "froze while packets still arrived"),
-    ("jumping-position:1.2@3", "completed", "samples jumped and were dropped."),
-    ("duplicated-packets@connect", "completed", ""),
-    ("reordered-packets@connect", "completed", ""),
-]
-
-
-@pytest.mark.parametrize(
-    ("fault", "ending", "reason"),
-    [*FAULTS, *(pytest.param(*each, marks=pytest.mark.complete) for each in FURTHER_FAULTS)],
-)
-def test_whatever_befalls_a_flight_it_ends_on_the_ground_with_the_safe_gains(
-    fault: str, ending: str, reason: str
-) -> None:
-    with LockstepRig(faults=[fault]) as rig:
-        vehicle = rig.vehicle()
-        record = fly(vehicle)
-        assert (record.ending, vehicle.read_gains()) == (ending, SAFE)
-        assert reason in record.reason
-        assert rig.drone.body.stands
-        vehicle.close()
-
-
-@pytest.mark.complete
-def test_a_rebooted_vehicle_is_left_alone_and_quarantined() -> None:
-    with LockstepRig(faults=["reboot@3"]) as rig:
-        vehicle = rig.vehicle()
-        record = fly(vehicle)
-        assert record.ending == "invalid"
-        assert "The vehicle rebooted." in record.reason or "The vehicle disarmed itself" in record.reason
-        for ask in (lambda: vehicle.stage(SAFE), lambda: fly(vehicle)):
-            with pytest.raises(SafeGainsError, match="Nothing is written"):
-                ask()
-        vehicle.close()
-
-
-@pytest.mark.complete
-def test_a_link_that_stays_lost_quarantines_the_vehicle_and_never_stops_its_motors() -> None:
-    with LockstepRig(faults=["link-lost@3"]) as rig:
-        vehicle = rig.vehicle()
-        record = fly(vehicle)
-        assert record.ending == "invalid"
-        assert "The link stayed lost for 60 s." in record.reason
-        assert "kil_thr" not in rig.writes
-        with pytest.raises(SafeGainsError, match="Nothing is written"):
-            vehicle.stage(SAFE)
-        vehicle.close()
-
-
 def test_an_abort_sends_the_safe_gains_then_land_and_keeps_the_record() -> None:
     watcher = Watcher(abort_at_s=2.0)
     with LockstepRig() as rig:
@@ -220,20 +166,6 @@ def test_another_autopilot_is_not_flown() -> None:
         options = rig.options(autopilot="px4")
         with pytest.raises(VehicleError, match=r"^ArduCopter answers at .*, not PX4; nothing was sent\."):
             MavlinkVehicle(options, OWN_SAFE["px4"], is_real=False, clock=rig, transport=rig)
-
-
-def test_a_vehicle_that_takes_no_parameters_is_refused() -> None:
-    with LockstepRig(faults=["param-unconfirmed@connect"]) as rig, pytest.raises(VehicleError, match="did not confirm"):
-        rig.vehicle()
-
-
-def test_a_vehicle_that_will_not_arm_is_not_flown_and_has_its_safe_gains_back() -> None:
-    with LockstepRig(faults=["arm-refused@connect"]) as rig:
-        vehicle = rig.vehicle()
-        with pytest.raises(VehicleError, match="did not arm"):
-            fly(vehicle)
-        assert vehicle.read_gains() == SAFE
-        vehicle.close()
 
 
 def test_a_position_that_comes_too_seldom_is_refused() -> None:
@@ -364,21 +296,6 @@ def test_the_other_autopilots_fly_a_trial_with_gains_of_their_own(autopilot: str
 def test_a_vehicle_whose_failsafes_are_off_is_not_flown(autopilot: str, named: str) -> None:
     with LockstepRig(autopilot) as rig, pytest.raises(VehicleError, match=f"Failsafe {named}: 0, required: "):
         rig.vehicle()
-
-
-@pytest.mark.complete
-@pytest.mark.parametrize("autopilot", MILDER)
-def test_an_abort_lands_the_other_autopilots_too(autopilot: str) -> None:
-    watcher = Watcher(abort_at_s=7.0)
-    with LockstepRig(autopilot) as rig:
-        rig.switch_on_failsafes()
-        vehicle = rig.vehicle()
-        vehicle.stage(MILDER[autopilot])
-        record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
-        assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
-        assert vehicle.read_gains() == OWN_SAFE[autopilot]
-        assert rig.drone.body.stands
-        vehicle.close()
 
 
 @pytest.mark.complete
