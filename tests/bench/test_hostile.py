@@ -51,7 +51,7 @@ SEEN_ALIKE = [
     ("paparazzi", "x inf for 0.3 s", State.RECORD, "completed", "", "safe"),
     ("paparazzi", "flies home", State.RECORD, "invalid", "F10b", "quarantined"),
     ("ardupilot", "foreign kill", State.LAND, "invalid", "F10b", "quarantined"),
-    ("px4", "foreign kill", State.RECORD, "invalid", "F10b", "quarantined"),
+    ("px4", "foreign kill", State.LAND, "invalid", "F10b", "quarantined"),
     ("ardupilot", "process killed", State.RECORD, "lost", "", "quarantined"),
     ("px4", "process killed", State.RECORD, "lost", "", "quarantined"),
     ("ardupilot", "companion as autopilot", State.CONNECT, "completed", "", "safe"),

@@ -63,6 +63,7 @@ def test_an_abort_before_the_takeoff_command_is_no_flight() -> None:
 def test_a_refused_takeoff_is_no_flight() -> None:
     walk = over(refused(taking_off()))
     assert (walk.state, walk.trial.failure) == (State.IDLE, Failure.TAKE_OFF_REFUSED)
+    assert walk.actions[-1] is Action.MOTORS_OFF
     assert (walk.trial.contact, has_flown(walk.trial), contact_of(walk.trial)) == ("stayed", False, {})
 
 
@@ -79,9 +80,7 @@ def hops(walk: TrialDriver) -> None:
     """Lower than what counts as lifted off."""
     walk.climb_rate_m_s = 0.4
     walk.pass_s(0.2)
-    walk.climb_rate_m_s = -0.4
-    walk.pass_s(0.2)
-    walk.climb_rate_m_s = 0.0
+    walk.climb(-0.4, for_s=0.2)
     assert not walk.trial.watch.lifted
 
 

@@ -221,15 +221,49 @@ def test_a_new_version_that_is_told_late_while_a_vehicle_connects_is_a_concern()
             assert vehicle.concern == f"Its firmware has changed from version 1.2.3 to {known.version}."
 
 
-def test_a_swapped_vehicle_whose_answers_are_lost_at_first_is_asked_on() -> None:
-    with LossyRig("px4") as rig, connected(rig) as vehicle:
-        swap(rig, vehicle, 9)
-        vehicle.attend(3.0)
-        written = list(rig.writes)
-        rig.lost_until_s = rig.now_s() + 4.0
-        with pytest.raises(SafeGainsError, match="hardware id is 0000000000000009"):
-            vehicle.stage(OWN_SAFE["px4"])
-        assert rig.writes == written
+def stage(vehicle: MavlinkVehicle) -> None:
+    vehicle.stage(OWN_SAFE["px4"])
+
+
+def fly(vehicle: MavlinkVehicle) -> None:
+    vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
+
+
+OTHER = "hardware id is 0000000000000009"
+
+
+@pytest.mark.parametrize(
+    ("ask", "lost_s", "says"),
+    [
+        (stage, 4.0, OTHER),
+        (fly, 0.0, OTHER),
+        (MavlinkVehicle.release, 0.0, OTHER),
+        (MavlinkVehicle.release, math.inf, "did not report its hardware id"),
+    ],
+)
+def test_a_vehicle_that_was_swapped_gets_nothing_until_a_person_has_seen_that_it_was(
+    ask: Callable[[MavlinkVehicle], None], lost_s: float, says: str
+) -> None:
+    """Staged and quarantined, or not, while its answers are lost for so long."""
+    with LossyRig("px4") as rig:
+        rig.switch_on_failsafes()
+        with connected(rig) as vehicle:
+            vehicle.attend(2.0)
+            stage(vehicle)
+            if ask is MavlinkVehicle.release:
+                vehicle._observe("Somebody else armed it.")
+            swap(rig, vehicle, 9)
+            vehicle.attend(3.0)
+            written = list(rig.writes)
+            rig.lost_until_s = rig.now_s() + lost_s
+            with pytest.raises(VehicleError, match=says) as refusal:
+                ask(vehicle)
+            assert refusal.value.not_flown == (ask is fly)
+            assert rig.writes == written
+            assert says in vehicle.concern
+            assert ("Somebody else armed it." in vehicle.concern) == (ask is MavlinkVehicle.release)
+            vehicle.release()
+            assert (vehicle.concern, vehicle.identity.uid) == ("", "" if lost_s == math.inf else "0000000000000009")
 
 
 def test_a_vehicle_that_was_away_and_whose_answers_are_lost_is_not_flown() -> None:
@@ -250,18 +284,6 @@ def test_a_vehicle_that_was_away_and_whose_answers_are_lost_is_not_flown() -> No
             assert [name for name in rig.writes[len(written) :] if name.startswith("MPC_")] == []
 
 
-def test_a_person_who_has_not_seen_that_no_hardware_id_is_told_does_not_release_the_vehicle() -> None:
-    with LossyRig("px4") as rig, connected(rig) as vehicle:
-        vehicle._observe("Somebody else armed it.")
-        swap(rig, vehicle, 9)
-        rig.lost_until_s = math.inf
-        with pytest.raises(SafeGainsError, match="did not report its hardware id"):
-            vehicle.release()
-        assert "Somebody else armed it. It did not report its hardware id" in vehicle.concern
-        vehicle.release()
-        assert (vehicle.concern, vehicle.identity.uid) == ("", "")
-
-
 def test_a_vehicle_that_was_not_listened_to_for_a_while_is_asked_who_it_is_and_passes_its_checks() -> None:
     with LockstepRig("px4") as rig:
         rig.switch_on_failsafes()
@@ -270,34 +292,6 @@ def test_a_vehicle_that_was_not_listened_to_for_a_while_is_asked_who_it_is_and_p
             assert [item.name for item in vehicle.check() if not item.passed] == []
             rig.wait_s(8.0)
             assert vehicle.stage(OWN_SAFE["px4"]) == OWN_SAFE["px4"]
-
-
-def test_a_vehicle_that_is_swapped_after_it_was_staged_is_not_flown() -> None:
-    with LockstepRig("px4") as rig:
-        rig.switch_on_failsafes()
-        with connected(rig) as vehicle:
-            vehicle.attend(2.0)
-            vehicle.stage(OWN_SAFE["px4"])
-            swap(rig, vehicle, 9)
-            vehicle.attend(3.0)
-            written = list(rig.writes)
-            with pytest.raises(VehicleError, match="hardware id is 0000000000000009") as refusal:
-                vehicle.fly(ORDER, on_sample=unwatched, should_stop=never)
-            assert refusal.value.not_flown
-            assert rig.writes == written
-
-
-def test_a_vehicle_that_is_swapped_while_it_is_quarantined_is_not_taken_for_the_one_that_a_person_released() -> None:
-    with LockstepRig("px4") as rig, connected(rig) as vehicle:
-        vehicle._observe("Somebody else armed it.")
-        swap(rig, vehicle, 9)
-        written = list(rig.writes)
-        with pytest.raises(VehicleError, match="hardware id is 0000000000000009"):
-            vehicle.release()
-        assert rig.writes == written
-        assert "Somebody else armed it. Another vehicle answers" in vehicle.concern
-        vehicle.release()
-        assert (vehicle.concern, vehicle.identity.uid) == ("", "0000000000000009")
 
 
 def test_a_release_verifies_the_gains_also_of_a_vehicle_that_seems_to_be_in_order() -> None:

@@ -60,16 +60,11 @@ def test_motors_off_is_sent_at_once_in_every_state_and_aborts_a_trial_that_had_n
 
 
 def test_motors_off_is_repeated_every_second_at_any_height_until_the_vehicle_says_so() -> None:
+    """Seen: stopped at 3.2 m, its safe gains were restored in the debris, and it was ready for its next flight."""
     walk = slide(STAGES[State.RECORD]()).pass_s(2.5)
     assert walk.altitude_m > 2.0
     assert len(walk.when(Action.KILL)) == 3
     walk.disarm().restore()
-    assert (walk.state, ending_of(walk.trial)) == (State.QUARANTINE, "aborted")
-
-
-def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_to_be_inspected() -> None:
-    """Seen: stopped at 3.2 m, its safe gains were restored in the debris, and it was ready for its next flight."""
-    walk = slide(STAGES[State.RECORD]()).disarm().restore()
     assert (walk.state, ending_of(walk.trial)) == (State.QUARANTINE, "aborted")
     assert walk.trial.why.endswith("The vehicle was 2.9 m above the ground: inspect it before it flies again.")
 
@@ -100,15 +95,6 @@ def test_motors_off_follows_an_abort_and_a_held_slide_sends_it_once_a_second() -
     assert walk.trial.why == "too high Motors off was requested: it flies towards people."
 
 
-def test_a_flight_plan_that_begins_to_land_is_landed_with_and_its_record_is_void() -> None:
-    walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
-    walk.hear(BlockEntered(LAND_BLOCK)).pass_s(STEP_S)
-    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.OWN_LANDING)
-    assert walk.trial.why == "Its flight plan entered the block “land”."
-    walk.touch_down().disarm().restore()
-    assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
-
-
 def test_a_flight_plan_that_lands_at_its_own_altitude_limit_counts_against_the_gains() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).lift_off()
     walk.climb_rate_m_s = 1.0
@@ -129,11 +115,8 @@ def test_a_flight_plan_that_changes_block_by_itself_gets_land() -> None:
 def test_the_blocks_that_were_asked_for_are_no_surprise() -> None:
     walk = TrialDriver(plan=WITH_BLOCKS).arm()
     walk.hear(BlockEntered(3)).hear(BlockEntered(TAKE_OFF))
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(2.9)
-    walk.climb_rate_m_s = 0.0
-    while walk.state is State.RECORD:
-        walk.pass_s(STEP_S)
+    walk.climb(1.0, for_s=2.9)
+    walk.through(State.RECORD)
     walk.hear(BlockEntered(LAND_BLOCK)).pass_s(0.5).hear(BlockEntered(2)).touch_down().disarm().restore()
     assert (walk.state, walk.trial.failure) == (State.IDLE, None)
 
@@ -247,8 +230,7 @@ def test_one_heartbeat_of_a_pilot_voids_the_record_and_leads_nowhere_else() -> N
     walk.pass_s(1.0)
     assert (walk.state, walk.trial.failure) == (State.RECORD, Failure.INTERRUPTED)
     assert walk.trial.why == "One heartbeat reported mode 64."
-    while walk.state is State.RECORD:
-        walk.pass_s(STEP_S)
+    walk.through(State.RECORD)
     walk.touch_down().disarm().restore()
     assert (walk.state, walk.trial.outcome) == (State.IDLE, "invalid")
 
@@ -280,14 +262,8 @@ def test_a_px4_that_stays_on_the_ground_in_hold_did_not_lift_off() -> None:
 
 def test_a_pilot_has_a_vehicle_too_that_was_landed_before_any_command() -> None:
     """Seen: it was lifted by a gust as it was armed; Land was sent against its pilot for 40 s."""
-    walk = TrialDriver(mode="64")
-    walk.give(ActionDone(Action.ARM, walk.now_s))
-    walk.armed = True
-    while walk.trial.armed_s is None:
-        walk.pass_s(STEP_S)
-    walk.climb_rate_m_s = 1.0
-    walk.pass_s(0.4)
-    walk.climb_rate_m_s = 0.0
+    walk = TrialDriver(mode="64").report_armed()
+    walk.climb(1.0, for_s=0.4)
     while walk.state is not State.ABORT_LAND or not walk.when(Action.LAND):
         walk.pass_s(STEP_S)
     walk.mode = "land"
@@ -366,8 +342,6 @@ def test_a_vehicle_that_hovers_near_its_set_point_has_climbed_however_it_swings(
     walk.climb_rate_m_s = 1.0
     walk.pass_s(2.2)
     walk.mode = "hold"
-    walk.climb_rate_m_s = -0.8
-    walk.pass_s(1.5)
-    walk.climb_rate_m_s = 0.0
+    walk.climb(-0.8, for_s=1.5)
     walk.pass_s(1.5)
     assert (walk.state, walk.trial.failure) == (State.RECORD, None)

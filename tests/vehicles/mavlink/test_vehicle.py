@@ -16,7 +16,6 @@ from app.vehicles.base import (
     StopRequest,
     VehicleError,
 )
-from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from app.vehicles.mavlink_kind import MAVLINK
 from app.vehicles.registry import open_vehicle
@@ -57,16 +56,6 @@ def test_a_whole_trial_scores_as_the_same_body_does_without_a_link() -> None:
     assert len(watcher.samples) == pytest.approx(12.4 * 50, rel=0.05)
 
 
-@pytest.mark.complete
-def test_a_trial_lasts_as_long_as_the_usual_window_needs() -> None:
-    with LockstepRig() as rig:
-        vehicle = rig.vehicle()
-        vehicle.stage(TUNED)
-        record = vehicle.fly(FlightOptions(seed=1), on_sample=unwatched, should_stop=never)
-        assert (record.ending, vehicle.read_gains()) == ("completed", SAFE)
-    assert 33.0 <= record.trajectory.time_s[-1] < 33.1
-
-
 def test_a_window_that_the_flight_plan_would_cut_short_is_refused_on_the_ground() -> None:
     with LockstepRig() as rig:
         vehicle = rig.vehicle()
@@ -76,40 +65,6 @@ def test_a_window_that_the_flight_plan_would_cut_short_is_refused_on_the_ground(
         assert refusal.value.not_flown
         assert vehicle.read_gains() == SAFE
         assert rig.drone.body.stands
-
-
-def test_an_abort_sends_the_safe_gains_then_land_and_keeps_the_record() -> None:
-    watcher = Watcher(abort_at_s=2.0)
-    with LockstepRig() as rig:
-        vehicle = rig.vehicle()
-        vehicle.stage(TUNED)
-        before = len(rig.heard)
-        record = vehicle.fly(ORDER, on_sample=watcher.see, should_stop=watcher.decide)
-        assert vehicle.read_gains() == SAFE
-        vehicle.close()
-    assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
-    told = [
-        text(message, "param_id") if message.get_type() == "PARAM_SET" else f"block {number(message, 'seq'):.0f}"
-        for _, message in rig.heard[before:]
-        if message.get_type() in {"PARAM_SET", "SCRIPT_ITEM"}
-    ]
-    take_off = told.index("block 4")
-    assert told[take_off + 1 : take_off + 5] == ["gui_v_kp", "gui_v_kd", "gui_v_ki", "block 13"]
-    flight = record.trajectory
-    assert flight.time_s[-1] > 3.0
-    assert flight["altitude_m"][-1] < 0.3
-    assert flight["set_point_m"][-1] < 0.3
-
-
-def test_land_never_waits_for_the_list_of_blocks() -> None:
-    with LockstepRig(faults=["low-battery@1"]) as rig:
-        vehicle = rig.vehicle()
-        fly(vehicle)
-        vehicle.close()
-    told = [message.get_type() for _, message in rig.heard]
-    activations = [place for place, kind in enumerate(told) if kind == "SCRIPT_ITEM"]
-    assert len(activations) >= 4
-    assert all(told[place - 1] == "MISSION_ACK" for place in activations)
 
 
 @pytest.mark.parametrize(
@@ -174,11 +129,6 @@ def test_a_position_that_comes_too_seldom_is_refused() -> None:
         pytest.raises(VehicleError, match=r"Position: .* per second, .* lost, required: 40"),
     ):
         rig.vehicle()
-
-
-def test_a_low_battery_stays_on_the_ground() -> None:
-    with LockstepRig() as rig, pytest.raises(VehicleError, match=r"Battery: .* V, required: 20 V or more"):
-        rig.vehicle(min_battery_v=20.0)
 
 
 def test_an_armed_vehicle_is_met_with_quarantine() -> None:

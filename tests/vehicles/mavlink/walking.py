@@ -157,29 +157,40 @@ class TrialDriver:
         if not self.states or self.states[-1] is not self.trial.state:
             self.states.append(self.trial.state)
 
-    # ---- as a flight goes
-
-    def arm(self) -> "TrialDriver":
-        """To the takeoff command."""
-        self.give(ActionDone(Action.ARM, self.now_s))
-        self.armed = True
-        while self.state is State.ARM:
+    def through(self, state: State) -> "TrialDriver":
+        """To the end of a state that it is in, or of the trial."""
+        while self.state is state and not self.trial.is_over:
             self.pass_s(STEP_S)
         return self
 
-    def lift_off(self) -> "TrialDriver":
-        """Until it hovers at 3 m, on record."""
-        self.arm()
-        self.climb_rate_m_s = 1.0
-        self.pass_s(3.0 - GROUND_M)
+    def climb(self, rate_m_s: float, *, for_s: float) -> "TrialDriver":
+        """At this rate, and stay there."""
+        self.climb_rate_m_s = rate_m_s
+        self.pass_s(for_s)
         self.climb_rate_m_s = 0.0
         return self
 
+    # ---- as a flight goes
+
+    def report_armed(self) -> "TrialDriver":
+        """To the first heartbeat that reports it."""
+        self.give(ActionDone(Action.ARM, self.now_s))
+        self.armed = True
+        while self.state is State.ARM and self.trial.armed_s is None:
+            self.pass_s(STEP_S)
+        return self
+
+    def arm(self) -> "TrialDriver":
+        """To the takeoff command."""
+        return self.report_armed().through(State.ARM)
+
+    def lift_off(self) -> "TrialDriver":
+        """Until it hovers at 3 m, on record."""
+        return self.arm().climb(1.0, for_s=3.0 - GROUND_M)
+
     def land(self) -> "TrialDriver":
         """To the end of the record, and half a second of descent."""
-        self.lift_off()
-        while self.state is State.RECORD:
-            self.pass_s(STEP_S)
+        self.lift_off().through(State.RECORD)
         self.climb_rate_m_s = -0.8
         return self.pass_s(0.5)
 
@@ -189,10 +200,7 @@ class TrialDriver:
         while self.altitude_m > GROUND_M + 0.02:
             self.pass_s(STEP_S)
         self.climb_rate_m_s = 0.0
-        state = self.state
-        while self.state is state and not self.trial.is_over:
-            self.pass_s(STEP_S)
-        return self
+        return self.through(self.state)
 
     def disarm(self) -> "TrialDriver":
         """From the landed vehicle to its gains being restored: it answers, and its next heartbeats agree."""
