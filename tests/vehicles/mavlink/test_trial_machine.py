@@ -488,6 +488,15 @@ def test_a_vehicle_that_shows_the_ground_again_has_descended_if_it_flew_and_has_
     assert walk.trial.failure == failure
 
 
+def test_an_altitude_that_stands_still_is_no_missing_lift_off() -> None:
+    """Seen: stuck 0.6 s after the command, which left 0.9 s until the lift-off was late, and blamed the gains."""
+    walk = taking_off().pass_s(0.1)
+    for _ in range(60):
+        walk.steps += 1  # the same estimate each time
+        walk.pass_s(STEP_S)
+    assert (walk.state, walk.trial.failure) == (State.ABORT_LAND, Failure.FROZEN)
+
+
 def test_no_take_off_is_commanded_while_the_newest_heartbeat_reports_the_motors_off() -> None:
     """Seen: another station stopped them 0.06 s after arming; the takeoff was commanded, and a quarantine followed."""
     walk = TrialDriver().report_armed()
