@@ -267,7 +267,7 @@ FURTHER: Final[Sequence[Row]] = [
 
 def named(row: Row) -> str:
     fault = row[0].faults[0]
-    return f"{row[0].autopilot}-{fault.kind}-{fault.state}-{fault.delay_s:g} s"
+    return f"{row[0].autopilot}-{fault.kind}-{fault.state}-{fault.delay_s:g} s-for {fault.duration_s:g} s"
 
 
 @pytest.mark.parametrize(
