@@ -40,6 +40,7 @@ def test_an_unknown_population_is_refused_by_name() -> None:
     assert refusal.value.problems[0].field == "population"
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("vehicle", [FURTHER[0], FURTHER[9]], ids=lambda vehicle: vehicle.kind)
 def test_a_quick_flight_is_the_flight_of_the_vehicle_seam(vehicle: SampledVehicle) -> None:
     quick, seam = fly(vehicle, TUNED, seed=5), flown(vehicle.kind, vehicle.options, TUNED, seed=5)
@@ -49,6 +50,7 @@ def test_a_quick_flight_is_the_flight_of_the_vehicle_seam(vehicle: SampledVehicl
         np.testing.assert_array_equal(quick[name], values, err_msg=name)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("vehicle", [FURTHER[0], FURTHER[9]], ids=lambda vehicle: vehicle.kind)
 def test_the_noise_free_error_is_the_error_of_a_flight_without_scatter(vehicle: SampledVehicle) -> None:
     error = TAKEOFF.error(fly(vehicle.quiet, TUNED, seed=9))

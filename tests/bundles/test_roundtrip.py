@@ -158,6 +158,7 @@ def test_a_campaign_whose_name_is_taken_says_that_it_was_imported(client: TestCl
     assert names == [f"{campaign['name']} (imported)", f"{campaign['name']} (imported 2)"]
 
 
+@pytest.mark.complete
 def test_a_simulated_campaign_flies_on_where_it_arrives(
     client: TestClient, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
@@ -166,6 +167,7 @@ def test_a_simulated_campaign_flies_on_where_it_arrives(
     assert fly(there, their_database, arrived["id"])["number"] == 4
 
 
+@pytest.mark.complete
 def test_what_a_registered_vehicle_flew_is_history_where_it_arrives(
     client: TestClient, database: Database, settings: Settings, campaign: Json, elsewhere: tuple[TestClient, Database]
 ) -> None:
@@ -216,6 +218,7 @@ def test_a_campaign_in_the_air_stays_with_its_vehicle(client: TestClient, databa
     assert "under way" in refused.json()["detail"]
 
 
+@pytest.mark.complete
 def test_nothing_is_brought_in_while_anything_is_staged_or_flies(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

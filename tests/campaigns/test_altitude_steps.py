@@ -201,6 +201,7 @@ def test_flights_of_other_steps_or_of_a_takeoff_are_not_compared_and_start_no_ca
     )
 
 
+@pytest.mark.complete
 def test_a_record_that_had_not_settled_is_invalid_and_says_why(client: TestClient, database: Database) -> None:
     """Gains that ring flew past the gate's refusal: with a reason, which a simulated vehicle allows."""
     campaign = create_ready_campaign(client, database, definition={**SHORT, "strategy": "manual"})

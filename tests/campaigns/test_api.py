@@ -184,6 +184,7 @@ def test_a_campaign_with_flights_is_never_deleted(client: TestClient, database: 
     assert client.delete(f"/api/campaigns/{campaign['id']}?version=1").status_code == 409
 
 
+@pytest.mark.complete
 def test_a_campaign_can_be_stopped_archived_and_continued_as_a_clone(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition=BUDGET)
     path = f"/api/campaigns/{campaign['id']}"
@@ -206,6 +207,7 @@ def test_a_campaign_can_be_stopped_archived_and_continued_as_a_clone(client: Tes
     assert [one.json()["name"] for one in again] == ["Test (3)", "Test (4)"]
 
 
+@pytest.mark.complete
 def test_reclassing_a_flight_recomputes_what_came_after(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 9}})
     path = f"/api/campaigns/{campaign['id']}"

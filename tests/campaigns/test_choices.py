@@ -55,6 +55,7 @@ def test_before_the_first_flight_the_only_choice_is_the_baseline_and_no_variant_
         )
 
 
+@pytest.mark.complete
 def test_after_two_flights_there_are_a_step_half_of_it_the_best_again_and_the_first_again(
     client: TestClient, database: Database
 ) -> None:
@@ -127,6 +128,7 @@ def test_own_gains_are_predicted_by_the_proposals_model(client: TestClient, data
     assert lower[max(lower)] < drawn[max(drawn)] < upper[max(upper)]
 
 
+@pytest.mark.complete
 def test_gains_that_were_flown_are_predicted_by_their_flights(client: TestClient, database: Database) -> None:
     campaign_id = create_ready_campaign(client, database, definition=PATIENT)["id"]
     flown = create_flown_trial(client, database, campaign_id, 1.5)
@@ -137,6 +139,7 @@ def test_gains_that_were_flown_are_predicted_by_their_flights(client: TestClient
     assert found["curve"]["values"][10] == pytest.approx(climb["altitude_m"][round(at[10] * 50.0)], abs=0.05)
 
 
+@pytest.mark.complete
 def test_a_newer_flight_changes_the_prediction(client: TestClient, database: Database) -> None:
     campaign_id = create_ready_campaign(client, database, definition=PATIENT)["id"]
     _, before = consider(client, campaign_id, "prediction", OWN)

@@ -37,6 +37,7 @@ def flown_by_hand(client: TestClient, database: Database) -> tuple[Json, list[Js
     return get(client, f"/api/campaigns/{campaign['id']}"), trials
 
 
+@pytest.mark.complete
 def test_a_script_submits_gains_and_gets_their_errors(client: TestClient, database: Database) -> None:
     campaign, trials = flown_by_hand(client, database)
     assert [trial["error"] for trial in trials] == pytest.approx([climb_error(each) for each in SETTLED_S], abs=1e-4)
@@ -49,6 +50,7 @@ def test_a_script_submits_gains_and_gets_their_errors(client: TestClient, databa
     assert {check["name"] for check in proposal["gate"]["checks"]} == {"bounds", "step"}
 
 
+@pytest.mark.complete
 def test_its_figures_and_statistics_stand_without_predictions(client: TestClient, database: Database) -> None:
     campaign, trials = flown_by_hand(client, database)
     cards = [get(client, f"/api/campaigns/{campaign['id']}/figures/{name}") for name in ("takeoffs", "errors", "gains")]
@@ -85,6 +87,7 @@ def test_nothing_is_better_before_a_gain_set_was_flown_twice_under_an_autopilot_
     assert "no gain set has two valid flights" in report
 
 
+@pytest.mark.complete
 def test_one_repeat_makes_the_scatter_known_from_these_flights_alone(client: TestClient, database: Database) -> None:
     campaign, trials = flown_by_hand(client, database)
     again = create_trial(client, campaign["id"], gains=FIRMER)

@@ -73,6 +73,7 @@ def campaign_id(client: TestClient, database: Database) -> int:
     return int(create_flown_campaign(client, database, 2.0)["id"])
 
 
+@pytest.mark.complete
 def test_asked_for_twice_it_is_computed_once_and_drawn_when_done(
     client: TestClient, database: Database, campaign_id: int
 ) -> None:
@@ -83,6 +84,7 @@ def test_asked_for_twice_it_is_computed_once_and_drawn_when_done(
     assert waiting_jobs(client) == []
 
 
+@pytest.mark.complete
 def test_the_path_goes_through_the_gains_of_the_trials(
     client: TestClient, database: Database, campaign_id: int
 ) -> None:
@@ -175,6 +177,7 @@ def test_one_that_a_person_cancelled_is_not_started_again_by_looking(client: Tes
     assert [one["state"] for one in landscape_jobs(client)] == ["cancelled"]
 
 
+@pytest.mark.complete
 def test_stacked_slices_stand_one_below_the_other(client: TestClient, database: Database, campaign_id: int) -> None:
     card_of(client, campaign_id)
     run_landscapes(database)

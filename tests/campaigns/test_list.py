@@ -47,6 +47,7 @@ def test_a_page_stays_right_when_something_is_added(client: TestClient) -> None:
     assert names(client, f"limit=2&cursor={first['next_cursor']}") == ["C1", "C0"]
 
 
+@pytest.mark.complete
 def test_the_list_can_be_searched_filtered_and_sorted(client: TestClient, database: Database) -> None:
     create_campaign(client, name="Windy 100% day", vehicle="jsbsim")
     create_campaign(client, name="calm_day")
@@ -62,6 +63,7 @@ def test_the_list_can_be_searched_filtered_and_sorted(client: TestClient, databa
     assert names(client, "sort=error")[:2] == ["better", "worse"]
 
 
+@pytest.mark.complete
 def test_a_card_shows_what_matters(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 20}})
     others, best = {"kp": 283, "ki": 13, "kd": 82}, {"kp": 290, "ki": 20, "kd": 82}
@@ -99,6 +101,7 @@ def test_a_query_that_makes_no_sense_is_refused_by_field(client: TestClient, que
     assert field in problems_of(answer)
 
 
+@pytest.mark.complete
 def test_a_card_compares_the_means_of_the_best_gains_and_of_the_first(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 20}})
     for settling_s, ki in ((1.5, 13), (1.3, 13), (1.0, 20)):

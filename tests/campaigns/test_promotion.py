@@ -59,6 +59,7 @@ def test_gains_that_are_not_shown_to_be_better_stay_what_they_are(client: TestCl
     assert seen(client, vehicle)["safe_gains"] == DEFAULT_GAINS
 
 
+@pytest.mark.complete
 def test_a_shared_simulation_keeps_its_safe_gains(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     for settling_s in (3.0, 1.0):

@@ -130,6 +130,7 @@ def test_a_spoilt_one_is_flown_anew(client: TestClient, database: Database, camp
     assert again(client, campaign)["rehearsal"]["state"] == "under way"
 
 
+@pytest.mark.complete
 def test_another_definition_and_other_safe_gains_want_another_one(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

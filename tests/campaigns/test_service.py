@@ -173,6 +173,7 @@ def test_a_campaign_is_reopened_for_one_to_fifty_flights(
     assert (answer.status_code, answer.json()["problems"][0]["field"]) == (status, "flights")
 
 
+@pytest.mark.complete
 def test_a_campaign_is_reopened_with_planned_flights_or_not_at_all(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"kind": "budget", "max_flights": 1}})
     path = f"/api/campaigns/{campaign['id']}"
@@ -217,6 +218,7 @@ def test_what_an_operator_stopped_stays_stopped_and_says_why_it_has_no_proposal(
     assert (after["outcome"], after["stop_reason"]) == ("stopped", "rain")
 
 
+@pytest.mark.complete
 def test_gains_of_ones_own_are_judged_without_searching_the_model_again(
     client: TestClient, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -44,6 +44,7 @@ def fly(client: TestClient, database: Database, campaign_id: int, settling_s: fl
     return identity
 
 
+@pytest.mark.complete
 def test_repeats_form_a_group_with_mean_and_standard_error(client: TestClient, database: Database) -> None:
     """Prior scatter 0.0105 m worth four degrees of freedom, as the experiment says."""
     campaign = create_ready_campaign(client, database, definition=LONG)
@@ -117,6 +118,7 @@ def test_one_sentence_each_says_how_the_error_with_the_same_gains_has_changed_in
     assert trend["sentence"].startswith("The error changes with the battery voltage: −0.")
 
 
+@pytest.mark.complete
 def test_a_flight_of_a_proposal_carries_its_interval_and_is_held_against_it(
     client: TestClient, database: Database
 ) -> None:
@@ -179,6 +181,7 @@ def test_repeats_of_a_simulation_without_scatter_get_none(client: TestClient, da
     assert last["group"] == {"mean": last["error"], "standard_error": None, "n": 3}
 
 
+@pytest.mark.complete
 def test_a_variant_is_what_the_advice_means_where_the_best_gains_are_outside_the_bounds(
     client: TestClient, database: Database
 ) -> None:
@@ -233,6 +236,7 @@ def donor(client: TestClient, database: Database) -> int:
     return int(made_once(database, "donor", make)["id"])
 
 
+@pytest.mark.complete
 def test_a_clone_on_another_vehicle_starts_from_the_best_flight(
     client: TestClient, database: Database, donor: int
 ) -> None:
@@ -251,6 +255,7 @@ def test_a_clone_on_another_vehicle_starts_from_the_best_flight(
     assert again.json()["definition"]["start"] == start
 
 
+@pytest.mark.complete
 def test_a_warm_start_takes_the_best_gains_and_not_those_of_one_lucky_flight(
     client: TestClient, database: Database, donor: int
 ) -> None:

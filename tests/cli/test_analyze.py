@@ -72,6 +72,7 @@ def test_a_log_of_release_4_7_is_answered_in_its_names_and_units(tmp_path: Path)
     assert values[1] == pytest.approx([*values[0][:2], 0.1 * values[0][2], 0.1 * values[0][3], values[0][4]])
 
 
+@pytest.mark.complete
 def test_the_document_alone_can_be_printed(takeoff: Path) -> None:
     result = analyze(takeoff, "--json", "-")
     assert json.loads(result.stdout)["file_name"] == "takeoff.tlog"
@@ -115,6 +116,7 @@ def test_what_does_not_suffice_is_said_and_writes_no_gains(tmp_path: Path) -> No
     assert not parameters.exists()
 
 
+@pytest.mark.complete
 def test_takeoffs_under_paparazzi_give_a_section_of_the_airframe_file(takeoff: Path, tmp_path: Path) -> None:
     section = tmp_path / "gains.xml"
     result = analyze(takeoff, "--params", section)
@@ -130,6 +132,7 @@ def test_the_log_file_beside_a_data_file_is_read_too(tmp_path: Path) -> None:
     assert "has a companion file that is not XML" in analyze(path).output
 
 
+@pytest.mark.complete
 def test_files_that_cannot_be_read_or_written_are_named(takeoff: Path, tmp_path: Path) -> None:
     missing = analyze(tmp_path / "missing.bin")
     assert missing.exit_code == 1

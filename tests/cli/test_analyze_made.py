@@ -134,6 +134,7 @@ USED: Final = (
 )
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("log", USED, ids=lambda log: log.name)
 def test_a_log_that_suffices_gives_the_vehicle_and_gains_for_it(log: UsedLog, tmp_path: Path) -> None:
     out = tmp_path / "answer.json"

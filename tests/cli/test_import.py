@@ -63,6 +63,7 @@ def test_yes_takes_the_gains_of_the_log(client: TestClient, settings: Settings, 
     assert json.loads((tmp_path / "trial.json").read_text())["gains"] == {"kp": 290, "ki": 40, "kd": 80}
 
 
+@pytest.mark.complete
 def test_a_question_can_be_answered(
     client: TestClient, settings: Settings, campaign: Json, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ import gzip
 import json
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli.commands import app
@@ -17,6 +18,7 @@ def replay(*arguments: str | Path) -> Result:
     return CliRunner().invoke(app, ["controller", "replay", *map(str, arguments)])
 
 
+@pytest.mark.complete
 def test_a_recording_named_in_place_of_the_result_is_not_overwritten(tmp_path: Path) -> None:
     """Observed: `--json LOG LOG` replaced the first log by the result of the second."""
     log = tmp_path / "flight.csv.gz"
@@ -37,6 +39,7 @@ def test_the_other_files_are_still_replayed_when_one_is_missing(tmp_path: Path) 
     assert "exact" in result.stdout
 
 
+@pytest.mark.complete
 def test_a_run_of_arducopter_is_told_by_its_columns_and_agrees_within_the_tolerances(tmp_path: Path) -> None:
     out = tmp_path / "replay.json"
     result = replay(DATA / "ardupilot_loop" / "steps_limits.csv.gz", TRACES[0], "--json", out)
@@ -63,6 +66,7 @@ def test_the_log_of_an_arducopter_is_compared_beside_a_trace_with_more_signals(t
     assert len(trace["largest_difference"]) == 8
 
 
+@pytest.mark.complete
 def test_the_loop_of_px4_alone_agrees_in_every_row_and_a_flight_in_its_medians(tmp_path: Path) -> None:
     out = tmp_path / "replay.json"
     folder = DATA / "px4_loop"
@@ -83,6 +87,7 @@ def test_the_loop_of_px4_alone_agrees_in_every_row_and_a_flight_in_its_medians(t
     assert len(wild["notes"]) == 1
 
 
+@pytest.mark.complete
 def test_a_flight_of_px4_with_an_integral_gain_5_percent_off_differs_in_its_medians(tmp_path: Path) -> None:
     with gzip.open(DATA / "px4_loop" / "default_steps_push.csv.gz", "rt") as recorded:
         first, rest = recorded.readline(), recorded.read()

@@ -41,6 +41,7 @@ def test_a_table_is_printed_and_written_with_published_measured_and_ratio(tmp_pa
         assert said in result.stdout
 
 
+@pytest.mark.complete
 def test_the_controller_is_replayed_from_the_packaged_run_or_from_a_given_one() -> None:
     packaged = reproduce("controller", "--json", "-")
     given = reproduce("controller", "--trace", TRACES / "takeoff_tuned.csv.gz", "--json", "-")

@@ -54,6 +54,7 @@ def test_given_gains_start_the_campaign_and_the_budget_ends_it() -> None:
     assert campaign["stopped_because"].startswith("The budget of 1 flight has been flown.")
 
 
+@pytest.mark.complete
 def test_gains_by_hand_are_flown_in_their_order_until_all_are_flown(tmp_path: Path) -> None:
     by_hand = ("--strategy", "manual", "--gains", "283,13,82", "--gains", "kd=81,kp=286,ki=60", "--gains", "283,13,82")
     campaign = flown(tmp_path, *RUN_ON_TWIN, *by_hand)
@@ -69,6 +70,7 @@ def test_gains_by_hand_are_flown_in_their_order_until_all_are_flown(tmp_path: Pa
     assert campaign["stopped_because"] == "All 3 given gain sets have been flown."
 
 
+@pytest.mark.complete
 def test_the_table_has_a_row_for_each_run(tmp_path: Path) -> None:
     out = tmp_path / "campaign.json"
     result = gainline(*RUN_ON_TWIN, "--max-flights", "2", "--json", out)
@@ -118,6 +120,7 @@ def test_an_unknown_preset_names_those_there_are() -> None:
     assert all(name in result.stderr for name in preset_names())
 
 
+@pytest.mark.complete
 def test_a_refused_start_flies_with_a_reason_that_the_result_keeps(tmp_path: Path) -> None:
     """Hardly any damping: the takeoffs that the gate simulates swing more and more."""
     undamped = ("run", "ardrone-takeoff", "--start", "1500,1000,40", "--max-flights", "1")
@@ -133,6 +136,7 @@ def test_a_refused_start_flies_with_a_reason_that_the_result_keeps(tmp_path: Pat
 SPIKE = Glitch(kind="acceleration", start_s=1.0, end_s=1.1, sentence="The altitude jumps.")
 
 
+@pytest.mark.complete
 def test_flights_with_a_glitch_do_not_count_and_a_low_battery_ends_their_campaign(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -156,6 +160,7 @@ def test_flights_with_a_glitch_do_not_count_and_a_low_battery_ends_their_campaig
     assert campaign["stopped_because"].startswith("The last flight ended at 11.10 V; the minimum is 11.5 V.")
 
 
+@pytest.mark.complete
 def test_flights_that_cannot_count_end_with_the_budget(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(records, "find_glitches", lambda _experiment, _record: (SPIKE,))
     monkeypatch.setattr(records, "repaired", lambda _experiment, record, _glitches: record)

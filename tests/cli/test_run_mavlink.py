@@ -91,6 +91,7 @@ def test_a_campaign_that_an_error_ends_prints_the_flights_it_has_and_which_gains
     assert document["stopped_because"].startswith("an error occurred")
 
 
+@pytest.mark.complete
 def test_when_the_safe_gains_could_not_be_verified_it_says_that_nobody_knows_what_the_vehicle_holds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

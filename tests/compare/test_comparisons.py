@@ -66,6 +66,7 @@ def t_test(own: Sequence[float], other: Sequence[float], *more: Sequence[float])
     return difference, standard_error, float(stats.t(freedom).cdf(abs(difference) / standard_error))
 
 
+@pytest.mark.complete
 def test_a_flight_is_better_than_the_first_with_the_confidence_of_a_t_test(
     client: TestClient, database: Database
 ) -> None:
@@ -106,6 +107,7 @@ def test_what_is_unresolved_says_which_further_flights_would_decide(client: Test
     assert f"{further['trial']} with the gains of flight 2" in found["sentence"]
 
 
+@pytest.mark.complete
 def test_only_what_differs_is_listed_with_its_change_against_the_first(client: TestClient, database: Database) -> None:
     plain = create(client, database, "Plain")
     body = {"name": "Heavier", "vehicle": {"kind": "twin", "options": {"hover_throttle": 0.65}}}
@@ -122,6 +124,7 @@ def test_only_what_differs_is_listed_with_its_change_against_the_first(client: T
     assert found["notes"][0].startswith("One vehicle with different settings.")
 
 
+@pytest.mark.complete
 def test_campaigns_of_one_vehicle_share_their_scatter(client: TestClient, database: Database) -> None:
     one, two = create(client, database, "Morning"), create(client, database, "Evening")
     first = [fly(client, database, one, settling_s) for settling_s in (1.0, 1.1)]
@@ -138,6 +141,7 @@ def test_campaigns_of_one_vehicle_share_their_scatter(client: TestClient, databa
     assert "2 campaigns of the same vehicle" in found["notes"][0]
 
 
+@pytest.mark.complete
 def test_between_vehicles_there_is_a_difference_and_no_verdict(client: TestClient, database: Database) -> None:
     twin, windy = create(client, database), create(client, database, vehicle="jsbsim")
     trials = [fly(client, database, twin, 1.0), fly(client, database, windy, 0.5, OTHER)]
@@ -181,6 +185,7 @@ def test_repeats_are_told_apart_alike_whichever_is_named_first(client: TestClien
     assert back["confidence"] == pytest.approx(forward["confidence"])
 
 
+@pytest.mark.complete
 def test_the_best_of_several_gets_no_credit_for_having_been_chosen(client: TestClient, database: Database) -> None:
     """Between three gain sets a mistake counts twice (Bonferroni), in the sentence and in the table alike."""
     campaign = create(client, database)
@@ -249,6 +254,7 @@ def test_what_cannot_be_compared_is_named_by_its_place(client: TestClient, datab
     assert "at most 20 items" in refusal(client, range(1, 22))["trial"]
 
 
+@pytest.mark.complete
 def test_errors_over_different_windows_are_refused_by_name(client: TestClient, database: Database) -> None:
     paper = fly(client, database, create(client, database), 1.0)
     named, shorter = (

@@ -125,6 +125,7 @@ def test_a_difference_beyond_the_tolerance_is_found_in_a_run_of_arducopter(clien
     assert "steps is not within the tolerances, the first at 2.500 s in throttle" in check["sentence"]
 
 
+@pytest.mark.complete
 def test_a_check_of_an_earlier_version_is_one_of_paparazzi(client: TestClient, database: Database) -> None:
     made = client.post(f"{PATH}/example").json()["id"]
     with database.write() as session:
@@ -249,6 +250,7 @@ def test_a_small_file_that_unpacks_to_a_huge_one_is_refused(client: TestClient) 
     assert (answer.status_code, problems_of(answer)) == (422, {"file": "contains more than 256 MiB of text"})
 
 
+@pytest.mark.complete
 def test_the_example_shows_what_a_check_is(client: TestClient) -> None:
     answer = client.post(f"{PATH}/example", headers={"Idempotency-Key": "one"})
     assert (answer.status_code, answer.json()["passed"]) == (201, True)
@@ -257,6 +259,7 @@ def test_the_example_shows_what_a_check_is(client: TestClient) -> None:
     assert get(client, PATH)["total"] == 1
 
 
+@pytest.mark.complete
 def test_checks_are_listed_newest_first_in_pages_and_removed(client: TestClient) -> None:
     made = [client.post(f"{PATH}/example").json()["id"] for _ in range(3)]
     first = get(client, f"{PATH}?limit=2")

@@ -44,6 +44,7 @@ def campaign(client: TestClient, database: Database) -> Json:
     return create_flown_campaign(client, database, 1.5, 1.2, 0.9, definition=definition)
 
 
+@pytest.mark.complete
 def test_a_backup_of_a_damaged_record_is_refused_and_names_its_trial(
     client: TestClient, campaign: Json, damaged: Json
 ) -> None:
@@ -78,6 +79,7 @@ def test_a_bundle_of_a_damaged_record_is_refused_and_leaves_no_file(
     assert list(tmp_path.glob("*.zip*")) == []
 
 
+@pytest.mark.complete
 def test_a_report_shows_the_rest_and_says_which_record_is_damaged(
     client: TestClient, campaign: Json, damaged: Json
 ) -> None:

@@ -20,6 +20,7 @@ from tests.builders import create_climb
 SINGLE = st.floats(width=32, allow_nan=False, allow_infinity=False)
 
 
+@pytest.mark.complete
 @given(
     columns=st.integers(1, 12).flatmap(
         lambda samples: st.lists(arrays(np.float64, samples, elements=SINGLE), min_size=0, max_size=5)

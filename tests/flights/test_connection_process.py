@@ -435,6 +435,7 @@ def left_alone(process: VehicleProcess, line: RecordingPipe, rig: AnsweringRig, 
     return rig.now_s() - begun_s
 
 
+@pytest.mark.complete
 def test_land_is_repeated_after_the_worker_died_until_the_vehicle_responds(
     rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess
 ) -> None:

@@ -118,6 +118,7 @@ def test_a_short_gap_of_the_link_leaves_the_vehicle_ready(rig: AnsweringRig, tmp
     assert lost(line) == []
 
 
+@pytest.mark.complete
 def test_a_silent_link_takes_readiness_back_within_two_seconds_until_the_gains_are_read_again(
     rig: AnsweringRig, tmp_path: Path
 ) -> None:

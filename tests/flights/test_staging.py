@@ -117,6 +117,7 @@ def is_wanted(database: Database, staged: Json) -> tuple[bool, str | None]:
         return flight_rows.clearance_of(session, flight_id)
 
 
+@pytest.mark.complete
 def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
     client: TestClient, database: Database, real: Json, staged: Json
 ) -> None:
@@ -195,6 +196,7 @@ def test_a_real_vehicle_is_never_flown_in_one_go(client: TestClient, planned: Js
     assert planned["actions"] == ["stage", "cancel", "note"]
 
 
+@pytest.mark.complete
 def test_real_vehicles_fly_only_from_a_server_that_nobody_else_reaches(
     settings: Settings, client: TestClient, database: Database, real: Json, planned: Json
 ) -> None:
@@ -267,6 +269,7 @@ def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
     assert seen(client, real)["state"] == "quarantined"
 
 
+@pytest.mark.complete
 def test_a_second_vehicle_of_the_kind_flies_meanwhile_and_the_same_one_does_not(
     client: TestClient, database: Database, staged: Json
 ) -> None:
@@ -337,6 +340,7 @@ def test_a_real_flight_keeps_its_battery_and_waits_for_a_persons_class(
     assert flown["flight"]["safe_gains_restored"] is True
 
 
+@pytest.mark.complete
 def test_an_unusable_measurement_suggests_invalid_for_a_real_flight_and_makes_a_simulated_one_invalid(
     client: TestClient, database: Database, real: Json, planned: Json
 ) -> None:
@@ -425,6 +429,7 @@ def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json
     assert trial(client, planned)["flight"]["state"] == "cancelled"
 
 
+@pytest.mark.complete
 def test_the_command_log_says_who_asked_what_of_a_flight(
     client: TestClient, database: Database, real: Json, planned: Json
 ) -> None:
@@ -591,6 +596,7 @@ def test_a_window_that_its_flight_plan_does_not_fit_is_refused_before_it_is_stag
     assert "“Paparazzi: time limit of the flight plan's takeoff”" in refused.json()["hint"]
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("motors_off", [False, True])
 def test_a_vehicle_whose_motors_were_stopped_in_the_air_is_not_said_to_have_landed(
     client: TestClient, database: Database, real: Json, staged: Json, motors_off: bool

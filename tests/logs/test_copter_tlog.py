@@ -103,6 +103,7 @@ def test_px4_flies_the_set_point_itself() -> None:
     assert found.error_m == pytest.approx(0.17, abs=0.02)
 
 
+@pytest.mark.complete
 def test_rows_in_which_more_than_a_position_was_commanded_are_left_out() -> None:
     """The vehicle reports the altitude alone: a push would be taken for a disturbance. Zeros, and those given to
     another vehicle, change nothing."""

@@ -64,6 +64,7 @@ def test_any_bytes_are_read_or_refused_in_words(head: bytes, rest: bytes) -> Non
     read_or_refuse(head + rest)
 
 
+@pytest.mark.complete
 @given(
     kind=st.sampled_from(sorted(ORIGINALS)),
     seed=st.integers(0, 2**32),
@@ -86,6 +87,7 @@ def test_a_log_damaged_anywhere_is_read_or_refused_in_words(kind: str, seed: int
     read_or_refuse(bytes(content[: max(1, int(cut * len(content)))]))
 
 
+@pytest.mark.complete
 @given(
     companion=st.one_of(
         st.binary(max_size=300), st.text(max_size=200).map(lambda text: COMPANION[:400].encode() + text.encode())

@@ -190,6 +190,7 @@ class TenMillionRows(io.RawIOBase):
         return b"time_s,altitude_m\n" if self.lines_read == 1 else b"%.3f,1.0\n" % (self.lines_read * 0.001)
 
 
+@pytest.mark.complete
 def test_ten_million_rows_are_refused_without_being_read() -> None:
     stream = TenMillionRows()
     with pytest.raises(TrajectoryError) as refusal:

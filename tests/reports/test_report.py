@@ -115,6 +115,7 @@ def test_the_report_says_what_the_api_says(client: TestClient, campaign: Json) -
             assert measured(trial["error"], statistics["sigma"], "") in cells
 
 
+@pytest.mark.complete
 def test_the_file_runs_its_own_scripts_alone_and_reaches_nothing_whatever_people_wrote(
     client: TestClient, campaign: Json
 ) -> None:
@@ -136,6 +137,7 @@ def test_the_file_runs_its_own_scripts_alone_and_reaches_nothing_whatever_people
     assert not [name for _, attributes in page.tags for name in attributes if name in {"src", "href", "srcset"}]
 
 
+@pytest.mark.complete
 def test_notes_and_photos_stand_with_their_flights_in_the_file_itself(client: TestClient, campaign: Json) -> None:
     first, _, third = get(client, f"/api/campaigns/{campaign['id']}/trials")["items"]
     said = {"version": third["version"], "note": "<i>New</i> propellers."}
@@ -154,6 +156,7 @@ def test_notes_and_photos_stand_with_their_flights_in_the_file_itself(client: Te
     assert "img-src data:;" in client.get(f"/api/campaigns/{campaign['id']}/report.html").headers[POLICY]
 
 
+@pytest.mark.complete
 def test_photos_beyond_what_a_file_can_hold_are_left_out_in_words_the_first_of_each_flight_last(
     client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,6 +202,7 @@ def test_a_flight_that_does_not_settle_is_said_not_to(client: TestClient, databa
     assert read(client, campaign).cells.count("not settled") == 1
 
 
+@pytest.mark.complete
 def test_a_campaign_that_has_not_flown_has_a_report_too(client: TestClient, database: Database) -> None:
     page = read(client, create_ready_campaign(client, database))
     assert "No valid flight yet" in page.said
@@ -219,6 +223,7 @@ def test_the_safe_gains_are_those_of_the_first_flight_and_later_ones_are_said(
     assert "Safe gainskp 283, ki 13, kd 82 at the first flight, now kp 250, ki 13, kd 82" in read(client, campaign).said
 
 
+@pytest.mark.complete
 def test_the_settings_of_a_vehicle_with_a_link_have_short_titles(client: TestClient, database: Database) -> None:
     said = read(client, create_campaign_on(client, database, create_connected(client, database))).said
     assert "Addressudp:127.0.0.1:4245@4244" in said
@@ -230,6 +235,7 @@ def test_the_report_of_no_campaign_is_not_found(client: TestClient) -> None:
     assert client.get("/api/campaigns/77/report.pdf").status_code == 404
 
 
+@pytest.mark.complete
 @pytest.mark.skipif(not any(map(shutil.which, pdf.PRINTERS)), reason="no Chromium to print with")
 def test_the_pdf_is_one_and_its_text_can_be_read(client: TestClient, campaign: Json) -> None:
     answer = client.get(f"/api/campaigns/{campaign['id']}/report.pdf")

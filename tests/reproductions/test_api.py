@@ -96,6 +96,7 @@ def test_a_result_has_rows_beside_the_papers_and_figures(client: TestClient, dat
     assert cards[0]["figure"]["data"][0]["line"] != cards[1]["figure"]["data"][0]["line"]
 
 
+@pytest.mark.complete
 def test_only_the_newest_result_is_kept(client: TestClient, database: Database) -> None:
     for _ in range(2):
         ask(client)
@@ -127,6 +128,7 @@ def test_progress_is_told_with_an_estimate(client: TestClient, database: Databas
         assert not jobs.report_progress(session, job_id, 0.5, "", worker="another", lease_s=30.0)
 
 
+@pytest.mark.complete
 def test_a_failed_run_shows_its_reason_beside_the_older_result_until_a_newer_one(
     client: TestClient, database: Database
 ) -> None:

@@ -29,6 +29,7 @@ def shown() -> Showcase:
     return showcase()
 
 
+@pytest.mark.complete
 def test_the_definition_gives_the_errors_it_was_checked_with() -> None:
     zero, hand, best = _definition()
     assert zero.measured == pytest.approx(6.66664, abs=1e-4)
@@ -42,6 +43,7 @@ def test_the_optimum_lies_on_three_bounds_of_ours() -> None:
     assert space.names_where((optimum == space.lower) | (optimum == space.upper)) == ("theta_1", "theta_2", "theta_3")
 
 
+@pytest.mark.complete
 def test_the_showcase_comes_near_the_optimum_about_as_fast_as_the_paper(shown: Showcase) -> None:
     near, first, ratio = _showcase(shown)
     assert (near.paper, near.reference) == (16.0, 18.0)

@@ -26,6 +26,7 @@ def test_without_a_model_the_simplex_takes_dozens_of_flights() -> None:
     assert 5 < result.flights[0] < 120
 
 
+@pytest.mark.complete
 def test_the_showcase_looks_like_the_papers_campaign() -> None:
     """The paper: near-optimal after 16 of 27 flights, the largest gain in the first step. Chosen: seed 50, 18 of 25."""
     shown = showcase()

@@ -119,6 +119,7 @@ def test_a_second_browser_is_unlocked_by_a_link_of_the_command_line(serving: Ser
         assert third.get(found.group()).status_code == 403
 
 
+@pytest.mark.complete
 def test_the_token_of_a_script_is_printed_for_this_computer_alone(serving: Serving) -> None:
     said = unlock(serving, "--script")
     token = said.split()[-1]
@@ -129,6 +130,7 @@ def test_the_token_of_a_script_is_printed_for_this_computer_alone(serving: Servi
         assert script.post("/vehicles/4711/motors-off").status_code == 202
 
 
+@pytest.mark.complete
 def test_without_a_server_there_is_no_link(tmp_path: Path) -> None:
     refused = subprocess.run(
         [sys.executable, "-m", "app.cli", "unlock", "--data-dir", str(tmp_path)],

@@ -47,6 +47,7 @@ def test_a_host_that_is_not_this_machine_is_refused(tmp_path: Path) -> None:
     assert "host: 192.0.2.1 is not an address of this computer" in refused.stderr
 
 
+@pytest.mark.complete
 def test_a_second_server_on_the_same_database_is_refused_and_the_first_goes_on(serving: Serving) -> None:
     refused = gainline("serve", "--port", "0", "--data-dir", str(serving.data_dir))
     assert refused.returncode == 1

@@ -74,6 +74,7 @@ def test_the_worker_starts_without_what_only_its_processes_need() -> None:
     assert not imported("import app.runtime.worker").intersection((*NUMERICS, "alembic", "fastapi"))
 
 
+@pytest.mark.complete
 def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
     assert not imported("import app.runtime.serve").intersection((*NUMERICS, "fastapi", "sqlalchemy"))
 

@@ -203,6 +203,7 @@ def test_px4_adds_a_streamed_acceleration_as_a_push_that_it_holds_against(px4_pi
     assert px4_pilot.height_m() == pytest.approx(3.0, abs=0.03)
 
 
+@pytest.mark.complete
 def test_px4s_takeoff_and_steps_are_the_replicas() -> None:
     pilot = Px4(flying("px4"))
     pilot.ground.listen(3.5)

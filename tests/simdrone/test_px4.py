@@ -73,6 +73,7 @@ def test_without_a_position_it_refuses_to_arm_and_gives_the_reason(pilot: Px4) -
     assert pilot.words() == ["Arming denied: resolve system health failures first"]
 
 
+@pytest.mark.complete
 def test_it_takes_off_above_its_place_waits_there_lands_and_disarms(pilot: Px4) -> None:
     pilot.hover()
     pilot.ground.expect("HEARTBEAT", lambda message: message.custom_mode == LOITER, within_s=8.0)
@@ -112,6 +113,7 @@ def test_after_a_flight_with_targets_it_is_in_offboard_again_and_does_not_arm(pi
     assert pilot.command(ARM, 1.0) == 0
 
 
+@pytest.mark.complete
 def test_the_height_of_the_takeoff_command_counts_from_the_sea(pilot: Px4) -> None:
     """Three metres above the sea are far below the ground here, 488 m above it. It may wait armed on the ground for
     longer than it takes a busy machine to ask again."""

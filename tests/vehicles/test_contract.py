@@ -144,6 +144,7 @@ def test_a_watched_flight_never_runs_ahead_of_its_pace(kind: str, vehicle: Vehic
     assert all(clock_s >= time_s / speed - 1e-9 for clock_s, time_s in seen)
 
 
+@pytest.mark.complete
 def test_the_pace_does_not_change_the_flight(kind: str, vehicle: Vehicle) -> None:
     assert same(fly(vehicle, speed=100.0).trajectory, fly(vehicle).trajectory)
 

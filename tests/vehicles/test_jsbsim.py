@@ -57,6 +57,7 @@ def test_it_stands_still_until_the_motors_lift_it() -> None:
     assert flight["thrust"][resting].max() == 0.0
 
 
+@pytest.mark.complete
 def test_the_start_latency_shifts_the_whole_takeoff() -> None:
     late = lift_off_s(flown("jsbsim", {"start_latency_s": 0.5})) - lift_off_s(flown("jsbsim", {}))
     assert late == pytest.approx(0.5, abs=0.01)
@@ -74,6 +75,7 @@ def test_command_to_hover_goes_with_mass(mass_kg: float) -> None:
     assert hover_share(flown("jsbsim", {"mass_kg": mass_kg})) == pytest.approx(expected, abs=0.001)
 
 
+@pytest.mark.complete
 def test_a_motor_lag_delays_the_lift_off() -> None:
     assert lift_off_s(flown("jsbsim", {"motor_lag_s": 0.1})) > lift_off_s(flown("jsbsim", {})) + 0.05
 
@@ -114,6 +116,7 @@ def test_still_air_leaves_it_where_it_started() -> None:
     assert offset_m < 0.001
 
 
+@pytest.mark.complete
 def test_a_takeoff_in_wind_can_be_scored() -> None:
     calm, windy = (TAKEOFF.error(flown("jsbsim", {"wind_m_s": wind, "gust_m_s": wind / 5})) for wind in (0.0, 5.0))
     assert calm < windy < 0.2

@@ -153,6 +153,7 @@ def acts_on(vehicle: Json) -> list[tuple[str, str, Json | None]]:
     ]
 
 
+@pytest.mark.complete
 def test_whoever_has_no_key_commands_no_real_vehicle_whatever_the_headers_say(
     stranger: TestClient, client: TestClient, database: Database, real: Json
 ) -> None:
@@ -258,6 +259,7 @@ def exposed(settings: Settings, client: TestClient) -> Iterator[TestClient]:
         yield network
 
 
+@pytest.mark.complete
 def test_a_server_that_others_reach_has_no_links_whoever_asks(
     exposed: TestClient, client: TestClient, database: Database
 ) -> None:

@@ -192,6 +192,7 @@ def test_another_campaigns_proposal_is_not_found(client: TestClient, database: D
     assert client.post(f"{CAMPAIGN}/{second}/trials", json={"proposal_id": theirs}).status_code == 404
 
 
+@pytest.mark.complete
 def test_a_full_disk_is_503_and_loses_nothing(client: TestClient, database: Database, listen: Listen) -> None:
     campaign = create_campaign(client)
     with database.engine.connect() as connection:

@@ -92,6 +92,7 @@ def test_the_same_key_from_many_threads_at_once_makes_one_campaign(client: TestC
     assert len({answer.json()["id"] for answer in answers}) == 1
 
 
+@pytest.mark.complete
 def test_many_threads_writing_at_once_lose_nothing(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, definition={"stop": {"max_flights": 16}})
     path = f"/api/campaigns/{campaign['id']}/trials"

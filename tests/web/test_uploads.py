@@ -133,6 +133,7 @@ def uploads_of(client: TestClient) -> dict[str, list[str]]:
     return {path.format(campaign_id=1, trial_id=1): kinds for path, kinds in accepted.items() if FORM in kinds}
 
 
+@pytest.mark.complete
 def test_every_route_for_files_refuses_what_is_too_large_whatever_its_length_says(strict: TestClient) -> None:
     uploads = uploads_of(strict)
     assert len(uploads) == 7
@@ -166,6 +167,7 @@ def test_something_else_than_a_record_is_refused(client: TestClient, trial: Json
     assert answer.headers["content-type"] == "application/problem+json"
 
 
+@pytest.mark.complete
 def test_an_export_can_be_imported_and_gives_the_same_record_and_error(client: TestClient, database: Database) -> None:
     first, second = (
         create_trial(client, create_ready_campaign(client, database, vehicle="import")["id"]) for _ in range(2)

@@ -72,6 +72,7 @@ def test_three_cautious_aborts_leave_the_proposal_as_it_was(
     assert proposal(client, campaign)["gains"] == before["gains"]
 
 
+@pytest.mark.complete
 def test_an_abort_counts_once_its_operator_says_that_the_vehicle_behaved_badly_and_no_more_when_they_take_it_back(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
@@ -131,6 +132,7 @@ def test_two_operators_do_not_overwrite_each_others_word(
     assert judge(client, trial, "something else", version=trial["version"]) == 409
 
 
+@pytest.mark.complete
 def test_a_flight_that_was_not_aborted_has_no_cause(client: TestClient, database: Database, campaign: Json) -> None:
     flown = create_flown_trial(client, database, campaign["id"])
     assert flown["abort_cause"] is None

@@ -54,6 +54,7 @@ def test_the_papers_ki_is_refused_with_the_case_that_wraps_and_the_largest_that_
     assert get(client, f"/api/campaigns/{campaign['id']}/trials")["total"] == 0
 
 
+@pytest.mark.complete
 def test_on_a_simulated_vehicle_the_gate_is_overruled_with_a_reason_that_the_flight_keeps(
     client: TestClient, database: Database
 ) -> None:

@@ -166,6 +166,7 @@ EXPERIMENTS = {
 LOGS = sorted(set().union(*EXPERIMENTS.values()))
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
     client: TestClient, database: Database, experiment: str

@@ -171,6 +171,7 @@ def test_the_flight_of_a_proposal_stores_no_second_curve(
         assert session.get_one(TrialRow, planned["id"]).predicted_id is None
 
 
+@pytest.mark.complete
 def test_before_a_valid_flight_only_the_models_curve_is_kept(client: TestClient, database: Database) -> None:
     """As with the proposal: error and band of a model that no flight has corrected say nothing."""
     created = create_ready_campaign(client, database)

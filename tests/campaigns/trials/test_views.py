@@ -26,6 +26,7 @@ def test_a_difference_is_shown_only_where_the_printed_errors_differ(client: Test
     assert told in trials[2]["verdict"]
 
 
+@pytest.mark.complete
 def test_gains_flown_again_on_purpose_are_not_held_against_the_best(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import", definition=PATIENT)
     first = create_imported_trial(client, campaign["id"], create_csv(2.0))
@@ -40,6 +41,7 @@ def test_gains_flown_again_on_purpose_are_not_held_against_the_best(client: Test
     assert second["predicted_error"] == pytest.approx(first["error"])
 
 
+@pytest.mark.complete
 def test_a_manual_strategy_that_proposes_flown_gains_repeats_them(client: TestClient, database: Database) -> None:
     definition = {**PATIENT, "strategy": "manual"}
     campaign = create_ready_campaign(client, database, vehicle="import", definition=definition)
@@ -51,6 +53,7 @@ def test_a_manual_strategy_that_proposes_flown_gains_repeats_them(client: TestCl
     assert f"{second['error']:.3f} m, repeating the gains of flight 1" in second["verdict"]
 
 
+@pytest.mark.complete
 def test_a_flight_is_compared_with_the_best_before_it_and_the_first_as_far_as_the_scatter_allows(
     client: TestClient, database: Database
 ) -> None:

@@ -46,6 +46,7 @@ def waypoints(rig: LockstepRig) -> list[float]:
     return [number(message, "z") for message in rig.told("MISSION_ITEM")]
 
 
+@pytest.mark.complete
 @compiled_only
 def test_the_steps_score_as_the_same_body_does_without_a_link() -> None:
     watcher = Watcher()
@@ -102,6 +103,7 @@ def test_an_abort_while_a_set_point_is_under_way_lands_on_the_safe_gains_and_doe
     assert (record.ending, record.reason) == ("aborted", "the operator pressed Abort")
 
 
+@pytest.mark.complete
 @compiled_only
 def test_motors_off_during_a_step_stops_it_at_once() -> None:
     def decide() -> StopRequest | None:

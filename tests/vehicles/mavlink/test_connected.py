@@ -266,6 +266,7 @@ def test_a_vehicle_that_was_swapped_gets_nothing_until_a_person_has_seen_that_it
             assert (vehicle.concern, vehicle.identity.uid) == ("", "" if lost_s == math.inf else "0000000000000009")
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_was_away_and_whose_answers_are_lost_is_not_flown() -> None:
     with LossyRig("px4") as rig:
         rig.switch_on_failsafes()
@@ -320,6 +321,7 @@ def test_another_vehicle_than_the_pinned_one_is_not_taken_for_it() -> None:
         pass
 
 
+@pytest.mark.complete
 def test_a_session_flies_twice_each_flight_with_a_log_of_its_own(tmp_path: Path) -> None:
     paths = [tmp_path / "flight-1.tlog", tmp_path / "flight-2.tlog"]
     steps: set[str] = set()
@@ -413,6 +415,7 @@ def test_every_parameter_can_be_read_also_where_some_are_lost(lost_s: float) -> 
     assert heard[-1][0] == heard[-1][1] >= len(found) > 50
 
 
+@pytest.mark.complete
 def test_a_vehicle_met_in_the_air_is_observed_landed_and_released_by_a_person() -> None:
     with LockstepRig() as rig:
         enter_block(rig, START_ENGINE, TAKE_OFF)
@@ -524,6 +527,7 @@ def test_a_vehicle_that_somebody_else_arms_is_only_observed_from_then_on() -> No
         assert vehicle.concern
 
 
+@pytest.mark.complete
 def test_what_was_ordered_is_repeated_also_while_something_else_takes_its_time() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         enter_block(rig, START_ENGINE, TAKE_OFF)

@@ -145,6 +145,7 @@ KEPT_IN = "udp-127.0.0.1-4245-4244-px4-1-4741494e4c494e01.json"
 KEPT = '{"vehicle": "px4 1", "parameters": {"MIS_TAKEOFF_ALT": [2.5, 3.0]}}'
 
 
+@pytest.mark.complete
 def test_what_a_trial_sets_is_kept_on_disk_until_it_is_put_back(tmp_path: Path) -> None:
     file, kept = tmp_path / KEPT_IN, set[str]()
     with ready("px4") as rig, connected(rig, trial_parameters=tmp_path) as vehicle:
@@ -390,6 +391,7 @@ def test_a_persons_land_always_goes_and_is_not_repeated_to_a_vehicle_whose_motor
         assert vehicle.condition().mode == "Hold"
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
 def test_a_vehicle_whose_own_checks_fail_is_not_flown_and_all_reasons_are_reported(autopilot: str) -> None:
     with LockstepRig(autopilot, faults=["arm-refused@connect"]) as rig:

@@ -117,6 +117,7 @@ def test_without_a_position_it_is_not_flown() -> None:
             assert blocks_told(rig) == [WAIT_GPS]
 
 
+@pytest.mark.complete
 def test_a_stranger_who_reports_the_last_block_over_and_over_does_not_hold_the_check_up() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         autopilot_of(rig).position_after_s = math.inf

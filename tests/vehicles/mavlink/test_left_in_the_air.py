@@ -131,6 +131,7 @@ def test_a_person_who_decides_ends_the_landing_that_no_person_asked_for() -> Non
         assert "Motors off was requested: people below." in vehicle.concern
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_has_landed_meanwhile_is_ready_and_hears_the_heartbeats_that_it_flies_with() -> None:
     def stop() -> StopRequest | None:
         return StopRequest("enough") if rig.drone.body.altitude_m > 1.0 else None

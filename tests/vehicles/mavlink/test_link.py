@@ -344,6 +344,7 @@ def test_paparazzis_other_counters_are_left_out_of_the_losses() -> None:
     assert losses.lost == 0
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("gains", FLOWN)
 def test_a_recorded_flight_of_the_real_paparazzi_is_heard_whole_with_nothing_lost(
     gains: tuple[int, int, int], paparazzi: FakeVehicleEndpoint, link: Link

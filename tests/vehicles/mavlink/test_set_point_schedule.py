@@ -397,6 +397,7 @@ def test_the_mode_in_which_it_follows_set_points_is_unexpected_before_the_first(
     assert (walk.state, walk.trial.doubt) == (State.ABORT_LAND, ""), "it lands out of that mode"
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("begin", [asked, lambda: following().until_s(9.3)], ids=["asked to hold", "during a step"])
 def test_every_failure_of_one_that_holds_first_leads_where_it_must_too(begin: Callable[[], Stepping]) -> None:
     begun = begin()

@@ -94,6 +94,7 @@ def _flown(autopilot: str, fault: str) -> Flown:
         return record, watcher.samples, rig.heard
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("autopilot", FLOWN_ON)
 def test_it_is_recorded_and_shown_live(autopilot: str) -> None:
     record, live, _ = flown(autopilot)
@@ -189,6 +190,7 @@ def with_throttle(letter: OutgoingMessage, percent: int) -> OutgoingMessage:
     return replace(letter, fields={**letter.fields, "throttle": percent})
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("autopilot", FLOWN_ON)
 def test_a_vehicle_that_reports_none_has_none_rather_than_zero(autopilot: str) -> None:
     record, live, _ = flown(autopilot, NoThrottle)

@@ -648,6 +648,7 @@ def test_a_record_ends_by_the_grounds_clock_too() -> None:
     assert walk.trial.why.startswith("Its clock advanced by ")
 
 
+@pytest.mark.complete
 def test_a_longer_record_allows_the_clock_the_same_share_of_delay() -> None:
     walk = TrialDriver(plan=replace(PLAN, record_s=60.4)).lift_off()
     assert walk.trial.commanded_s is not None

@@ -91,6 +91,7 @@ def test_its_heartbeat_looks_like_nav_unless_its_release_tells_the_modes_number(
     assert (beat.base_mode, beat.custom_mode) == (ARMED | 4, number)
 
 
+@pytest.mark.complete
 def test_the_plan_lands_it_before_that() -> None:
     """At the distance of the delivered plan, without a ground station on the link."""
     ground = flying("paparazzi", faults=["carried-away:6@6"])
