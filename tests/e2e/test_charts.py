@@ -14,6 +14,8 @@ from tests.e2e.states import States
 FLIGHTS = 1000
 SAMPLES = 4000
 WHOLE_FLIGHT_S = pytest.approx([-0.326, 32.6], abs=0.01)
+DWELL_MS = 300
+"""The mouse rests for half as long before the curve of a row is asked for."""
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +46,14 @@ def lent_curve(dashboard: Dashboard, flight: int) -> Json | None:
     """That of a flight that has none of its own, while it is pointed at."""
     trace = dashboard.trace("takeoffs", "pointed")
     return trace if trace is not None and trace["name"] == f"Flight {flight}" else None
+
+
+def lent_to_its_row(dashboard: Dashboard, flight: int) -> Json | None:
+    """With the mouse moved onto the row anew: a row may move away from under it."""
+    dashboard.page.mouse.move(5, 5)
+    row(dashboard, flight).hover()
+    dashboard.page.wait_for_timeout(DWELL_MS)
+    return lent_curve(dashboard, flight)
 
 
 def best_of(dashboard: Dashboard) -> Json:
@@ -249,8 +259,7 @@ def points_at_a_row_and_its_curve_stands_out(page_of_many: Dashboard) -> None:
     row(page_of_many, number).get_by_role("button").focus()
     expect(row(page_of_many, number)).to_have_attribute("data-pointed", "")
     plain = FLIGHTS - 20
-    row(page_of_many, plain).hover()
-    lent = page_of_many.until(lambda: lent_curve(page_of_many, plain))
+    lent = page_of_many.until(lambda: lent_to_its_row(page_of_many, plain))
     best = best_of(page_of_many)
     time_s, altitude_m = page_of_many.record(best["trial_id"] - best["trial_number"] + plain)
     np.testing.assert_allclose(lent["y"], np.interp(lent["x"], time_s, altitude_m), atol=5e-3)

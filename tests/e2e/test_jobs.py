@@ -1,6 +1,5 @@
 """The page of jobs: what failed stands first, with why, what to do, and its log; it is retried."""
 
-import json
 import os
 import re
 import signal
@@ -9,7 +8,6 @@ from pathlib import Path
 
 from playwright.sync_api import expect
 
-from app.reproductions.registry import NICENESS
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
@@ -29,21 +27,11 @@ def children_of(pid: int) -> list[int]:
     return found
 
 
-def computing(server: Server) -> int | None:
-    """The process that computes a reproduction: the only one that yields to all others."""
-    worker = json.loads((server.data_dir / "worker.lock").read_text())["pid"]
-    for pid in children_of(worker):
-        try:
-            if os.getpriority(os.PRIO_PROCESS, pid) - os.getpriority(os.PRIO_PROCESS, 0) == NICENESS:
-                return pid
-        except ProcessLookupError:
-            continue
-    return None
+def kill_until_given_up(dashboard: Dashboard, server: Server, job_id: int, before: set[int]) -> None:
+    """Kill whatever process the worker has begun for the job: any that was not there `before`."""
 
-
-def kill_until_given_up(dashboard: Dashboard, server: Server, job_id: int) -> None:
     def killed() -> bool:
-        if (pid := computing(server)) is not None:
+        for pid in set(children_of(server.worker_pid())) - before:
             with suppress(ProcessLookupError):  # one that was killed before, and collected just now
                 os.kill(pid, signal.SIGKILL)
         return bool(dashboard.get(f"/jobs/{job_id}")["state"] == "failed")
@@ -58,11 +46,12 @@ def test_a_job_is_watched_fails_when_its_process_is_killed_again_and_again_is_re
     page = dashboard.page
     dashboard.open("/jobs")
     expect(page.get_by_text("No jobs yet.")).to_be_visible()
+    before = set(children_of(empty_server.worker_pid()))
     job_id = dashboard.post("/reproductions/variability/run")["id"]
     card = page.locator("tbody").filter(has_text=f"Job {job_id}")
     expect(card.get_by_role("link", name="Fig. 12: takeoffs repeated over a battery")).to_be_visible()
     expect(card.get_by_text(re.compile(r"^[1-9]\d?\s% · .*battery \d+ of 240 flown"))).to_be_visible()
-    kill_until_given_up(dashboard, empty_server, job_id)
+    kill_until_given_up(dashboard, empty_server, job_id, before)
     states.reproduce("controller")
     groups = page.get_by_role("main").get_by_role("region", name=re.compile("jobs$"))
     expect(groups.nth(1)).to_be_visible()
