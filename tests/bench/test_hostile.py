@@ -133,6 +133,7 @@ def test_nothing_is_written_while_another_vehicle_with_its_ids_flies(autopilot: 
     assert ended.outcome == "refused"
 
 
+@pytest.mark.complete
 def test_every_hazard_sets_in_in_every_state_and_under_every_autopilot_that_it_concerns() -> None:
     drawn = {(each.autopilot, each.faults[0].kind, each.faults[0].state) for each in cases()}
     assert drawn == {

@@ -160,6 +160,7 @@ def test_a_small_bundle_of_many_values_stays_small_in_memory(
     assert found[name] == "is larger than 4 MiB" or "million values" in found[name]
 
 
+@pytest.mark.complete
 def test_a_directory_without_end_is_not_read(client: TestClient, database: Database) -> None:
     file = BytesIO()
     with zipfile.ZipFile(file, "w") as out:

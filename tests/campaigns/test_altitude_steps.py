@@ -160,6 +160,7 @@ def test_a_vehicle_with_a_link_flies_to_no_set_point_near_its_altitude_limit(cli
     }
 
 
+@pytest.mark.complete
 def test_steps_that_last_longer_than_the_flight_plan_allows_are_refused_with_the_time_that_is_needed(
     client: TestClient, database: Database
 ) -> None:

@@ -119,6 +119,7 @@ def test_everything_wrong_is_named_at_once(client: TestClient) -> None:
     }
 
 
+@pytest.mark.complete
 def test_a_campaign_can_be_renamed_and_redefined_before_its_first_flight(
     client: TestClient, database: Database
 ) -> None:
@@ -168,6 +169,7 @@ def test_what_is_asked_for_cannot_change_while_a_flight_is_asked_for(client: Tes
     claim(database)
 
 
+@pytest.mark.complete
 def test_a_campaign_is_deleted_with_everything_that_it_made(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     create_trial(client, campaign["id"])

@@ -96,6 +96,7 @@ def test_gains_chosen_by_hand_start_from_the_best_flown(client: TestClient, data
     ]
 
 
+@pytest.mark.complete
 def test_a_variant_is_refused_when_its_gains_are_not_those_shown(client: TestClient, database: Database) -> None:
     campaign_id = create_ready_campaign(client, database, definition=PATIENT)["id"]
     create_flown_trial(client, database, campaign_id)
@@ -109,6 +110,7 @@ def test_a_variant_is_refused_when_its_gains_are_not_those_shown(client: TestCli
     assert (planned["kind"], planned["gains"]) == ("repeat", FIRST)
 
 
+@pytest.mark.complete
 def test_own_gains_are_predicted_by_the_proposals_model(client: TestClient, database: Database) -> None:
     campaign_id = create_ready_campaign(client, database, definition=PATIENT)["id"]
     create_flown_trial(client, database, campaign_id, 6.0)
@@ -156,6 +158,7 @@ def test_without_a_model_only_flown_gains_are_predicted(client: TestClient, data
     assert (status, found["predicted_error"], found["curve"]) == (200, None, None)
 
 
+@pytest.mark.complete
 def test_the_gate_judges_gains_before_they_are_planned(client: TestClient, database: Database) -> None:
     campaign_id = create_ready_campaign(client, database)["id"]
     status, gate = consider(client, campaign_id, "gate", OWN)

@@ -22,6 +22,7 @@ def names(client: TestClient, query: str) -> list[str]:
     return [item["name"] for item in get(client, f"/api/campaigns?{query}")["items"]]
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("sort", SORTS)
 def test_pages_hold_everything_once_in_every_order(client: TestClient, sort: str) -> None:
     for index in range(7):

@@ -108,6 +108,7 @@ def test_a_real_vehicle_is_staged_only_after_three_flights_on_its_simulation(
     assert client.post(f"/api/trials/{planned['id']}/stage").status_code == 202
 
 
+@pytest.mark.complete
 def test_the_card_of_one_that_has_passed_leads_to_the_real_vehicle(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
@@ -118,6 +119,7 @@ def test_the_card_of_one_that_has_passed_leads_to_the_real_vehicle(
     assert not cards["passed"]["has_passed_as_rehearsal"]
 
 
+@pytest.mark.complete
 def test_a_spoilt_one_is_flown_anew(client: TestClient, database: Database, campaign: Json) -> None:
     rehearsal = rehearse(client, campaign)
     run_jobs(database)
@@ -155,6 +157,7 @@ def test_another_definition_and_other_safe_gains_want_another_one(
     assert flown["gains"] == first["gains"]
 
 
+@pytest.mark.complete
 def test_safe_gains_set_after_the_first_flight_want_no_other_one(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

@@ -82,6 +82,7 @@ def test_the_frozen_digest_covers_the_vehicle(client: TestClient, database: Data
     assert len(digests) == 3
 
 
+@pytest.mark.complete
 def test_a_vehicles_own_safe_gains_stand_in_the_definition_that_proposals_and_gate_go_by(
     client: TestClient, database: Database
 ) -> None:

@@ -75,6 +75,7 @@ def test_a_campaign_without_a_flight_has_the_prior_scatter_only(client: TestClie
     assert client.get("/api/campaigns/99/statistics").status_code == 404
 
 
+@pytest.mark.complete
 def test_what_noise_hides_is_unresolved_and_says_how_many_flights_would_decide(
     client: TestClient, database: Database
 ) -> None:
@@ -158,6 +159,7 @@ def test_a_first_prediction_that_allows_any_flight_is_none_and_does_not_count_as
     assert record["sentence"] == "No prediction has been tested by a flight yet."
 
 
+@pytest.mark.complete
 def test_repeats_of_a_simulation_without_scatter_get_none(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     path = f"/api/campaigns/{campaign['id']}"
@@ -327,6 +329,7 @@ def test_a_donor_that_cannot_be_one_is_refused_by_name(client: TestClient, datab
     assert "kind 'campaign' only" in problems_of(answer)["definition.start.donor"]
 
 
+@pytest.mark.complete
 def test_a_donor_flight_serves_on_when_it_is_classed_otherwise_later(
     client: TestClient, database: Database, donor: int
 ) -> None:

@@ -56,6 +56,7 @@ def test_other_gains_are_refused_where_nobody_can_be_asked_and_nothing_is_planne
     assert get(client, f"/api/campaigns/{campaign['id']}/trials")["total"] == 0
 
 
+@pytest.mark.complete
 def test_yes_takes_the_gains_of_the_log(client: TestClient, settings: Settings, campaign: Json, tmp_path: Path) -> None:
     data = write(tmp_path, Flight({"kp": 290, "ki": 40, "kd": 80}, setting=True))
     result = run(settings, data, "--campaign", "Garage", "--yes", "--json", tmp_path / "trial.json")
@@ -78,6 +79,7 @@ def test_a_question_can_be_answered(
     assert get(client, f"/api/campaigns/{campaign['id']}/trials")["items"][0]["gains"]["kp"] == 290
 
 
+@pytest.mark.complete
 def test_two_takeoffs_are_listed_and_one_is_taken_by_its_number(
     client: TestClient, settings: Settings, campaign: Json, tmp_path: Path
 ) -> None:
@@ -90,6 +92,7 @@ def test_two_takeoffs_are_listed_and_one_is_taken_by_its_number(
     assert run(settings, both, "--campaign", "Garage", "--takeoff", 2).exit_code == 0
 
 
+@pytest.mark.complete
 def test_two_waiting_trials_are_told_apart_by_their_number(
     client: TestClient, settings: Settings, campaign: Json
 ) -> None:
@@ -138,6 +141,7 @@ def test_a_log_for_a_campaign_that_flies_by_itself_is_refused(
     assert "Flown elsewhere" in result.stderr
 
 
+@pytest.mark.complete
 def test_a_log_for_a_campaign_that_has_ended_is_refused_with_the_way_to_import_it(
     client: TestClient, settings: Settings, campaign: Json
 ) -> None:

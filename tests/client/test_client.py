@@ -58,6 +58,7 @@ def test_ask_and_tell(gainline: Client, database: Database, tmp_path: Path) -> N
     assert classed.state == "invalid"
 
 
+@pytest.mark.complete
 def test_a_script_with_its_token_plans_on_a_real_vehicle_and_is_refused_in_words_without(
     client: TestClient, database: Database, settings: Settings
 ) -> None:
@@ -126,6 +127,7 @@ def test_all_campaigns_come_page_by_page(gainline: Client) -> None:
     assert [campaign.name for campaign in gainline.campaigns(search="c1")] == ["C1"]
 
 
+@pytest.mark.complete
 def test_refusals_are_raised_with_the_servers_own_words(gainline: Client, database: Database) -> None:
     with pytest.raises(NotFoundError, match="There is no campaign 99") as missing:
         gainline.campaign(99)

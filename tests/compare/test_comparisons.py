@@ -157,6 +157,7 @@ def test_between_vehicles_there_is_a_difference_and_no_verdict(client: TestClien
     assert "(campaign" in found["flights"][0]["name"], "two campaigns of one name are told apart"
 
 
+@pytest.mark.complete
 def test_flights_made_elsewhere_are_not_taken_for_those_of_one_vehicle(client: TestClient, database: Database) -> None:
     campaigns = [create_ready_campaign(client, database, vehicle="import")["id"] for _ in range(2)]
     trials = [create_imported_trial(client, campaign)["id"] for campaign in campaigns]
@@ -164,6 +165,7 @@ def test_flights_made_elsewhere_are_not_taken_for_those_of_one_vehicle(client: T
     assert note.startswith("Flights flown elsewhere: it is unknown whether the same vehicle")
 
 
+@pytest.mark.complete
 def test_repeats_are_told_apart_only_when_something_has_changed(client: TestClient, database: Database) -> None:
     campaign = create(client, database)
     first, near, far = (fly(client, database, campaign, settling_s) for settling_s in (1.0, 1.05, 1.6))
@@ -205,6 +207,7 @@ def test_the_best_of_several_gets_no_credit_for_having_been_chosen(client: TestC
     )
 
 
+@pytest.mark.complete
 def test_a_flight_without_an_error_stands_beside_the_others_without_a_verdict(
     client: TestClient, database: Database
 ) -> None:
@@ -218,6 +221,7 @@ def test_a_flight_without_an_error_stands_beside_the_others_without_a_verdict(
     assert found["sentence"].startswith("No verdict")
 
 
+@pytest.mark.complete
 def test_curves_and_csv_are_the_stored_records(client: TestClient, database: Database) -> None:
     campaign = create(client, database)
     trials = [fly(client, database, campaign, 1.0), fly(client, database, campaign, 0.5, OTHER)]
@@ -269,6 +273,7 @@ def test_errors_over_different_windows_are_refused_by_name(client: TestClient, d
     assert get(client, address([paper, same]))["pairs"][0]["basis"] == "repeats"
 
 
+@pytest.mark.complete
 def test_errors_in_different_units_are_refused_by_name(client: TestClient, database: Database) -> None:
     takeoff = fly(client, database, create(client, database), 1.0)
     pitch = create_ready_campaign(

@@ -138,6 +138,7 @@ def test_a_check_of_an_earlier_version_is_one_of_paparazzi(client: TestClient, d
     assert get(client, f"{PATH}/{made}/figures/commands")["state"] == "ready"
 
 
+@pytest.mark.complete
 def test_what_is_drawn_is_the_recording_in_its_units_and_the_replica_over_it(client: TestClient) -> None:
     trace = next(path for path in TRACES if path.name.startswith("takeoff_default"))
     check = send(client, trace.name, trace.read_bytes()).json()
@@ -158,6 +159,7 @@ def test_what_is_drawn_is_the_recording_in_its_units_and_the_replica_over_it(cli
         assert places[-1] == len(rows) - 1
 
 
+@pytest.mark.complete
 def test_numbers_are_those_of_the_command(client: TestClient, tmp_path: Path) -> None:
     log = write(tmp_path, Flight(DEFAULT, stale=True))
     printed = CliRunner().invoke(app, ["controller", "check", str(log), "--json", str(tmp_path / "out.json")])
@@ -277,6 +279,7 @@ def test_checks_are_listed_newest_first_in_pages_and_removed(client: TestClient)
     assert client.get(f"{PATH}/{made[1]}/figures/nonsense").status_code == 422
 
 
+@pytest.mark.complete
 def test_a_browser_hears_of_a_check(client: TestClient, database: Database) -> None:
     made = client.post(f"{PATH}/example").json()["id"]
     with database.engine.connect() as connection:

@@ -24,6 +24,7 @@ def test_a_new_campaign_is_published_with_its_vehicle_and_its_job(client: TestCl
     assert topics(database) == [("vehicle", 1, None), ("campaign", campaign, campaign), ("job", 1, campaign)]
 
 
+@pytest.mark.complete
 def test_the_phases_of_a_flight_are_published_one_by_one(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)["id"]
     with database.read() as session:

@@ -31,6 +31,7 @@ def test_the_file_is_in_wal_mode_with_foreign_keys_and_a_commit_outlives_a_power
     assert found == ["wal", 1, 5000, 2]  # synchronous = FULL: the log is on the disk before a commit returns
 
 
+@pytest.mark.complete
 def test_concurrent_writers_that_read_first_lose_nothing(database: Database) -> None:
     with database.write() as session:
         session.add(JobRow(id=1, kind="count", state=JobState.QUEUED))

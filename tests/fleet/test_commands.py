@@ -98,6 +98,7 @@ def test_a_vehicle_is_asked_nothing_that_its_state_does_not_allow(client: TestCl
             assert seen(client, vehicle)["state"] == state
 
 
+@pytest.mark.complete
 def test_a_vehicle_is_asked_what_its_state_allows(client: TestClient, database: Database) -> None:
     """Each of a vehicle of its own; flights are staged and flown by the tests of flights."""
     for act, state in product(ASKED, VehicleState):
@@ -474,6 +475,7 @@ def test_what_a_restarted_worker_does_not_do_tells_whether_it_was_begun(client: 
     ]
 
 
+@pytest.mark.complete
 def test_a_vehicle_with_a_link_is_asked_nothing_but_to_be_let_go_over_a_server_that_others_reach(
     settings: Settings, client: TestClient, database: Database
 ) -> None:

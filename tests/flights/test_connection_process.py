@@ -157,6 +157,7 @@ def process(rig: AnsweringRig, line: RecordingPipe, tmp_path: Path) -> VehiclePr
     return started(rig, line, tmp_path)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("takes_its_safe_gains", [True, False])
 def test_a_vehicle_that_will_not_arm_has_not_flown_whether_or_not_its_safe_gains_can_be_verified(
     rig: AnsweringRig, line: RecordingPipe, process: VehicleProcess, tmp_path: Path, takes_its_safe_gains: bool
@@ -383,6 +384,7 @@ def stop_outcomes(process: VehicleProcess, line: RecordingPipe) -> list[str]:
     return [each.problem for each in said if not each.is_awaited]
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("is_confirmed", [True, False])
 @pytest.mark.parametrize("in_flight", [True, False])
 def test_motors_off_is_done_only_once_the_vehicle_has_confirmed_it(

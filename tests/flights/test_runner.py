@@ -130,6 +130,7 @@ def test_a_flight_goes_from_its_request_to_its_outcome(client: TestClient, field
     assert vehicle_state(client) == "ready"
 
 
+@pytest.mark.complete
 def test_an_abort_while_the_lift_off_is_stored_is_no_flight(
     client: TestClient, when_changed_to: WhenChanged, field: RunnerFixture, settings: Settings, trial_id: int
 ) -> None:

@@ -130,6 +130,7 @@ def test_a_silent_link_takes_readiness_back_within_two_seconds_until_the_gains_a
     assert lost(line) == []
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("act", [restart, restart_at_once])
 def test_a_restarted_vehicle_is_no_longer_staged(rig: AnsweringRig, tmp_path: Path, act: Act) -> None:
     """Observed defect: the read-back from before the restart was shown beside gains that the drone no longer held."""
@@ -143,6 +144,7 @@ def test_a_restarted_vehicle_is_no_longer_staged(rig: AnsweringRig, tmp_path: Pa
     ]
 
 
+@pytest.mark.complete
 def test_gains_that_another_program_changed_during_a_silence_are_no_longer_staged(
     rig: AnsweringRig, tmp_path: Path
 ) -> None:
@@ -158,6 +160,7 @@ def test_gains_that_another_program_changed_during_a_silence_are_no_longer_stage
     assert "not the staged gains" in why
 
 
+@pytest.mark.complete
 def test_a_take_off_that_crosses_the_loss_of_the_gains_is_not_flown(rig: AnsweringRig, tmp_path: Path) -> None:
     line = staged_for(rig, tmp_path, (3.0, restart), (20.0, nothing), answer=TakeOffCommand(by_s=float("inf")))
     [failure] = [said for said in line.said if isinstance(said, FlightFailure)]

@@ -150,10 +150,12 @@ def test_a_real_vehicle_takes_off_only_on_its_operators_own_act_in_the_browser(
     assert seen(client, real)["state"] == "flying"
 
 
+@pytest.mark.complete
 def test_without_anybody_in_control_nothing_real_takes_off(client: TestClient, staged: Json) -> None:
     assert take_off(client, staged, OUR_PAGE) == (409, "No operator is in control of Drone.")
 
 
+@pytest.mark.complete
 def test_a_rehearsal_that_is_found_bad_while_its_vehicle_is_staged_keeps_it_on_the_ground(
     client: TestClient, database: Database, real: Json, staged: Json
 ) -> None:
@@ -167,12 +169,14 @@ def test_a_rehearsal_that_is_found_bad_while_its_vehicle_is_staged_keeps_it_on_t
     assert trial(client, staged)["flight"]["take_off_at"] is None
 
 
+@pytest.mark.complete
 def test_the_word_sent_twice_with_one_key_is_one_word(client: TestClient, real: Json, staged: Json) -> None:
     headers = {**OUR_PAGE, **control_header(client, real), "Idempotency-Key": "hold"}
     assert take_off(client, staged, headers) == (202, "")
     assert take_off(client, staged, headers) == (202, "")
 
 
+@pytest.mark.complete
 def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
     client: TestClient, database: Database, real: Json, staged: Json
 ) -> None:
@@ -185,6 +189,7 @@ def test_a_take_off_that_could_not_begin_in_time_does_not_begin_at_all(
         flight_rows.record_lift_off(session, staged["flight"]["id"])
 
 
+@pytest.mark.complete
 def test_a_real_vehicle_is_never_flown_in_one_go(client: TestClient, planned: Json) -> None:
     for path, body in (
         (f"/api/trials/{planned['id']}/fly", {}),
@@ -212,6 +217,7 @@ def test_real_vehicles_fly_only_from_a_server_that_nobody_else_reaches(
         assert (status, "other devices can reach the server" in sentence) == (403, True)
 
 
+@pytest.mark.complete
 def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_again(
     client: TestClient, database: Database, real: Json, staged: Json
 ) -> None:
@@ -231,6 +237,7 @@ def test_an_unstaged_vehicle_gets_its_safe_gains_back_and_its_trial_is_planned_a
     assert seen(client, real)["state"] == "ready"
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     ("headers", "reason"), [(OUR_PAGE, "unstaged from another browser"), ({}, "unstaged by a script")]
 )
@@ -243,6 +250,7 @@ def test_an_unstaging_by_somebody_else_is_not_recorded_as_the_operators(
     assert answer.json()["flight"]["standing_down"] == reason
 
 
+@pytest.mark.complete
 def test_a_take_off_does_not_pass_an_unstaging(
     client: TestClient, database: Database, real: Json, staged: Json
 ) -> None:
@@ -252,11 +260,13 @@ def test_a_take_off_does_not_pass_an_unstaging(
         flight_rows.record_lift_off(session, staged["flight"]["id"])
 
 
+@pytest.mark.complete
 def test_a_cancelled_trial_stands_its_vehicle_down(client: TestClient, database: Database, staged: Json) -> None:
     assert client.post(f"/api/trials/{staged['id']}/cancel").status_code == 200
     assert is_wanted(database, staged) == (False, "the trial is cancelled")
 
 
+@pytest.mark.complete
 def test_a_word_given_to_a_worker_that_ended_moves_nothing_later(
     client: TestClient, database: Database, real: Json, staged: Json
 ) -> None:
@@ -329,6 +339,7 @@ def with_battery(first_v: float, last_v: float) -> FlightRecord:
     return FlightRecord(trajectory=Trajectory(climb.time_s, channels, "test", "vehicle"), ending="completed")
 
 
+@pytest.mark.complete
 def test_a_real_flight_keeps_its_battery_and_waits_for_a_persons_class(
     client: TestClient, database: Database, real: Json, planned: Json
 ) -> None:
@@ -357,6 +368,7 @@ def test_an_unusable_measurement_suggests_invalid_for_a_real_flight_and_makes_a_
     assert (judged["state"], judged["reason"], judged["error"]) == ("invalid", "the clock stood still for 0.3 s", None)
 
 
+@pytest.mark.complete
 def test_the_ledger_lists_every_gain_set_that_was_given(
     client: TestClient, database: Database, real: Json, planned: Json
 ) -> None:
@@ -407,6 +419,7 @@ def test_safe_gains_that_did_not_come_back_after_a_flight_stand_in_the_ledger_as
     assert seen(client, real)["state"] == "quarantined"
 
 
+@pytest.mark.complete
 def test_the_telemetry_log_of_a_flight_is_handed_out(
     settings: Settings, client: TestClient, database: Database, staged: Json
 ) -> None:
@@ -421,6 +434,7 @@ def test_the_telemetry_log_of_a_flight_is_handed_out(
     assert f"campaign-{staged['campaign_id']}-trial-{staged['number']}.tlog" in answer.headers["content-disposition"]
 
 
+@pytest.mark.complete
 def test_an_abort_needs_no_control(client: TestClient, real: Json, planned: Json) -> None:
     client.post(f"/api/trials/{planned['id']}/stage")
     take_control(client, real)
@@ -458,6 +472,7 @@ def test_the_command_log_says_who_asked_what_of_a_flight(
     ]
 
 
+@pytest.mark.complete
 def test_the_command_log_follows_a_flight(client: TestClient, database: Database, real: Json, planned: Json) -> None:
     """Observed gap: every command of a flight stayed “requested” for ever."""
     operator = {**OUR_PAGE, **control_header(client, real)}
@@ -492,6 +507,7 @@ def stopped(restored: Json | None = DEFAULT_GAINS, **fields: Any) -> FlightOutco
     return FlightOutcome(record=record, restored=restored)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     ("outcome", "reason", "cause"),
     [
@@ -533,6 +549,7 @@ SILENT = "No current data has been received from the vehicle for more than 2 s."
 LOW = "The battery voltage is below the vehicle's minimum."
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     ("unready", "over_minimum_v", "told", "steps", "lost"),
     [
@@ -569,6 +586,7 @@ def test_a_staged_vehicle_that_is_no_longer_ready_does_not_take_off_until_it_is_
     assert client.get(f"{path}/readiness", headers=operator).json()["steps"] == ["control", "staged", "held"]
 
 
+@pytest.mark.complete
 def test_who_watches_while_another_operator_is_in_control_sees_the_flight_as_staged(
     client: TestClient, real: Json, staged: Json
 ) -> None:
@@ -579,12 +597,14 @@ def test_who_watches_while_another_operator_is_in_control_sees_the_flight_as_sta
     assert [loss["kind"] for loss in readiness["losses"]] == ["controlled by other"]
 
 
+@pytest.mark.complete
 def test_a_vehicle_of_which_no_status_has_come_does_not_take_off(client: TestClient, real: Json, staged: Json) -> None:
     operator = control_header(client, real) | OUR_PAGE
     answer = client.post(f"/api/trials/{staged['id']}/take-off", headers=operator)
     assert (answer.status_code, "not connected" in answer.json()["detail"]) == (409, True)
 
 
+@pytest.mark.complete
 def test_a_window_that_its_flight_plan_does_not_fit_is_refused_before_it_is_staged(
     client: TestClient, database: Database, real: Json
 ) -> None:

@@ -130,6 +130,7 @@ def test_a_deleted_campaigns_job_takes_no_result(client: TestClient, database: D
         assert not jobs.finish_job(session, job, worker="a")
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("query", ["", "?state=done"])
 def test_jobs_are_listed_in_pages_the_newest_first(client: TestClient, database: Database, query: str) -> None:
     ids = []

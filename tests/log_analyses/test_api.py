@@ -196,6 +196,7 @@ def flights_of(client: TestClient, campaign: Json) -> list[Json]:
     return flights
 
 
+@pytest.mark.complete
 def test_a_campaign_starts_with_the_takeoff_of_a_log(client: TestClient) -> None:
     answer = start(client, "flight.tlog", recorded("paparazzi_283_13_82.tlog"))
     assert answer.status_code == 201, answer.text
@@ -231,6 +232,7 @@ def test_a_log_flown_with_gains_that_the_gate_refuses_starts_a_campaign_with_the
     assert not flight["gate"]["passed"]
 
 
+@pytest.mark.complete
 def test_every_takeoff_of_a_log_is_a_flight_of_its_campaign(client: TestClient) -> None:
     flown = [{"kp": 283, "ki": 13, "kd": 82}, {"kp": 900, "ki": 40, "kd": 150}]
     parts = [
@@ -247,6 +249,7 @@ def test_every_takeoff_of_a_log_is_a_flight_of_its_campaign(client: TestClient) 
     assert answer.json()["best"]["trial_number"] == 2
 
 
+@pytest.mark.complete
 def test_a_campaign_of_steps_starts_with_the_gains_proposed_from_a_copters_log(
     client: TestClient, database: Database
 ) -> None:

@@ -57,6 +57,7 @@ def read(name: str) -> LoggedFlight:
     return READERS[name.rpartition(".")[2]](io.BytesIO(recorded(name)), name=name)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("flown", FLIGHTS, ids=lambda each: each.name)
 def test_the_vehicle_is_the_one_that_flew_and_flies_as_it_did(flown: RecordedFlight) -> None:
     flight = read(flown.name)

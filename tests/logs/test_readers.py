@@ -58,6 +58,7 @@ def read_or_refuse(content: bytes | Path, companion: bytes | None = None) -> Non
     assert said
 
 
+@pytest.mark.complete
 @given(head=st.sampled_from(HEADS), rest=st.binary(max_size=600))
 @settings(max_examples=400)
 def test_any_bytes_are_read_or_refused_in_words(head: bytes, rest: bytes) -> None:

@@ -359,6 +359,7 @@ def test_without_a_browser_the_pdf_is_refused_in_words(
     assert "HTML" in answer.json()["hint"]
 
 
+@pytest.mark.complete
 def test_a_failing_browser_is_reported_in_words(
     client: TestClient, campaign: Json, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

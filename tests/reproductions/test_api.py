@@ -52,6 +52,7 @@ def test_every_reproduction_is_listed_before_any_has_run(client: TestClient) -> 
     assert get(client, "/api/reproductions/table1")["rows"] == []
 
 
+@pytest.mark.complete
 def test_asking_twice_gives_the_job_that_waits(client: TestClient, database: Database) -> None:
     first, second = ask(client), ask(client)
     assert first["id"] == second["id"]
@@ -63,6 +64,7 @@ def test_asking_twice_gives_the_job_that_waits(client: TestClient, database: Dat
     assert ask(client)["id"] > first["id"]
 
 
+@pytest.mark.complete
 def test_a_request_sent_again_with_its_key_is_done_once(client: TestClient, database: Database) -> None:
     headers = {"Idempotency-Key": "again"}
     first = client.post("/api/reproductions/controller/run", headers=headers).json()
@@ -71,6 +73,7 @@ def test_a_request_sent_again_with_its_key_is_done_once(client: TestClient, data
     assert get(client, "/api/jobs")["total"] == 1
 
 
+@pytest.mark.complete
 def test_a_result_has_rows_beside_the_papers_and_figures(client: TestClient, database: Database) -> None:
     waiting = get(client, "/api/reproductions/controller/figures/figure6-commands")
     assert (waiting["state"], waiting["figure"]) == ("waiting", None)

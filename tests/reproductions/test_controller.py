@@ -35,6 +35,7 @@ def test_recording_and_replica_are_overlaid_signal_by_signal() -> None:
     assert max(drawn["thrust"][0].y) == pytest.approx(8965.0, abs=2.0), "the recorded peak, thinned"
 
 
+@pytest.mark.complete
 def test_a_trace_that_differs_is_measured(tmp_path: Path) -> None:
     with gzip.open(RECORDED_TAKEOFF, "rt", newline="") as recorded:
         rows = list(csv.reader(recorded))

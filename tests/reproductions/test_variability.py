@@ -42,6 +42,7 @@ def test_a_fading_battery_makes_the_default_gains_score_better() -> None:
     assert fading[-1] < steady[-1] - 0.1
 
 
+@pytest.mark.complete
 def test_a_few_batteries_give_every_row_and_the_figure() -> None:
     told: list[float] = []
     result = run_variability(lambda share, _doing: told.append(share), groups=3, fading_groups=1)

@@ -49,6 +49,7 @@ def require_telemetry(heard: list[tuple[str, str | None, Any]], trial: Any) -> N
     assert telemetry[-1]["time_s"] > 32.6
 
 
+@pytest.mark.complete
 def test_two_streams_see_the_same_and_a_later_one_resumes_where_another_left(serving: Serving) -> None:
     with stream(serving.url) as first, stream(serving.url) as second:
         heard: list[list[tuple[str, str | None, Any]]] = [[], []]

@@ -42,6 +42,7 @@ def require_sound_database(data_dir: Path) -> None:
         connection.close()
 
 
+@pytest.mark.complete
 def test_a_worker_killed_in_mid_flight_leaves_a_lost_trial_and_a_free_vehicle(serving: Serving) -> None:
     campaign_id = serving.campaign()
     first = serving.worker_pid()

@@ -60,6 +60,7 @@ def test_the_first_pages_are_served_without_a_numeric_library(migrated_file: Pat
     assert not imported(SERVE, data_dir, ui_dir).intersection((*NUMERICS, "alembic"))
 
 
+@pytest.mark.complete
 def test_help_is_printed_without_the_web_the_database_and_numbers() -> None:
     assert not imported(HELP).intersection((*NUMERICS, *DATABASE, "fastapi", "numpy", "structlog"))
 
@@ -79,6 +80,7 @@ def test_the_worker_is_started_before_the_web_application_is_imported() -> None:
     assert not imported("import app.runtime.serve").intersection((*NUMERICS, "fastapi", "sqlalchemy"))
 
 
+@pytest.mark.complete
 def test_a_process_that_reads_a_file_loads_neither_the_web_nor_the_database() -> None:
     """Each file has a separate process, whose start the sender of the file waits for."""
     modules = f"{read_content.__module__}, {examine_content.__module__}"

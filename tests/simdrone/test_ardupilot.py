@@ -101,6 +101,7 @@ def test_it_takes_off_in_guided_alone_to_the_height_asked_for(pilot: ArduPilot) 
     assert pilot.ground.expect("HEARTBEAT").custom_mode == GUIDED
 
 
+@pytest.mark.complete
 def test_it_lands_and_disarms_by_itself(pilot: ArduPilot) -> None:
     pilot.hover()
     assert pilot.command(SET_MODE, 1, LAND) == 0

@@ -124,6 +124,7 @@ def test_arducopters_gains_decide_how_closely_it_follows(run: Run) -> None:
     assert errors_m[1] < 0.5 * errors_m[0]
 
 
+@pytest.mark.complete
 def test_arducopter_ignores_other_targets_and_those_in_other_modes() -> None:
     pilot = ArduPilot(flying("ardupilot"))
     pilot.hover()

@@ -252,6 +252,7 @@ def test_a_drift_of_the_altitude_is_in_the_telemetry_alone(fault: str, drift_m_s
     assert last.vz == pytest.approx(drift_m_s, abs=0.1)
 
 
+@pytest.mark.complete
 def test_a_drift_ends_at_the_ground() -> None:
     ground = hovering("paparazzi")
     drone_of(ground).inject_fault("drifting-altitude")
@@ -277,6 +278,7 @@ def test_a_lean_oscillation_has_a_standard_deviation_of_28_degrees() -> None:
     assert math.degrees(statistics.pstdev(rolls)) == pytest.approx(28.0, abs=2.0)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(("autopilot", "height_m"), [("paparazzi", 0.9), ("ardupilot", 0.0)])
 def test_it_flies_home_by_itself(autopilot: str, height_m: float) -> None:
     """Paparazzi to the height of its HOME mode, 1 m in its own frame; a return of the others only lands."""

@@ -52,6 +52,7 @@ def vehicle_s(ground: Ground, message: Heard) -> float:
     return float(from_vehicle(before, "LOCAL_POSITION_NED")[-1].time_boot_ms) / 1000
 
 
+@pytest.mark.complete
 def test_its_takeoff_is_the_replicas_to_the_last_digit(pilot: Pilot) -> None:
     """One position comes every ten steps of the loop, from one of the first ten on."""
     pilot.set_gains(*TUNED)
@@ -95,6 +96,7 @@ def test_without_its_ground_reference_it_scores_as_the_real_one_did() -> None:
     assert 0.265 < float(np.mean(np.abs(3.0 - np.array(heights)))) < 0.29
 
 
+@pytest.mark.complete
 def test_writing_ki_empties_the_integrator_and_writing_kp_does_not(pilot: Pilot) -> None:
     """The twin hovers on less than the autopilot believes: the integrator carries the difference."""
     pilot.set_gains(600, 600, 150)
@@ -126,6 +128,7 @@ def test_land_here_lands_in_realistic_time_and_says_so(gains: tuple[int, int, in
     assert not pilot.is_armed()
 
 
+@pytest.mark.complete
 def test_it_flies_again_after_a_landing(pilot: Pilot) -> None:
     pilot.hover()
     pilot.block(LAND_HERE)
@@ -206,6 +209,7 @@ def test_with_a_silent_ground_it_hovers_until_the_blocks_own_limit_lands_it(pilo
     assert heights_m(pilot.ground.listen(8.0))[-1] < 0.2
 
 
+@pytest.mark.complete
 def test_above_four_and_a_half_metres_it_lands_by_itself(pilot: Pilot) -> None:
     pilot.take_off(6.0)
     heard = pilot.ground.listen(15.0)

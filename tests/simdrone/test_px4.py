@@ -127,6 +127,7 @@ def test_the_height_of_the_takeoff_command_counts_from_the_sea(pilot: Px4) -> No
     assert pilot.height_m() == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.complete
 def test_disarming_in_the_air_is_refused_unless_it_is_forced(pilot: Px4) -> None:
     pilot.hover()
     assert pilot.command(ARM, 0.0) == 1
@@ -156,6 +157,7 @@ def test_heartbeats_of_no_ground_station_do_not_keep_it_in_the_air(pilot: Px4) -
     pilot.ground.expect("HEARTBEAT", lambda message: message.custom_mode == LANDING)
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(("action", "mode"), [(5, LANDING), (2, LOITER)])
 def test_a_breached_fence_triggers_its_action(action: int, mode: int, pilot: Px4) -> None:
     pilot.set("GF_ACTION", bytewise(action), INT32)

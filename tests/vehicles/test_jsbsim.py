@@ -45,10 +45,12 @@ def furthest_from_start_m(options: Mapping[str, OptionValue]) -> tuple[float, fl
     return max(offsets), altitude_m
 
 
+@pytest.mark.complete
 def test_it_hovers_on_its_weight_in_thrust() -> None:
     assert hover_share(flown("jsbsim", {})) == pytest.approx(WEIGHT_N / FULL_THRUST_N, abs=0.0005)
 
 
+@pytest.mark.complete
 def test_it_stands_still_until_the_motors_lift_it() -> None:
     flight = flown("jsbsim", {"start_latency_s": 1.0})
     resting = flight.time_s < 1.0
@@ -63,12 +65,14 @@ def test_the_start_latency_shifts_the_whole_takeoff() -> None:
     assert late == pytest.approx(0.5, abs=0.01)
 
 
+@pytest.mark.complete
 def test_more_thrust_means_less_command_to_hover() -> None:
     assert hover_share(flown("jsbsim", {"thrust_scale": 1.2})) == pytest.approx(
         WEIGHT_N / FULL_THRUST_N / 1.2, abs=0.001
     )
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("mass_kg", [0.35, 0.48])
 def test_command_to_hover_goes_with_mass(mass_kg: float) -> None:
     expected = mass_kg / 0.4 * WEIGHT_N / FULL_THRUST_N
@@ -80,6 +84,7 @@ def test_a_motor_lag_delays_the_lift_off() -> None:
     assert lift_off_s(flown("jsbsim", {"motor_lag_s": 0.1})) > lift_off_s(flown("jsbsim", {})) + 0.05
 
 
+@pytest.mark.complete
 def test_a_sagging_battery_loses_voltage_with_the_load_and_costs_thrust() -> None:
     flight = flown("jsbsim", {"battery_sag": 0.05})
     share = hover_share(flight)
@@ -87,6 +92,7 @@ def test_a_sagging_battery_loses_voltage_with_the_load_and_costs_thrust() -> Non
     assert flight["battery_v"][-1] == pytest.approx(11.1 * (1.0 - 0.05 * share), abs=0.01)
 
 
+@pytest.mark.complete
 def test_altitude_noise_has_the_asked_for_spread() -> None:
     """The motion of a resting vehicle is nil, so what is recorded before the start is noise alone."""
     flight = flown("jsbsim", {"altitude_noise_m": 0.02, "start_latency_s": 2.0})
@@ -105,6 +111,7 @@ def test_it_holds_its_place_in_wind_of_5_m_s_with_gusts(wind_from_deg: float) ->
     assert altitude_m == pytest.approx(3.0, abs=0.2)
 
 
+@pytest.mark.complete
 def test_the_strongest_wind_it_may_be_given_does_not_upset_it() -> None:
     offset_m, altitude_m = furthest_from_start_m({"wind_m_s": 10.0, "gust_m_s": 3.0, "motor_lag_s": 0.15})
     assert offset_m < 6.0
@@ -162,6 +169,7 @@ def test_a_vehicle_too_heavy_for_its_motors_is_refused_by_name() -> None:
     assert [problem.field for problem in refusal.value.problems] == ["vehicle.options.mass_kg"]
 
 
+@pytest.mark.complete
 def test_gains_that_throw_it_about_still_leave_a_finite_record() -> None:
     flight = flown("jsbsim", {}, {"kp": 4000, "ki": 2000, "kd": 0})
     assert np.isfinite(flight["altitude_m"]).all()
@@ -201,6 +209,7 @@ def test_jsbsim_in_threads_that_end_neither_kills_the_process_nor_writes_to_the_
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+@pytest.mark.complete
 def test_jsbsim_writes_nothing_to_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:
     flown("jsbsim", {"wind_m_s": 1.0}, SAFE)
     captured = capfd.readouterr()

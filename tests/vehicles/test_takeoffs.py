@@ -68,6 +68,7 @@ def test_a_flight_leaves_every_channel_at_512_hz_from_the_command_past_the_score
     assert flight.time_s[-1] >= 32.6
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("window_s", [10.0, 20.25])
 def test_a_flight_with_another_window_is_the_same_and_lasts_as_long_as_that_needs(
     kind: str, vehicle: Vehicle, window_s: float
@@ -133,6 +134,7 @@ def test_an_abort_ends_the_flight_within_20_ms_of_vehicle_time(
     assert watcher.samples[-1].time_s == pytest.approx(2.0, abs=0.02)
 
 
+@pytest.mark.complete
 def test_an_aborted_flight_lands_on_its_safe_gains_and_keeps_its_record(kind: str, vehicle: Vehicle) -> None:
     watcher = Watcher(abort_at_s=8.0)
     flight = fly(vehicle, on_sample=watcher.see, should_stop=watcher.decide).trajectory

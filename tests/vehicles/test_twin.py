@@ -42,6 +42,7 @@ def test_repeated_takeoffs_scatter_as_the_real_drones_did(gains: dict[str, float
     assert spread(gains) == pytest.approx(paper_m, rel=0.3)
 
 
+@pytest.mark.complete
 def test_scatter_grows_with_its_option() -> None:
     def deviation(scatter: float) -> float:
         return abs(TAKEOFF.error(flown("twin", {"scatter": scatter}, SAFE, seed=4))

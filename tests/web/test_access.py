@@ -102,6 +102,7 @@ def test_a_used_link_unlocks_no_other_browser_and_shows_how_to_get_another(
     assert not get(stranger, "/api/access")["may_command"]
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("what", ["rename", "finish", "archive", "delete"])
 def test_a_campaign_on_a_real_vehicle_is_changed_with_a_key_only(
     what: str, client: TestClient, database: Database, stranger: TestClient, real: Json
@@ -199,6 +200,7 @@ def test_abort_and_land_of_a_real_vehicle_need_no_key_here(
     assert stranger.post(f"/api/trials/{trial['id']}/abort").json()["accepted"]
 
 
+@pytest.mark.complete
 def test_a_scripts_token_stages_a_real_vehicle_and_does_not_take_it_off(
     stranger: TestClient, client: TestClient, database: Database, settings: Settings, real: Json
 ) -> None:
@@ -314,6 +316,7 @@ def changes(application: FastAPI) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.complete
 def test_every_change_in_the_api_is_refused_to_a_stranger(application: FastAPI, neighbour: TestClient) -> None:
     found = changes(application)
     assert len(found) > 30

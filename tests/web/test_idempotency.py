@@ -45,6 +45,7 @@ def test_a_key_that_stands_for_another_request_is_refused(client: TestClient, ot
     assert problems_of(answer) == {"Idempotency-Key": "belongs to another request"}
 
 
+@pytest.mark.complete
 def test_a_refused_request_may_be_tried_again_with_its_key(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database)
     busy = create_trial(client, campaign["id"], fly={"speed": None})
@@ -85,6 +86,7 @@ def test_old_keys_are_forgotten(client: TestClient, database: Database) -> None:
         assert [row.key for row in session.query(IdempotencyRow)] == ["new"]
 
 
+@pytest.mark.complete
 def test_the_same_key_from_many_threads_at_once_makes_one_campaign(client: TestClient, database: Database) -> None:
     with ThreadPoolExecutor(8) as pool:
         answers = list(pool.map(lambda _: client.post("/api/campaigns", json={"name": "Once"}, headers=KEY), range(24)))

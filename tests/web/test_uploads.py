@@ -186,6 +186,7 @@ def test_an_export_can_be_imported_and_gives_the_same_record_and_error(client: T
     assert back["error"] == sent["error"]
 
 
+@pytest.mark.complete
 def test_a_thinned_record_keeps_its_ends_and_its_peak(client: TestClient, trial: Json) -> None:
     time_s = np.arange(16_700) / 500.0
     altitude_m = 3.0 - 3.0 * np.exp(-time_s)

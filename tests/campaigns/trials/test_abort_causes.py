@@ -108,6 +108,7 @@ def test_an_abort_at_a_limit_always_counts_against_the_gains(
     assert trust(client, campaign) == 0.5
 
 
+@pytest.mark.complete
 def test_a_campaign_whose_start_gains_a_limit_aborted_twice_stops_and_says_what_to_do(
     client: TestClient, database: Database
 ) -> None:
@@ -139,6 +140,7 @@ def test_a_flight_that_was_not_aborted_has_no_cause(client: TestClient, database
     assert judge(client, flown, "behaved badly") == 409
 
 
+@pytest.mark.complete
 def test_an_abort_from_before_its_cause_was_recorded_counts_until_its_operator_says_otherwise(
     client: TestClient, database: Database, campaign: Json
 ) -> None:

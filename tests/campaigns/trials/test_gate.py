@@ -41,6 +41,7 @@ def ask(client: TestClient, campaign: Json, **fields: object) -> tuple[int, Json
     return answer.status_code, answer.json()
 
 
+@pytest.mark.complete
 def test_the_papers_ki_is_refused_with_the_case_that_wraps_and_the_largest_that_cannot(
     client: TestClient, database: Database
 ) -> None:
@@ -85,6 +86,7 @@ def test_a_proposal_that_the_gate_refuses_flies_with_a_reason_only(client: TestC
     assert (status, planned["overrule_reason"]) == (201, REASON)
 
 
+@pytest.mark.complete
 def test_gains_that_the_vehicle_would_not_be_given_are_refused_whoever_overrules(
     client: TestClient, database: Database
 ) -> None:
@@ -129,6 +131,7 @@ def test_nobody_overrules_the_gate_on_a_real_vehicle(client: TestClient, databas
     assert problems_of(answer) == {"overrule": "is only for simulated vehicles"}
 
 
+@pytest.mark.complete
 def test_own_gains_are_judged_over_what_the_flights_have_shown(client: TestClient, database: Database) -> None:
     """Before any proposal, the data sheet; then the distribution stored with the latest proposal, which earlier
     releases stored not at all, or without the flights that showed it."""

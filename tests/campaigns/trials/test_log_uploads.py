@@ -125,6 +125,7 @@ def test_a_step_starts_from_the_best_gains_within_the_bounds(
     assert get(client, f"/api/campaigns/{campaign['id']}")["best"]["gains"] == TLOGS[TUNED]
 
 
+@pytest.mark.complete
 def test_confirmed_gains_become_the_trial_s_and_what_was_predicted_for_others_goes(
     client: TestClient, trial: Json
 ) -> None:
@@ -137,6 +138,7 @@ def test_confirmed_gains_become_the_trial_s_and_what_was_predicted_for_others_go
     assert not is_prediction_drawn(client, flown)
 
 
+@pytest.mark.complete
 def test_the_curve_predicted_for_other_custom_gains_is_deleted(
     client: TestClient, database: Database, campaign: Json
 ) -> None:
@@ -194,6 +196,7 @@ def test_a_log_of_another_autopilot_is_refused_whatever_is_confirmed(
 FLOWN_HERE = {"twin": "takeoff", "jsbsim": "takeoff", "lti": "pitch-tracking"}
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("vehicle", FLOWN_HERE)
 def test_no_log_is_taken_for_a_trial_that_gainline_flies_itself(
     client: TestClient, database: Database, vehicle: str

@@ -40,6 +40,7 @@ def prediction(client: TestClient, campaign_id: int, gains: Json) -> Json:
     return found
 
 
+@pytest.mark.complete
 def test_custom_gains_keep_the_prediction_with_which_they_were_planned(client: TestClient, campaign: Json) -> None:
     shown = prediction(client, campaign["id"], OWN)
     planned = create_trial(client, campaign["id"], gains=OWN)

@@ -183,6 +183,7 @@ def test_aborting_a_flight_that_is_over_is_harmless(client: TestClient, database
     assert client.post(f"/api/trials/{planned['id']}/abort").status_code == 409
 
 
+@pytest.mark.complete
 def test_trials_come_page_by_page_with_the_best_before_each(client: TestClient, database: Database) -> None:
     campaign = create_ready_campaign(client, database, vehicle="import", definition=PATIENT)
     for settling_s in (2.0, 1.0, 1.5):

@@ -117,6 +117,7 @@ class UndoneError(Exception):
     """Ends a transaction as if it had not been."""
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     "state", [state for state in TrialState if state not in {TrialState.PLANNED, TrialState.CANCELLED}]
 )

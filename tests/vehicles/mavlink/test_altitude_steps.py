@@ -120,6 +120,7 @@ def test_motors_off_during_a_step_stops_it_at_once() -> None:
     assert record.reason.startswith("Motors off was requested: it burns.")
 
 
+@pytest.mark.complete
 def test_set_points_too_near_the_altitude_limit_or_the_ground_are_refused_on_the_ground() -> None:
     for low_m, high_m in ((3.0, 3.6), (3.0, 1.5)):
         order = replace(ORDER, set_points=SetPoints((0.0, 10.0), (low_m, high_m)))
@@ -356,6 +357,7 @@ def test_an_abort_during_a_px4s_step_or_push_ends_the_stream_and_lands(abort_at_
     assert record.trajectory["altitude_m"][-1] < 0.3
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize(
     ("autopilot", "parameter", "value", "needed", "correction"),
     [

@@ -152,6 +152,7 @@ def test_a_vehicle_that_does_not_report_its_known_hardware_id_gets_no_gains_unti
             assert not [item for item in vehicle.check() if item.name == "hardware_id"]
 
 
+@pytest.mark.complete
 def test_the_first_hardware_id_reported_is_pinned() -> None:
     """Pinned by a release that did not look at it."""
     with LockstepRig("px4") as rig:
@@ -175,6 +176,7 @@ def swap(rig: LockstepRig, vehicle: MavlinkVehicle, uid: int) -> None:
     rig.muted = False
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_is_swapped_while_the_link_stays_open_is_asked_who_it_is_before_anything_is_written() -> None:
     with LockstepRig("px4") as rig, connected(rig) as vehicle:
         known = vehicle.identity
@@ -285,6 +287,7 @@ def test_a_vehicle_that_was_away_and_whose_answers_are_lost_is_not_flown() -> No
             assert [name for name in rig.writes[len(written) :] if name.startswith("MPC_")] == []
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_was_not_listened_to_for_a_while_is_asked_who_it_is_and_passes_its_checks() -> None:
     with LockstepRig("px4") as rig:
         rig.switch_on_failsafes()
@@ -439,6 +442,7 @@ def test_a_vehicle_met_in_the_air_is_observed_landed_and_released_by_a_person() 
             assert (vehicle.concern, vehicle.condition().step, vehicle.read_gains()) == ("", "idle", SAFE)
 
 
+@pytest.mark.complete
 def test_land_is_repeated_every_second_until_the_vehicle_obeys_and_not_afterwards() -> None:
     with LockstepRig() as rig:
         enter_block(rig, START_ENGINE, TAKE_OFF)

@@ -255,6 +255,7 @@ def test_a_vehicle_whose_kept_parameters_cannot_be_read_is_only_observed(tmp_pat
         assert file.read_text() == damaged
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_is_connected_as_the_program_does_it_keeps_that_file(tmp_path: Path) -> None:
     folder = tmp_path / "parameters"
     folder.write_text("no folder")
@@ -294,6 +295,7 @@ def test_a_px4_is_brought_out_of_a_mode_in_which_it_cannot_be_armed_for_a_flight
         assert vehicle.condition().mode == "Hold"
 
 
+@pytest.mark.complete
 def test_a_px4_that_refuses_to_leave_its_mode_is_not_flown() -> None:
     """It says that it may not be armed by saying nothing, also to a ground station that has never heard it."""
     with ready("px4") as rig:
@@ -379,6 +381,7 @@ def test_a_px4_that_enters_offboard_in_the_middle_of_a_check_is_brought_out_of_i
         assert vehicle.condition().mode == "Hold"
 
 
+@pytest.mark.complete
 def test_a_persons_land_always_goes_and_is_not_repeated_to_a_vehicle_whose_motors_stand() -> None:
     """What it says of its motors may be another's word; a PX4 is brought out of the mode again before it flies."""
     with ready("px4") as rig, connected(rig) as vehicle:
@@ -407,6 +410,7 @@ def test_a_vehicle_whose_own_checks_fail_is_not_flown_and_all_reasons_are_report
             assert reason[autopilot] in own.found
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("tells_events", [True, False])
 def test_a_px4_that_would_not_arm_is_asked_what_keeps_it_from_that(tells_events: bool) -> None:
     """It sent them at its start, before anyone listened, and sends them again after a change or on request."""
@@ -437,6 +441,7 @@ def test_the_last_message_of_a_vehicle_has_its_age() -> None:
         assert vehicle.condition().said_age_s == pytest.approx(7.0, abs=0.5)
 
 
+@pytest.mark.complete
 def test_a_px4_that_does_not_leave_its_mode_reports_in_which_it_would_arm() -> None:
     with LockstepRig("px4") as rig, connected(rig) as vehicle:
         vehicle.attend(4.0)

@@ -52,6 +52,7 @@ def test_a_plan_that_is_heard_from_the_start_is_only_waited_for() -> None:
         assert 12.0 < rig.now_s() < 15.0
 
 
+@pytest.mark.complete
 def test_a_plan_that_was_not_heard_sets_the_reference_again_and_once() -> None:
     with late() as rig, connected(rig) as vehicle:
         rig.drone.body.north_m = 1.0
@@ -73,6 +74,7 @@ def test_a_plan_that_another_station_hurries_sets_the_reference_again() -> None:
         assert (blocks_told(rig), autopilot_of(rig)._origin_mm) == ([WAIT_GPS], PLACE_MM)
 
 
+@pytest.mark.complete
 def test_a_plan_whose_report_was_lost_is_begun_again() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         vehicle.attend(1.0)
@@ -84,6 +86,7 @@ def test_a_plan_whose_report_was_lost_is_begun_again() -> None:
         assert blocks_told(rig) == [WAIT_GPS]
 
 
+@pytest.mark.complete
 def test_a_restarted_vehicle_sets_it_again() -> None:
     with LockstepRig() as rig, connected(rig) as vehicle:
         assert reference(vehicle).passed
@@ -95,6 +98,7 @@ def test_a_restarted_vehicle_sets_it_again() -> None:
         assert (blocks_told(rig), autopilot_of(rig)._origin_mm) == ([WAIT_GPS], PLACE_MM)
 
 
+@pytest.mark.complete
 def test_a_vehicle_that_stands_elsewhere_sets_it_again() -> None:
     """Switched on in the hand, say, and put down."""
     with LockstepRig() as rig, connected(rig) as vehicle:

@@ -74,6 +74,7 @@ def stops_told(rig: LockstepRig) -> list[object]:
     return [message for message in rig.told("COMMAND_LONG") if message.command == 400]  # type: ignore[attr-defined]
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("autopilot", LESS_OFTEN)
 def test_a_vehicle_that_somebody_else_has_in_the_air_is_only_observed(autopilot: str) -> None:
     with left_in_the_air(autopilot) as rig, found(rig, was_flying=False) as vehicle:
@@ -96,6 +97,7 @@ def test_a_pilots_mode_gets_no_land_and_goes_on_getting_heartbeats(autopilot: st
             assert lands_told(rig) == 0
 
 
+@pytest.mark.complete
 def test_in_an_automatic_mode_that_is_not_the_trials_it_hears_nothing_until_its_own_failsafe_lands_it() -> None:
     """FS_GCS_TIMEOUT is 5 s; the last heartbeat was sent up to a second before it was left alone."""
     with left_in_the_air("ardupilot") as rig:

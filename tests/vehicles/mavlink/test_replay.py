@@ -121,6 +121,7 @@ def stored_takeoff(gains: tuple[int, int, int]) -> Trajectory:
     return Trajectory(time_s, {"altitude_m": altitude_m}, "csv", "vehicle")
 
 
+@pytest.mark.complete
 def test_a_recorded_trial_goes_through_its_states_without_any_failure(
     replay: tuple[tuple[int, int, int], Replay],
 ) -> None:

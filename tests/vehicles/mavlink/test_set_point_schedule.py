@@ -413,6 +413,7 @@ def test_every_failure_of_one_that_holds_first_leads_where_it_must_too(begin: Ca
         assert not {Action.HOLD, Action.FLY_TO} & set(walk.actions[flown:]), happens
 
 
+@pytest.mark.complete
 def test_a_set_point_of_another_ground_station_makes_the_flight_invalid_and_a_pilots_does_not() -> None:
     """A report of the previous set point that comes late decides nothing."""
     for seconds, mode, failure in ((0.2, OFFBOARD, None), (1.2, OFFBOARD, Failure.INTERRUPTED), (0.8, "3.0", None)):

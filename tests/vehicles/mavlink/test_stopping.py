@@ -104,6 +104,7 @@ def test_the_command_is_tried_only_on_a_vehicle_that_stands_disarmed() -> None:
         assert not rig.told("COMMAND_LONG")
 
 
+@pytest.mark.complete
 @pytest.mark.parametrize("setting", [KILL_SETTING, NEWER_KILL_SETTING, ""])
 def test_motors_off_in_the_air_stops_them_and_is_said_to_have_when_the_vehicle_says_so(setting: str) -> None:
     with LockstepRig(make=of(kill_setting=setting)) as rig, connected(rig) as vehicle:

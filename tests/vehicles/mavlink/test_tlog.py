@@ -117,6 +117,7 @@ def test_a_frame_is_in_the_file_soon_though_the_log_is_open(tmp_path: Path) -> N
     log.close()
 
 
+@pytest.mark.complete
 def test_a_disk_that_stalls_keeps_nothing_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A pipe without a reader accepts only 64 kB."""
     monkeypatch.setattr("app.vehicles.mavlink.tlog.STORED_WITHIN_S", 0.2)

@@ -640,6 +640,7 @@ def test_one_heartbeat_of_a_failsafe_decides_nothing() -> None:
     assert (walk.state, walk.trial.outcome) == (State.IDLE, None)
 
 
+@pytest.mark.complete
 def test_a_record_ends_by_the_grounds_clock_too() -> None:
     walk = TrialDriver(plan=replace(PLAN, record_s=33.0)).lift_off()
     walk.tempo = 0.905

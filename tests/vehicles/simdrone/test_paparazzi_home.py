@@ -41,6 +41,7 @@ def test_wind_carries_it_over_the_ground_and_it_says_where_it_is() -> None:
     assert max(each.vx for each in heard) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.complete
 def test_too_far_from_home_it_flies_back_at_its_height_of_home_and_obeys_no_block(lost: Pilot) -> None:
     for _ in range(3):
         lost.block(LAND_HERE)
@@ -51,6 +52,7 @@ def test_too_far_from_home_it_flies_back_at_its_height_of_home_and_obeys_no_bloc
     assert lost.is_armed()
 
 
+@pytest.mark.complete
 def test_its_mode_stays_home_inside_the_radius_until_it_is_set_again(lost: Pilot) -> None:
     lost.ground.listen(10.0)
     answer = lost.read("aut_mod")
