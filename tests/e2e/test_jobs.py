@@ -4,34 +4,20 @@ import os
 import re
 import signal
 from contextlib import suppress
-from pathlib import Path
 
 from playwright.sync_api import expect
 
 from tests.e2e.conftest import Opener, Server
 from tests.e2e.dashboard import Dashboard
 from tests.e2e.states import States
+from tests.runtime.processes import fork_server, started_by
 
 
-def children_of(pid: int) -> list[int]:
-    """Every process below that one."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            after_name = stat.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(after_name[1]) == pid:
-            child = int(stat.parent.name)
-            found += [child, *children_of(child)]
-    return found
-
-
-def kill_until_given_up(dashboard: Dashboard, server: Server, job_id: int, before: set[int]) -> None:
-    """Kill whatever process the worker has begun for the job: any that was not there `before`."""
+def kill_until_given_up(dashboard: Dashboard, forks: int, job_id: int, others: set[int]) -> None:
+    """Kill whatever the fork server has begun for the job: what is none of the other processes."""
 
     def killed() -> bool:
-        for pid in set(children_of(server.worker_pid())) - before:
+        for pid in set(started_by(forks)) - others:
             with suppress(ProcessLookupError):  # one that was killed before, and collected just now
                 os.kill(pid, signal.SIGKILL)
         return bool(dashboard.get(f"/jobs/{job_id}")["state"] == "failed")
@@ -46,12 +32,13 @@ def test_a_job_is_watched_fails_when_its_process_is_killed_again_and_again_is_re
     page = dashboard.page
     dashboard.open("/jobs")
     expect(page.get_by_text("No jobs yet.")).to_be_visible()
-    before = set(children_of(empty_server.worker_pid()))
+    forks = fork_server(empty_server.worker_pid())
+    others = set(started_by(forks))
     job_id = dashboard.post("/reproductions/variability/run")["id"]
     card = page.locator("tbody").filter(has_text=f"Job {job_id}")
     expect(card.get_by_role("link", name="Fig. 12: takeoffs repeated over a battery")).to_be_visible()
     expect(card.get_by_text(re.compile(r"^[1-9]\d?\s% · .*battery \d+ of 240 flown"))).to_be_visible()
-    kill_until_given_up(dashboard, empty_server, job_id, before)
+    kill_until_given_up(dashboard, forks, job_id, others)
     states.reproduce("controller")
     groups = page.get_by_role("main").get_by_role("region", name=re.compile("jobs$"))
     expect(groups.nth(1)).to_be_visible()

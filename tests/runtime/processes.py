@@ -26,6 +26,22 @@ def environment(**more: str) -> dict[str, str]:
     return {**kept, **more}
 
 
+def started_by(pid: int) -> list[int]:
+    """The processes whose parent it is."""
+    return [int(child) for task in Path(f"/proc/{pid}/task").glob("*/children") for child in task.read_text().split()]
+
+
+def fork_server(worker: int) -> int:
+    """From which a worker's processes are forked."""
+    commands = {child: Path(f"/proc/{child}/cmdline").read_bytes() for child in started_by(worker)}
+    return next(child for child, command in commands.items() if b"multiprocessing.forkserver" in command)
+
+
+def children(worker: int) -> list[int]:
+    """The processes that fly and compute for a worker."""
+    return started_by(fork_server(worker))
+
+
 def is_alive(pid: int) -> bool:
     """Whether that process runs; a zombie does not."""
     try:

@@ -10,27 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.runtime.processes import Serving, in_the_air, is_alive
+from tests.runtime.processes import Serving, children, fork_server, in_the_air, is_alive
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.real_time("processes are killed, noticed and replaced")
-
-
-def started_by(pid: int) -> dict[int, bytes]:
-    """The processes whose parent it is, and what they were started as."""
-    listed = Path(f"/proc/{pid}/task").glob("*/children")
-    found = [int(child) for task in listed for child in task.read_text().split()]
-    return {child: Path(f"/proc/{child}/cmdline").read_bytes() for child in found}
-
-
-def fork_server(pid: int) -> int:
-    """From which a worker's processes are forked."""
-    return next(child for child, command in started_by(pid).items() if b"multiprocessing.forkserver" in command)
-
-
-def children(pid: int) -> list[int]:
-    """The processes that fly and compute for a worker."""
-    return list(started_by(fork_server(pid)))
 
 
 def require_sound_database(data_dir: Path) -> None:

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.runtime.processes import Serving, is_alive
-from tests.runtime.test_crashes import children
+from tests.runtime.processes import Serving, children, is_alive
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.real_time("a worker and its processes compute, are killed and replaced")
