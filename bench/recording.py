@@ -25,13 +25,13 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
 
+from app.autopilots.dialects import Message, number
 from app.core.clock import ScaledClock
 from app.simdrone.body import new_body
 from app.simdrone.drone import Drone, Server
 from app.simdrone.registry import get_autopilot
 from app.vehicles.base import RECORDED_BEYOND_S, FlightOptions, FlightRecord, OptionValue, Sample
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.preflight import Ground
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Peer, Transport, open_transport

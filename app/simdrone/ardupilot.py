@@ -10,6 +10,7 @@ from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import ClassVar, Final
 
+from app.autopilots.dialects import ARDUPILOTMEGA, Message
 from app.core.control import ardupilot_parameters as loop
 from app.core.errors import InputError
 from app.simdrone.ardupilot_control import LOOP_HZ, ArduPilotController
@@ -26,7 +27,6 @@ from app.simdrone.copter_parameters import (
     Reaction,
     real,
 )
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, Message
 
 _MANUAL: Final = 1 | 16 | 64
 _GUIDED: Final = 1 | 8 | 16

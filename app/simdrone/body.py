@@ -9,13 +9,13 @@ from typing import Final, Protocol, Self
 
 import numpy as np
 
+from app.autopilots.dialects import Dialect, FieldValue
 from app.core.control.paparazzi import RATE_HZ, THROTTLE, Z_SUM_ERR
 from app.core.errors import InputError, Problem
 from app.vehicles.base import OptionValue, VehicleError
 from app.vehicles.jsbsim import JSBSIM, JsbsimFlight
 from app.vehicles.kernels import ALTITUDE, BATTERY, CLIMB_RATE, COMMAND_SIZE, KD, KI, KP, MODE, TARGET, THRUST, Integers
 from app.vehicles.kinds import VehicleKind
-from app.vehicles.mavlink.dialects import Dialect, FieldValue
 from app.vehicles.simulated import Simulation
 from app.vehicles.twin import TWIN, TwinFlight
 

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import ClassVar, Final, Self
 
+from app.autopilots.dialects import FieldValue, Message, is_known, number, text
 from app.simdrone import copter_telemetry
 from app.simdrone.body import (
     ACCEPTED,
@@ -18,7 +19,6 @@ from app.simdrone.body import (
 )
 from app.simdrone.copter_control import LOCAL_NED, AltitudeController, Phase, SetPoint
 from app.simdrone.copter_parameters import Behaviour, FirmwareProfile, FlightMode, Parameters, Reaction
-from app.vehicles.mavlink.dialects import FieldValue, Message, is_known, number, text
 
 COMPONENT: Final = 1
 FORCE: Final = 21196

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from app.autopilots.dialects import Message, number
 from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Body, throttle_command
-from app.vehicles.mavlink.dialects import Message, number
 
 LOCAL_NED: Final = 1
 """MAV_FRAME."""

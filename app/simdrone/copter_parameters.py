@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-from app.vehicles.mavlink.dialects import Dialect
+from app.autopilots.dialects import Dialect
 
 
 class Kind(IntEnum):

@@ -9,11 +9,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from app.autopilots.dialects import Codec
 from app.core.clock import Clock
 from app.simdrone.body import MOTORS_OFF, TICK_S, TICK_STEPS, Autopilot, Body, OutgoingMessage
 from app.simdrone.faults import Faults, PlannedFault
 from app.simdrone.motion_capture import MocapOutput, MotionCapture
-from app.vehicles.mavlink.dialects import Codec
 from app.vehicles.mavlink.transports import Peer, Transport
 
 BOOT_S: Final = 2.0

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final, Self
 
+from app.autopilots.dialects import PAPARAZZI, FieldValue, Message, is_known, number, text
 from app.core.control.paparazzi import ALT, CLIMB, POSITION_BITS, SPEED_BITS, fix
 from app.simdrone import paparazzi_telemetry
 from app.simdrone.body import (
@@ -42,7 +43,6 @@ from app.simdrone.paparazzi_plan import (
 )
 from app.simdrone.paparazzi_telemetry import GROUND_MM
 from app.vehicles.kernels import Integers
-from app.vehicles.mavlink.dialects import PAPARAZZI, FieldValue, Message, is_known, number, text
 
 KILL: Final = 0
 FAILSAFE: Final = 1

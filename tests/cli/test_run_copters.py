@@ -15,6 +15,7 @@ from typing import IO, Final
 import pytest
 from typer.testing import CliRunner
 
+from app.autopilots.dialects import number, text
 from app.campaigns.campaign_files import read_preset
 from app.cli.commands import app
 from app.core.clock import ScaledClock
@@ -22,7 +23,6 @@ from app.simdrone.copter_parameters import Parameters
 from app.simdrone.px4 import Px4
 from app.vehicles.base import Identity
 from app.vehicles.mavlink.addresses import UdpAddress, parse
-from app.vehicles.mavlink.dialects import number, text
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
 from tests.ports import free_port

@@ -5,9 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from app.autopilots import signing
 from app.core.clock import Clock, ScaledClock
 from app.vehicles.kinds import Options
-from app.vehicles.mavlink import addresses, signing
+from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.events import PacketReceived
 from app.vehicles.mavlink.failures import HELP, Limits
 from app.vehicles.mavlink.link import Link, Received

@@ -5,12 +5,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from app.autopilots.dialects import Message, source_component
 from app.core.clock import Clock
 from app.core.records.trajectory import THROTTLE_HOLDS_S
 from app.vehicles.base import Condition
 from app.vehicles.mavlink.arming_checks import ArmingChecks
 from app.vehicles.mavlink.boot_clock import RestartCounter
-from app.vehicles.mavlink.dialects import Message, source_component
 from app.vehicles.mavlink.events import (
     Action,
     ActionDone,

@@ -17,6 +17,7 @@ from typing import Final, Self
 
 import pytest
 
+from app.autopilots.dialects import Message, number, text
 from app.core.policy import Gains
 from app.simdrone.body import TICK_S
 from app.simdrone.copter import Copter
@@ -26,7 +27,6 @@ from app.simdrone.registry import Make
 from app.vehicles import registry as open_module
 from app.vehicles.base import Identity, OptionValue
 from app.vehicles.mavlink.addresses import UdpAddress, parse
-from app.vehicles.mavlink.dialects import Message, number, text
 from app.vehicles.mavlink.link import Link
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.transports import Transport, open_transport

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from pyulog import ULog
 
+from app.autopilots.dialects import COMMON
 from app.vehicles.mavlink.arming_checks import (
     ARMING_CHECK_SUMMARY,
     COMPONENTS,
@@ -19,7 +20,6 @@ from app.vehicles.mavlink.arming_checks import (
     MODE_GROUPS,
     ArmingChecks,
 )
-from app.vehicles.mavlink.dialects import COMMON
 from app.vehicles.mavlink.events import VehicleEvent
 from app.vehicles.mavlink.profiles import PROFILES
 from tests.logs.recorded import recorded

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from app.autopilots.dialects import number
 from app.vehicles.base import FlightOptions, Identity, SafeGainsError, Sample, StopRequest, VehicleError
-from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched

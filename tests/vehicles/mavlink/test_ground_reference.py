@@ -4,10 +4,10 @@ import math
 
 import pytest
 
+from app.autopilots.dialects import FieldValue
 from app.simdrone.body import OutgoingMessage
 from app.simdrone.paparazzi import Paparazzi
 from app.vehicles.base import CheckItem, SafeGainsError
-from app.vehicles.mavlink.dialects import FieldValue
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import TUNED, never, unwatched

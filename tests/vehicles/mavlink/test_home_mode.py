@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.dialects import Message, number
 from app.simdrone.body import Autopilot, Body, OutgoingMessage
 from app.simdrone.paparazzi import HOME, NAV, Paparazzi
 from app.simdrone.registry import Make
 from app.vehicles.base import FlightOptions, FlightRecord, SafeGainsError, VehicleError
-from app.vehicles.mavlink.dialects import Message, number
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, never, unwatched

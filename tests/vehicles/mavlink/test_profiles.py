@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.dialects import FieldValue, Message, number, text
 from app.core.errors import GainsError
 from app.core.experiments import get_experiment
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.dialects import FieldValue, Message, number, text
 from app.vehicles.mavlink.events import (
     Action,
     Battery,

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.autopilots.dialects import source_system
 from app.core.experiments.takeoff import Takeoff
 from app.core.records.trajectory import Trajectory
 from app.vehicles.mavlink import observation as watching
-from app.vehicles.mavlink.dialects import source_system
 from app.vehicles.mavlink.events import (
     Action,
     ActionDone,

@@ -2,10 +2,10 @@
 
 import pytest
 
+from app.autopilots import signing
+from app.autopilots.dialects import ARDUPILOTMEGA, BAD_DATA, PAPARAZZI, Codec, FieldValue, number
 from app.core.clock import ScaledClock
 from app.core.errors import InputError
-from app.vehicles.mavlink import signing
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, BAD_DATA, PAPARAZZI, Codec, FieldValue, number
 from app.vehicles.mavlink.link import Link
 from tests.vehicles.mavlink.speaking import FakeVehicleEndpoint, collect, position
 from tests.waiting import eventually

@@ -5,6 +5,7 @@ from contextlib import closing
 
 import pytest
 
+from app.autopilots.dialects import number
 from app.simdrone.body import Autopilot, Body
 from app.simdrone.paparazzi import Paparazzi
 from app.simdrone.paparazzi_plan import KILL_SETTING, LANDED_AFTER_S, NEWER_KILL_SETTING
@@ -17,7 +18,6 @@ from app.vehicles.base import (
     StopRequest,
     VehicleError,
 )
-from app.vehicles.mavlink.dialects import number
 from app.vehicles.mavlink.transports import Peer
 from app.vehicles.mavlink.vehicle import MavlinkVehicle
 from tests.vehicles.flying import SAFE, TUNED, Watcher, never, unwatched

@@ -8,12 +8,12 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from app.autopilots.dialects import FieldValue, Message, number
 from app.core.experiments.takeoff import Takeoff
 from app.simdrone import faults
 from app.simdrone.body import OutgoingMessage
 from app.simdrone.faults import Fault, FaultTarget
 from app.vehicles.base import FlightOptions, FlightRecord, Sample
-from app.vehicles.mavlink.dialects import FieldValue, Message, number
 from app.vehicles.mavlink.events import Measurement, Throttle
 from app.vehicles.mavlink.profiles import PROFILES
 from app.vehicles.mavlink.profiles.base import Profile

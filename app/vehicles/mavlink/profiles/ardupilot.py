@@ -3,8 +3,8 @@
 from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.core.control.ardupilot_parameters import LOOP_NAMES, NEWER_NAMES, UNSUPPORTED
-from app.vehicles.mavlink.dialects import ARDUPILOTMEGA, GROUND_STATION, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Setting
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.base import GainParameter, Outgoing, Profile, Requirement, Step, Target

@@ -8,9 +8,7 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import ClassVar, Final, Literal
 
-from app.core.errors import GainsError, Problem
-from app.core.policy import Gains, shortened
-from app.vehicles.mavlink.dialects import (
+from app.autopilots.dialects import (
     Dialect,
     FieldValue,
     Message,
@@ -20,6 +18,8 @@ from app.vehicles.mavlink.dialects import (
     source_system,
     text,
 )
+from app.core.errors import GainsError, Problem
+from app.core.policy import Gains, shortened
 from app.vehicles.mavlink.events import (
     Action,
     AltitudeError,

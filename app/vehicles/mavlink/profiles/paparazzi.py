@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.dialects import PAPARAZZI as DIALECT
+from app.autopilots.dialects import Message, number, text
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.dialects import PAPARAZZI as DIALECT
-from app.vehicles.mavlink.dialects import Message, number, text
 from app.vehicles.mavlink.events import (
     Action,
     Block,

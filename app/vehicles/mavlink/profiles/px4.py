@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
+from app.autopilots.dialects import COMMON, Message, number
 from app.core.control.px4_parameters import (
     ESTIMATOR_NAMES,
     HOVER_RANGE_NAME,
@@ -15,7 +16,6 @@ from app.core.control.px4_parameters import (
 )
 from app.core.errors import InputError
 from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.dialects import COMMON, Message, number
 from app.vehicles.mavlink.events import DISARMING, Action, Measurement, Parameter, Setting, VehicleEvent
 from app.vehicles.mavlink.profiles import base
 from app.vehicles.mavlink.profiles.ardupilot import (

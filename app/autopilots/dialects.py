@@ -12,8 +12,8 @@ from functools import cache
 from types import MappingProxyType, ModuleType
 from typing import Any, Final, Protocol
 
+from app.autopilots import signing
 from app.core.errors import InputError, Problem
-from app.vehicles.mavlink import signing
 
 FieldValue = float | int | str | bytes | Sequence[float]
 
