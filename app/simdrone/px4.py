@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import ClassVar, Final
 
 from app.autopilots.dialects import COMMON
+from app.autopilots.px4.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
 from app.core.control import px4_parameters as loop
 from app.core.errors import InputError
 from app.simdrone.body import ACCEPTED, TEMPORARILY_REJECTED, Body, OutgoingMessage
@@ -29,7 +30,6 @@ from app.simdrone.copter_parameters import (
 )
 from app.simdrone.copter_telemetry import HOME_AMSL_M
 from app.simdrone.px4_control import Px4Controller
-from app.vehicles.mavlink.arming_checks import ARMING_CHECK_SUMMARY, HEALTH_SUMMARY
 
 _MANUAL: Final = 1 | 16 | 64
 _AUTO: Final = 1 | 4 | 8 | 16

@@ -6,6 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from app.autopilots.gains import check_gains
+from app.autopilots.registry import AUTOPILOTS
 from app.core.clock import ScaledClock
 from app.core.errors import InputError, Problem
 from app.core.policy import Gains
@@ -20,8 +22,6 @@ from app.vehicles.base import (
 from app.vehicles.kinds import HERE, Hosts, Options, VehicleKind
 from app.vehicles.mavlink import addresses
 from app.vehicles.mavlink.addresses import UdpAddress
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import check_gains
 from app.vehicles.mocap import addresses as sources
 
 if TYPE_CHECKING:
@@ -90,8 +90,8 @@ def _longest_window_s(options: Options) -> float:
 
 def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]:
     problems = []
-    if options["autopilot"] not in PROFILES:
-        problems.append(Problem("autopilot", f"must be {', '.join(PROFILES)}, got {options['autopilot']}"))
+    if options["autopilot"] not in AUTOPILOTS:
+        problems.append(Problem("autopilot", f"must be {', '.join(AUTOPILOTS)}, got {options['autopilot']}"))
     try:
         address = addresses.parse(str(options["address"]))
         if options["autopilot"] == "paparazzi" and isinstance(address, UdpAddress) and address.local_port is None:
@@ -118,11 +118,11 @@ def _conflicts(options: Options, simulation_hosts: Hosts) -> tuple[Problem, ...]
 
 def _experiments(options: Options) -> tuple[str, ...]:
     """Return the experiments whose gains the autopilot has."""
-    return PROFILES[str(options["autopilot"])].experiments
+    return AUTOPILOTS[str(options["autopilot"])].experiments
 
 
 def _check_gains(options: Options, gains: Gains) -> None:
-    check_gains(gains, PROFILES[str(options["autopilot"])].gain_sets[0])
+    check_gains(gains, AUTOPILOTS[str(options["autopilot"])].gain_sets[0])
 
 
 def _second_source_problems(place: str, scored: str) -> tuple[Problem, ...]:
@@ -145,7 +145,7 @@ MAVLINK: Final = VehicleKind(
     line="A real vehicle with Paparazzi, ArduCopter or PX4, or a simulated one with the same protocol.",
     is_real=True,
     can_fly=True,
-    experiments=tuple(name for profile in PROFILES.values() for name in profile.experiments),
+    experiments=tuple(name for profile in AUTOPILOTS.values() for name in profile.experiments),
     options=(
         VehicleOption(
             "autopilot", "Autopilot: paparazzi, ardupilot or px4", "", "paparazzi", label="Kind of autopilot"

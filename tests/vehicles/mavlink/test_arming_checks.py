@@ -13,15 +13,15 @@ import pytest
 from pyulog import ULog
 
 from app.autopilots.dialects import COMMON
-from app.vehicles.mavlink.arming_checks import (
+from app.autopilots.measurements import VehicleEvent
+from app.autopilots.px4.arming_checks import (
     ARMING_CHECK_SUMMARY,
     COMPONENTS,
     HEALTH_SUMMARY,
     MODE_GROUPS,
-    ArmingChecks,
+    Px4ArmingChecks,
 )
-from app.vehicles.mavlink.events import VehicleEvent
-from app.vehicles.mavlink.profiles import PROFILES
+from app.autopilots.registry import AUTOPILOTS
 from tests.logs.recorded import recorded
 
 HOLD, TAKE_OFF, MISSION, POSITION = "4.3", "4.2", "4.4", "3.0"
@@ -60,8 +60,8 @@ def block(sequence: int, *, errors: int, checks: Sequence[tuple[int, int]], chun
     ]
 
 
-def heard(events: Sequence[VehicleEvent]) -> ArmingChecks:
-    checks = ArmingChecks()
+def heard(events: Sequence[VehicleEvent]) -> Px4ArmingChecks:
+    checks = Px4ArmingChecks()
     for event in events:
         checks.take(event)
     return checks
@@ -155,6 +155,6 @@ def test_an_event_is_read_from_the_wire() -> None:
         crc = crc >> 8 ^ mixed << 8 ^ mixed << 3 ^ mixed >> 4
     frame = b"\xfd" + header + payload + struct.pack("<H", crc)
     [message] = COMMON.codec(system=255, component=190).parse(frame)
-    assert PROFILES["px4"].measure(message) == VehicleEvent(ARMING_CHECK_SUMMARY, 17, FAILING[0].arguments)
+    assert AUTOPILOTS["px4"].measure(message) == VehicleEvent(ARMING_CHECK_SUMMARY, 17, FAILING[0].arguments)
     [noise] = COMMON.codec(system=255, component=190).parse(frame[:-1] + bytes([frame[-1] ^ 1]))
     assert noise.get_type() == "BAD_DATA"

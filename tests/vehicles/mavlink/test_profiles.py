@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import pytest
 
+from app.autopilots.autopilot import Autopilot, AutopilotError
+from app.autopilots.commands import Action, Outgoing, Setting, Target
 from app.autopilots.dialects import FieldValue, Message, number, text
-from app.core.errors import GainsError
-from app.core.experiments import get_experiment
-from app.vehicles.base import VehicleError
-from app.vehicles.mavlink.events import (
-    Action,
+from app.autopilots.gains import check_gains
+from app.autopilots.measurements import (
     Battery,
     Block,
     BlockCount,
@@ -24,16 +23,16 @@ from app.vehicles.mavlink.events import (
     Measurement,
     Parameter,
     Position,
-    Setting,
     Throttle,
     Version,
 )
+from app.autopilots.registry import AUTOPILOTS
+from app.core.errors import GainsError
+from app.core.experiments import get_experiment
 from app.vehicles.mavlink.parameters import settings
-from app.vehicles.mavlink.profiles import PROFILES
-from app.vehicles.mavlink.profiles.base import Outgoing, Profile, Target, check_gains
 from tests.vehicles.mavlink.replaying import FLOWN, VEHICLE, messages, recorded
 
-PAPARAZZI, ARDUPILOT, PX4 = (PROFILES[name] for name in ("paparazzi", "ardupilot", "px4"))
+PAPARAZZI, ARDUPILOT, PX4 = (AUTOPILOTS[name] for name in ("paparazzi", "ardupilot", "px4"))
 SAFE = {"kp": 283, "ki": 13, "kd": 82}
 
 
@@ -49,14 +48,14 @@ def aim(gains: tuple[int, int, int] = FLOWN[0]) -> Target:
     return Target(system=VEHICLE, aircraft=VEHICLE, blocks=blocks)
 
 
-def heard(profile: Profile, kind: str, **fields: FieldValue) -> Measurement | None:
+def heard(profile: Autopilot, kind: str, **fields: FieldValue) -> Measurement | None:
     """What the profile makes of a message that came over the wire."""
     codec = profile.dialect.codec(system=1, component=1)
     [message] = codec.parse(codec.pack(profile.dialect.message(kind, fields)))
     return profile.measure(message)
 
 
-def sent(profile: Profile, action: Action, aim: Target) -> list[Outgoing]:
+def sent(profile: Autopilot, action: Action, aim: Target) -> list[Outgoing]:
     return [message for step in profile.steps(action, aim) for message in step.sends]
 
 
@@ -237,9 +236,9 @@ def test_the_flight_plan_is_listed_block_by_block() -> None:
 
 
 def test_a_flight_plan_without_a_block_to_land_is_not_flown() -> None:
-    with pytest.raises(VehicleError, match="no block land here"):
+    with pytest.raises(AutopilotError, match="no block land here"):
         PAPARAZZI.explore(answers({0: "Holding point", 1: "Start Engine", 2: "Takeoff"}, 3), aim())
-    with pytest.raises(VehicleError, match="did not name block 1 of 2"):
+    with pytest.raises(AutopilotError, match="did not name block 1 of 2"):
         PAPARAZZI.explore(answers({0: "Holding point"}, 2), aim())
 
 
@@ -255,8 +254,8 @@ def test_gains_are_clamped_here_because_no_autopilot_does() -> None:
     }
 
 
-@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
-def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_every_release(profile: Profile) -> None:
+@pytest.mark.parametrize("profile", AUTOPILOTS.values(), ids=AUTOPILOTS)
+def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_every_release(profile: Autopilot) -> None:
     space = get_experiment(profile.experiments[0]).space
     for gain_set in profile.gain_sets:
         for edge in (space.lower, space.default, space.upper):
@@ -264,15 +263,15 @@ def test_whatever_its_experiment_lets_pass_may_be_written_under_the_names_of_eve
             assert check_gains(gains, gain_set) == gains
 
 
-@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
-def test_the_gains_of_a_vehicle_have_the_order_of_its_experiment(profile: Profile) -> None:
+@pytest.mark.parametrize("profile", AUTOPILOTS.values(), ids=AUTOPILOTS)
+def test_the_gains_of_a_vehicle_have_the_order_of_its_experiment(profile: Autopilot) -> None:
     for gain_set in profile.gain_sets:
         assert tuple(gain.gain for gain in gain_set) == get_experiment(profile.experiments[0]).space.names
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400])
 def test_what_is_no_number_is_never_written(value: float) -> None:
-    for profile in PROFILES.values():
+    for profile in AUTOPILOTS.values():
         for gain_set in profile.gain_sets:
             with pytest.raises(GainsError):
                 check_gains({gain.gain: value for gain in gain_set}, gain_set)
@@ -281,7 +280,7 @@ def test_what_is_no_number_is_never_written(value: float) -> None:
 def test_in_the_air_the_gain_that_clears_the_integrator_comes_last() -> None:
     [gain_set] = PAPARAZZI.gain_sets
     assert [setting.parameter for setting in settings(gain_set, SAFE)] == ["gui_v_kp", "gui_v_kd", "gui_v_ki"]
-    for profile in PROFILES.values():
+    for profile in AUTOPILOTS.values():
         for known in profile.gain_sets:
             assert settings(known, {gain.gain: gain.lower for gain in known})[-1].parameter.endswith(
                 ("i", "I", "I_ACC")
@@ -317,7 +316,7 @@ def test_px4s_whole_numbers_come_bytewise() -> None:
     ) == Parameter("MPC_Z_P", 0.5)
 
 
-def heartbeat(profile: Profile, custom_mode: int, base_mode: int = 209) -> Measurement | None:
+def heartbeat(profile: Autopilot, custom_mode: int, base_mode: int = 209) -> Measurement | None:
     beat = {"type": 2, "autopilot": profile.autopilot, "base_mode": base_mode, "custom_mode": custom_mode}
     return heard(profile, "HEARTBEAT", **beat, system_status=4, mavlink_version=3)
 
@@ -348,7 +347,7 @@ def test_a_breached_fence_is_reported() -> None:
     assert heard(ARDUPILOT, "FENCE_STATUS", breach_status=0, **known) is None
 
 
-def commands(profile: Profile, action: Action) -> list[tuple[FieldValue, ...]]:
+def commands(profile: Autopilot, action: Action) -> list[tuple[FieldValue, ...]]:
     whom = Target(system=1, aircraft=1)
     return [
         (message.fields["command"], *(message.fields[f"param{place}"] for place in range(1, 8)))
@@ -370,7 +369,7 @@ def test_px4_takes_off_by_its_mode_to_the_altitude_of_its_parameter() -> None:
 
 
 @pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=["ardupilot", "px4"])
-def test_every_message_that_a_trial_listens_to_is_asked_for(profile: Profile) -> None:
+def test_every_message_that_a_trial_listens_to_is_asked_for(profile: Autopilot) -> None:
     steps = profile.prepare(Target(system=1, aircraft=1), 125.0)
     asked = [(step.sends[0].fields, step.needed) for step in steps]
     assert {fields["command"] for fields, _ in asked} == {511}
@@ -386,13 +385,13 @@ def test_every_message_that_a_trial_listens_to_is_asked_for(profile: Profile) ->
 
 
 @pytest.mark.parametrize("profile", [ARDUPILOT, PX4], ids=["ardupilot", "px4"])
-def test_nobody_is_armed_or_disarmed_by_force(profile: Profile) -> None:
+def test_nobody_is_armed_or_disarmed_by_force(profile: Autopilot) -> None:
     for action in (Action.ARM, Action.MOTORS_OFF):
         assert all(second == 0 for command, _, second, *_ in commands(profile, action) if command == 400)
 
 
-@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
-def test_everything_that_is_sent_can_be_packed(profile: Profile) -> None:
+@pytest.mark.parametrize("profile", AUTOPILOTS.values(), ids=AUTOPILOTS)
+def test_everything_that_is_sent_can_be_packed(profile: Autopilot) -> None:
     whom = aim()
     steps = [*profile.prepare(whom, 50.0), *(step for action in Action for step in profile.steps(action, whom))]
     for message in (message for step in steps for message in step.sends):
@@ -409,7 +408,7 @@ def test_motors_off_at_any_height_is_the_one_command_that_is_forced() -> None:
 
 def test_a_gimbal_or_a_companion_computer_is_not_taken_for_the_autopilot() -> None:
     said: dict[str, FieldValue] = {"base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3}
-    for profile in PROFILES.values():
+    for profile in AUTOPILOTS.values():
         for kind in (6, 18, 26, 30):
             assert heard(profile, "HEARTBEAT", autopilot=8, type=kind, **said) is None
             assert heard(profile, "HEARTBEAT", autopilot=profile.autopilot, type=kind, **said) is None
@@ -428,7 +427,7 @@ def test_values_that_are_not_numbers_are_not_a_position(field: str, nothing: flo
         "vy": 0.0,
         "vz": 0.0,
     }
-    for profile in PROFILES.values():
+    for profile in AUTOPILOTS.values():
         assert isinstance(heard(profile, "LOCAL_POSITION_NED", **sample), Position)
         assert heard(profile, "LOCAL_POSITION_NED", **sample | {field: nothing}) == InvalidPosition(1.0)
 
@@ -452,7 +451,8 @@ def test_a_version_is_read_as_each_autopilot_writes_it() -> None:
     }
     written = {"paparazzi": 51000, "ardupilot": 0x040603FF, "px4": 0x011000FF}
     told = {
-        name: heard(PROFILES[name], "AUTOPILOT_VERSION", flight_sw_version=n, **nothing) for name, n in written.items()
+        name: heard(AUTOPILOTS[name], "AUTOPILOT_VERSION", flight_sw_version=n, **nothing)
+        for name, n in written.items()
     }
     assert told == {"paparazzi": Version("5.10.0"), "ardupilot": Version("4.6.3"), "px4": Version("1.16.0")}
     assert heard(PX4, "AUTOPILOT_VERSION", flight_sw_version=0, **nothing) is None
@@ -509,7 +509,7 @@ def test_paparazzi_tells_every_change_of_block() -> None:
     ],
 )
 def test_only_a_failsafe_that_brings_the_vehicle_down_without_climbing_or_stopping_its_motors_will_do(
-    profile: Profile, parameter: str, protects: set[float], does_not: set[float]
+    profile: Autopilot, parameter: str, protects: set[float], does_not: set[float]
 ) -> None:
     every = (*profile.requirements, *profile.set_point_requirements)
     requirement = next(each for each in every if each.parameter == parameter)
@@ -525,7 +525,7 @@ def test_only_a_failsafe_that_brings_the_vehicle_down_without_climbing_or_stoppi
     ],
 )
 def test_a_pilot_flies_in_every_mode_that_is_not_automatic_also_in_those_of_later_releases(
-    profile: Profile, modes: set[str]
+    profile: Autopilot, modes: set[str]
 ) -> None:
     """Seen: in AutoTune, FlowHold, Position slow and others Land was sent once a second against the pilot."""
     assert not modes & profile.automatic_modes
@@ -549,7 +549,7 @@ def test_paparazzis_mode_is_read_with_and_without_the_bit_for_a_custom_mode(base
 
 
 @pytest.mark.parametrize("profile", [ARDUPILOT, PX4])
-def test_a_copters_set_point_is_a_target_of_position_alone_that_it_must_report(profile: Profile) -> None:
+def test_a_copters_set_point_is_a_target_of_position_alone_that_it_must_report(profile: Autopilot) -> None:
     target = Target(system=1, aircraft=1, component=1, north_m=2.0, east_m=-1.0, altitude_m=2.5)
     [step] = profile.steps(Action.FLY_TO, target)
     [message] = step.sends

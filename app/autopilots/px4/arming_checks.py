@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from app.vehicles.mavlink.events import VehicleEvent
+from app.autopilots.autopilot import ArmingChecks
+from app.autopilots.measurements import VehicleEvent
 
 ARMING_CHECK_SUMMARY: Final = 1 << 24 | 11047904
 """The autopilot's component, and the event commander_arming_check_summary."""
@@ -66,7 +67,7 @@ class _Report:
         return self.errors & about
 
 
-class ArmingChecks:
+class Px4ArmingChecks(ArmingChecks):
     """Latest results, assembled from events as they arrive; lost events are not waited for."""
 
     def __init__(self) -> None:
