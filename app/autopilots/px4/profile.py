@@ -50,9 +50,9 @@ _STREAMED_FOR_S: Final = 1.2
 
 def _hover_limits(parameters: Mapping[str, float]) -> tuple[float, float] | None:
     """Return those of its estimator; None if its parameter is not known."""
-    told = parameters.get(_HOVER)
+    assumed = parameters.get(_HOVER)
     try:
-        return None if told is None else hover_limits(told, hover_deviation(parameters))
+        return None if assumed is None else hover_limits(assumed, hover_deviation(parameters))
     except InputError as error:
         raise AutopilotError(str(error), hint=f"Correct {HOVER_RANGE_NAME} on the vehicle, then try again.") from error
 
